@@ -1,0 +1,248 @@
+//! A coil's geometry and fibre: what is wound, before anybody says in which order.
+
+use thiserror::Error;
+
+/// The fibre's optical properties.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fibre {
+    /// n, of the guided mode.
+    pub refractive_index: f64,
+    /// dn/dT.
+    pub thermo_optic_per_k: f64,
+    /// α, in n·α; 0 gives the paper's Eq. (4).
+    pub thermal_expansion_per_k: f64,
+    pub wavelength_m: f64,
+    /// Over the coating.
+    pub outer_diameter_m: f64,
+}
+
+impl Fibre {
+    /// κ = dn/dT + n·α, the change of optical path per metre and kelvin (paper, Eq. 2).
+    pub fn path_per_k(&self) -> f64 {
+        self.thermo_optic_per_k + self.refractive_index * self.thermal_expansion_per_k
+    }
+}
+
+/// How the layers' lengths follow from the winding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LayerLength {
+    /// All layers are L/N long (the paper).
+    Equal,
+    /// l_j = 2π r_j M_j.
+    Actual,
+}
+
+/// What is needed to build a [`Coil`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct CoilSpec {
+    pub fibre: Fibre,
+    pub layers: usize,
+    pub turns_per_layer: Option<f64>,
+    pub bore_radius_m: f64,
+    pub radial_pitch_m: f64,
+    pub axial_pitch_m: f64,
+    pub layer_length: LayerLength,
+    /// The fibre's length; with `Equal` it may stand in for the turns.
+    pub length_m: Option<f64>,
+}
+
+/// N layers of fibre on a spool; layer index 0 is the innermost, wound first.
+///
+/// # Shapes
+/// `turns` and `layer_lengths_m` have one entry a layer, innermost first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coil {
+    fibre: Fibre,
+    bore_radius_m: f64,
+    radial_pitch_m: f64,
+    axial_pitch_m: f64,
+    layer_length: LayerLength,
+    turns: Vec<f64>,
+    layer_lengths_m: Vec<f64>,
+}
+
+/// A stated and a computed length may differ by this much: windings are never quite full.
+const LENGTH_AGREEMENT: f64 = 0.02;
+
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum CoilError {
+    #[error(
+        "winding.layers must be an even number of at least 2, found {found}: both halves of the fibre need the same number of layers"
+    )]
+    Layers { found: usize },
+    #[error("winding.turns_per_layer is needed for layer_length = \"actual\", found none: give the turns of one layer")]
+    TurnsMissing,
+    #[error("the fibre's length is unknown: give winding.length_m or winding.turns_per_layer")]
+    LengthMissing,
+    #[error(
+        "winding.length_m = {stated_m} disagrees with turns and radii, which make {computed_m:.3} m: correct one of them (they may differ by 2 %)"
+    )]
+    LengthDisagrees { stated_m: f64, computed_m: f64 },
+    #[error("{quantity} must be positive and finite, found {found}")]
+    NotPositive { quantity: &'static str, found: f64 },
+}
+
+impl Coil {
+    /// # Errors
+    /// An odd or too small layer count, lengths that are missing or disagree, dimensions that are not positive.
+    pub fn new(spec: CoilSpec) -> Result<Self, CoilError> {
+        if spec.layers < 2 || spec.layers % 2 != 0 {
+            return Err(CoilError::Layers { found: spec.layers });
+        }
+        for (quantity, found) in [
+            ("the bore radius", spec.bore_radius_m),
+            ("winding.radial_pitch_um", spec.radial_pitch_m),
+            ("winding.axial_pitch_um", spec.axial_pitch_m),
+            ("winding.turns_per_layer", spec.turns_per_layer.unwrap_or(1.0)),
+            ("winding.length_m", spec.length_m.unwrap_or(1.0)),
+        ] {
+            if !(found > 0.0 && found.is_finite()) {
+                return Err(CoilError::NotPositive { quantity, found });
+            }
+        }
+        let mean_radius_m = spec.bore_radius_m + 0.5 * spec.layers as f64 * spec.radial_pitch_m;
+        let mean_turn_m = std::f64::consts::TAU * mean_radius_m;
+        let turns_per_layer = match (spec.turns_per_layer, spec.layer_length, spec.length_m) {
+            (Some(turns), _, _) => turns,
+            (None, LayerLength::Actual, _) => return Err(CoilError::TurnsMissing),
+            (None, LayerLength::Equal, Some(length_m)) => length_m / (spec.layers as f64 * mean_turn_m),
+            (None, LayerLength::Equal, None) => return Err(CoilError::LengthMissing),
+        };
+        let mut coil = Self {
+            fibre: spec.fibre,
+            bore_radius_m: spec.bore_radius_m,
+            radial_pitch_m: spec.radial_pitch_m,
+            axial_pitch_m: spec.axial_pitch_m,
+            layer_length: spec.layer_length,
+            turns: vec![turns_per_layer; spec.layers],
+            layer_lengths_m: Vec::new(),
+        };
+        coil.layer_lengths_m = coil.lengths_of(&coil.turns);
+        if let Some(stated_m) = spec.length_m {
+            let computed_m = coil.length_m();
+            if (stated_m - computed_m).abs() > LENGTH_AGREEMENT * stated_m {
+                return Err(CoilError::LengthDisagrees { stated_m, computed_m });
+            }
+            if coil.layer_length == LayerLength::Equal {
+                coil.layer_lengths_m = vec![stated_m / spec.layers as f64; spec.layers];
+            }
+        }
+        Ok(coil)
+    }
+
+    fn lengths_of(&self, turns: &[f64]) -> Vec<f64> {
+        let mean_radius_m = self.mean_radius_m();
+        turns
+            .iter()
+            .enumerate()
+            .map(|(layer, turns)| {
+                let radius_m = match self.layer_length {
+                    LayerLength::Equal => mean_radius_m,
+                    LayerLength::Actual => self.layer_radius_m(layer),
+                };
+                std::f64::consts::TAU * radius_m * turns
+            })
+            .collect()
+    }
+
+    /// The same coil with other turn counts; each layer's length scales with its turns.
+    ///
+    /// # Errors
+    /// Turn counts that are not positive, or not one a layer.
+    pub fn with_turns(&self, turns: Vec<f64>) -> Result<Self, CoilError> {
+        if turns.len() != self.layers() {
+            return Err(CoilError::Layers { found: turns.len() });
+        }
+        if let Some(&found) = turns.iter().find(|t| !(**t > 0.0 && t.is_finite())) {
+            return Err(CoilError::NotPositive { quantity: "the turns of a layer", found });
+        }
+        let layer_lengths_m = self
+            .layer_lengths_m
+            .iter()
+            .zip(&self.turns)
+            .zip(&turns)
+            .map(|((length_m, old), new)| length_m * new / old)
+            .collect();
+        Ok(Self { turns, layer_lengths_m, ..self.clone() })
+    }
+
+    /// The same coil with another radial pitch; radii and actual lengths follow, the bore stays.
+    ///
+    /// # Errors
+    /// A pitch that is not positive.
+    pub fn with_radial_pitch(&self, radial_pitch_m: f64) -> Result<Self, CoilError> {
+        if !(radial_pitch_m > 0.0 && radial_pitch_m.is_finite()) {
+            return Err(CoilError::NotPositive { quantity: "winding.radial_pitch_um", found: radial_pitch_m });
+        }
+        let mut coil = Self { radial_pitch_m, ..self.clone() };
+        if coil.layer_length == LayerLength::Actual {
+            coil.layer_lengths_m = coil.lengths_of(&coil.turns);
+        }
+        Ok(coil)
+    }
+
+    pub fn fibre(&self) -> &Fibre {
+        &self.fibre
+    }
+
+    /// N.
+    pub fn layers(&self) -> usize {
+        self.turns.len()
+    }
+
+    pub fn layer_length(&self) -> LayerLength {
+        self.layer_length
+    }
+
+    /// M_j, innermost layer first.
+    pub fn turns(&self) -> &[f64] {
+        &self.turns
+    }
+
+    /// l_j, innermost layer first.
+    pub fn layer_lengths_m(&self) -> &[f64] {
+        &self.layer_lengths_m
+    }
+
+    /// L.
+    pub fn length_m(&self) -> f64 {
+        self.layer_lengths_m.iter().sum()
+    }
+
+    /// r_in, the spool's surface.
+    pub fn bore_radius_m(&self) -> f64 {
+        self.bore_radius_m
+    }
+
+    /// The pack's outer surface.
+    pub fn outer_radius_m(&self) -> f64 {
+        self.bore_radius_m + self.layers() as f64 * self.radial_pitch_m
+    }
+
+    pub fn radial_pitch_m(&self) -> f64 {
+        self.radial_pitch_m
+    }
+
+    pub fn axial_pitch_m(&self) -> f64 {
+        self.axial_pitch_m
+    }
+
+    /// Between the flanges.
+    pub fn height_m(&self) -> f64 {
+        self.axial_pitch_m * self.turns.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// r_j, the middle of a layer (index 0 is the innermost).
+    pub fn layer_radius_m(&self, layer: usize) -> f64 {
+        self.bore_radius_m + (layer as f64 + 0.5) * self.radial_pitch_m
+    }
+
+    fn mean_radius_m(&self) -> f64 {
+        self.bore_radius_m + 0.5 * self.layers() as f64 * self.radial_pitch_m
+    }
+
+    /// D, the diameter in the Sagnac scale factor.
+    pub fn mean_diameter_m(&self) -> f64 {
+        2.0 * self.mean_radius_m()
+    }
+}

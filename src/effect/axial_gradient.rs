@@ -1,0 +1,49 @@
+//! `axial_gradient`: one flange exchanges heat with the ambient, so temperature varies along the axis.
+//!
+//! ```text
+//! k dT/dz = ±h (T − T_air) at one flange; the optics see the layer's first axial moment ∫ Ṫ ζ dζ, signed by its direction
+//! ```
+//!
+//! # Source
+//! Mohr, J. Lightwave Technol. 14, 27 (1996): the axial contribution to the Shupe error.
+
+use super::{Acts, ChoiceSpec, Effect, EffectSpec, ParameterSpec};
+use crate::thermal::{Flange, FlangeFilm, HeatPath};
+use crate::units::Unit;
+
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    kind: "axial_gradient",
+    summary: "One flange exchanges heat with the ambient, so temperature varies along the axis",
+    equation: "k dT/dz = ±h (T − T_air) at one flange; the optics see the layer's first axial moment ∫ Ṫ ζ dζ, signed by its direction",
+    acts: Acts::HeatPath,
+    parameters: &[ParameterSpec {
+        key: "film_w_per_m2_k",
+        unit: Unit::WattPerSquareMetreKelvin,
+        meaning: "film coefficient at the flange",
+        lower: 0.1,
+        upper: 100000.0,
+        start: 20.0,
+        default: None,
+    }],
+    choices: &[ChoiceSpec {
+        key: "flange",
+        options: &["first", "second"],
+        meaning: "the flange that exchanges heat; layer 1 starts at the first",
+    }],
+    source: "Mohr, J. Lightwave Technol. 14, 27 (1996): the axial contribution to the Shupe error",
+    signature: "an error in the transients that does not follow from the radial model and whose sign belongs to the flange",
+    experiment: "heat one flange, then the other; or insulate both",
+    build: |values, choices, _| {
+        let flange = if choices[0] == 0 { Flange::First } else { Flange::Second };
+        Box::new(AxialGradient(FlangeFilm { flange, film_w_per_m2_k: values[0] }))
+    },
+};
+
+#[derive(Debug)]
+struct AxialGradient(FlangeFilm);
+
+impl Effect for AxialGradient {
+    fn change_heat_path(&self, path: &mut HeatPath) {
+        path.flange = Some(self.0);
+    }
+}

@@ -1,0 +1,59 @@
+//! `bias_temperature`: a bias that depends on the pack's mean temperature.
+//!
+//! ```text
+//! Ω_b = b1 (T − 20 °C) + b2 (T − 20 °C)²
+//! ```
+//!
+//! # Source
+//! thesis chapter on FOG drift compensation (2021), section 3.2: D_ΔT.
+
+use super::{Acts, Effect, EffectSpec, PackState, ParameterSpec};
+use crate::units::REFERENCE_TEMPERATURE_K;
+use crate::units::Unit;
+
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    kind: "bias_temperature",
+    summary: "A bias that depends on the pack's mean temperature",
+    equation: "Ω_b = b1 (T − 20 °C) + b2 (T − 20 °C)²",
+    acts: Acts::Outside,
+    parameters: &[
+        ParameterSpec {
+            key: "linear_deg_per_h_per_k",
+            unit: Unit::DegPerHourPerKelvin,
+            meaning: "b1",
+            lower: -10.0,
+            upper: 10.0,
+            start: 0.005,
+            default: Some(0.0),
+        },
+        ParameterSpec {
+            key: "quadratic_deg_per_h_per_k2",
+            unit: Unit::DegPerHourPerSquareKelvin,
+            meaning: "b2",
+            lower: -1.0,
+            upper: 1.0,
+            start: 0.0001,
+            default: Some(0.0),
+        },
+    ],
+    choices: &[],
+    source: "thesis chapter on FOG drift compensation (2021), section 3.2: D_ΔT",
+    signature: "the residual follows temperature, also in a soak",
+    experiment: "long soaks at several temperatures",
+    build: |values, _, _| {
+        Box::new(BiasTemperature { linear_rad_per_s_k: values[0], quadratic_rad_per_s_k2: values[1] })
+    },
+};
+
+#[derive(Debug)]
+struct BiasTemperature {
+    linear_rad_per_s_k: f64,
+    quadratic_rad_per_s_k2: f64,
+}
+
+impl Effect for BiasTemperature {
+    fn outside_rate_rad_per_s(&self, state: &PackState) -> f64 {
+        let above_k = state.mean_temperature_k - REFERENCE_TEMPERATURE_K;
+        (self.linear_rad_per_s_k + self.quadratic_rad_per_s_k2 * above_k) * above_k
+    }
+}

@@ -1,0 +1,44 @@
+//! `diffusivity`: No new physics: the declared conductivity (or diffusivity) is wrong by a factor.
+//!
+//! ```text
+//! k → factor · k
+//! ```
+//!
+//! # Source
+//! effective conductivity of a fibre pack is rarely known better than 20 %.
+
+use super::{Acts, Effect, EffectSpec, ParameterSpec};
+use crate::thermal::HeatPath;
+use crate::units::Unit;
+
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    kind: "diffusivity",
+    summary: "No new physics: the declared conductivity (or diffusivity) is wrong by a factor",
+    equation: "k → factor · k",
+    acts: Acts::HeatPath,
+    parameters: &[ParameterSpec {
+        key: "factor",
+        unit: Unit::One,
+        meaning: "true over declared conductivity",
+        lower: 0.1,
+        upper: 10.0,
+        start: 1.1,
+        default: None,
+    }],
+    choices: &[],
+    source: "effective conductivity of a fibre pack is rarely known better than 20 %",
+    signature: "all transients are faster or slower by one factor",
+    experiment: "a laser-flash or hot-disk measurement of the pack; a second sensor at the bore",
+    build: |values, _, _| Box::new(Diffusivity { factor: values[0] }),
+};
+
+#[derive(Debug)]
+struct Diffusivity {
+    factor: f64,
+}
+
+impl Effect for Diffusivity {
+    fn change_heat_path(&self, path: &mut HeatPath) {
+        path.material = path.material.scaled(self.factor);
+    }
+}

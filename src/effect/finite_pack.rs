@@ -1,0 +1,33 @@
+//! `finite_pack`: the pack ends at an adiabatic bore instead of a half space.
+//!
+//! ```text
+//! K (1/r) d/dr(r dT/dr) = dT/dt, dT/dr = 0 at r = r_in
+//! ```
+//!
+//! # Source
+//! Shupe, Appl. Opt. 19, 654 (1980); heat conduction in a hollow cylinder, Carslaw and Jaeger (1959), chapter 7.
+
+use super::{Acts, Effect, EffectSpec};
+use crate::thermal::{Extent, HeatPath};
+
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    kind: "finite_pack",
+    summary: "The pack ends at an adiabatic bore instead of a half space",
+    equation: "K (1/r) d/dr(r dT/dr) = dT/dt, dT/dr = 0 at r = r_in",
+    acts: Acts::HeatPath,
+    parameters: &[],
+    choices: &[],
+    source: "Shupe, Appl. Opt. 19, 654 (1980); heat conduction in a hollow cylinder, Carslaw and Jaeger (1959), chapter 7",
+    signature: "after each change of ramp the measured error dies out within (pack thickness)²/K, where the half space predicts a tail falling as 1/√t",
+    experiment: "one long ramp at constant rate: with a finite pack the error settles to a constant within minutes",
+    build: |_, _, _| Box::new(FinitePack),
+};
+
+#[derive(Debug)]
+struct FinitePack;
+
+impl Effect for FinitePack {
+    fn change_heat_path(&self, path: &mut HeatPath) {
+        path.extent = Extent::Pack;
+    }
+}

@@ -1,0 +1,309 @@
+//! Effects: one piece of physics each, one file each.
+//!
+//! An effect describes what it changes — the heat path, the winding, the sensor, the fibre's response, or the rate
+//! outside the coil — by overriding the methods of [`Effect`] that concern it. Prediction, search, fit, diagnosis,
+//! reports and the list of effects all derive from that and from its [`EffectSpec`]. Adding an effect is one new
+//! file and one line in [`CATALOGUE`].
+
+mod axial_gradient;
+mod bias_gradient_rate;
+mod bias_temperature;
+mod bias_temperature_rate;
+mod conductivity_temperature;
+mod diffusivity;
+mod finite_pack;
+mod glass_transition;
+mod heating_cooling_asymmetry;
+mod midpoint_offset;
+mod self_heating;
+mod sensor_lag;
+mod spool_mass;
+mod strain_mismatch;
+mod stress_gradient;
+mod surface_film;
+mod thermo_optic;
+mod thermo_optic_temperature;
+mod turn_mismatch;
+
+use thiserror::Error;
+
+use crate::coil::Coil;
+use crate::pattern::Half;
+use crate::thermal::HeatPath;
+use crate::units::Unit;
+
+/// Every effect that a model file can name, in the order in which `coilwright effects` prints them.
+pub const CATALOGUE: &[&EffectSpec] = &[
+    &finite_pack::SPEC,
+    &spool_mass::SPEC,
+    &surface_film::SPEC,
+    &sensor_lag::SPEC,
+    &self_heating::SPEC,
+    &axial_gradient::SPEC,
+    &conductivity_temperature::SPEC,
+    &stress_gradient::SPEC,
+    &strain_mismatch::SPEC,
+    &glass_transition::SPEC,
+    &thermo_optic_temperature::SPEC,
+    &midpoint_offset::SPEC,
+    &turn_mismatch::SPEC,
+    &heating_cooling_asymmetry::SPEC,
+    &bias_temperature::SPEC,
+    &bias_temperature_rate::SPEC,
+    &bias_gradient_rate::SPEC,
+    &diffusivity::SPEC,
+    &thermo_optic::SPEC,
+];
+
+/// What an effect does to a model. Every method's default is "nothing".
+pub trait Effect: std::fmt::Debug + Send + Sync {
+    /// Edits what the heat flows through.
+    fn change_heat_path(&self, _path: &mut HeatPath) {}
+
+    /// Edits the turn counts, innermost layer first.
+    fn change_turns(&self, _turns: &mut [f64]) {}
+
+    /// Time constant with which the sensor follows what it is attached to [s].
+    fn sensor_lag_s(&self) -> f64 {
+        0.0
+    }
+
+    /// Fibre beyond the pack at one end.
+    fn surplus_fibre(&self) -> Option<SurplusFibre> {
+        None
+    }
+
+    /// Factor on κ at a place of the fibre; the factors of several effects multiply.
+    fn path_factor(&self, _place: &FibrePlace) -> f64 {
+        1.0
+    }
+
+    /// Factor on the coil's rate error; those of several effects multiply.
+    fn coil_gain(&self, _state: &PackState) -> f64 {
+        1.0
+    }
+
+    /// Rate that does not come from the coil [rad/s]; those of several effects add.
+    fn outside_rate_rad_per_s(&self, _state: &PackState) -> f64 {
+        0.0
+    }
+}
+
+/// A place of the fibre, as far as its optical response may depend on it.
+#[derive(Debug, Clone, Copy)]
+pub struct FibrePlace {
+    /// Index 0 is the innermost.
+    pub layer: usize,
+    pub half: Half,
+    pub temperature_k: f64,
+}
+
+/// The pack at one instant, or on average over one logging interval.
+///
+/// # Shapes
+/// One entry a layer, innermost first; `axial_moments_k_per_s` is empty where nothing varies along the axis;
+/// `channels` in the order of [`Binding::channels`].
+#[derive(Debug, Clone, Copy)]
+pub struct PackState<'a> {
+    pub time_s: f64,
+    pub temperatures_k: &'a [f64],
+    pub rates_k_per_s: &'a [f64],
+    pub axial_moments_k_per_s: &'a [f64],
+    /// Over the fibre's length.
+    pub mean_temperature_k: f64,
+    pub mean_rate_k_per_s: f64,
+    pub ambient_k: f64,
+    pub ambient_rate_k_per_s: f64,
+    /// A record's further columns.
+    pub channels: &'a [f64],
+}
+
+impl PackState<'_> {
+    /// d(T_out − T_in)/dt: outermost less innermost layer.
+    pub fn gradient_rate_k_per_s(&self) -> f64 {
+        self.rates_k_per_s[self.rates_k_per_s.len() - 1] - self.rates_k_per_s[0]
+    }
+}
+
+/// What the surplus fibre's temperature follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lead {
+    Ambient,
+    Isothermal,
+}
+
+/// Surplus fibre 2δ at one end, outside the pack.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurplusFibre {
+    /// δ > 0: at end A.
+    pub offset_m: f64,
+    pub lead: Lead,
+}
+
+/// What an effect is bound to before it acts.
+#[derive(Debug, Clone, Copy)]
+pub struct Binding<'a> {
+    pub coil: &'a Coil,
+    /// Names of a record's further columns, in the order of [`PackState::channels`].
+    pub channels: &'a [String],
+}
+
+/// Which part of the model an effect changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Acts {
+    /// The temperature field changes.
+    HeatPath,
+    /// The coil's geometry changes.
+    Winding,
+    /// What the sensor shows changes, not the coil.
+    Sensor,
+    /// The fibre's response to the field changes.
+    Response,
+    /// A rate is added that does not come from the coil.
+    Outside,
+}
+
+/// A numeric parameter, as a user states it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ParameterSpec {
+    /// The key in the model file; ends in the unit.
+    pub key: &'static str,
+    pub unit: Unit,
+    pub meaning: &'static str,
+    /// Bounds, start of a fit and default, all in `unit`.
+    pub lower: f64,
+    pub upper: f64,
+    pub start: f64,
+    /// Where a model file need not state it.
+    pub default: Option<f64>,
+}
+
+/// A parameter that is one of a few words.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ChoiceSpec {
+    pub key: &'static str,
+    pub options: &'static [&'static str],
+    pub meaning: &'static str,
+}
+
+/// All that is to be said about an effect.
+#[derive(Debug, Clone, Copy)]
+pub struct EffectSpec {
+    /// The name used in model files.
+    pub kind: &'static str,
+    /// One line: what it adds.
+    pub summary: &'static str,
+    pub equation: &'static str,
+    pub acts: Acts,
+    pub parameters: &'static [ParameterSpec],
+    pub choices: &'static [ChoiceSpec],
+    pub source: &'static str,
+    /// What it looks like in a record.
+    pub signature: &'static str,
+    /// Which experiment would isolate it.
+    pub experiment: &'static str,
+    /// Makes the effect from its values in SI (in the order of `parameters`) and choices.
+    pub build: fn(&[f64], &[usize], &Binding) -> Box<dyn Effect>,
+}
+
+/// An effect with its parameters, as a model declares it.
+#[derive(Debug, Clone)]
+pub struct DeclaredEffect {
+    spec: &'static EffectSpec,
+    /// SI, in the order of the spec.
+    values: Vec<f64>,
+    choices: Vec<usize>,
+}
+
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum EffectError {
+    #[error("{kind} takes {expected} parameters, found {found}")]
+    Count { kind: &'static str, expected: usize, found: usize },
+    #[error("effect.{key} must lie between {lower} and {upper} {unit} for {kind}, found {found}", unit = .unit.symbol())]
+    OutOfBounds { kind: &'static str, key: &'static str, lower: f64, upper: f64, unit: Unit, found: f64 },
+    #[error("effect.{key} must be one of {options:?} for {kind}")]
+    Choice { kind: &'static str, key: &'static str, options: &'static [&'static str] },
+}
+
+impl DeclaredEffect {
+    /// # Errors
+    /// A value outside its bounds, or as many values or choices as the effect does not take.
+    pub fn new(spec: &'static EffectSpec, values: Vec<f64>, choices: Vec<usize>) -> Result<Self, EffectError> {
+        let kind = spec.kind;
+        if values.len() != spec.parameters.len() {
+            return Err(EffectError::Count { kind, expected: spec.parameters.len(), found: values.len() });
+        }
+        if choices.len() != spec.choices.len() {
+            return Err(EffectError::Count { kind, expected: spec.choices.len(), found: choices.len() });
+        }
+        for (parameter, &si) in spec.parameters.iter().zip(&values) {
+            let ParameterSpec { key, unit, lower, upper, .. } = *parameter;
+            let found = unit.from_si(si);
+            let slack = 1e-9 * (upper - lower).abs();
+            if !(found >= lower - slack && found <= upper + slack) {
+                return Err(EffectError::OutOfBounds { kind, key, lower, upper, unit, found });
+            }
+        }
+        for (choice, &index) in spec.choices.iter().zip(&choices) {
+            if index >= choice.options.len() {
+                return Err(EffectError::Choice { kind, key: choice.key, options: choice.options });
+            }
+        }
+        Ok(Self { spec, values, choices })
+    }
+
+    /// The effect at the start values of a fit and its first choices.
+    pub fn at_start(spec: &'static EffectSpec) -> Self {
+        Self {
+            spec,
+            values: spec.parameters.iter().map(|p| p.unit.to_si(p.start)).collect(),
+            choices: vec![0; spec.choices.len()],
+        }
+    }
+
+    pub fn spec(&self) -> &'static EffectSpec {
+        self.spec
+    }
+
+    /// SI, in the order of the spec's parameters.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    pub fn choices(&self) -> &[usize] {
+        &self.choices
+    }
+
+    pub fn bind(&self, binding: &Binding) -> Box<dyn Effect> {
+        (self.spec.build)(&self.values, &self.choices, binding)
+    }
+}
+
+/// The spec of an effect by its name in files.
+pub fn find(kind: &str) -> Option<&'static EffectSpec> {
+    CATALOGUE.iter().copied().find(|spec| spec.kind == kind)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_effect_of_the_catalogue_is_described_and_starts_within_its_bounds() {
+        for spec in CATALOGUE {
+            for text in [spec.summary, spec.equation, spec.source, spec.signature, spec.experiment] {
+                assert!(!text.is_empty(), "{}", spec.kind);
+            }
+            for p in spec.parameters {
+                assert!(p.lower <= p.start && p.start <= p.upper, "{} {}", spec.kind, p.key);
+            }
+            assert!(
+                DeclaredEffect::new(spec, DeclaredEffect::at_start(spec).values, vec![0; spec.choices.len()]).is_ok()
+            );
+        }
+        let mut kinds: Vec<_> = CATALOGUE.iter().map(|s| s.kind).collect();
+        kinds.sort_unstable();
+        kinds.dedup();
+        assert_eq!(kinds.len(), CATALOGUE.len());
+    }
+}

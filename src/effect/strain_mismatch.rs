@@ -1,0 +1,47 @@
+//! `strain_mismatch`: Elasto-optic: the two halves of the fibre respond differently (the T-dot or Mohr bias).
+//!
+//! ```text
+//! κ_B − κ_A = m κ; in a steady ramp Ω = n κ m L Ṫ/(4D)
+//! ```
+//!
+//! # Source
+//! Mohr and Schadt, Proc. SPIE 5855 (2005): T-dot bias of 0.03 … 4.9 °/h at 5 °C/min.
+
+use super::{Acts, Effect, EffectSpec, FibrePlace, ParameterSpec};
+use crate::pattern::Half;
+use crate::units::Unit;
+
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    kind: "strain_mismatch",
+    summary: "Elasto-optic: the two halves of the fibre respond differently (the T-dot or Mohr bias)",
+    equation: "κ_B − κ_A = m κ; in a steady ramp Ω = n κ m L Ṫ/(4D)",
+    acts: Acts::Response,
+    parameters: &[ParameterSpec {
+        key: "mismatch",
+        unit: Unit::One,
+        meaning: "m, relative difference of the halves",
+        lower: -0.5,
+        upper: 0.5,
+        start: 0.002,
+        default: None,
+    }],
+    choices: &[],
+    source: "Mohr and Schadt, Proc. SPIE 5855 (2005): T-dot bias of 0.03 … 4.9 °/h at 5 °C/min",
+    signature: "a step of the error that lasts as long as the ramp and is ∝ the pack's mean rate, the same at every temperature",
+    experiment: "ramps of several rates long enough to settle; flip the coil (it changes sign), trim an end (it does not follow)",
+    build: |values, _, _| Box::new(StrainMismatch { mismatch: values[0] }),
+};
+
+#[derive(Debug)]
+struct StrainMismatch {
+    mismatch: f64,
+}
+
+impl Effect for StrainMismatch {
+    fn path_factor(&self, place: &FibrePlace) -> f64 {
+        match place.half {
+            Half::A => 1.0 - 0.5 * self.mismatch,
+            Half::B => 1.0 + 0.5 * self.mismatch,
+        }
+    }
+}

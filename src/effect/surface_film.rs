@@ -1,0 +1,45 @@
+//! `surface_film`: the sensor (or the profile) is the ambient air; the outer layer follows through a film.
+//!
+//! ```text
+//! k dT/dr = h (T_air − T) at r = r_out
+//! ```
+//!
+//! # Source
+//! Newton's law of cooling; film coefficients of free and forced air 5 … 250 W/(m²K), Incropera et al., table 1.1.
+
+use super::{Acts, Effect, EffectSpec, ParameterSpec};
+use crate::thermal::{HeatPath, Location};
+use crate::units::Unit;
+
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    kind: "surface_film",
+    summary: "The sensor (or the profile) is the ambient air; the outer layer follows through a film",
+    equation: "k dT/dr = h (T_air − T) at r = r_out",
+    acts: Acts::HeatPath,
+    parameters: &[ParameterSpec {
+        key: "film_w_per_m2_k",
+        unit: Unit::WattPerSquareMetreKelvin,
+        meaning: "film coefficient at the outer surface",
+        lower: 0.5,
+        upper: 100000.0,
+        start: 30.0,
+        default: None,
+    }],
+    choices: &[],
+    source: "Newton's law of cooling; film coefficients of free and forced air 5 … 250 W/(m²K), Incropera et al., table 1.1",
+    signature: "the measured error begins late and rounded after each change of the recorded temperature's rate; the delay is about the pack's heat capacity over h",
+    experiment: "a second sensor under the outermost layer's lacquer, or another air speed in the chamber",
+    build: |values, _, _| Box::new(SurfaceFilm { film_w_per_m2_k: values[0] }),
+};
+
+#[derive(Debug)]
+struct SurfaceFilm {
+    film_w_per_m2_k: f64,
+}
+
+impl Effect for SurfaceFilm {
+    fn change_heat_path(&self, path: &mut HeatPath) {
+        path.location = Location::Ambient;
+        path.film_w_per_m2_k = Some(self.film_w_per_m2_k);
+    }
+}

@@ -1,0 +1,43 @@
+//! `thermo_optic`: No new physics: the declared thermo-optic coefficient κ is wrong by a factor.
+//!
+//! ```text
+//! κ → factor · κ
+//! ```
+//!
+//! # Source
+//! dn/dT of doped silica in a coating: 0.8 … 1.4e-5 per kelvin.
+
+use super::{Acts, Effect, EffectSpec, FibrePlace, ParameterSpec};
+use crate::units::Unit;
+
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    kind: "thermo_optic",
+    summary: "No new physics: the declared thermo-optic coefficient κ is wrong by a factor",
+    equation: "κ → factor · κ",
+    acts: Acts::Response,
+    parameters: &[ParameterSpec {
+        key: "factor",
+        unit: Unit::One,
+        meaning: "true over declared κ",
+        lower: 0.1,
+        upper: 10.0,
+        start: 1.05,
+        default: None,
+    }],
+    choices: &[],
+    source: "dn/dT of doped silica in a coating: 0.8 … 1.4e-5 per kelvin",
+    signature: "the whole error is larger or smaller by one factor at every temperature and rate",
+    experiment: "an interferometric measurement of the fibre's dn/dT",
+    build: |values, _, _| Box::new(ThermoOptic { factor: values[0] }),
+};
+
+#[derive(Debug)]
+struct ThermoOptic {
+    factor: f64,
+}
+
+impl Effect for ThermoOptic {
+    fn path_factor(&self, _place: &FibrePlace) -> f64 {
+        self.factor
+    }
+}

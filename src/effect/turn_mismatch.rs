@@ -1,0 +1,45 @@
+//! `turn_mismatch`: Nesting: every second layer has fewer turns, so the layers' lengths alternate.
+//!
+//! ```text
+//! M_j = M − ΔM on layers 2, 4, 6, … counted from the spool
+//! ```
+//!
+//! # Source
+//! orthocyclic winding: a nested layer holds one turn less.
+
+use super::{Acts, Effect, EffectSpec, ParameterSpec};
+use crate::units::Unit;
+
+pub(super) const SPEC: EffectSpec = EffectSpec {
+    kind: "turn_mismatch",
+    summary: "Nesting: every second layer has fewer turns, so the layers' lengths alternate",
+    equation: "M_j = M − ΔM on layers 2, 4, 6, … counted from the spool",
+    acts: Acts::Winding,
+    parameters: &[ParameterSpec {
+        key: "turns",
+        unit: Unit::One,
+        meaning: "ΔM, turns missing on every second layer",
+        lower: -20.0,
+        upper: 20.0,
+        start: 1.0,
+        default: None,
+    }],
+    choices: &[],
+    source: "orthocyclic winding: a nested layer holds one turn less",
+    signature: "the layers' weights change and with them the shape of the transient after each change of ramp",
+    experiment: "count the turns; it cannot be switched off on a wound coil",
+    build: |values, _, _| Box::new(TurnMismatch { turns: values[0] }),
+};
+
+#[derive(Debug)]
+struct TurnMismatch {
+    turns: f64,
+}
+
+impl Effect for TurnMismatch {
+    fn change_turns(&self, turns: &mut [f64]) {
+        for layer_turns in turns.iter_mut().skip(1).step_by(2) {
+            *layer_turns -= self.turns;
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! The largest value of a smooth function between two points.
+
+/// The place and the value of a maximum.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Maximum {
+    pub at: f64,
+    pub value: f64,
+}
+
+/// Golden-section search for a maximum of `f` in [`low`, `high`], where `f` is unimodal.
+///
+/// Stops when the bracket is shorter than 1e-10 of its own start; a maximum's value is then off by the square
+/// of that, so by rounding only. Returns the best point that was evaluated.
+pub fn golden_section(mut f: impl FnMut(f64) -> f64, low: f64, high: f64) -> Maximum {
+    let ratio = (5.0_f64.sqrt() - 1.0) / 2.0;
+    let (mut a, mut b) = (low, high);
+    let mut left = Maximum { at: b - ratio * (b - a), value: 0.0 };
+    let mut right = Maximum { at: a + ratio * (b - a), value: 0.0 };
+    left.value = f(left.at);
+    right.value = f(right.at);
+    let tolerance = (high - low) * 1e-10;
+    while b - a > tolerance {
+        if left.value >= right.value {
+            b = right.at;
+            right = left;
+            left.at = b - ratio * (b - a);
+            left.value = f(left.at);
+        } else {
+            a = left.at;
+            left = right;
+            right.at = a + ratio * (b - a);
+            right.value = f(right.at);
+        }
+    }
+    if left.value >= right.value { left } else { right }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_maximum_of_x_exp_minus_x_is_found_at_one() {
+        let found = golden_section(|x| x * (-x).exp(), 0.0, 5.0);
+        assert!((found.at - 1.0).abs() < 1e-6);
+        assert!((found.value - (-1.0_f64).exp()).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,4 @@
+//! Mathematics without domain words; what a well-kept library has is called, not written again.
+
+pub mod maximise;
+pub mod piecewise;

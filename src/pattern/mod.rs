@@ -1,0 +1,155 @@
+//! Winding patterns: which segment of the fibre lies in which layer.
+
+pub mod classic;
+pub mod windability;
+
+use thiserror::Error;
+
+/// A permutation layer → segment, innermost layer first.
+///
+/// Segments are numbered 1 … N in the order of arclength from end A; half A is 1 … N/2. Layers are indexed from
+/// 0, the innermost. The type can hold nothing but a permutation of an even number of segments.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Pattern {
+    segments: Vec<usize>,
+}
+
+/// A half of the fibre, by arclength: A is z < L/2.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Half {
+    A,
+    B,
+}
+
+impl std::fmt::Display for Half {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            Half::A => "A",
+            Half::B => "B",
+        })
+    }
+}
+
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum PatternError {
+    #[error("a pattern needs an even number of at least 2 segments, found {found}")]
+    Count { found: usize },
+    #[error("segment {segment} on layer {layer} is outside 1 … {layers}")]
+    OutOfRange { layer: usize, segment: usize, layers: usize },
+    #[error(
+        "segment {segment} lies on layer {first} and again on layer {second}: each segment lies on exactly one layer"
+    )]
+    Duplicate { segment: usize, first: usize, second: usize },
+}
+
+impl Pattern {
+    /// # Errors
+    /// An odd or too small count, a segment out of range, a segment named twice. Layers in errors count from 1.
+    pub fn new(segments: Vec<usize>) -> Result<Self, PatternError> {
+        let layers = segments.len();
+        if layers < 2 || layers % 2 != 0 {
+            return Err(PatternError::Count { found: layers });
+        }
+        let mut seen = vec![None; layers];
+        for (layer, &segment) in segments.iter().enumerate() {
+            if segment == 0 || segment > layers {
+                return Err(PatternError::OutOfRange { layer: layer + 1, segment, layers });
+            }
+            if let Some(first) = seen[segment - 1].replace(layer + 1) {
+                return Err(PatternError::Duplicate { segment, first, second: layer + 1 });
+            }
+        }
+        Ok(Self { segments })
+    }
+
+    /// N.
+    pub fn layers(&self) -> usize {
+        self.segments.len()
+    }
+
+    /// P(j), innermost layer first; segments count from 1.
+    pub fn segments(&self) -> &[usize] {
+        &self.segments
+    }
+
+    /// The segment on a layer (index 0 is the innermost).
+    pub fn segment(&self, layer: usize) -> usize {
+        self.segments[layer]
+    }
+
+    /// P⁻¹ as layer indices: entry s−1 is the layer of segment s.
+    pub fn layers_by_segment(&self) -> Vec<usize> {
+        let mut layers = vec![0; self.layers()];
+        for (layer, &segment) in self.segments.iter().enumerate() {
+            layers[segment - 1] = layer;
+        }
+        layers
+    }
+
+    pub fn half(&self, layer: usize) -> Half {
+        if self.segments[layer] <= self.layers() / 2 { Half::A } else { Half::B }
+    }
+
+    /// The same coil with its ends exchanged: s → N+1−s. Flips the sign of the rate error.
+    pub fn reversed(&self) -> Self {
+        let layers = self.layers();
+        Self { segments: self.segments.iter().map(|s| layers + 1 - s).collect() }
+    }
+
+    /// Whether arclength z grows away from the first flange (where layer 1 starts) on a layer: +1, or −1.
+    ///
+    /// The fibre fills a layer from flange to flange, so segments alternate. Layer 1 starts with the end of its
+    /// segment that is nearer to the fibre's middle, or with the fibre's own end if it is wound with that.
+    pub fn axial_direction(&self, layer: usize) -> f64 {
+        let first = self.segments[0];
+        let starts_low = first == 1 || (first != self.layers() && self.half(0) == Half::B);
+        let same_parity = (self.segments[layer] + first) % 2 == 0;
+        if starts_low == same_parity { 1.0 } else { -1.0 }
+    }
+}
+
+impl TryFrom<Vec<usize>> for Pattern {
+    type Error = PatternError;
+
+    fn try_from(segments: Vec<usize>) -> Result<Self, PatternError> {
+        Self::new(segments)
+    }
+}
+
+impl std::fmt::Display for Pattern {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        for (i, segment) in self.segments.iter().enumerate() {
+            if i > 0 {
+                f.write_str(" ")?;
+            }
+            write!(f, "{segment}")?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_permutations_of_an_even_count_are_patterns() {
+        assert!(Pattern::new(vec![2, 1]).is_ok());
+        assert_eq!(Pattern::new(vec![1]), Err(PatternError::Count { found: 1 }));
+        assert_eq!(Pattern::new(vec![1, 2, 3]), Err(PatternError::Count { found: 3 }));
+        assert_eq!(Pattern::new(vec![1, 3]), Err(PatternError::OutOfRange { layer: 2, segment: 3, layers: 2 }));
+        assert_eq!(Pattern::new(vec![2, 1, 2, 4]), Err(PatternError::Duplicate { segment: 2, first: 1, second: 3 }));
+    }
+
+    #[test]
+    fn a_cylindrical_coil_runs_to_and_fro_from_the_first_flange() {
+        let zyl = Pattern::new(vec![1, 2, 3, 4]).unwrap();
+        assert_eq!((0..4).map(|j| zyl.axial_direction(j)).collect::<Vec<_>>(), [1.0, -1.0, 1.0, -1.0]);
+    }
+
+    #[test]
+    fn both_layers_next_to_the_middle_of_a_dipole_coil_start_at_the_first_flange() {
+        let dip = Pattern::new(vec![2, 3, 1, 4]).unwrap();
+        assert_eq!((dip.axial_direction(0), dip.axial_direction(1)), (-1.0, 1.0));
+    }
+}

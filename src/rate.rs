@@ -1,0 +1,263 @@
+//! The rate error of a coil: the readable reference that every fast path is tested against.
+//!
+//! ```text
+//! Ω = n/(L D) · { Σ_j κ_j Ṫ_j w_j + 2 Σ_j κ_j d_j l_j² m_j } · gain + lead + outside
+//! w_j = ∫_segment (2z − L) dz = l_j (2 z̄_j − L)
+//! ```
+//!
+//! | symbol | meaning | unit | in code |
+//! |---|---|---|---|
+//! | Ω | rate error, positive as written | rad/s | `rate_error_rad_per_s` |
+//! | n, κ | refractive index, path per kelvin | 1, 1/K | `Fibre` |
+//! | L, D | fibre length, mean coil diameter | m | `Coil` |
+//! | Ṫ_j | rate of the layer's axial mean temperature | K/s | `PackState::rates_k_per_s` |
+//! | m_j | first axial moment of the rate | K/s | `PackState::axial_moments_k_per_s` |
+//! | d_j | direction of the layer, ±1 | 1 | `Pattern::axial_direction` |
+//! | w_j | layer weight, kept apart for the two halves of the fibre | m² | `LayerWeights` |
+//!
+//! Leaves out scale-factor errors and everything that no declared effect describes.
+//!
+//! # Source
+//! Yan, Lan, Jian, Acta Optica Sinica (1998), Eq. (4), with the dots on ΔT that the paper lost; Shupe, Appl. Opt. 19,
+//! 654 (1980). The sign is the paper's: positive Ω for a positive phase as written.
+
+use thiserror::Error;
+
+use crate::coil::{Coil, CoilError};
+use crate::effect::{Binding, DeclaredEffect, Effect, FibrePlace, Lead, PackState, SurplusFibre};
+use crate::pattern::{Half, Pattern};
+use crate::thermal::{Extent, HeatPath, Location, Material, PackShape, ThermalHistory};
+use crate::units::LIGHT_SPEED_M_PER_S;
+
+/// A coil, how it is heated, and which physics is taken into account; everything but the pattern.
+#[derive(Debug, Clone)]
+pub struct CoilModel {
+    pub name: String,
+    /// As declared, before effects change it.
+    pub coil: Coil,
+    pub extent: Extent,
+    pub material: Material,
+    /// Where the sensor is, and so what a profile or a record is the temperature of.
+    pub location: Location,
+    /// Each recorded rate is the mean over this interval, which ends at its stamp; 0: instantaneous.
+    pub rate_mean_s: f64,
+    pub effects: Vec<DeclaredEffect>,
+}
+
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum RateError {
+    #[error("the pattern has {pattern} layers and the coil {coil}: use a pattern of the coil's layer count")]
+    Layers { pattern: usize, coil: usize },
+    #[error(transparent)]
+    Coil(#[from] CoilError),
+}
+
+impl CoilModel {
+    /// The coil with the turns that the effects leave it.
+    ///
+    /// # Errors
+    /// Effects that leave a layer no turns.
+    pub fn wound_coil(&self) -> Result<Coil, CoilError> {
+        let mut turns = self.coil.turns().to_vec();
+        for effect in self.bind_all(&self.coil, &[]) {
+            effect.change_turns(&mut turns);
+        }
+        if turns == self.coil.turns() { Ok(self.coil.clone()) } else { self.coil.with_turns(turns) }
+    }
+
+    /// The heat path with every effect's change.
+    ///
+    /// # Errors
+    /// As [`CoilModel::wound_coil`].
+    pub fn heat_path(&self) -> Result<HeatPath, CoilError> {
+        let coil = self.wound_coil()?;
+        let mut path = HeatPath::new(PackShape::of(&coil), self.extent, self.material, self.location);
+        for effect in self.bind_all(&coil, &[]) {
+            effect.change_heat_path(&mut path);
+        }
+        Ok(path)
+    }
+
+    /// The sensor's lag behind what it is attached to [s]; several lags add.
+    pub fn sensor_lag_s(&self) -> f64 {
+        self.bind_all(&self.coil, &[]).iter().map(|e| e.sensor_lag_s()).sum()
+    }
+
+    /// The same model with one more effect.
+    pub fn with_effect(&self, effect: DeclaredEffect) -> Self {
+        let mut model = self.clone();
+        model.effects.push(effect);
+        model
+    }
+
+    fn bind_all(&self, coil: &Coil, channels: &[String]) -> Vec<Box<dyn Effect>> {
+        self.effects.iter().map(|e| e.bind(&Binding { coil, channels })).collect()
+    }
+}
+
+/// Each layer's weight in the phase integral, kept apart for the two halves of the fibre.
+///
+/// # Shapes
+/// One entry a layer, innermost first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LayerWeights {
+    /// The part of w_j with z < L/2 [m²].
+    pub half_a_m2: Vec<f64>,
+    /// The part with z > L/2 [m²].
+    pub half_b_m2: Vec<f64>,
+    /// 2 d_j l_j², the weight of the axial moment [m²].
+    pub axial_m2: Vec<f64>,
+}
+
+impl LayerWeights {
+    /// # Errors
+    /// A pattern of another layer count.
+    pub fn new(coil: &Coil, pattern: &Pattern) -> Result<Self, RateError> {
+        if coil.layers() != pattern.layers() {
+            return Err(RateError::Layers { pattern: pattern.layers(), coil: coil.layers() });
+        }
+        let lengths_m = coil.layer_lengths_m();
+        let length_m = coil.length_m();
+        let mut weights = Self {
+            half_a_m2: vec![0.0; lengths_m.len()],
+            half_b_m2: vec![0.0; lengths_m.len()],
+            axial_m2: vec![0.0; lengths_m.len()],
+        };
+        let mut from_m = 0.0;
+        for layer in pattern.layers_by_segment() {
+            let to_m = from_m + lengths_m[layer];
+            let middle_m = (0.5 * length_m).clamp(from_m, to_m);
+            weights.half_a_m2[layer] = (middle_m - from_m) * (from_m + middle_m - length_m);
+            weights.half_b_m2[layer] = (to_m - middle_m) * (middle_m + to_m - length_m);
+            weights.axial_m2[layer] = 2.0 * pattern.axial_direction(layer) * lengths_m[layer].powi(2);
+            from_m = to_m;
+        }
+        Ok(weights)
+    }
+
+    /// w_j, both halves together [m²].
+    pub fn total_m2(&self) -> Vec<f64> {
+        self.half_a_m2.iter().zip(&self.half_b_m2).map(|(a, b)| a + b).collect()
+    }
+}
+
+/// A coil model with a pattern: from the pack's state to the rate error.
+#[derive(Debug)]
+pub struct RateModel {
+    coil: Coil,
+    weights: LayerWeights,
+    effects: Vec<Box<dyn Effect>>,
+    surplus: Vec<SurplusFibre>,
+}
+
+impl RateModel {
+    /// `channels` names a record's further columns, in the order in which [`PackState::channels`] will hold them.
+    ///
+    /// # Errors
+    /// A pattern of another layer count; effects that leave a layer no turns.
+    pub fn new(model: &CoilModel, pattern: &Pattern, channels: &[String]) -> Result<Self, RateError> {
+        let coil = model.wound_coil()?;
+        let weights = LayerWeights::new(&coil, pattern)?;
+        let effects = model.bind_all(&coil, channels);
+        let surplus = effects.iter().filter_map(|e| e.surplus_fibre()).collect();
+        Ok(Self { coil, weights, effects, surplus })
+    }
+
+    pub fn coil(&self) -> &Coil {
+        &self.coil
+    }
+
+    pub fn weights(&self) -> &LayerWeights {
+        &self.weights
+    }
+
+    /// n/(L D) [1/m²].
+    pub fn scale_per_m2(&self) -> f64 {
+        self.coil.fibre().refractive_index / (self.coil.length_m() * self.coil.mean_diameter_m())
+    }
+
+    /// κ times the effects' factors [1/K].
+    fn path_per_k(&self, layer: usize, half: Half, temperature_k: f64) -> f64 {
+        let place = FibrePlace { layer, half, temperature_k };
+        self.coil.fibre().path_per_k() * self.effects.iter().map(|e| e.path_factor(&place)).product::<f64>()
+    }
+
+    /// Ω, with everything that the model declares.
+    pub fn rate_error_rad_per_s(&self, state: &PackState) -> f64 {
+        let scale = self.scale_per_m2();
+        let mut coil_sum = 0.0;
+        for (layer, (&rate, &temperature_k)) in state.rates_k_per_s.iter().zip(state.temperatures_k).enumerate() {
+            let kappa_a = self.path_per_k(layer, Half::A, temperature_k);
+            let kappa_b = self.path_per_k(layer, Half::B, temperature_k);
+            coil_sum += (kappa_a * self.weights.half_a_m2[layer] + kappa_b * self.weights.half_b_m2[layer]) * rate;
+            if let Some(moment) = state.axial_moments_k_per_s.get(layer) {
+                coil_sum += 0.5 * (kappa_a + kappa_b) * self.weights.axial_m2[layer] * moment;
+            }
+        }
+        let gain: f64 = self.effects.iter().map(|e| e.coil_gain(state)).product();
+        let lead: f64 = self.surplus.iter().map(|s| self.surplus_rad_per_s(s, state)).sum();
+        let outside: f64 = self.effects.iter().map(|e| e.outside_rate_rad_per_s(state)).sum();
+        scale * coil_sum * gain + lead + outside
+    }
+
+    /// Surplus fibre 2δ at end A moves the coil by 2δ along z and adds a lead at z < 2δ; exact in δ.
+    fn surplus_rad_per_s(&self, surplus: &SurplusFibre, state: &PackState) -> f64 {
+        let lead_rate = match surplus.lead {
+            Lead::Ambient => state.ambient_rate_k_per_s,
+            Lead::Isothermal => 0.0,
+        };
+        let moved: f64 = state
+            .rates_k_per_s
+            .iter()
+            .zip(state.temperatures_k)
+            .zip(self.coil.layer_lengths_m())
+            .enumerate()
+            .map(|(layer, ((rate, &temperature_k), length_m))| {
+                let kappa = 0.5
+                    * (self.path_per_k(layer, Half::A, temperature_k) + self.path_per_k(layer, Half::B, temperature_k));
+                kappa * rate * length_m
+            })
+            .sum();
+        let lead = self.coil.fibre().path_per_k() * lead_rate * self.coil.length_m();
+        self.scale_per_m2() * 2.0 * surplus.offset_m * (moved - lead)
+    }
+
+    /// Δφ for a rate error: Δφ = Ω 2πLD/(λ c0) [rad].
+    pub fn phase_rad(&self, rate_rad_per_s: f64) -> f64 {
+        rate_rad_per_s * std::f64::consts::TAU * self.coil.length_m() * self.coil.mean_diameter_m()
+            / (self.coil.fibre().wavelength_m * LIGHT_SPEED_M_PER_S)
+    }
+
+    /// The hard bound n κ k0 L/(4D) on |Ω| of the coil alone while all layer rates lie between 0 and `rate_k_per_s`.
+    pub fn hard_bound_rad_per_s(&self, rate_k_per_s: f64) -> f64 {
+        let fibre = self.coil.fibre();
+        fibre.refractive_index * fibre.path_per_k() * rate_k_per_s * self.coil.length_m()
+            / (4.0 * self.coil.mean_diameter_m())
+    }
+
+    /// The state of row `row` of a history; `channels` as named when the model was made.
+    pub fn state<'a>(&self, history: &'a ThermalHistory, row: usize, channels: &'a [f64]) -> PackState<'a> {
+        let temperatures_k = history.temperatures_k(row);
+        let rates_k_per_s = history.rates_k_per_s(row);
+        PackState {
+            time_s: history.times_s[row],
+            temperatures_k,
+            rates_k_per_s,
+            axial_moments_k_per_s: history.axial_moments_k_per_s(row),
+            mean_temperature_k: self.length_mean(temperatures_k),
+            mean_rate_k_per_s: self.length_mean(rates_k_per_s),
+            ambient_k: history.ambient_k[row],
+            ambient_rate_k_per_s: history.ambient_rate_k_per_s[row],
+            channels,
+        }
+    }
+
+    /// Ω over a whole history, for models without further channels.
+    pub fn series_rad_per_s(&self, history: &ThermalHistory) -> Vec<f64> {
+        (0..history.len()).map(|row| self.rate_error_rad_per_s(&self.state(history, row, &[]))).collect()
+    }
+
+    fn length_mean(&self, layers: &[f64]) -> f64 {
+        layers.iter().zip(self.coil.layer_lengths_m()).map(|(v, l)| v * l).sum::<f64>() / self.coil.length_m()
+    }
+}

@@ -1,0 +1,3 @@
+//! What the best pattern is: worst cases, objectives, annealing, proofs.
+
+pub mod worst_case;

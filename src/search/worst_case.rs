@@ -1,0 +1,159 @@
+//! The worst rate error of a pattern over a set of profiles: the reference value that is reported.
+//!
+//! The supremum is taken over all times, both one-sided limits at every break point of a profile included, because
+//! the outermost layer's rate jumps there. Between break points the error is sampled on a grid that is fine where the
+//! field changes fast, and each local maximum of |Ω| is refined by golden-section search on the exact field.
+
+use rayon::prelude::*;
+use thiserror::Error;
+
+use crate::coil::CoilError;
+use crate::numeric::maximise::golden_section;
+use crate::pattern::Pattern;
+use crate::profile::Profile;
+use crate::rate::{CoilModel, RateError, RateModel};
+use crate::thermal::{Drive, Field, HeatPath, Instant, ThermalError, ThermalHistory, solve};
+use crate::units::REFERENCE_TEMPERATURE_K;
+
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum SearchError {
+    #[error(transparent)]
+    Thermal(#[from] ThermalError),
+    #[error(transparent)]
+    Rate(#[from] RateError),
+    #[error(transparent)]
+    Coil(#[from] CoilError),
+    #[error("there is no profile to search over: list one in [profiles] or set profiles.count above 0")]
+    NoProfiles,
+}
+
+/// The fields of all profiles, solved once: they do not depend on the pattern.
+#[derive(Debug)]
+pub struct SolvedProfiles {
+    profiles: Vec<SolvedProfile>,
+}
+
+#[derive(Debug)]
+pub struct SolvedProfile {
+    pub profile: Profile,
+    pub field: Field,
+    /// One list of instants a piece, from just after its start to just before its end.
+    pub pieces: Vec<Vec<Instant>>,
+    /// The field at all of them, in order.
+    pub history: ThermalHistory,
+}
+
+/// Where and how large the rate error of a pattern is largest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WorstCase {
+    /// With its sign.
+    pub rate_rad_per_s: f64,
+    pub profile: String,
+    pub profile_index: usize,
+    pub time_s: f64,
+}
+
+/// Points a piece: close to its start, where layers respond one after the other, and then wider apart.
+const POINTS_PER_PIECE: usize = 96;
+
+/// From just after a piece's start to just before its end; the spacing grows geometrically from a tenth of the
+/// fastest response so that every layer's onset is seen.
+fn instants_of_piece(start_s: f64, end_s: f64, path: &HeatPath) -> Vec<Instant> {
+    let duration_s = end_s - start_s;
+    let first_s =
+        (0.1 * path.shape.radial_pitch_m.powi(2) / (4.0 * path.material.diffusivity_m2_per_s())).min(0.01 * duration_s);
+    let ratio = (duration_s / first_s).powf(1.0 / (POINTS_PER_PIECE - 1) as f64);
+    let mut instants = vec![Instant::after(start_s)];
+    instants.extend((0..POINTS_PER_PIECE - 1).map(|i| Instant::after(start_s + first_s * ratio.powi(i as i32))));
+    instants.push(Instant::before(end_s));
+    instants
+}
+
+impl SolvedProfiles {
+    /// # Errors
+    /// No profile; a heat path that cannot be solved.
+    pub fn new(model: &CoilModel, profiles: &[Profile]) -> Result<Self, SearchError> {
+        if profiles.is_empty() {
+            return Err(SearchError::NoProfiles);
+        }
+        let path = model.heat_path()?;
+        let profiles = profiles
+            .par_iter()
+            .map(|profile| {
+                let drive = Drive::boundary(profile.temperature(REFERENCE_TEMPERATURE_K));
+                let field = solve(&path, &drive)?;
+                let pieces: Vec<Vec<Instant>> = drive
+                    .boundary_k
+                    .knots()
+                    .windows(2)
+                    .map(|knots| instants_of_piece(knots[0], knots[1], &path))
+                    .chain(std::iter::once(vec![Instant::after(profile.duration_s())]))
+                    .collect();
+                let history = field.at(&pieces.concat());
+                Ok(SolvedProfile { profile: profile.clone(), field, pieces, history })
+            })
+            .collect::<Result<_, ThermalError>>()?;
+        Ok(Self { profiles })
+    }
+
+    pub fn profiles(&self) -> &[SolvedProfile] {
+        &self.profiles
+    }
+
+    /// The largest |Ω| of a pattern over all profiles and times.
+    ///
+    /// # Errors
+    /// A pattern of another layer count.
+    pub fn worst_case(&self, model: &CoilModel, pattern: &Pattern) -> Result<WorstCase, SearchError> {
+        let rate_model = RateModel::new(model, pattern, &[])?;
+        let candidates: Vec<WorstCase> = self
+            .profiles
+            .par_iter()
+            .enumerate()
+            .map(|(index, solved)| {
+                let (rate_rad_per_s, time_s) = solved.worst(&rate_model);
+                WorstCase { rate_rad_per_s, profile: solved.profile.name().to_owned(), profile_index: index, time_s }
+            })
+            .collect();
+        // The first of equals, so that the answer does not depend on the number of threads.
+        let mut worst = &candidates[0];
+        for candidate in &candidates[1..] {
+            if candidate.rate_rad_per_s.abs() > worst.rate_rad_per_s.abs() {
+                worst = candidate;
+            }
+        }
+        Ok(worst.clone())
+    }
+}
+
+impl SolvedProfile {
+    /// The rate error with its sign and the time at which its size is largest.
+    fn worst(&self, rate_model: &RateModel) -> (f64, f64) {
+        let series = rate_model.series_rad_per_s(&self.history);
+        let largest = series.iter().map(|r| r.abs()).fold(0.0, f64::max);
+        let (mut best_rate, mut best_time_s) = (0.0_f64, 0.0);
+        let mut offset = 0;
+        for piece in &self.pieces {
+            let size = |i: usize| series[offset + i].abs();
+            for i in 0..piece.len() {
+                if size(i) > best_rate.abs() {
+                    (best_rate, best_time_s) = (series[offset + i], piece[i].time_s);
+                }
+                // A local maximum between grid points can exceed its neighbours by a few per cent only.
+                let is_peak = i > 0 && i + 1 < piece.len() && size(i) >= size(i - 1) && size(i) >= size(i + 1);
+                if is_peak && size(i) > 0.9 * largest {
+                    let rate_at = |time_s: f64| {
+                        let history = self.field.at(&[Instant::after(time_s)]);
+                        rate_model.rate_error_rad_per_s(&rate_model.state(&history, 0, &[]))
+                    };
+                    let peak = golden_section(|t| rate_at(t).abs(), piece[i - 1].time_s, piece[i + 1].time_s);
+                    if peak.value > best_rate.abs() {
+                        (best_rate, best_time_s) = (rate_at(peak.at), peak.at);
+                    }
+                }
+            }
+            offset += piece.len();
+        }
+        (best_rate, best_time_s)
+    }
+}

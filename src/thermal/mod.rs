@@ -1,0 +1,421 @@
+//! From a boundary's temperature to the temperature and its rate in every layer.
+//!
+//! [`HeatPath`] says what the heat flows through; effects edit it. [`solve`] takes a heat path and a [`Drive`] and
+//! gives a [`Field`], which can be asked for any instants. The field does not depend on the winding pattern.
+
+pub mod half_space;
+pub mod pack;
+
+use thiserror::Error;
+
+use crate::coil::Coil;
+use crate::numeric::piecewise::PiecewiseLinear;
+use half_space::HalfSpaceField;
+use pack::{Pack, PackField};
+
+/// What the pack is made of, thermally.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Material {
+    /// Only K = k/ρc is known; effects that exchange heat with something else need both.
+    Diffusivity {
+        m2_per_s: f64,
+    },
+    Conductivity {
+        w_per_m_k: f64,
+        heat_capacity_j_per_m3_k: f64,
+    },
+}
+
+impl Material {
+    pub fn diffusivity_m2_per_s(&self) -> f64 {
+        match *self {
+            Material::Diffusivity { m2_per_s } => m2_per_s,
+            Material::Conductivity { w_per_m_k, heat_capacity_j_per_m3_k } => w_per_m_k / heat_capacity_j_per_m3_k,
+        }
+    }
+
+    /// The same material conducting `factor` times as well.
+    pub fn scaled(self, factor: f64) -> Self {
+        match self {
+            Material::Diffusivity { m2_per_s } => Material::Diffusivity { m2_per_s: m2_per_s * factor },
+            Material::Conductivity { w_per_m_k, heat_capacity_j_per_m3_k } => {
+                Material::Conductivity { w_per_m_k: w_per_m_k * factor, heat_capacity_j_per_m3_k }
+            }
+        }
+    }
+}
+
+/// Where the pack ends inwards.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Extent {
+    /// Nowhere: the paper's half space behind the outermost layer.
+    HalfSpace,
+    /// At an adiabatic bore (unless a spool is there), in cylindrical coordinates.
+    Pack,
+}
+
+/// What the driving temperature is the temperature of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Location {
+    /// The outermost layer itself.
+    OuterLayer,
+    /// The air outside the film; without a film, the pack's outer surface.
+    Ambient,
+}
+
+/// A lumped spool behind a contact.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spool {
+    /// Per bore area.
+    pub heat_capacity_j_per_m2_k: f64,
+    pub contact_w_per_m2_k: f64,
+    /// From the spool to the ambient.
+    pub mount_w_per_m2_k: f64,
+}
+
+/// Heat into the bore after power-on at the drive's first knot: q∞ (1 − e^{−t/τ}).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoreHeat {
+    pub power_w_per_m2: f64,
+    pub time_constant_s: f64,
+}
+
+/// Which flange: layer 1 starts at the first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Flange {
+    First,
+    Second,
+}
+
+/// A flange that exchanges heat with the ambient.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FlangeFilm {
+    pub flange: Flange,
+    pub film_w_per_m2_k: f64,
+}
+
+/// The pack's dimensions as far as heat is concerned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PackShape {
+    pub layers: usize,
+    pub bore_radius_m: f64,
+    pub radial_pitch_m: f64,
+    pub height_m: f64,
+}
+
+impl PackShape {
+    pub fn of(coil: &Coil) -> Self {
+        Self {
+            layers: coil.layers(),
+            bore_radius_m: coil.bore_radius_m(),
+            radial_pitch_m: coil.radial_pitch_m(),
+            height_m: coil.height_m(),
+        }
+    }
+}
+
+/// Everything that the heat flows through, from the drive to the bore.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeatPath {
+    pub shape: PackShape,
+    pub extent: Extent,
+    pub material: Material,
+    pub location: Location,
+    /// At the outer surface; only used where the drive is the ambient.
+    pub film_w_per_m2_k: Option<f64>,
+    pub spool: Option<Spool>,
+    pub bore_heat: Option<BoreHeat>,
+    pub flange: Option<FlangeFilm>,
+    /// a in k = k0 (1 + a (T − 20 °C)).
+    pub conductivity_slope_per_k: f64,
+    /// Finite-volume cells across a layer: 1 or an even number.
+    pub cells_per_layer: usize,
+}
+
+/// Cells a layer that put the layer rates within 1e-4 of the continuum for the packs in `examples/`.
+pub const DEFAULT_CELLS_PER_LAYER: usize = 2;
+
+impl HeatPath {
+    pub fn new(shape: PackShape, extent: Extent, material: Material, location: Location) -> Self {
+        Self {
+            shape,
+            extent,
+            material,
+            location,
+            film_w_per_m2_k: None,
+            spool: None,
+            bore_heat: None,
+            flange: None,
+            conductivity_slope_per_k: 0.0,
+            cells_per_layer: DEFAULT_CELLS_PER_LAYER,
+        }
+    }
+}
+
+/// What drives the field: temperatures against time, the pack being in a steady state before the first knot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Drive {
+    /// The temperature at the heat path's [`Location`] [K].
+    pub boundary_k: PiecewiseLinear,
+    /// The ambient's, where it is known apart from the boundary [K].
+    pub ambient_k: Option<PiecewiseLinear>,
+}
+
+impl Drive {
+    pub fn boundary(boundary_k: PiecewiseLinear) -> Self {
+        Self { boundary_k, ambient_k: None }
+    }
+
+    pub fn ambient_k(&self) -> &PiecewiseLinear {
+        self.ambient_k.as_ref().unwrap_or(&self.boundary_k)
+    }
+
+    pub fn start_s(&self) -> f64 {
+        self.boundary_k.knots()[0]
+    }
+}
+
+/// From which side a time is approached: rates jump where the drive's rate does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    Before,
+    After,
+}
+
+/// A time at which a field is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Instant {
+    pub time_s: f64,
+    pub side: Side,
+}
+
+impl Instant {
+    pub fn after(time_s: f64) -> Self {
+        Self { time_s, side: Side::After }
+    }
+
+    pub fn before(time_s: f64) -> Self {
+        Self { time_s, side: Side::Before }
+    }
+}
+
+/// Temperatures and their rates in every layer at a sequence of times.
+///
+/// # Shapes
+/// Row-major, one row a time, `layers` columns, innermost layer first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ThermalHistory {
+    pub layers: usize,
+    pub times_s: Vec<f64>,
+    pub temperature_k: Vec<f64>,
+    pub rate_k_per_s: Vec<f64>,
+    /// ∫ Ṫ ζ dζ over −½ ≤ ζ ≤ ½, ζ the axial coordinate over the height, growing away from the first flange; empty
+    /// where nothing varies along the axis.
+    pub axial_moment_k_per_s: Vec<f64>,
+    pub ambient_k: Vec<f64>,
+    pub ambient_rate_k_per_s: Vec<f64>,
+}
+
+impl ThermalHistory {
+    pub fn with_capacity(layers: usize, times: usize) -> Self {
+        Self {
+            layers,
+            times_s: Vec::with_capacity(times),
+            temperature_k: Vec::with_capacity(times * layers),
+            rate_k_per_s: Vec::with_capacity(times * layers),
+            axial_moment_k_per_s: Vec::new(),
+            ambient_k: Vec::with_capacity(times),
+            ambient_rate_k_per_s: Vec::with_capacity(times),
+        }
+    }
+
+    pub fn len(&self) -> usize {
+        self.times_s.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.times_s.is_empty()
+    }
+
+    pub fn temperatures_k(&self, row: usize) -> &[f64] {
+        &self.temperature_k[row * self.layers..(row + 1) * self.layers]
+    }
+
+    pub fn rates_k_per_s(&self, row: usize) -> &[f64] {
+        &self.rate_k_per_s[row * self.layers..(row + 1) * self.layers]
+    }
+
+    pub fn axial_moments_k_per_s(&self, row: usize) -> &[f64] {
+        if self.axial_moment_k_per_s.is_empty() {
+            &[]
+        } else {
+            &self.axial_moment_k_per_s[row * self.layers..(row + 1) * self.layers]
+        }
+    }
+}
+
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum ThermalError {
+    #[error("{what} needs a pack that ends somewhere: set thermal.model = \"pack\" or add the effect finite_pack")]
+    NeedsPack { what: &'static str },
+    #[error(
+        "{what} needs thermal.conductivity_w_per_m_k and thermal.volumetric_heat_capacity_j_per_m3_k, found only thermal.diffusivity_m2_per_s"
+    )]
+    NeedsConductivity { what: &'static str },
+    #[error("cells per layer must be 1 or an even number, found {found}")]
+    Cells { found: usize },
+    #[error(
+        "the thermal operator's eigenvalues did not converge: check that all thermal values are of a physical size"
+    )]
+    Eigen,
+    #[error(
+        "the conductivity at {temperature_k:.1} K is not positive: the slope {slope_per_k} per K is too steep for this record or profile"
+    )]
+    ConductivityNotPositive { temperature_k: f64, slope_per_k: f64 },
+    #[error("{what} makes the field nonlinear: it has no step response")]
+    Nonlinear { what: &'static str },
+}
+
+/// The response of every layer's rate to a unit step of the boundary's rate at t = 0.
+#[derive(Debug, Clone)]
+pub enum StepResponse {
+    HalfSpace(half_space::HalfSpace),
+    Pack(Pack),
+}
+
+impl StepResponse {
+    /// # Errors
+    /// Heat paths that are nonlinear, or that lack what they need.
+    pub fn of(path: &HeatPath) -> Result<Self, ThermalError> {
+        check(path)?;
+        if path.conductivity_slope_per_k != 0.0 {
+            return Err(ThermalError::Nonlinear { what: "conductivity_temperature" });
+        }
+        Ok(match path.extent {
+            Extent::HalfSpace => StepResponse::HalfSpace(half_space::HalfSpace::new(path)),
+            Extent::Pack => StepResponse::Pack(Pack::new(path)?),
+        })
+    }
+
+    /// Ṫ_j/k0 at `time_s` ≥ 0 after the step (the right limit at 0), written to `layers`.
+    pub fn rates(&self, time_s: f64, layers: &mut [f64]) {
+        match self {
+            StepResponse::HalfSpace(half_space) => half_space.step_rates(time_s, layers),
+            StepResponse::Pack(pack) => pack.step_rates(time_s, layers),
+        }
+    }
+
+    /// A time after which the response no longer changes, or after which it follows its power-law tail.
+    pub fn settling_s(&self) -> f64 {
+        match self {
+            StepResponse::HalfSpace(half_space) => half_space.settling_s(),
+            StepResponse::Pack(pack) => pack.settling_s(),
+        }
+    }
+
+    /// The shortest time on which the response changes: that of the thinnest cell or spacing.
+    pub fn shortest_s(&self) -> f64 {
+        match self {
+            StepResponse::HalfSpace(half_space) => half_space.shortest_s(),
+            StepResponse::Pack(pack) => pack.shortest_s(),
+        }
+    }
+}
+
+/// The temperature field under one drive.
+#[derive(Debug, Clone)]
+pub enum Field {
+    HalfSpace(HalfSpaceField),
+    Pack(PackField),
+}
+
+/// Solves a heat path under a drive.
+///
+/// # Errors
+/// A heat path whose parts contradict each other or lack a material property.
+pub fn solve(path: &HeatPath, drive: &Drive) -> Result<Field, ThermalError> {
+    check(path)?;
+    Ok(match path.extent {
+        Extent::HalfSpace => Field::HalfSpace(HalfSpaceField::new(half_space::HalfSpace::new(path), drive)),
+        Extent::Pack => Field::Pack(PackField::new(Pack::new(path)?, drive)),
+    })
+}
+
+/// What a heat path cannot be.
+fn check(path: &HeatPath) -> Result<(), ThermalError> {
+    if path.extent == Extent::HalfSpace {
+        let extras = [
+            (path.location == Location::Ambient, "a film or an ambient sensor"),
+            (path.spool.is_some(), "spool_mass"),
+            (path.bore_heat.is_some(), "self_heating"),
+            (path.flange.is_some(), "axial_gradient"),
+            (path.conductivity_slope_per_k != 0.0, "conductivity_temperature"),
+        ];
+        if let Some((_, what)) = extras.into_iter().find(|(present, _)| *present) {
+            return Err(ThermalError::NeedsPack { what });
+        }
+    }
+    if matches!(path.material, Material::Diffusivity { .. }) {
+        let extras = [
+            (path.location == Location::Ambient && path.film_w_per_m2_k.is_some(), "surface_film"),
+            (path.spool.is_some(), "spool_mass"),
+            (path.bore_heat.is_some(), "self_heating"),
+            (path.flange.is_some(), "axial_gradient"),
+        ];
+        if let Some((_, what)) = extras.into_iter().find(|(present, _)| *present) {
+            return Err(ThermalError::NeedsConductivity { what });
+        }
+    }
+    if path.cells_per_layer != 1 && path.cells_per_layer % 2 != 0 || path.cells_per_layer == 0 {
+        return Err(ThermalError::Cells { found: path.cells_per_layer });
+    }
+    Ok(())
+}
+
+impl Field {
+    /// The field at given instants.
+    pub fn at(&self, instants: &[Instant]) -> ThermalHistory {
+        match self {
+            Field::HalfSpace(field) => field.at(instants),
+            Field::Pack(field) => field.at(instants),
+        }
+    }
+
+    /// The mean over the window that ends at each time: what a logger that averages sees.
+    ///
+    /// A layer's mean rate over a window is exactly its change of temperature over the window; its temperature is
+    /// taken as the mean of both ends. A window of zero gives the instants themselves.
+    pub fn means(&self, ends_s: &[f64], window_s: f64) -> ThermalHistory {
+        if window_s <= 0.0 {
+            return self.at(&ends_s.iter().map(|&t| Instant::after(t)).collect::<Vec<_>>());
+        }
+        let ends = self.at(&ends_s.iter().map(|&t| Instant::before(t)).collect::<Vec<_>>());
+        let starts = self.at(&ends_s.iter().map(|&t| Instant::after(t - window_s)).collect::<Vec<_>>());
+        let moments = self.moment_means(ends_s, window_s);
+        let middle = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| 0.5 * (a + b)).collect::<Vec<f64>>();
+        let change = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (b - a) / window_s).collect::<Vec<f64>>();
+        ThermalHistory {
+            layers: ends.layers,
+            times_s: ends_s.to_vec(),
+            temperature_k: middle(&starts.temperature_k, &ends.temperature_k),
+            rate_k_per_s: change(&starts.temperature_k, &ends.temperature_k),
+            axial_moment_k_per_s: moments,
+            ambient_k: middle(&starts.ambient_k, &ends.ambient_k),
+            ambient_rate_k_per_s: change(&starts.ambient_k, &ends.ambient_k),
+        }
+    }
+
+    /// The axial moment's mean over each window; empty where nothing varies along the axis.
+    fn moment_means(&self, _ends_s: &[f64], _window_s: f64) -> Vec<f64> {
+        Vec::new()
+    }
+}
+
+fn push_ambient(history: &mut ThermalHistory, drive: &Drive, instant: Instant) {
+    let ambient = drive.ambient_k();
+    history.ambient_k.push(ambient.value(instant.time_s));
+    history.ambient_rate_k_per_s.push(match instant.side {
+        Side::Before => ambient.slope_before(instant.time_s),
+        Side::After => ambient.slope_after(instant.time_s),
+    });
+}

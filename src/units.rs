@@ -1,0 +1,220 @@
+//! The only place where units are converted; everything else in the crate holds SI.
+//!
+//! Files and screens speak °/h, °C, mm, µm, nm and °C/h, because coil designers do. A number is converted once
+//! when it is read and once when it is shown, and its name ends in its unit on both sides.
+
+/// Speed of light in vacuum [m/s], exact by definition of the metre.
+pub const LIGHT_SPEED_M_PER_S: f64 = 299_792_458.0;
+
+const SECONDS_PER_HOUR: f64 = 3600.0;
+const SECONDS_PER_MINUTE: f64 = 60.0;
+const DEGREES_PER_RADIAN: f64 = 180.0 / std::f64::consts::PI;
+const ZERO_CELSIUS_K: f64 = 273.15;
+const MILLI: f64 = 1e-3;
+const MICRO: f64 = 1e-6;
+const NANO: f64 = 1e-9;
+
+/// The temperature at which the temperature-dependent effects are zero: 20 °C, in kelvin.
+pub const REFERENCE_TEMPERATURE_K: f64 = ZERO_CELSIUS_K + 20.0;
+
+pub fn rad_per_s_from_deg_per_h(rate_deg_per_h: f64) -> f64 {
+    rate_deg_per_h / DEGREES_PER_RADIAN / SECONDS_PER_HOUR
+}
+
+pub fn deg_per_h_from_rad_per_s(rate_rad_per_s: f64) -> f64 {
+    rate_rad_per_s * DEGREES_PER_RADIAN * SECONDS_PER_HOUR
+}
+
+pub fn rad_per_s_from_deg_per_s(rate_deg_per_s: f64) -> f64 {
+    rate_deg_per_s / DEGREES_PER_RADIAN
+}
+
+pub fn deg_per_s_from_rad_per_s(rate_rad_per_s: f64) -> f64 {
+    rate_rad_per_s * DEGREES_PER_RADIAN
+}
+
+/// Angle random walk: rad/√s to °/√h.
+pub fn deg_per_sqrt_h_from_rad_per_sqrt_s(walk_rad_per_sqrt_s: f64) -> f64 {
+    walk_rad_per_sqrt_s * DEGREES_PER_RADIAN * SECONDS_PER_HOUR.sqrt()
+}
+
+/// Rate random walk: rad/s/√s to °/h/√h.
+pub fn deg_per_h_per_sqrt_h_from_rad_per_s_per_sqrt_s(walk_rad_per_s_per_sqrt_s: f64) -> f64 {
+    deg_per_h_from_rad_per_s(walk_rad_per_s_per_sqrt_s) * SECONDS_PER_HOUR.sqrt()
+}
+
+pub fn deg_from_rad(angle_rad: f64) -> f64 {
+    angle_rad * DEGREES_PER_RADIAN
+}
+
+pub fn arcsec_from_rad(angle_rad: f64) -> f64 {
+    angle_rad * DEGREES_PER_RADIAN * SECONDS_PER_HOUR
+}
+
+pub fn kelvin_from_celsius(temperature_c: f64) -> f64 {
+    temperature_c + ZERO_CELSIUS_K
+}
+
+pub fn celsius_from_kelvin(temperature_k: f64) -> f64 {
+    temperature_k - ZERO_CELSIUS_K
+}
+
+pub fn k_per_s_from_c_per_h(ramp_c_per_h: f64) -> f64 {
+    ramp_c_per_h / SECONDS_PER_HOUR
+}
+
+pub fn c_per_h_from_k_per_s(ramp_k_per_s: f64) -> f64 {
+    ramp_k_per_s * SECONDS_PER_HOUR
+}
+
+pub fn k_per_s_from_c_per_min(ramp_c_per_min: f64) -> f64 {
+    ramp_c_per_min / SECONDS_PER_MINUTE
+}
+
+pub fn c_per_min_from_k_per_s(ramp_k_per_s: f64) -> f64 {
+    ramp_k_per_s * SECONDS_PER_MINUTE
+}
+
+pub fn h_from_s(duration_s: f64) -> f64 {
+    duration_s / SECONDS_PER_HOUR
+}
+
+pub fn min_from_s(duration_s: f64) -> f64 {
+    duration_s / SECONDS_PER_MINUTE
+}
+
+pub fn s_from_min(duration_min: f64) -> f64 {
+    duration_min * SECONDS_PER_MINUTE
+}
+
+pub fn s_from_h(duration_h: f64) -> f64 {
+    duration_h * SECONDS_PER_HOUR
+}
+
+pub fn m_from_mm(length_mm: f64) -> f64 {
+    length_mm * MILLI
+}
+
+pub fn mm_from_m(length_m: f64) -> f64 {
+    length_m / MILLI
+}
+
+pub fn m_from_um(length_um: f64) -> f64 {
+    length_um * MICRO
+}
+
+pub fn um_from_m(length_m: f64) -> f64 {
+    length_m / MICRO
+}
+
+pub fn m_from_nm(length_nm: f64) -> f64 {
+    length_nm * NANO
+}
+
+pub fn nm_from_m(length_m: f64) -> f64 {
+    length_m / NANO
+}
+
+pub fn percent_from_fraction(fraction: f64) -> f64 {
+    fraction * 100.0
+}
+
+pub fn fraction_from_percent(percent: f64) -> f64 {
+    percent / 100.0
+}
+
+/// The unit in which a user states an effect's parameter; the key's name ends in it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unit {
+    /// A ratio or a count.
+    One,
+    PerKelvin,
+    Second,
+    Metre,
+    Celsius,
+    Kelvin,
+    WattPerSquareMetre,
+    WattPerSquareMetreKelvin,
+    JoulePerSquareMetreKelvin,
+    DegPerHour,
+    DegPerHourPerKelvin,
+    DegPerHourPerSquareKelvin,
+    DegPerHourSecondPerKelvin,
+    DegPerHourPerUnit,
+}
+
+impl Unit {
+    /// As shown behind a number.
+    pub fn symbol(self) -> &'static str {
+        match self {
+            Unit::One => "1",
+            Unit::PerKelvin => "1/K",
+            Unit::Second => "s",
+            Unit::Metre => "m",
+            Unit::Celsius => "°C",
+            Unit::Kelvin => "K",
+            Unit::WattPerSquareMetre => "W/m²",
+            Unit::WattPerSquareMetreKelvin => "W/(m²K)",
+            Unit::JoulePerSquareMetreKelvin => "J/(m²K)",
+            Unit::DegPerHour => "°/h",
+            Unit::DegPerHourPerKelvin => "°/h/K",
+            Unit::DegPerHourPerSquareKelvin => "°/h/K²",
+            Unit::DegPerHourSecondPerKelvin => "°/h per K/s",
+            Unit::DegPerHourPerUnit => "°/h per unit",
+        }
+    }
+
+    /// A value as stated by the user, in SI.
+    pub fn to_si(self, stated: f64) -> f64 {
+        match self {
+            Unit::Celsius => kelvin_from_celsius(stated),
+            _ => stated * self.scale(),
+        }
+    }
+
+    /// A value in SI, as stated to the user.
+    pub fn from_si(self, si: f64) -> f64 {
+        match self {
+            Unit::Celsius => celsius_from_kelvin(si),
+            _ => si / self.scale(),
+        }
+    }
+
+    /// A difference or a standard error in SI, as stated to the user (no zero point).
+    pub fn difference_from_si(self, si: f64) -> f64 {
+        si / self.scale()
+    }
+
+    fn scale(self) -> f64 {
+        match self {
+            Unit::DegPerHour
+            | Unit::DegPerHourPerKelvin
+            | Unit::DegPerHourPerSquareKelvin
+            | Unit::DegPerHourSecondPerKelvin
+            | Unit::DegPerHourPerUnit => rad_per_s_from_deg_per_h(1.0),
+            _ => 1.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_earth_rate_survives_the_round_trip() {
+        let earth_rad_per_s = 7.292_115e-5;
+        let shown_deg_per_h = deg_per_h_from_rad_per_s(earth_rad_per_s);
+        assert!((shown_deg_per_h - 15.041_067).abs() < 1e-6);
+        assert!((rad_per_s_from_deg_per_h(shown_deg_per_h) - earth_rad_per_s).abs() < 1e-19);
+    }
+
+    #[test]
+    fn a_stated_parameter_survives_the_round_trip_in_every_unit() {
+        for unit in [Unit::One, Unit::Celsius, Unit::Kelvin, Unit::DegPerHourSecondPerKelvin, Unit::WattPerSquareMetre]
+        {
+            let stated = -12.5;
+            assert!((unit.from_si(unit.to_si(stated)) - stated).abs() < 1e-12, "{unit:?}");
+        }
+    }
+}

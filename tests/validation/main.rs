@@ -1,0 +1,3 @@
+//! Numbers checked against something outside the program; each file's head names its reference.
+
+mod paper;
