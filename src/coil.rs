@@ -86,7 +86,7 @@ impl Coil {
     /// # Errors
     /// An odd or too small layer count, lengths that are missing or disagree, dimensions that are not positive.
     pub fn new(spec: CoilSpec) -> Result<Self, CoilError> {
-        if spec.layers < 2 || spec.layers % 2 != 0 {
+        if spec.layers < 2 || !spec.layers.is_multiple_of(2) {
             return Err(CoilError::Layers { found: spec.layers });
         }
         for (quantity, found) in [

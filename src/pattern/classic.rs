@@ -109,7 +109,7 @@ impl Classic {
     /// A layer count that is no multiple of the winding's word: never truncated silently.
     pub fn pattern(self, layers: usize) -> Result<Pattern, ClassicError> {
         let multiple = self.multiple();
-        if layers == 0 || layers % multiple != 0 {
+        if layers == 0 || !layers.is_multiple_of(multiple) {
             let below = layers / multiple * multiple;
             return Err(ClassicError::Multiple {
                 name: self.title(),

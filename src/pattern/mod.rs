@@ -47,7 +47,7 @@ impl Pattern {
     /// An odd or too small count, a segment out of range, a segment named twice. Layers in errors count from 1.
     pub fn new(segments: Vec<usize>) -> Result<Self, PatternError> {
         let layers = segments.len();
-        if layers < 2 || layers % 2 != 0 {
+        if layers < 2 || !layers.is_multiple_of(2) {
             return Err(PatternError::Count { found: layers });
         }
         let mut seen = vec![None; layers];
@@ -103,7 +103,7 @@ impl Pattern {
     pub fn axial_direction(&self, layer: usize) -> f64 {
         let first = self.segments[0];
         let starts_low = first == 1 || (first != self.layers() && self.half(0) == Half::B);
-        let same_parity = (self.segments[layer] + first) % 2 == 0;
+        let same_parity = (self.segments[layer] + first).is_multiple_of(2);
         if starts_low == same_parity { 1.0 } else { -1.0 }
     }
 }

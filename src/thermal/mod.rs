@@ -326,7 +326,7 @@ impl StepResponse {
 #[derive(Debug, Clone)]
 pub enum Field {
     HalfSpace(HalfSpaceField),
-    Pack(PackField),
+    Pack(Box<PackField>),
 }
 
 /// Solves a heat path under a drive.
@@ -337,7 +337,7 @@ pub fn solve(path: &HeatPath, drive: &Drive) -> Result<Field, ThermalError> {
     check(path)?;
     Ok(match path.extent {
         Extent::HalfSpace => Field::HalfSpace(HalfSpaceField::new(half_space::HalfSpace::new(path), drive)),
-        Extent::Pack => Field::Pack(PackField::new(Pack::new(path)?, drive)),
+        Extent::Pack => Field::Pack(Box::new(PackField::new(Pack::new(path)?, drive))),
     })
 }
 
@@ -366,7 +366,7 @@ fn check(path: &HeatPath) -> Result<(), ThermalError> {
             return Err(ThermalError::NeedsConductivity { what });
         }
     }
-    if path.cells_per_layer != 1 && path.cells_per_layer % 2 != 0 || path.cells_per_layer == 0 {
+    if path.cells_per_layer == 0 || (path.cells_per_layer != 1 && !path.cells_per_layer.is_multiple_of(2)) {
         return Err(ThermalError::Cells { found: path.cells_per_layer });
     }
     Ok(())
