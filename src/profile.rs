@@ -38,7 +38,8 @@ impl Profile {
             return Err(ProfileError::Empty);
         }
         for (index, piece) in pieces.iter().enumerate() {
-            if !piece.rate_k_per_s.is_finite() || !(piece.duration_s > 0.0 && piece.duration_s.is_finite()) {
+            let valid = piece.rate_k_per_s.is_finite() && piece.duration_s > 0.0 && piece.duration_s.is_finite();
+            if !valid {
                 return Err(ProfileError::Piece {
                     index,
                     rate_k_per_s: piece.rate_k_per_s,

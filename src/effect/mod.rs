@@ -186,6 +186,9 @@ pub struct ChoiceSpec {
     pub meaning: &'static str,
 }
 
+/// Makes an effect from its values in SI (in the order of the spec's parameters), its choices and what it is bound to.
+pub type Build = fn(&[f64], &[usize], &Binding) -> Box<dyn Effect>;
+
 /// All that is to be said about an effect.
 #[derive(Debug, Clone, Copy)]
 pub struct EffectSpec {
@@ -202,8 +205,7 @@ pub struct EffectSpec {
     pub signature: &'static str,
     /// Which experiment would isolate it.
     pub experiment: &'static str,
-    /// Makes the effect from its values in SI (in the order of `parameters`) and choices.
-    pub build: fn(&[f64], &[usize], &Binding) -> Box<dyn Effect>,
+    pub build: Build,
 }
 
 /// An effect with its parameters, as a model declares it.
