@@ -19,3 +19,7 @@ pub mod thermal;
 pub mod rate;
 // Floor 4: what is done with it.
 pub mod search;
+// Floor 5: files and pages.
+pub mod io;
+// Floor 6: the command line.
+pub mod cli;

@@ -342,7 +342,10 @@ pub fn solve(path: &HeatPath, drive: &Drive) -> Result<Field, ThermalError> {
 }
 
 /// What a heat path cannot be.
-fn check(path: &HeatPath) -> Result<(), ThermalError> {
+///
+/// # Errors
+/// Parts that contradict each other or lack a material property.
+pub fn check(path: &HeatPath) -> Result<(), ThermalError> {
     if path.extent == Extent::HalfSpace {
         let extras = [
             (path.location == Location::Ambient, "a film or an ambient sensor"),

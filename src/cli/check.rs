@@ -1,0 +1,48 @@
+//! `check`: all faults of a model file at once.
+
+use std::path::PathBuf;
+
+use super::screen::Screen;
+use super::{CliError, Ending};
+use crate::io::fault::Faults;
+use crate::io::json::{CheckJson, FaultJson};
+use crate::io::model_file::read_model;
+
+/// All faults of a model file at once
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  coilwright check examples/paper-200m.toml")]
+pub struct Arguments {
+    /// The model file
+    model: PathBuf,
+}
+
+pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+    let file = arguments.model.display().to_string();
+    match read_model(&arguments.model) {
+        Ok(found) => {
+            let advice = found.advice.iter().map(ToString::to_string).collect();
+            screen.answer(CheckJson { file, faults: Vec::new(), advice }, |body| {
+                let notes: String = body.advice.iter().map(|a| format!("note: {a}\n")).collect();
+                format!("{}: no faults\n{notes}", body.file)
+            })?;
+            Ok(Ending::Done)
+        }
+        Err(faults) if screen.is_json() => {
+            screen.answer(CheckJson { file, faults: faults_json(&faults), advice: Vec::new() }, |_| String::new())?;
+            Err(faults.into())
+        }
+        Err(faults) => Err(faults.into()),
+    }
+}
+
+fn faults_json(faults: &Faults) -> Vec<FaultJson> {
+    faults
+        .faults
+        .iter()
+        .map(|fault| FaultJson {
+            message: fault.message.clone(),
+            line: fault.span.as_ref().map(|s| faults.source[..s.start].lines().count().max(1)),
+            note: fault.note.clone(),
+        })
+        .collect()
+}

@@ -1,0 +1,74 @@
+//! `evaluate`: what the rate error of given windings is at worst.
+
+use std::path::PathBuf;
+
+use super::screen::{Screen, table};
+use super::{CliError, Ending};
+use crate::io::json::{EvaluateJson, PatternJson};
+use crate::io::model_file::{ModelFile, NamedPattern, read_model};
+use crate::io::pattern_file::resolve_pattern;
+use crate::pattern::classic::Classic;
+use crate::rate::RateModel;
+use crate::search::worst_case::SolvedProfiles;
+
+/// Worst rate error of windings over a model's profiles
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  coilwright evaluate examples/paper-200m.toml --pattern qua --pattern patterns/qua-12.toml"
+)]
+pub struct Arguments {
+    /// The model file
+    model: PathBuf,
+    /// A winding's name (zyl, sym, sym-text, dip, qua, oct, hex) or a pattern file; may be repeated. Without it: the
+    /// model's own and all classics that fit
+    #[arg(long, short, value_name = "PATTERN")]
+    pattern: Vec<String>,
+}
+
+pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+    let file = read_model(&arguments.model)?;
+    for advice in &file.advice {
+        screen.note(&format!("note: {advice}"));
+    }
+    let patterns = if arguments.pattern.is_empty() {
+        own_and_classics(&file)
+    } else {
+        let layers = file.model.coil.layers();
+        arguments.pattern.iter().map(|stated| resolve_pattern(stated, layers, None)).collect::<Result<_, _>>()?
+    };
+    let solved = SolvedProfiles::new(&file.model, &file.profiles.profiles())?;
+    let mut answers = Vec::with_capacity(patterns.len());
+    for NamedPattern { name, pattern } in &patterns {
+        let worst = solved.worst_case(&file.model, pattern)?;
+        let phase_rad = RateModel::new(&file.model, pattern, &[])?.phase_rad(worst.rate_rad_per_s);
+        answers.push(PatternJson::new(name, pattern, &worst, phase_rad, None));
+    }
+    let body = EvaluateJson { model: file.model.name.clone(), patterns: answers };
+    screen.answer(body, |body| {
+        let rows = body.patterns.iter().map(|p| {
+            vec![
+                p.name.clone(),
+                format!("{:.4}", p.worst_rate_deg_per_h),
+                format!("{:.3e}", p.worst_phase_rad),
+                p.worst_profile.clone(),
+                format!("{:.2}", p.worst_time_s),
+                p.windability.class.clone(),
+                p.windability.reels.to_string(),
+                p.windability.max_climb.to_string(),
+            ]
+        });
+        table(&["pattern", "worst °/h", "phase rad", "profile", "at s", "class", "reels", "climb"], rows)
+    })?;
+    Ok(Ending::Done)
+}
+
+/// The model's own pattern first, unless it is a classic anyway.
+fn own_and_classics(file: &ModelFile) -> Vec<NamedPattern> {
+    let layers = file.model.coil.layers();
+    let classics = Classic::ALL.into_iter().filter_map(|classic| {
+        let pattern = classic.pattern(layers).ok()?;
+        Some(NamedPattern { name: classic.key().to_owned(), pattern })
+    });
+    let own = file.pattern.iter().filter(|named| Classic::from_key(&named.name).is_err()).cloned();
+    own.chain(classics).collect()
+}

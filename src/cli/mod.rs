@@ -1,0 +1,115 @@
+//! The command line: one file a subcommand — parse, call, print. Documents go to stdout, words and progress to stderr.
+
+mod check;
+mod evaluate;
+mod new;
+mod patterns;
+pub mod screen;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand, ValueEnum};
+use thiserror::Error;
+
+use crate::io::fault::Faults;
+use crate::io::files::WriteError;
+use crate::io::pattern_file::ResolveError;
+use crate::rate::RateError;
+use crate::search::worst_case::SearchError;
+use screen::Screen;
+
+/// Designs winding patterns of fibre-optic-gyroscope coils.
+#[derive(Debug, Parser)]
+#[command(name = "coilwright", version, max_term_width = 110, after_help = EXAMPLES)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    #[command(flatten)]
+    output: OutputOptions,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  coilwright new my-coil.toml                    write a commented model file
+  coilwright check my-coil.toml                  find all its faults at once
+  coilwright evaluate my-coil.toml               the classic windings' worst rate errors
+  coilwright optimise my-coil.toml -o results/my-coil
+
+Exit codes: 0 done; 1 the answer is no; 2 the request was wrong; 130 interrupted";
+
+#[derive(Debug, Clone, clap::Args)]
+pub struct OutputOptions {
+    /// How the answer is written to stdout
+    #[arg(long, global = true, value_enum, default_value_t = Format::Text)]
+    pub format: Format,
+    /// Nothing on stderr but errors
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// Words and tables
+    Text,
+    /// One JSON document
+    Json,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Evaluate(evaluate::Arguments),
+    Patterns(patterns::Arguments),
+    Check(check::Arguments),
+    New(new::Arguments),
+}
+
+/// How a command ended; errors aside.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ending {
+    Done,
+    /// The answer is no: violations found, model not adequate under `--strict`.
+    No,
+    Interrupted,
+}
+
+/// Why a request cannot be carried out; all of them end with exit code 2.
+#[derive(Debug, Error)]
+pub enum CliError {
+    #[error("{0}")]
+    Faults(#[from] Faults),
+    #[error("error: {0}")]
+    Write(#[from] WriteError),
+    #[error("error: {0}")]
+    Resolve(#[from] ResolveError),
+    #[error("error: {0}")]
+    Search(#[from] SearchError),
+    #[error("error: {0}")]
+    Rate(#[from] RateError),
+    #[error("error: {path} exists already: choose another name or remove it first")]
+    Exists { path: String },
+    #[error("error: cannot write to stdout: {0}")]
+    Stdout(std::io::Error),
+}
+
+/// Parses the arguments, runs the command, and turns its ending into an exit code.
+pub fn run() -> ExitCode {
+    let cli = Cli::parse();
+    let screen = Screen::new(&cli.output);
+    let ending = match &cli.command {
+        Command::Evaluate(arguments) => evaluate::run(arguments, &screen),
+        Command::Patterns(arguments) => patterns::run(arguments, &screen),
+        Command::Check(arguments) => check::run(arguments, &screen),
+        Command::New(arguments) => new::run(arguments, &screen),
+    };
+    match ending {
+        Ok(Ending::Done) => ExitCode::SUCCESS,
+        Ok(Ending::No) => ExitCode::from(1),
+        Ok(Ending::Interrupted) => ExitCode::from(130),
+        // A reader that has seen enough (`| head`) is no failure.
+        Err(CliError::Stdout(error)) if error.kind() == std::io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{}", error.to_string().trim_end());
+            ExitCode::from(2)
+        }
+    }
+}

@@ -1,0 +1,32 @@
+//! `new`: a commented model file to start from.
+
+use std::path::PathBuf;
+
+use super::screen::Screen;
+use super::{CliError, Ending};
+use crate::io::files::write_atomically;
+
+/// Write a commented model file to start from
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  coilwright new my-coil        writes my-coil.toml")]
+pub struct Arguments {
+    /// The coil's name, or the file's (with .toml)
+    name: String,
+}
+
+const TEMPLATE: &str = include_str!("new_template.toml");
+
+pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+    let mut path = PathBuf::from(&arguments.name);
+    if path.extension().is_none_or(|e| e != "toml") {
+        path = PathBuf::from(format!("{}.toml", arguments.name));
+    }
+    if path.exists() {
+        return Err(CliError::Exists { path: path.display().to_string() });
+    }
+    let coil = path.file_stem().map_or_else(|| "coil".to_owned(), |s| s.to_string_lossy().into_owned());
+    let name = toml_edit::Value::from(coil).to_string();
+    write_atomically(&path, TEMPLATE.replace("\"NAME\"", name.trim()).as_bytes())?;
+    screen.note(&format!("wrote {}; next: coilwright check {0}", path.display()));
+    Ok(Ending::Done)
+}

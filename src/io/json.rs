@@ -1,0 +1,116 @@
+//! JSON documents: mirror types of what commands answer, with the keys that scripts read.
+
+use serde::Serialize;
+
+use crate::pattern::Pattern;
+use crate::pattern::windability::WindingGraph;
+use crate::search::worst_case::WorstCase;
+use crate::units::deg_per_h_from_rad_per_s;
+
+/// Raised when a key changes its meaning or goes; new keys do not raise it.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// A document with its schema version in front.
+#[derive(Debug, Serialize)]
+pub struct Document<T: Serialize> {
+    pub schema_version: u32,
+    #[serde(flatten)]
+    pub body: T,
+}
+
+impl<T: Serialize> Document<T> {
+    pub fn new(body: T) -> Self {
+        Self { schema_version: SCHEMA_VERSION, body }
+    }
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct WindabilityJson {
+    pub class: String,
+    pub reels: usize,
+    pub captive: usize,
+    pub max_climb: usize,
+}
+
+impl WindabilityJson {
+    pub fn of(pattern: &Pattern) -> Self {
+        let found = WindingGraph::new(pattern).windability();
+        Self {
+            class: found.class().to_string(),
+            reels: found.reels,
+            captive: found.captive,
+            max_climb: found.max_climb,
+        }
+    }
+}
+
+/// A pattern with its worst case.
+#[derive(Debug, Clone, Serialize)]
+pub struct PatternJson {
+    pub name: String,
+    pub segments: Vec<usize>,
+    pub worst_rate_deg_per_h: f64,
+    pub worst_phase_rad: f64,
+    pub worst_profile: String,
+    pub worst_time_s: f64,
+    /// Null where the model is nonlinear and no bound over all profiles exists.
+    pub guaranteed_worst_rate_deg_per_h: Option<f64>,
+    pub windability: WindabilityJson,
+}
+
+impl PatternJson {
+    /// `phase_rad` is the phase at the worst rate; the worst rate is shown as a size.
+    pub fn new(
+        name: &str,
+        pattern: &Pattern,
+        worst: &WorstCase,
+        phase_rad: f64,
+        guaranteed_rad_per_s: Option<f64>,
+    ) -> Self {
+        Self {
+            name: name.to_owned(),
+            segments: pattern.segments().to_vec(),
+            worst_rate_deg_per_h: deg_per_h_from_rad_per_s(worst.rate_rad_per_s.abs()),
+            worst_phase_rad: phase_rad.abs(),
+            worst_profile: worst.profile.clone(),
+            worst_time_s: worst.time_s,
+            guaranteed_worst_rate_deg_per_h: guaranteed_rad_per_s.map(deg_per_h_from_rad_per_s),
+            windability: WindabilityJson::of(pattern),
+        }
+    }
+}
+
+#[derive(Debug, Serialize)]
+pub struct EvaluateJson {
+    pub model: String,
+    pub patterns: Vec<PatternJson>,
+}
+
+#[derive(Debug, Serialize)]
+pub struct FaultJson {
+    pub message: String,
+    /// Counted from 1; null for a fault of the file as a whole.
+    pub line: Option<usize>,
+    pub note: Option<String>,
+}
+
+#[derive(Debug, Serialize)]
+pub struct CheckJson {
+    pub file: String,
+    pub faults: Vec<FaultJson>,
+    pub advice: Vec<String>,
+}
+
+#[derive(Debug, Serialize)]
+pub struct ClassicJson {
+    pub name: String,
+    pub title: String,
+    pub layers: usize,
+    pub segments: Vec<usize>,
+    pub windability: WindabilityJson,
+}
+
+#[derive(Debug, Serialize)]
+pub struct PatternsJson {
+    pub patterns: Vec<ClassicJson>,
+}

@@ -1,0 +1,8 @@
+//! Files in, files out: the only place (with `report`) that knows serde, paths, TOML, CSV and JSON.
+
+pub mod fault;
+pub mod files;
+pub mod json;
+pub mod model_file;
+pub mod pattern_file;
+pub mod toml_reader;
