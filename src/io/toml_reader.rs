@@ -345,7 +345,7 @@ impl<'d> TableReader<'d> {
     pub fn finish(mut self, reader: &mut TomlReader) {
         let Some(table) = self.table else { return };
         for (key, item) in table.iter() {
-            if self.known.iter().any(|k| *k == key) {
+            if self.known.contains(&key) {
                 continue;
             }
             let span = table.key(key).and_then(|k| k.span()).or_else(|| item.span()).or_else(|| self.span.clone());
