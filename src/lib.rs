@@ -18,6 +18,8 @@ pub mod thermal;
 // Floor 3: the readable reference of the rate error.
 pub mod rate;
 // Floor 4: what is done with it.
+pub mod boundary;
+pub mod predict;
 pub mod search;
 // Floor 5: files and pages.
 pub mod io;

@@ -2,3 +2,4 @@
 
 pub mod maximise;
 pub mod piecewise;
+pub mod state_space;

@@ -203,6 +203,17 @@ impl Pack {
         self.decay_per_s.len()
     }
 
+    /// λ_i [1/s], in no particular order.
+    pub fn decays_per_s(&self) -> &[f64] {
+        &self.decay_per_s
+    }
+
+    /// a_ji: what mode `mode` takes away from a layer's steady response while drive and ambient are one temperature.
+    pub fn amplitude(&self, layer: usize, mode: usize) -> f64 {
+        let place = layer * self.modes() + mode;
+        self.boundary.amplitude[place] + self.ambient.as_ref().map_or(0.0, |a| a.amplitude[place])
+    }
+
     /// The rate of every layer after a unit step of the drive's rate; the ambient, if apart, does the same step.
     pub fn step_rates(&self, time_s: f64, layers: &mut [f64]) {
         let decayed: Vec<f64> = self.decay_per_s.iter().map(|l| (-l * time_s.max(0.0)).exp()).collect();

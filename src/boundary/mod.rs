@@ -1,0 +1,290 @@
+//! The temperature that drove a measured record, from the sensor's noisy readings.
+//!
+//! Differentiating a thermocouple amplifies its noise, and smoothing it first smears every change of ramp. So the air
+//! around the pack is treated as latent: piecewise smooth, with few kinks, seen through a film, the pack and the sensor.
+//!
+//! ```text
+//! a' = s,  s' = c + Σ_i σ_i δ(t − t_i),  c' = b,  db ~ N(0, q dt)   air: temperature, slope, curvature, jerk; kinks σ_i
+//! y_i' = −λ_i y_i + s                                                modes of the pack behind the film
+//! T_out = a − Σ_i a_i y_i,   τ T_s' = T_out − T_s,   reading = T_s + N(0, σ²)
+//! ```
+//!
+//! | symbol | meaning | unit | in code |
+//! |---|---|---|---|
+//! | h | film coefficient, in λ_i and a_i | W/(m² K) | `film_w_per_m2_k` |
+//! | t_i, σ_i | time and size of a kink | s, K/s | `Kink` |
+//! | q | how fast the jerk wanders | K²/s⁷ | `jerk_noise_k2_per_s7` |
+//! | τ | lag of the sensor | s | `lag_s` |
+//! | σ | noise of one reading | K | `noise_k` |
+//!
+//! With h, q, t_i given everything is linear and Gaussian. They are chosen by maximum likelihood: kinks are added where
+//! a further shock to the slope would be most significant, moved by Newton steps on the score of a shift in time, and
+//! dropped where they do not stand out. The uncertainty of what is left (that of the kinks' times included) is carried
+//! into the predicted rate error.
+//!
+//! Leaves out: heat from the bore and the flanges, and a conductivity that depends on temperature, all of which the
+//! estimated air absorbs; a half space is estimated as if the pack ended at its bore.
+//!
+//! # Source
+//! Structural time-series models: Harvey, Forecasting, Structural Time Series Models and the Kalman Filter (1989),
+//! chapters 2 and 7; shocks after de Jong and Penzer, J. Am. Stat. Assoc. 93 (1998) 796.
+
+mod air;
+mod kinks;
+
+use thiserror::Error;
+
+use crate::numeric::piecewise::PiecewiseLinear;
+use crate::numeric::state_space::Whitener;
+use crate::thermal::{Drive, HeatPath, Location, ThermalError};
+use air::Scene;
+
+/// Everything about a record and a model that the boundary depends on.
+#[derive(Debug, Clone, Copy)]
+pub struct Observation<'a> {
+    pub times_s: &'a [f64],
+    pub temperature_k: &'a [f64],
+    /// With the model's effects; its location is where the sensor is.
+    pub path: &'a HeatPath,
+    pub lag_s: f64,
+    /// dΩ/dṪ_j of the coil, innermost layer first [rad/s per K/s].
+    pub layer_gain_rad_per_k: &'a [f64],
+    /// Each rate is the mean over this interval before its stamp; 0: instantaneous.
+    pub rate_mean_s: f64,
+}
+
+/// A sudden change of the air's slope.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Kink {
+    pub time_s: f64,
+    pub slope_change_k_per_s: f64,
+}
+
+/// What was found out about the air and the film.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Air {
+    /// None: the sensor is in the air and the model's own film counts.
+    pub film_w_per_m2_k: Option<f64>,
+    pub jerk_noise_k2_per_s7: f64,
+    pub kinks: Vec<Kink>,
+    /// Standard deviation of one reading.
+    pub noise_k: f64,
+}
+
+/// The estimated boundary of one record.
+#[derive(Debug, Clone)]
+pub struct Boundary {
+    air: Air,
+    outer_k: PiecewiseLinear,
+    air_k: PiecewiseLinear,
+    rate_variance_rad2_per_s2: Vec<f64>,
+    log_likelihood: f64,
+    scene: Scene,
+}
+
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum BoundaryError {
+    #[error("the boundary's estimate needs at least {needed} readings of temperature, found {found}")]
+    TooFew { needed: usize, found: usize },
+    #[error(
+        "the temperature stays within {range_k:.4} K: a record without a change of temperature says nothing about the model"
+    )]
+    Constant { range_k: f64 },
+    #[error(transparent)]
+    Thermal(#[from] ThermalError),
+}
+
+/// Fewer readings than this hold no ramp.
+const MIN_READINGS: usize = 16;
+
+/// Estimates the boundary from nothing but the readings.
+///
+/// # Errors
+/// Too few readings, a constant temperature, a heat path that cannot be solved.
+pub fn estimate(observation: &Observation) -> Result<Boundary, BoundaryError> {
+    check(observation)?;
+    let mut scene = Scene::new(observation)?;
+    let air = kinks::search(&mut scene)?;
+    Boundary::new(scene, air)
+}
+
+/// Estimates again, after the model changed a little, starting from what was found before.
+///
+/// # Errors
+/// As [`estimate`].
+pub fn refine(observation: &Observation, known: &Air) -> Result<Boundary, BoundaryError> {
+    check(observation)?;
+    let mut scene = Scene::new(observation)?;
+    let air = kinks::refine(&mut scene, known.clone())?;
+    Boundary::new(scene, air)
+}
+
+fn check(observation: &Observation) -> Result<(), BoundaryError> {
+    let found = observation.temperature_k.len();
+    if found < MIN_READINGS {
+        return Err(BoundaryError::TooFew { needed: MIN_READINGS, found });
+    }
+    let low = observation.temperature_k.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = observation.temperature_k.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if high == low {
+        return Err(BoundaryError::Constant { range_k: high - low });
+    }
+    Ok(())
+}
+
+impl Boundary {
+    fn new(scene: Scene, air: Air) -> Result<Self, BoundaryError> {
+        let found = scene.reconstruct(&air)?;
+        Ok(Self {
+            outer_k: found.outer_k,
+            air_k: found.air_k,
+            rate_variance_rad2_per_s2: found.rate_variance_rad2_per_s2,
+            log_likelihood: found.log_likelihood,
+            air,
+            scene,
+        })
+    }
+
+    pub fn air(&self) -> &Air {
+        &self.air
+    }
+
+    /// The outermost layer's temperature.
+    pub fn outer_k(&self) -> &PiecewiseLinear {
+        &self.outer_k
+    }
+
+    /// The air's temperature.
+    pub fn air_k(&self) -> &PiecewiseLinear {
+        &self.air_k
+    }
+
+    /// Variance that the boundary's uncertainty gives each predicted rate [(rad/s)²].
+    pub fn rate_variance_rad2_per_s2(&self) -> &[f64] {
+        &self.rate_variance_rad2_per_s2
+    }
+
+    /// Of the readings, given the air's model.
+    pub fn log_likelihood(&self) -> f64 {
+        self.log_likelihood
+    }
+
+    /// The drive for a heat path at a location: the outermost layer's temperature, or the air's.
+    pub fn drive(&self, location: Location) -> Drive {
+        let boundary_k = match location {
+            Location::OuterLayer => self.outer_k.clone(),
+            Location::Ambient => self.air_k.clone(),
+        };
+        Drive { boundary_k, ambient_k: Some(self.air_k.clone()) }
+    }
+
+    /// The whitening of rate residuals whose covariance is that of white noise plus that of the boundary's error.
+    ///
+    /// # Errors
+    /// A heat path that cannot be solved.
+    pub fn rate_whitener(&self, noise_rad_per_s: f64) -> Result<RateWhitener, BoundaryError> {
+        let space = self.scene.joint_space(&self.air, noise_rad_per_s)?;
+        Ok(RateWhitener { whitener: space.space.whitener(), rate_places: space.rate_places, noise_rad_per_s })
+    }
+}
+
+/// Turns a column over a record's rows into one whose inner products are weighted by the residuals' inverse covariance.
+#[derive(Debug, Clone)]
+pub struct RateWhitener {
+    whitener: Whitener,
+    /// Which measurement of the whitener is the rate of each row.
+    rate_places: Vec<usize>,
+    noise_rad_per_s: f64,
+}
+
+impl RateWhitener {
+    /// # Shapes
+    /// One value a row in; more than one a row out, in units of the noise.
+    pub fn whiten(&self, column_rad_per_s: &[f64]) -> Vec<f64> {
+        let mut measurements = vec![0.0; self.whitener.len()];
+        for (&place, value) in self.rate_places.iter().zip(column_rad_per_s) {
+            measurements[place] = value / self.noise_rad_per_s;
+        }
+        self.whitener.whiten(&measurements)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::thermal::{self, Extent, Instant, Material, PackShape};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use statrs::distribution::{ContinuousCDF, Normal};
+
+    const FILM_W_PER_M2_K: f64 = 25.0;
+    const NOISE_K: f64 = 0.004;
+
+    fn path() -> HeatPath {
+        let shape = PackShape { layers: 24, bore_radius_m: 0.04, radial_pitch_m: 165e-6, height_m: 8.5e-3 };
+        let material = Material::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 };
+        HeatPath::new(shape, Extent::Pack, material, Location::OuterLayer)
+    }
+
+    /// Ramps of 1 K/min with soaks between, as the outermost layer sees them through a film; and with noise.
+    fn record() -> (Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>) {
+        let kinks_s = vec![0.0, 903.0, 2698.0, 4507.0, 6701.0, 9000.0];
+        let air = PiecewiseLinear::new(kinks_s.clone(), vec![293.0, 293.0, 322.9, 322.9, 286.3, 286.3]).unwrap();
+        let mut outside = path();
+        outside.location = Location::Ambient;
+        outside.film_w_per_m2_k = Some(FILM_W_PER_M2_K);
+        let times_s: Vec<f64> = (0..900).map(|i| 10.0 * i as f64).collect();
+        let instants: Vec<Instant> = times_s.iter().map(|&t| Instant::after(t)).collect();
+        let field = thermal::solve(&outside, &Drive::boundary(air)).unwrap().at(&instants);
+        let outer_k: Vec<f64> = (0..900).map(|row| field.temperatures_k(row)[23]).collect();
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        let normal = Normal::new(0.0, NOISE_K).unwrap();
+        let readings = outer_k.iter().map(|t| t + normal.inverse_cdf(random.random::<f64>())).collect();
+        (times_s, outer_k, readings, kinks_s[1..5].to_vec())
+    }
+
+    #[test]
+    fn film_kinks_and_the_outer_layer_are_found_again_through_the_noise() {
+        let (times_s, outer_k, readings, kinks_s) = record();
+        let path = path();
+        let found = estimate(&Observation {
+            times_s: &times_s,
+            temperature_k: &readings,
+            path: &path,
+            lag_s: 0.0,
+            layer_gain_rad_per_k: &[0.0; 24],
+            rate_mean_s: 10.0,
+        })
+        .unwrap();
+        let film = found.air().film_w_per_m2_k.unwrap();
+        let times: Vec<f64> = found.air().kinks.iter().map(|k| k.time_s).collect();
+        let error_k = (outer_k.iter().zip(&times_s).map(|(t, s)| (found.outer_k().value(*s) - t).powi(2)).sum::<f64>()
+            / 900.0)
+            .sqrt();
+        println!(
+            "film {film:.3} of {FILM_W_PER_M2_K}, kinks {times:.1?} of {kinks_s:?}, outer layer {error_k:.5} K rms"
+        );
+        assert!((film / FILM_W_PER_M2_K - 1.0).abs() < 0.02);
+        assert_eq!(times.len(), kinks_s.len());
+        for (found_s, true_s) in times.iter().zip(&kinks_s) {
+            assert!((found_s - true_s).abs() < 2.0);
+        }
+        assert!(error_k < 0.25 * NOISE_K);
+        assert!((found.air().noise_k / NOISE_K - 1.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn a_record_at_one_temperature_is_refused() {
+        let path = path();
+        let error = estimate(&Observation {
+            times_s: &(0..100).map(f64::from).collect::<Vec<_>>(),
+            temperature_k: &[300.0; 100],
+            path: &path,
+            lag_s: 0.0,
+            layer_gain_rad_per_k: &[0.0; 24],
+            rate_mean_s: 1.0,
+        })
+        .unwrap_err();
+        assert_eq!(error, BoundaryError::Constant { range_k: 0.0 });
+    }
+}
