@@ -141,6 +141,25 @@ impl LayerWeights {
     }
 }
 
+/// What a state of the pack makes of layer weights: Ω is linear in them.
+///
+/// ```text
+/// Ω = constant + Σ_j ( half_a_j w_j^A + half_b_j w_j^B + axial_j x_j )
+/// ```
+///
+/// None of it depends on the pattern.
+///
+/// # Shapes
+/// One entry a layer, innermost first; `axial_rad_per_s_m2` is empty where nothing varies along the axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WeightResponse {
+    pub half_a_rad_per_s_m2: Vec<f64>,
+    pub half_b_rad_per_s_m2: Vec<f64>,
+    pub axial_rad_per_s_m2: Vec<f64>,
+    /// Lead and everything outside the coil.
+    pub constant_rad_per_s: f64,
+}
+
 /// A coil model with a pattern: from the pack's state to the rate error.
 #[derive(Debug)]
 pub struct RateModel {
@@ -198,6 +217,26 @@ impl RateModel {
         let lead: f64 = self.surplus.iter().map(|s| self.surplus_rad_per_s(s, state)).sum();
         let outside: f64 = self.effects.iter().map(|e| e.outside_rate_rad_per_s(state)).sum();
         scale * coil_sum * gain + lead + outside
+    }
+
+    /// The coefficients of the layer weights in Ω at a state; the fast paths of the search are compiled from them.
+    pub fn weight_response(&self, state: &PackState) -> WeightResponse {
+        let gain: f64 = self.effects.iter().map(|e| e.coil_gain(state)).product();
+        let scale = self.scale_per_m2() * gain;
+        let layers = state.rates_k_per_s.len();
+        let kappa = |layer: usize, half| self.path_per_k(layer, half, state.temperatures_k[layer]);
+        let of_half = |half| (0..layers).map(|j| scale * kappa(j, half) * state.rates_k_per_s[j]).collect::<Vec<f64>>();
+        let axial = state.axial_moments_k_per_s.iter().enumerate();
+        let lead: f64 = self.surplus.iter().map(|s| self.surplus_rad_per_s(s, state)).sum();
+        let outside: f64 = self.effects.iter().map(|e| e.outside_rate_rad_per_s(state)).sum();
+        WeightResponse {
+            half_a_rad_per_s_m2: of_half(Half::A),
+            half_b_rad_per_s_m2: of_half(Half::B),
+            axial_rad_per_s_m2: axial
+                .map(|(j, moment)| scale * 0.5 * (kappa(j, Half::A) + kappa(j, Half::B)) * moment)
+                .collect(),
+            constant_rad_per_s: lead + outside,
+        }
     }
 
     /// Surplus fibre 2δ at end A moves the coil by 2δ along z and adds a lead at z < 2δ; exact in δ.

@@ -1,0 +1,254 @@
+//! A coil model under given profiles, compiled into columns over samples: what the search runs on.
+//!
+//! ```text
+//! Ω_s(P) = c_s + Σ_j ( A_sj w_j^A(P) + B_sj w_j^B(P) + X_sj x_j(P) )
+//! ```
+//!
+//! Only the weights depend on the pattern, so the fields are solved and the effects asked once per search. Where the
+//! halves of the fibre respond alike, A and B are one column; where nothing varies along the axis there is no X.
+//!
+//! # Source
+//! The coefficients come from [`RateModel::weight_response`]; tests compare every value with the reference.
+
+use rayon::prelude::*;
+
+use super::columns::{Columns, Norm};
+use super::worst_case::{SearchError, SolvedProfiles};
+use crate::pattern::Pattern;
+use crate::pattern::classic::Classic;
+use crate::rate::{CoilModel, LayerWeights, RateError, RateModel, WeightResponse};
+use crate::thermal::Instant;
+
+/// Which column belongs to which layer and half.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Layout {
+    pub layers: usize,
+    /// Both halves of the fibre respond alike: their weights share a column.
+    pub halves_alike: bool,
+    pub axial: bool,
+}
+
+impl Layout {
+    pub fn column_a(&self, layer: usize) -> usize {
+        layer
+    }
+
+    pub fn column_b(&self, layer: usize) -> usize {
+        if self.halves_alike { layer } else { self.layers + layer }
+    }
+
+    /// Only where `axial` holds.
+    pub fn column_axial(&self, layer: usize) -> usize {
+        self.column_b(self.layers - 1) + 1 + layer
+    }
+
+    pub fn columns(&self) -> usize {
+        self.layers * (1 + usize::from(!self.halves_alike) + usize::from(self.axial))
+    }
+}
+
+/// Where a sample comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Origin {
+    pub profile: usize,
+    pub instant: Instant,
+}
+
+/// The compiled objective: columns over samples, and the lengths that turn a pattern into weights.
+#[derive(Debug, Clone)]
+pub struct SampleMatrix {
+    pub layout: Layout,
+    pub columns: Columns,
+    lengths_m: Vec<f64>,
+}
+
+impl SampleMatrix {
+    /// From the responses of any samples of a model.
+    ///
+    /// # Errors
+    /// Effects that leave a layer no turns.
+    pub fn new(model: &CoilModel, responses: &[WeightResponse]) -> Result<Self, RateError> {
+        let lengths_m = model.wound_coil()?.layer_lengths_m().to_vec();
+        let layers = lengths_m.len();
+        let layout = Layout {
+            layers,
+            halves_alike: responses.iter().all(|r| r.half_a_rad_per_s_m2 == r.half_b_rad_per_s_m2),
+            axial: responses.iter().any(|r| r.axial_rad_per_s_m2.iter().any(|x| *x != 0.0)),
+        };
+        let constant: Vec<f64> = responses.iter().map(|r| r.constant_rad_per_s).collect();
+        let of = |part: fn(&WeightResponse) -> &[f64]| {
+            (0..layers)
+                .map(move |j| responses.iter().map(|r| part(r).get(j).copied().unwrap_or(0.0)).collect::<Vec<f64>>())
+        };
+        let mut columns: Vec<Vec<f64>> = of(|r| &r.half_a_rad_per_s_m2).collect();
+        if !layout.halves_alike {
+            columns.extend(of(|r| &r.half_b_rad_per_s_m2));
+        }
+        if layout.axial {
+            columns.extend(of(|r| &r.axial_rad_per_s_m2));
+        }
+        Ok(Self { layout, columns: Columns::new(&constant, &columns), lengths_m })
+    }
+
+    /// Every instant of the solved profiles is a sample, in their order.
+    ///
+    /// # Errors
+    /// Effects that leave a layer no turns.
+    pub fn of_profiles(model: &CoilModel, solved: &SolvedProfiles) -> Result<(Self, Vec<Origin>), SearchError> {
+        let rate_model = any_rate_model(model)?;
+        let responses: Vec<WeightResponse> = solved
+            .profiles()
+            .par_iter()
+            .flat_map_iter(|profile| {
+                (0..profile.history.len())
+                    .map(|row| rate_model.weight_response(&rate_model.state(&profile.history, row, &[])))
+            })
+            .collect();
+        let origins = solved
+            .profiles()
+            .iter()
+            .enumerate()
+            .flat_map(|(index, solved)| {
+                solved.pieces.iter().flatten().map(move |&instant| Origin { profile: index, instant })
+            })
+            .collect();
+        Ok((Self::new(model, &responses)?, origins))
+    }
+
+    /// The same matrix with the samples in another order, or fewer of them.
+    pub fn select(&self, samples: &[usize]) -> Self {
+        Self { layout: self.layout, columns: self.columns.select(samples), lengths_m: self.lengths_m.clone() }
+    }
+
+    pub fn layers(&self) -> usize {
+        self.layout.layers
+    }
+
+    pub fn samples(&self) -> usize {
+        self.columns.samples()
+    }
+
+    /// l_j, innermost layer first.
+    pub fn lengths_m(&self) -> &[f64] {
+        &self.lengths_m
+    }
+
+    /// Whether each segment's place along the fibre is the same for every pattern.
+    pub fn equal_lengths(&self) -> bool {
+        self.lengths_m.iter().all(|l| *l == self.lengths_m[0])
+    }
+
+    /// The coefficients of a pattern, from the reference's own weights.
+    pub fn coefficients(&self, weights: &LayerWeights) -> Vec<f64> {
+        let mut coefficients = vec![0.0; self.layout.columns()];
+        for layer in 0..self.layers() {
+            coefficients[self.layout.column_a(layer)] += weights.half_a_m2[layer];
+            coefficients[self.layout.column_b(layer)] += weights.half_b_m2[layer];
+            if self.layout.axial {
+                coefficients[self.layout.column_axial(layer)] = weights.axial_m2[layer];
+            }
+        }
+        coefficients
+    }
+
+    /// Ω at every sample, computed from nothing.
+    ///
+    /// # Errors
+    /// A pattern of another layer count.
+    pub fn rates_rad_per_s(&self, model: &CoilModel, pattern: &Pattern) -> Result<Vec<f64>, RateError> {
+        let weights = LayerWeights::new(&model.wound_coil()?, pattern)?;
+        Ok(self.columns.values(&self.coefficients(&weights)))
+    }
+
+    /// The cost of a pattern, computed from nothing.
+    ///
+    /// # Errors
+    /// A pattern of another layer count.
+    pub fn cost(&self, model: &CoilModel, pattern: &Pattern, norm: Norm) -> Result<f64, RateError> {
+        Ok(norm.of(&self.rates_rad_per_s(model, pattern)?))
+    }
+}
+
+/// A rate model with a pattern that does not matter, to ask for responses.
+pub fn any_rate_model(model: &CoilModel) -> Result<RateModel, SearchError> {
+    let pattern = Classic::Zyl.pattern(model.coil.layers()).expect("every even layer count has a cylindrical winding");
+    Ok(RateModel::new(model, &pattern, &[])?)
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::coil::{Coil, CoilSpec, Fibre, LayerLength};
+    use crate::effect::{self, DeclaredEffect};
+    use crate::profile::{Piece, Profile};
+    use crate::thermal::{Extent, Location, Material};
+
+    /// A tactical coil with any effects at their start values.
+    pub fn model(layers: usize, layer_length: LayerLength, effects: &[&str]) -> CoilModel {
+        let fibre = Fibre {
+            refractive_index: 1.45,
+            thermo_optic_per_k: 1.0e-5,
+            thermal_expansion_per_k: 0.0,
+            wavelength_m: 1550e-9,
+            outer_diameter_m: 165e-6,
+        };
+        let spec = CoilSpec {
+            fibre,
+            layers,
+            turns_per_layer: Some(50.0),
+            bore_radius_m: 0.04,
+            radial_pitch_m: 165e-6,
+            axial_pitch_m: 170e-6,
+            layer_length,
+            length_m: None,
+        };
+        let declare =
+            |kind: &&str| DeclaredEffect::at_start(effect::find(kind).expect("the effect is in the catalogue"));
+        CoilModel {
+            name: "test".into(),
+            coil: Coil::new(spec).unwrap(),
+            extent: Extent::Pack,
+            material: Material::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 },
+            location: Location::OuterLayer,
+            rate_mean_s: 0.0,
+            effects: effects.iter().map(declare).collect(),
+        }
+    }
+
+    pub fn profiles() -> Vec<Profile> {
+        let up = Piece { rate_k_per_s: 0.003, duration_s: 40.0 };
+        let down = Piece { rate_k_per_s: -0.002, duration_s: 60.0 };
+        vec![Profile::new("up", vec![up, down]).unwrap(), Profile::new("down", vec![down, up, down]).unwrap()]
+    }
+
+    #[test]
+    fn every_sample_is_the_reference_value_with_any_effects_and_lengths() {
+        let effect_sets: [&[&str]; 6] = [
+            &[],
+            &["strain_mismatch", "midpoint_offset"],
+            &["axial_gradient"],
+            &["heating_cooling_asymmetry", "stress_gradient", "turn_mismatch"],
+            &["glass_transition", "bias_gradient_rate", "axial_gradient"],
+            &["thermo_optic_temperature", "spool_mass"],
+        ];
+        for effects in effect_sets {
+            for layer_length in [LayerLength::Equal, LayerLength::Actual] {
+                let model = model(8, layer_length, effects);
+                let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
+                let (matrix, origins) = SampleMatrix::of_profiles(&model, &solved).unwrap();
+                for segments in [vec![3, 8, 1, 5, 2, 7, 6, 4], vec![4, 5, 6, 3, 2, 7, 8, 1]] {
+                    let pattern = Pattern::new(segments).unwrap();
+                    let rate_model = RateModel::new(&model, &pattern, &[]).unwrap();
+                    let expected: Vec<f64> =
+                        solved.profiles().iter().flat_map(|p| rate_model.series_rad_per_s(&p.history)).collect();
+                    let found = matrix.rates_rad_per_s(&model, &pattern).unwrap();
+                    let scale = expected.iter().map(|v| v.abs()).fold(0.0, f64::max);
+                    assert_eq!((found.len(), origins.len()), (expected.len(), expected.len()));
+                    for (f, e) in found.iter().zip(&expected) {
+                        assert!((f - e).abs() < 1e-12 * scale, "{effects:?} {layer_length:?}: {f} {e}");
+                    }
+                }
+            }
+        }
+    }
+}
