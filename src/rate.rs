@@ -24,7 +24,7 @@
 use thiserror::Error;
 
 use crate::coil::{Coil, CoilError};
-use crate::effect::{Binding, DeclaredEffect, Effect, FibrePlace, Lead, PackState, SurplusFibre};
+use crate::effect::{DeclaredEffect, Effect, FibrePlace, Lead, PackState, SurplusFibre};
 use crate::pattern::{Half, Pattern};
 use crate::thermal::{Extent, HeatPath, Location, Material, PackShape, ThermalHistory};
 use crate::units::LIGHT_SPEED_M_PER_S;
@@ -90,8 +90,16 @@ impl CoilModel {
         model
     }
 
+    /// Columns that the effects read and that are not among `channels`.
+    pub fn missing_channels(&self, channels: &[String]) -> Vec<String> {
+        let mut missing: Vec<String> = self.effects.iter().flat_map(|e| e.channels()).collect();
+        missing.retain(|name| !channels.contains(name));
+        missing.dedup();
+        missing
+    }
+
     fn bind_all(&self, coil: &Coil, channels: &[String]) -> Vec<Box<dyn Effect>> {
-        self.effects.iter().map(|e| e.bind(&Binding { coil, channels })).collect()
+        self.effects.iter().map(|e| e.bind(coil, channels)).collect()
     }
 }
 

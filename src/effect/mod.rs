@@ -9,7 +9,9 @@ mod axial_gradient;
 mod bias_gradient_rate;
 mod bias_temperature;
 mod bias_temperature_rate;
+mod channel;
 mod conductivity_temperature;
+pub mod custom;
 mod diffusivity;
 mod finite_pack;
 mod glass_transition;
@@ -54,6 +56,12 @@ pub const CATALOGUE: &[&EffectSpec] = &[
     &diffusivity::SPEC,
     &thermo_optic::SPEC,
 ];
+
+/// An effect of any further column of a record; one declaration a column, `channel:NAME`.
+pub const CHANNEL: &EffectSpec = &channel::SPEC;
+
+/// An effect that the user writes.
+pub const CUSTOM: &EffectSpec = &custom::SPEC;
 
 /// What an effect does to a model. Every method's default is "nothing".
 pub trait Effect: std::fmt::Debug + Send + Sync {
@@ -140,10 +148,22 @@ pub struct SurplusFibre {
     pub lead: Lead,
 }
 
+/// What an effect is about, where its kind alone does not say.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum Subject {
+    #[default]
+    None,
+    /// A further column of a record.
+    Channel(String),
+    /// A formula of the user's own.
+    Formula(custom::Formula),
+}
+
 /// What an effect is bound to before it acts.
 #[derive(Debug, Clone, Copy)]
 pub struct Binding<'a> {
     pub coil: &'a Coil,
+    pub subject: &'a Subject,
     /// Names of a record's further columns, in the order of [`PackState::channels`].
     pub channels: &'a [String],
 }
@@ -215,6 +235,17 @@ pub struct DeclaredEffect {
     /// SI, in the order of the spec.
     values: Vec<f64>,
     choices: Vec<usize>,
+    subject: Subject,
+}
+
+/// One parameter of a declared effect, whether its spec or the user names it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DeclaredParameter {
+    pub key: String,
+    pub unit: Unit,
+    /// SI.
+    pub lower: f64,
+    pub upper: f64,
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
@@ -251,7 +282,7 @@ impl DeclaredEffect {
                 return Err(EffectError::Choice { kind, key: choice.key, options: choice.options });
             }
         }
-        Ok(Self { spec, values, choices })
+        Ok(Self { spec, values, choices, subject: Subject::None })
     }
 
     /// The effect at the start values of a fit and its first choices.
@@ -260,6 +291,88 @@ impl DeclaredEffect {
             spec,
             values: spec.parameters.iter().map(|p| p.unit.to_si(p.start)).collect(),
             choices: vec![0; spec.choices.len()],
+            subject: Subject::None,
+        }
+    }
+
+    /// Linear in a further column of the record.
+    pub fn channel(name: impl Into<String>, gain_rad_per_s_per_unit: f64) -> Self {
+        let subject = Subject::Channel(name.into());
+        Self { spec: CHANNEL, values: vec![gain_rad_per_s_per_unit], choices: Vec::new(), subject }
+    }
+
+    /// A formula of the user's own; `values` in the order of its parameters.
+    ///
+    /// # Errors
+    /// As many values as the formula has no parameters.
+    pub fn custom(formula: custom::Formula, values: Vec<f64>) -> Result<Self, EffectError> {
+        let expected = formula.parameters().len();
+        if values.len() != expected {
+            return Err(EffectError::Count { kind: CUSTOM.kind, expected, found: values.len() });
+        }
+        Ok(Self { spec: CUSTOM, values, choices: Vec::new(), subject: Subject::Formula(formula) })
+    }
+
+    /// The same effect with other values (SI).
+    ///
+    /// # Errors
+    /// As [`DeclaredEffect::new`].
+    pub fn with_values(&self, values: Vec<f64>) -> Result<Self, EffectError> {
+        match &self.subject {
+            Subject::None => Self::new(self.spec, values, self.choices.clone()),
+            Subject::Channel(name) => match values[..] {
+                [gain] => Ok(Self::channel(name.clone(), gain)),
+                _ => Err(EffectError::Count { kind: CHANNEL.kind, expected: 1, found: values.len() }),
+            },
+            Subject::Formula(formula) => Self::custom(formula.clone(), values),
+        }
+    }
+
+    /// As written in files: the spec's kind, or `channel:NAME`.
+    pub fn kind(&self) -> String {
+        match &self.subject {
+            Subject::Channel(name) => format!("channel:{name}"),
+            Subject::None | Subject::Formula(_) => self.spec.kind.to_owned(),
+        }
+    }
+
+    pub fn subject(&self) -> &Subject {
+        &self.subject
+    }
+
+    /// In the order of [`DeclaredEffect::values`]; bounds in SI.
+    pub fn parameters(&self) -> Vec<DeclaredParameter> {
+        match &self.subject {
+            Subject::Formula(formula) => formula
+                .parameters()
+                .iter()
+                .map(|key| DeclaredParameter {
+                    key: key.clone(),
+                    unit: Unit::One,
+                    lower: f64::NEG_INFINITY,
+                    upper: f64::INFINITY,
+                })
+                .collect(),
+            Subject::None | Subject::Channel(_) => self
+                .spec
+                .parameters
+                .iter()
+                .map(|p| DeclaredParameter {
+                    key: p.key.to_owned(),
+                    unit: p.unit,
+                    lower: p.unit.to_si(p.lower),
+                    upper: p.unit.to_si(p.upper),
+                })
+                .collect(),
+        }
+    }
+
+    /// The record's columns that it reads, besides the needed ones.
+    pub fn channels(&self) -> Vec<String> {
+        match &self.subject {
+            Subject::None => Vec::new(),
+            Subject::Channel(name) => vec![name.clone()],
+            Subject::Formula(formula) => formula.channels().to_vec(),
         }
     }
 
@@ -276,8 +389,10 @@ impl DeclaredEffect {
         &self.choices
     }
 
-    pub fn bind(&self, binding: &Binding) -> Box<dyn Effect> {
-        (self.spec.build)(&self.values, &self.choices, binding)
+    /// Ready to act on a coil; `channels` names a record's further columns.
+    pub fn bind(&self, coil: &Coil, channels: &[String]) -> Box<dyn Effect> {
+        let binding = Binding { coil, subject: &self.subject, channels };
+        (self.spec.build)(&self.values, &self.choices, &binding)
     }
 }
 

@@ -6,7 +6,8 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::coil::{Coil, CoilSpec, Fibre, LayerLength};
-use crate::effect::{self, CATALOGUE, DeclaredEffect};
+use crate::effect::custom::{Formula, FormulaError};
+use crate::effect::{self, CATALOGUE, CHANNEL, CUSTOM, DeclaredEffect};
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::profile::{Piece, Profile, ProfileSpec};
@@ -286,8 +287,8 @@ fn read_effects(r: &mut TomlReader, tables: Vec<TableReader>) -> Option<Vec<Decl
         let effect = read_effect(r, &mut table);
         let kind_span = table.span_of("kind");
         match effect {
-            Some(effect) if effects.iter().any(|e| e.spec().kind == effect.spec().kind) => {
-                let message = format!("the effect {} is declared twice: keep one of them", effect.spec().kind);
+            Some(effect) if effects.iter().any(|e| e.kind() == effect.kind() && e.spec().kind != CUSTOM.kind) => {
+                let message = format!("the effect {} is declared twice: keep one of them", effect.kind());
                 r.fault(Fault::new(message, kind_span));
                 clean = false;
             }
@@ -302,12 +303,18 @@ fn read_effects(r: &mut TomlReader, tables: Vec<TableReader>) -> Option<Vec<Decl
 }
 
 fn read_effect(r: &mut TomlReader, table: &mut TableReader) -> Option<DeclaredEffect> {
-    let kinds: Vec<&str> = CATALOGUE.iter().map(|s| s.kind).collect();
+    let kinds: Vec<&str> = CATALOGUE.iter().chain([&CHANNEL, &CUSTOM]).map(|s| s.kind).collect();
     if !table.has("kind") {
         r.fault(Fault::new(format!("missing key effect.kind: expected one of {}", kinds.join(", ")), table.span()));
         return None;
     }
     let kind = table.text(r, "kind")?;
+    if let Some(name) = kind.strip_prefix("channel:") {
+        return read_channel(r, table, name);
+    }
+    if kind == CUSTOM.kind {
+        return read_custom(r, table);
+    }
     let Some(spec) = effect::find(kind) else {
         let mut fault = Fault::new(format!("effect.kind \"{kind}\" is not in the catalogue"), table.span_of("kind"));
         fault = match nearest(kind, &kinds) {
@@ -346,6 +353,55 @@ fn read_effect(r: &mut TomlReader, table: &mut TableReader) -> Option<DeclaredEf
             None
         }
     }
+}
+
+fn read_channel(r: &mut TomlReader, table: &mut TableReader, name: &str) -> Option<DeclaredEffect> {
+    if name.is_empty() {
+        r.fault(Fault::new(
+            "effect.kind \"channel:\" lacks the column's name: write channel:NAME",
+            table.span_of("kind"),
+        ));
+    }
+    let parameter = &CHANNEL.parameters[0];
+    let gain = table.needed_number(r, parameter.key, Limits::between(parameter.lower, parameter.upper));
+    match gain {
+        Some(gain) if !name.is_empty() => Some(DeclaredEffect::channel(name, parameter.unit.to_si(gain))),
+        _ => {
+            std::mem::replace(table, TableReader::gone()).finish(r);
+            None
+        }
+    }
+}
+
+fn read_custom(r: &mut TomlReader, table: &mut TableReader) -> Option<DeclaredEffect> {
+    let source = table.needed_text(r, "formula", "a formula in °/h");
+    let formula_span = table.span_of("formula");
+    let mut parameters = table.table(r, "parameters");
+    let named = parameters.all_numbers(r);
+    let effect = source.zip(named).and_then(|(source, named)| {
+        let (names, values): (Vec<String>, Vec<f64>) = named.into_iter().unzip();
+        match Formula::new(source, names) {
+            // The number of values is that of the names.
+            Ok(formula) => DeclaredEffect::custom(formula, values).ok(),
+            Err(error) => {
+                r.fault(Fault::new(format!("effect.formula: {error}"), formula_place(&error, formula_span)));
+                None
+            }
+        }
+    });
+    if effect.is_none() {
+        std::mem::replace(table, TableReader::gone()).finish(r);
+    }
+    effect
+}
+
+/// The character of the source at which a formula goes wrong: its place in the string, behind the opening quote.
+fn formula_place(error: &FormulaError, string: Option<Range<usize>>) -> Option<Range<usize>> {
+    let string = string?;
+    let FormulaError::Expression(error) = error else { return Some(string) };
+    let at = error.at()?;
+    let start = (string.start + 1 + at.start).min(string.end.saturating_sub(1));
+    Some(start..(string.start + 1 + at.end).clamp(start, string.end))
 }
 
 fn read_profiles(r: &mut TomlReader, table: &mut TableReader) -> ProfileSpec {

@@ -285,6 +285,28 @@ impl<'d> TableReader<'d> {
         clean.then_some(integers)
     }
 
+    /// Every entry of the table as a finite number; none if one is not. For tables whose keys the user chooses.
+    pub fn all_numbers(&mut self, reader: &mut TomlReader) -> Option<Vec<(String, f64)>> {
+        let Some(table) = self.table else { return Some(Vec::new()) };
+        let mut numbers = Vec::new();
+        let mut clean = true;
+        for (key, item) in table.iter() {
+            let number = match item {
+                Item::Value(Value::Float(v)) => *v.value(),
+                Item::Value(Value::Integer(v)) => *v.value() as f64,
+                _ => f64::NAN,
+            };
+            if number.is_finite() {
+                numbers.push((key.to_owned(), number));
+            } else {
+                clean = false;
+                let message = format!("{}{key} must be a finite number", self.prefix);
+                reader.fault(Fault::new(message, item.span().or_else(|| self.span.clone())));
+            }
+        }
+        clean.then_some(numbers)
+    }
+
     /// A table below this one that may be absent.
     pub fn table(&mut self, reader: &mut TomlReader, key: &'static str) -> TableReader<'d> {
         let prefix = format!("{}{key}.", self.prefix);

@@ -1,5 +1,6 @@
 //! Mathematics without domain words; what a well-kept library has is called, not written again.
 
+pub mod expression;
 pub mod maximise;
 pub mod piecewise;
 pub mod state_space;
