@@ -3,6 +3,7 @@
 pub mod fault;
 pub mod files;
 pub mod json;
+pub mod model_edit;
 pub mod model_file;
 pub mod pattern_file;
 pub mod toml_reader;

@@ -405,6 +405,11 @@ fn one_of(words: &[&str]) -> String {
 
 /// The word that a misspelling most likely stands for.
 pub fn nearest<'w>(found: &str, words: &[&'w str]) -> Option<&'w str> {
+    // A name without its unit: `gain` for `gain_deg_per_h_per_unit`.
+    let beginning = words.iter().find(|w| found.len() > 2 && w.strip_prefix(found).is_some_and(|r| r.starts_with('_')));
+    if let Some(word) = beginning {
+        return Some(word);
+    }
     words
         .iter()
         .map(|w| (strsim::jaro_winkler(found, w), *w))
