@@ -24,5 +24,6 @@ pub mod predict;
 pub mod search;
 // Floor 5: files and pages.
 pub mod io;
+pub mod report;
 // Floor 6: the command line.
 pub mod cli;

@@ -1,0 +1,3 @@
+//! What a reader sees: charts, drawings and pages.
+
+pub mod plot;

@@ -1,0 +1,187 @@
+//! Where the parts of a chart go, in pixels of its natural size.
+
+use super::axis::Ruler;
+use super::{Along, Chart, Shape};
+
+pub(super) const TEXT_PX: i32 = 13;
+pub(super) const ROW_PX: i32 = 19;
+pub(super) const MARK_ROW_PX: i32 = 17;
+/// Widest glyphs of common sans-serif fonts, on average, per pixel of height.
+const GLYPH: f64 = 0.58;
+
+/// Width of a text at the chart's font size [px].
+pub(super) fn text_width_px(text: &str) -> i32 {
+    (text.chars().count() as f64 * GLYPH * f64::from(TEXT_PX)).ceil() as i32
+}
+
+/// Where things are [px].
+pub(super) struct Layout {
+    pub(super) left: i32,
+    pub(super) top: i32,
+    pub(super) right: i32,
+    pub(super) bottom: i32,
+    pub(super) height: i32,
+    pub(super) x: Ruler,
+    pub(super) y: Ruler,
+    pub(super) legend: Vec<LegendEntry>,
+    pub(super) legend_top: i32,
+    /// Above the frame: one entry a vertical mark.
+    pub(super) mark_words: Vec<MarkWord>,
+}
+
+/// The words on a vertical mark: row above the frame and left edge; none where the mark cannot be drawn.
+type MarkWord = Option<(i32, i32)>;
+
+pub(super) struct LegendEntry {
+    pub(super) row: i32,
+    pub(super) left: i32,
+    pub(super) text: String,
+    pub(super) colour: usize,
+    pub(super) shape: LegendShape,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum LegendShape {
+    Line,
+    Dashed,
+    Dot,
+    Block,
+    Band,
+}
+
+impl Layout {
+    pub(super) fn new(chart: &Chart) -> Self {
+        let width = chart.width_px as i32;
+        let title = if chart.title.is_empty() { 8 } else { 34 };
+        let lying = !chart.categories.is_empty();
+        let x_wanted = (width / 95).max(2) as usize;
+        let finite = || {
+            chart.series.iter().flat_map(|s| s.points.iter()).filter(|(x, y)| chart.x.admits(*x) && chart.y.admits(*y))
+        };
+        let marks = |along: Along| {
+            let marks = chart.marks.iter().filter(move |m| m.along == along).map(|m| m.value);
+            marks.chain(chart.bands.iter().filter(move |b| b.along == along).flat_map(|b| [b.from, b.to]))
+        };
+        let has = |wanted: Shape| chart.series.iter().any(|s| s.shape == wanted);
+        let x_margin = if lying || has(Shape::Points) { 0.04 } else { 0.0 };
+        let mut x_axis = chart.x.clone();
+        let mut y_axis = chart.y.clone();
+        if lying {
+            x_axis = x_axis.reaching(0.0);
+        }
+        if has(Shape::Histogram) {
+            y_axis = y_axis.reaching(0.0);
+        }
+        let x_values: Vec<f64> = if lying {
+            chart.series.iter().flat_map(|s| s.points.iter()).map(|p| p.0).collect()
+        } else {
+            finite().map(|p| p.0).collect()
+        };
+        let mut x = x_axis.ruler(x_values.into_iter().chain(marks(Along::X)), x_wanted, x_margin);
+        if lying {
+            // Room for the numbers at the ends of the bars.
+            let room = 0.1 * (x.high - x.low);
+            x.high += room;
+            if x.low < 0.0 && chart.series.iter().flat_map(|s| &s.points).any(|p| p.0 < 0.0) {
+                x.low -= room;
+            } else {
+                x.low = x.base(&chart.x);
+            }
+            x.ticks.retain(|t| t.position >= x.low && t.position <= x.high);
+        }
+        let legend_width = width - 24;
+        let (legend, rows) = legend(chart, legend_width);
+        let legend_top = title;
+        let without_marks = title + rows * ROW_PX + 8;
+        let below = 6 + ROW_PX + if chart.x.label.is_empty() { 4 } else { ROW_PX + 6 };
+        let stated = (chart.height_px as i32).max(without_marks + below + 60);
+        let y = if lying {
+            Ruler { low: -0.5, high: chart.categories.len() as f64 - 0.5, ticks: Vec::new(), suffix: String::new() }
+        } else {
+            let wanted = ((stated - below - without_marks) / 46).max(2) as usize;
+            let mut y = y_axis.ruler(finite().map(|p| p.1).chain(marks(Along::Y)), wanted, 0.05);
+            if has(Shape::Histogram) {
+                y.low = y.base(&chart.y);
+            }
+            y
+        };
+        let longest = y.ticks.iter().map(|t| &t.label).chain(&chart.categories).map(|l| text_width_px(l)).max();
+        let label = if chart.y.label.is_empty() { 0 } else { ROW_PX };
+        let left = (8 + label + longest.unwrap_or(0) + 8).min(width / 2);
+        let last = x.ticks.iter().rev().find(|t| !t.label.is_empty()).map_or(0, |t| text_width_px(&t.label) / 2);
+        let right = width - 10.max(last + 4);
+        let (mark_words, mark_rows) = place_mark_words(chart, &x, left, right);
+        let top = without_marks + mark_rows * MARK_ROW_PX;
+        let height = if lying {
+            let bars = chart.series.len().max(1) as i32;
+            top + below + chart.categories.len() as i32 * (14 + 14 * bars)
+        } else {
+            stated
+        };
+        let bottom = height - below;
+        Self { left, top, right, bottom, height, x, y, legend, legend_top, mark_words }
+    }
+
+    pub(super) fn x_px(&self, position: f64) -> f64 {
+        along(&self.x, position, self.left, self.right)
+    }
+
+    pub(super) fn y_px(&self, position: f64, lying: bool) -> f64 {
+        let share = (position - self.y.low) / (self.y.high - self.y.low);
+        let share = if lying { share } else { 1.0 - share };
+        f64::from(self.top) + share * f64::from(self.bottom - self.top)
+    }
+}
+
+fn along(ruler: &Ruler, position: f64, from: i32, to: i32) -> f64 {
+    f64::from(from) + (position - ruler.low) / (ruler.high - ruler.low) * f64::from(to - from)
+}
+
+/// Words that would lie on one another go to different rows; also says how many rows there are.
+fn place_mark_words(chart: &Chart, x: &Ruler, left: i32, right: i32) -> (Vec<MarkWord>, i32) {
+    let mut taken: Vec<(i32, i32, i32)> = Vec::new();
+    let mut place = |mark: &super::Mark| {
+        if mark.along != Along::X || !chart.x.admits(mark.value) || mark.label.is_empty() {
+            return None;
+        }
+        let wide = text_width_px(&mark.label);
+        let middle = along(x, chart.x.position(mark.value), left, right) as i32;
+        let start = (middle - wide / 2).min(right - wide).max(left);
+        let free = |row: i32| !taken.iter().any(|t| t.0 == row && start < t.2 && t.1 < start + wide + 8);
+        let row = (0..6).find(|r| free(*r)).unwrap_or(0);
+        taken.push((row, start, start + wide + 8));
+        Some((row, start))
+    };
+    let words: Vec<MarkWord> = chart.marks.iter().map(&mut place).collect();
+    let rows = taken.iter().map(|t| t.0 + 1).max().unwrap_or(0);
+    (words, rows)
+}
+
+/// Places the legend's entries in rows; none where there is nothing to tell apart.
+fn legend(chart: &Chart, width: i32) -> (Vec<LegendEntry>, i32) {
+    let series = chart.series.iter().enumerate().map(|(i, s)| {
+        let shape = match s.shape {
+            Shape::Line | Shape::Step => LegendShape::Line,
+            Shape::Dashed => LegendShape::Dashed,
+            Shape::Points => LegendShape::Dot,
+            Shape::Histogram | Shape::Bars => LegendShape::Block,
+        };
+        (s.name.clone(), i, shape)
+    });
+    let bands = chart.bands.iter().enumerate().map(|(i, b)| (b.label.clone(), i + 7, LegendShape::Band));
+    let entries: Vec<_> = series.chain(bands).filter(|e| !e.0.is_empty()).collect();
+    if entries.len() < 2 {
+        return (Vec::new(), 0);
+    }
+    let (mut row, mut left) = (0, 12);
+    let mut placed = Vec::with_capacity(entries.len());
+    for (text, colour, shape) in entries {
+        let wide = 26 + text_width_px(&text) + 14;
+        if left > 12 && left + wide > width {
+            (row, left) = (row + 1, 12);
+        }
+        placed.push(LegendEntry { row, left, text, colour, shape });
+        left += wide;
+    }
+    (placed, row + 1)
+}

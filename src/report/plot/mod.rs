@@ -1,0 +1,242 @@
+//! Charts as SVG: say what is to be seen, get a picture that is finished.
+//!
+//! A [`Chart`] takes two [`Axis`] and any number of [`Series`], marks and bands, and finds by itself where the axes
+//! end, which numbers stand along them, where the legend goes, and how many points a line needs. The text and the
+//! lines of the frame take the reader's colour (light or dark), the series have colours that are legible on both. The
+//! same chart gives the same bytes.
+//!
+//! ```
+//! use coilwright::report::plot::{Axis, Chart, Mark, Series};
+//! let svg = Chart::new("Rate error during a ramp")
+//!     .x(Axis::linear("time [min]"))
+//!     .y(Axis::linear("rate error [°/h]"))
+//!     .with(Series::line("quadrupole", vec![(0.0, 0.0), (5.0, 2.1), (25.0, 0.3)]))
+//!     .with(Series::line("searched", vec![(0.0, 0.0), (5.0, 0.2), (25.0, 0.0)]))
+//!     .mark(Mark::vertical("ramp ends", 20.0))
+//!     .svg();
+//! assert!(svg.starts_with("<svg") && svg.contains("rate error [°/h]"));
+//! ```
+//!
+//! Numbers that are not finite (or, on a logarithmic axis, not positive) leave a gap.
+
+mod axis;
+mod draw;
+mod layout;
+
+pub use axis::Axis;
+
+/// What a series looks like.
+#[derive(Debug, Clone, PartialEq)]
+enum Shape {
+    Line,
+    Dashed,
+    Points,
+    /// Each value holds until the next.
+    Step,
+    /// Columns between neighbouring edges; the points are (left edge, height), the last one closes the last column.
+    Histogram,
+    /// One value a category; the points are (value, index of the category).
+    Bars,
+}
+
+/// One set of numbers under one name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    name: String,
+    shape: Shape,
+    points: Vec<(f64, f64)>,
+    /// Written next to the points; empty or one a point.
+    labels: Vec<String>,
+}
+
+impl Series {
+    /// A continuous line through the points in their order.
+    pub fn line(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+        Self::of(name, Shape::Line, points)
+    }
+
+    /// A thin dashed line: a reference, a prediction.
+    pub fn dashed(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+        Self::of(name, Shape::Dashed, points)
+    }
+
+    pub fn points(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+        Self::of(name, Shape::Points, points)
+    }
+
+    /// Each value holds until the next one's x.
+    pub fn step(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+        Self::of(name, Shape::Step, points)
+    }
+
+    /// Columns of a histogram: `edges` has one entry more than `heights`.
+    pub fn histogram(name: impl Into<String>, edges: &[f64], heights: &[f64]) -> Self {
+        let mut points: Vec<(f64, f64)> = edges.iter().copied().zip(heights.iter().copied()).collect();
+        if let Some(&edge) = edges.get(points.len()) {
+            points.push((edge, 0.0));
+        }
+        Self::of(name, Shape::Histogram, points)
+    }
+
+    /// Lying bars, one value for each of the chart's [`Chart::categories`].
+    pub fn bars(name: impl Into<String>, values: &[f64]) -> Self {
+        let points = values.iter().enumerate().map(|(i, v)| (*v, i as f64)).collect();
+        Self::of(name, Shape::Bars, points)
+    }
+
+    /// Writes a word next to each point.
+    pub fn labelled(mut self, labels: Vec<String>) -> Self {
+        self.labels = labels;
+        self
+    }
+
+    fn of(name: impl Into<String>, shape: Shape, points: Vec<(f64, f64)>) -> Self {
+        Self { name: name.into(), shape, points, labels: Vec::new() }
+    }
+}
+
+/// Along which axis a mark or a band is given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Along {
+    X,
+    Y,
+}
+
+/// A thin line across the chart with a word on it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mark {
+    label: String,
+    along: Along,
+    value: f64,
+}
+
+impl Mark {
+    /// At one x.
+    pub fn vertical(label: impl Into<String>, x: f64) -> Self {
+        Self { label: label.into(), along: Along::X, value: x }
+    }
+
+    /// At one y.
+    pub fn horizontal(label: impl Into<String>, y: f64) -> Self {
+        Self { label: label.into(), along: Along::Y, value: y }
+    }
+}
+
+/// A tinted range with an entry in the legend.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Band {
+    label: String,
+    along: Along,
+    from: f64,
+    to: f64,
+}
+
+impl Band {
+    /// Between two x, over the whole height.
+    pub fn vertical(label: impl Into<String>, from: f64, to: f64) -> Self {
+        Self { label: label.into(), along: Along::X, from, to }
+    }
+
+    /// Between two y, over the whole width.
+    pub fn horizontal(label: impl Into<String>, from: f64, to: f64) -> Self {
+        Self { label: label.into(), along: Along::Y, from, to }
+    }
+}
+
+/// A chart to be drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chart {
+    title: String,
+    width_px: u32,
+    height_px: u32,
+    x: Axis,
+    y: Axis,
+    series: Vec<Series>,
+    marks: Vec<Mark>,
+    bands: Vec<Band>,
+    categories: Vec<String>,
+}
+
+impl Chart {
+    /// 720 × 400 pixels, linear axes without labels. An empty title takes no room.
+    pub fn new(title: impl Into<String>) -> Self {
+        Self {
+            title: title.into(),
+            width_px: 720,
+            height_px: 400,
+            x: Axis::linear(""),
+            y: Axis::linear(""),
+            series: Vec::new(),
+            marks: Vec::new(),
+            bands: Vec::new(),
+            categories: Vec::new(),
+        }
+    }
+
+    /// Natural size; the picture scales without loss. At least 240 × 160.
+    pub fn size(mut self, width_px: u32, height_px: u32) -> Self {
+        (self.width_px, self.height_px) = (width_px.clamp(240, 8000), height_px.clamp(160, 8000));
+        self
+    }
+
+    pub fn x(mut self, axis: Axis) -> Self {
+        self.x = axis;
+        self
+    }
+
+    pub fn y(mut self, axis: Axis) -> Self {
+        self.y = axis;
+        self
+    }
+
+    /// Adds a series; colours follow the order.
+    pub fn with(mut self, series: Series) -> Self {
+        self.series.push(series);
+        self
+    }
+
+    pub fn mark(mut self, mark: Mark) -> Self {
+        self.marks.push(mark);
+        self
+    }
+
+    pub fn band(mut self, band: Band) -> Self {
+        self.bands.push(band);
+        self
+    }
+
+    /// Names along the vertical axis, from the top, for [`Series::bars`]; the height follows their number.
+    pub fn categories(mut self, names: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        self.categories = names.into_iter().map(Into::into).collect();
+        self
+    }
+
+    /// The picture: one `<svg>` element, as a file of its own or inside a page.
+    pub fn svg(&self) -> String {
+        draw::svg(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_same_chart_gives_the_same_bytes() {
+        let chart = Chart::new("a < b & c").with(Series::line("x", vec![(0.0, 1.0), (1.0, f64::NAN), (2.0, 3.0)]));
+        assert_eq!(chart.svg(), chart.svg());
+        assert!(chart.svg().contains("a &lt; b &amp; c"));
+    }
+
+    #[test]
+    fn a_line_of_a_million_points_stays_a_small_file() {
+        let points = (0..1_000_000).map(|i| (f64::from(i), (f64::from(i) * 0.01).sin())).collect();
+        assert!(Chart::new("").with(Series::line("x", points)).svg().len() < 200_000);
+    }
+
+    #[test]
+    fn a_chart_without_data_says_so() {
+        assert!(Chart::new("empty").svg().contains("no data"));
+        assert!(Chart::new("nan").with(Series::points("x", vec![(f64::NAN, 1.0)])).svg().contains("no data"));
+    }
+}
