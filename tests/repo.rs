@@ -21,6 +21,7 @@ const FLOORS: &[(&str, u8)] = &[
     ("effect", 2),
     ("rate", 3),
     ("boundary", 4),
+    ("predict", 4),
     ("search", 4),
     ("fit", 4),
     ("diagnose", 4),
@@ -36,7 +37,7 @@ const FLOORS: &[(&str, u8)] = &[
 ];
 
 /// Who may use a sibling on its own floor, in this direction only.
-const SIBLING_EDGES: &[(&str, &str)] = &[("numeric", "units"), ("effect", "thermal"), ("reproduce", "search")];
+const SIBLING_EDGES: &[(&str, &str)] = &[("numeric", "units"), ("effect", "thermal"), ("predict", "boundary"), ("reproduce", "search")];
 
 /// A file that outgrows this holds two ideas.
 const LONGEST_FILE: usize = 500;
