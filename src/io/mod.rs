@@ -1,9 +1,11 @@
 //! Files in, files out: the only place (with `report`) that knows serde, paths, TOML, CSV and JSON.
 
+mod effect_tables;
 pub mod fault;
 pub mod files;
 pub mod json;
 pub mod model_edit;
 pub mod model_file;
 pub mod pattern_file;
+mod profile_tables;
 pub mod toml_reader;

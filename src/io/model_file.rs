@@ -6,19 +6,19 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::coil::{Coil, CoilSpec, Fibre, LayerLength};
-use crate::effect::custom::{Formula, FormulaError};
-use crate::effect::{self, CATALOGUE, CHANNEL, CUSTOM, DeclaredEffect};
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
-use crate::profile::{Piece, Profile, ProfileSpec};
+use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;
 use crate::thermal::{self, Extent, Location, Material};
-use crate::units::{k_per_s_from_c_per_h, m_from_mm, m_from_nm, m_from_um};
+use crate::units::{m_from_mm, m_from_nm, m_from_um};
 
+use super::effect_tables::read_effects;
 use super::fault::{Fault, Faults};
 use super::files::read_text;
 use super::pattern_file::resolve_pattern;
-use super::toml_reader::{Limits, TableReader, TomlReader, nearest, parse};
+use super::profile_tables::read_profiles;
+use super::toml_reader::{Limits, TableReader, TomlReader, parse};
 
 /// A model file, understood.
 #[derive(Debug, Clone)]
@@ -63,12 +63,6 @@ pub enum Advice {
     #[error("finite_pack changes nothing where thermal.model is \"pack\" already")]
     FinitePackTwice,
 }
-
-/// Used where a file has no [profiles]: steep enough for chamber tests, long enough to settle.
-const DEFAULT_MAX_RATE_C_PER_H: f64 = 60.0;
-const DEFAULT_COUNT: i64 = 64;
-const DEFAULT_SEGMENTS: i64 = 4;
-const DEFAULT_DURATION_S: f64 = 6000.0;
 
 /// Reads and checks a model file.
 ///
@@ -278,204 +272,6 @@ fn read_thermal(r: &mut TomlReader, table: &mut TableReader) -> Option<(Extent, 
     };
     let extent = if extent? == 0 { Extent::Pack } else { Extent::HalfSpace };
     Some((extent, material?))
-}
-
-fn read_effects(r: &mut TomlReader, tables: Vec<TableReader>) -> Option<Vec<DeclaredEffect>> {
-    let mut effects: Vec<DeclaredEffect> = Vec::new();
-    let mut clean = true;
-    for mut table in tables {
-        let effect = read_effect(r, &mut table);
-        let kind_span = table.span_of("kind");
-        match effect {
-            Some(effect) if effects.iter().any(|e| e.kind() == effect.kind() && e.spec().kind != CUSTOM.kind) => {
-                let message = format!("the effect {} is declared twice: keep one of them", effect.kind());
-                r.fault(Fault::new(message, kind_span));
-                clean = false;
-            }
-            Some(effect) => {
-                effects.push(effect);
-                table.finish(r);
-            }
-            None => clean = false,
-        }
-    }
-    clean.then_some(effects)
-}
-
-fn read_effect(r: &mut TomlReader, table: &mut TableReader) -> Option<DeclaredEffect> {
-    let kinds: Vec<&str> = CATALOGUE.iter().chain([&CHANNEL, &CUSTOM]).map(|s| s.kind).collect();
-    if !table.has("kind") {
-        r.fault(Fault::new(format!("missing key effect.kind: expected one of {}", kinds.join(", ")), table.span()));
-        return None;
-    }
-    let kind = table.text(r, "kind")?;
-    if let Some(name) = kind.strip_prefix("channel:") {
-        return read_channel(r, table, name);
-    }
-    if kind == CUSTOM.kind {
-        return read_custom(r, table);
-    }
-    let Some(spec) = effect::find(kind) else {
-        let mut fault = Fault::new(format!("effect.kind \"{kind}\" is not in the catalogue"), table.span_of("kind"));
-        fault = match nearest(kind, &kinds) {
-            Some(near) => fault.with_note(format!("did you mean \"{near}\"?")),
-            None => fault.with_note(format!("known effects: {}", kinds.join(", "))),
-        };
-        r.fault(fault);
-        return None;
-    };
-    let mut values = Vec::new();
-    for parameter in spec.parameters {
-        let limits = Limits::between(parameter.lower, parameter.upper);
-        let stated = match parameter.default {
-            Some(default) if !table.has(parameter.key) => Some(default),
-            _ => table.needed_number(r, parameter.key, limits),
-        };
-        // Registers the key as known also where the default stands in for it.
-        let _ = parameter.default.and_then(|_| table.number(r, parameter.key, limits));
-        values.push(stated.map(|v| parameter.unit.to_si(v)));
-    }
-    let mut choices = Vec::new();
-    for choice in spec.choices {
-        choices.push(table.needed_word(r, choice.key, choice.options));
-    }
-    let values: Option<Vec<f64>> = values.into_iter().collect();
-    let choices: Option<Vec<usize>> = choices.into_iter().collect();
-    let Some((values, choices)) = values.zip(choices) else {
-        // What is missing or unknown is reported here, because the caller drops the table.
-        std::mem::replace(table, TableReader::gone()).finish(r);
-        return None;
-    };
-    match DeclaredEffect::new(spec, values, choices) {
-        Ok(effect) => Some(effect),
-        Err(error) => {
-            r.fault(Fault::new(error.to_string(), table.span()));
-            None
-        }
-    }
-}
-
-fn read_channel(r: &mut TomlReader, table: &mut TableReader, name: &str) -> Option<DeclaredEffect> {
-    if name.is_empty() {
-        r.fault(Fault::new(
-            "effect.kind \"channel:\" lacks the column's name: write channel:NAME",
-            table.span_of("kind"),
-        ));
-    }
-    let parameter = &CHANNEL.parameters[0];
-    let gain = table.needed_number(r, parameter.key, Limits::between(parameter.lower, parameter.upper));
-    match gain {
-        Some(gain) if !name.is_empty() => Some(DeclaredEffect::channel(name, parameter.unit.to_si(gain))),
-        _ => {
-            std::mem::replace(table, TableReader::gone()).finish(r);
-            None
-        }
-    }
-}
-
-fn read_custom(r: &mut TomlReader, table: &mut TableReader) -> Option<DeclaredEffect> {
-    let source = table.needed_text(r, "formula", "a formula in °/h");
-    let formula_span = table.span_of("formula");
-    let mut parameters = table.table(r, "parameters");
-    let named = parameters.all_numbers(r);
-    let effect = source.zip(named).and_then(|(source, named)| {
-        let (names, values): (Vec<String>, Vec<f64>) = named.into_iter().unzip();
-        match Formula::new(source, names) {
-            // The number of values is that of the names.
-            Ok(formula) => DeclaredEffect::custom(formula, values).ok(),
-            Err(error) => {
-                r.fault(Fault::new(format!("effect.formula: {error}"), formula_place(&error, formula_span)));
-                None
-            }
-        }
-    });
-    if effect.is_none() {
-        std::mem::replace(table, TableReader::gone()).finish(r);
-    }
-    effect
-}
-
-/// The character of the source at which a formula goes wrong: its place in the string, behind the opening quote.
-fn formula_place(error: &FormulaError, string: Option<Range<usize>>) -> Option<Range<usize>> {
-    let string = string?;
-    let FormulaError::Expression(error) = error else { return Some(string) };
-    let at = error.at()?;
-    let start = (string.start + 1 + at.start).min(string.end.saturating_sub(1));
-    Some(start..(string.start + 1 + at.end).clamp(start, string.end))
-}
-
-fn read_profiles(r: &mut TomlReader, table: &mut TableReader) -> ProfileSpec {
-    let rate = Limits::between(1e-6, 1e6);
-    let max_rate = if table.is_present() { table.needed_number(r, "max_rate_c_per_h", rate) } else { None };
-    let max_rate_c_per_h = max_rate.unwrap_or(DEFAULT_MAX_RATE_C_PER_H);
-    let count = table.integer(r, "count", 0, 100_000).unwrap_or(DEFAULT_COUNT);
-    let segments = table.integer(r, "segments", 1, 1_000).unwrap_or(DEFAULT_SEGMENTS);
-    let duration_s = table.number(r, "duration_s", Limits::between(1e-3, 1e8)).unwrap_or(DEFAULT_DURATION_S);
-    let seed = table.integer(r, "seed", 0, i64::MAX).unwrap_or(1);
-    let mut listed: Vec<Profile> = Vec::new();
-    let ramps = table.tables(r, "ramp");
-    if count == 0 && ramps.is_empty() {
-        let message = "profiles.count is 0 and no profile is listed: list a [[profiles.ramp]] or sample some";
-        r.fault(Fault::new(message, table.span_of("count")));
-    }
-    for mut ramp in ramps {
-        if let Some(profile) = read_ramp(r, &mut ramp, max_rate) {
-            if listed.iter().any(|p| p.name() == profile.name()) {
-                let message = format!("two profiles are called \"{}\": rename one", profile.name());
-                r.fault(Fault::new(message, ramp.span_of("name")));
-            }
-            listed.push(profile);
-        }
-        ramp.finish(r);
-    }
-    ProfileSpec {
-        max_rate_k_per_s: k_per_s_from_c_per_h(max_rate_c_per_h),
-        count: count as usize,
-        segments: segments as usize,
-        duration_s,
-        seed: seed as u64,
-        listed,
-    }
-}
-
-fn read_ramp(r: &mut TomlReader, table: &mut TableReader, max_rate_c_per_h: Option<f64>) -> Option<Profile> {
-    let name = table.needed_text(r, "name", "a string");
-    let pieces_span = table.span_of("pieces").or_else(|| table.span());
-    if !table.has("pieces") {
-        let message = "missing key profiles.ramp.pieces: expected an array of { rate_c_per_h, duration_s }";
-        r.fault(Fault::new(message, table.span()));
-    }
-    let mut pieces = Vec::new();
-    let mut clean = true;
-    for mut piece in table.tables(r, "pieces") {
-        let rate = piece.needed_number(r, "rate_c_per_h", Limits::between(-1e6, 1e6));
-        let duration = piece.needed_number(r, "duration_s", Limits::between(1e-6, 1e8));
-        if let (Some(rate), Some(most)) = (rate, max_rate_c_per_h)
-            && rate.abs() > most * (1.0 + 1e-12)
-        {
-            let message = format!(
-                "profiles.ramp.pieces.rate_c_per_h must not exceed profiles.max_rate_c_per_h = {most}, found {rate}: \
-                 raise the bound, the guaranteed worst case rests on it"
-            );
-            r.fault(Fault::new(message, piece.span_of("rate_c_per_h")));
-        }
-        match rate.zip(duration) {
-            Some((rate, duration_s)) => pieces.push(Piece { rate_k_per_s: k_per_s_from_c_per_h(rate), duration_s }),
-            None => clean = false,
-        }
-        piece.finish(r);
-    }
-    let name = name?;
-    if !clean || !table.has("pieces") {
-        return None;
-    }
-    match Profile::new(name, pieces) {
-        Ok(profile) => Some(profile),
-        Err(error) => {
-            r.fault(Fault::new(format!("profiles.ramp \"{name}\": {error}"), pieces_span));
-            None
-        }
-    }
 }
 
 fn read_search(r: &mut TomlReader, table: &mut TableReader) -> SearchSettings {
