@@ -4,6 +4,7 @@ mod check;
 mod evaluate;
 mod new;
 mod patterns;
+pub mod progress;
 pub mod screen;
 
 use std::process::ExitCode;
@@ -16,6 +17,7 @@ use crate::io::files::WriteError;
 use crate::io::pattern_file::ResolveError;
 use crate::rate::RateError;
 use crate::search::worst_case::SearchError;
+use progress::ProgressMode;
 use screen::Screen;
 
 /// Designs winding patterns of fibre-optic-gyroscope coils.
@@ -45,6 +47,9 @@ pub struct OutputOptions {
     /// Nothing on stderr but errors
     #[arg(long, short, global = true)]
     pub quiet: bool,
+    /// How progress is shown on stderr
+    #[arg(long, global = true, value_enum, default_value_t = ProgressMode::Auto)]
+    pub progress: ProgressMode,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

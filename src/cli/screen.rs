@@ -5,6 +5,7 @@ use std::io::Write;
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 use serde::Serialize;
 
+use super::progress::{Progress, ProgressMode};
 use super::{CliError, Format, OutputOptions};
 use crate::io::json::Document;
 
@@ -13,11 +14,12 @@ use crate::io::json::Document;
 pub struct Screen {
     format: Format,
     quiet: bool,
+    progress: ProgressMode,
 }
 
 impl Screen {
     pub fn new(options: &OutputOptions) -> Self {
-        Self { format: options.format, quiet: options.quiet }
+        Self { format: options.format, quiet: options.quiet, progress: options.progress }
     }
 
     pub fn is_json(&self) -> bool {
@@ -49,6 +51,11 @@ impl Screen {
     pub fn write(&self, text: &str) -> Result<(), CliError> {
         let mut stdout = std::io::stdout().lock();
         stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()).map_err(CliError::Stdout)
+    }
+
+    /// Shows the progress of a task; see [`Progress::new`].
+    pub fn progress(&self, task: &str, total: Option<u64>) -> Progress {
+        Progress::new(self.progress, self.quiet, task, total)
     }
 
     /// A note to the person at the terminal.

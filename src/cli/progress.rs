@@ -1,0 +1,147 @@
+//! Progress of long work on stderr, and the wish to stop it.
+//!
+//! On a terminal a bar; as JSON lines on request; otherwise nothing, so that logs stay readable.
+
+use std::io::{IsTerminal, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use clap::ValueEnum;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde::Serialize;
+
+/// How progress is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ProgressMode {
+    /// A bar if stderr is a terminal, else nothing
+    Auto,
+    /// One JSON object a line on stderr
+    Json,
+    /// Nothing
+    None,
+}
+
+/// One line of `--progress json`.
+#[derive(Debug, Serialize)]
+struct ProgressLine<'a> {
+    task: &'a str,
+    done: u64,
+    /// Null where the end is not known.
+    total: Option<u64>,
+    message: &'a str,
+}
+
+/// Shows how far a task is. Safe to call from several threads.
+#[derive(Debug)]
+pub struct Progress {
+    task: String,
+    total: Option<u64>,
+    shown: Shown,
+}
+
+#[derive(Debug)]
+enum Shown {
+    Bar(ProgressBar),
+    Json,
+    Nothing,
+}
+
+impl Progress {
+    /// `total` counts whatever `at` will count; none where the end is not known.
+    pub fn new(mode: ProgressMode, quiet: bool, task: &str, total: Option<u64>) -> Self {
+        let shown = match mode {
+            ProgressMode::Json => Shown::Json,
+            ProgressMode::Auto if !quiet && std::io::stderr().is_terminal() => Shown::Bar(bar(task, total)),
+            ProgressMode::Auto | ProgressMode::None => Shown::Nothing,
+        };
+        Self { task: task.to_owned(), total, shown }
+    }
+
+    /// So much is done; `message` says what has been found so far.
+    pub fn at(&self, done: u64, message: &str) {
+        match &self.shown {
+            Shown::Bar(bar) => {
+                bar.set_position(done);
+                bar.set_message(message.to_owned());
+            }
+            Shown::Json => {
+                let line = ProgressLine { task: &self.task, done, total: self.total, message };
+                if let Ok(json) = serde_json::to_string(&line) {
+                    // Progress that nobody reads any more is no reason to stop the work.
+                    let _ = writeln!(std::io::stderr().lock(), "{json}");
+                }
+            }
+            Shown::Nothing => {}
+        }
+    }
+
+    /// Takes the bar off the terminal.
+    pub fn finish(&self) {
+        if let Shown::Bar(bar) = &self.shown {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.finish();
+    }
+}
+
+const BOUNDED: &str = "{prefix} {bar:30} {percent:>3} % {elapsed_precise} {per_sec} {msg}";
+const UNBOUNDED: &str = "{prefix} {spinner} {pos} {elapsed_precise} {per_sec} {msg}";
+
+fn bar(task: &str, total: Option<u64>) -> ProgressBar {
+    let bar = match total {
+        Some(total) => ProgressBar::new(total),
+        None => ProgressBar::new_spinner(),
+    };
+    let template = if total.is_some() { BOUNDED } else { UNBOUNDED };
+    bar.set_draw_target(ProgressDrawTarget::stderr_with_hz(8));
+    // The templates are constants that a test parses.
+    bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.set_prefix(task.to_owned());
+    bar.enable_steady_tick(Duration::from_millis(250));
+    bar
+}
+
+/// Set by Ctrl-C or a termination signal; long work looks at it and ends in good order. A second signal ends the
+/// program at once.
+#[derive(Debug, Clone)]
+pub struct StopFlag(Arc<AtomicBool>);
+
+impl StopFlag {
+    /// Begins to listen for signals. Without signals (an embedding that has taken them) the flag is simply never set.
+    pub fn listen() -> Self {
+        let flag = Arc::new(AtomicBool::new(false));
+        let seen = Arc::clone(&flag);
+        let _ = ctrlc::set_handler(move || {
+            if seen.swap(true, Ordering::Relaxed) {
+                std::process::exit(130);
+            }
+        });
+        Self(flag)
+    }
+
+    pub fn is_set(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+
+    pub fn as_atomic(&self) -> &AtomicBool {
+        &self.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_templates_of_the_bar_are_understood() {
+        for template in [BOUNDED, UNBOUNDED] {
+            assert!(ProgressStyle::with_template(template).is_ok(), "{template}");
+        }
+    }
+}
