@@ -1,0 +1,316 @@
+//! The order of work at the winding machine: which piece of fibre goes on which layer, from which reel, which way.
+//!
+//! Winding goes from the innermost layer outwards. The unwound fibre is in runs, each on a supply reel. Reel A holds
+//! the run with end A, reel B the run with end B; a run both of whose ends are on the coil already is *captive* and
+//! gets a reel of its own, C1, C2, …, which must travel around the coil.
+//!
+//! A layer continues the fibre of a neighbouring segment where one is wound already. Else it begins a new island: with
+//! the fibre's own end if it is the first or last segment, with the end nearer to the fibre's middle otherwise (so a
+//! standard winding begins at the midpoint). Which way the carriage then travels follows from
+//! [`Pattern::axial_direction`].
+//!
+//! Leaves out: the length of the crossovers themselves, the helix' slant, and fibre beyond the pack.
+
+pub mod production;
+mod reels;
+
+use crate::coil::Coil;
+use crate::pattern::windability::WindingGraph;
+use crate::pattern::{Half, Pattern};
+use crate::rate::RateError;
+use crate::thermal::Flange;
+pub use reels::{Reel, ReelName};
+use reels::{Reels, Start};
+
+/// One layer's winding.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Step {
+    /// Counted from 1, as layers and segments are.
+    pub step: usize,
+    pub layer: usize,
+    pub half: Half,
+    pub segment: usize,
+    pub supply_reel: ReelName,
+    /// The flange at which the layer starts; it ends at the other one.
+    pub from_flange: Flange,
+    pub turns: f64,
+    /// Arclength from end A: the segment's low end, whichever end is wound first.
+    pub fibre_from_m: f64,
+    pub fibre_to_m: f64,
+    pub length_m: f64,
+    pub radius_m: f64,
+    /// Largest climb of the crossovers that this step completes [layers].
+    pub climb: usize,
+    /// The crossovers that this step completes, the one at its start first.
+    pub crossovers: Vec<Crossing>,
+    /// Drawn from the supply reel so far, this step included.
+    pub cumulative_m: f64,
+    /// Wound of half A less wound of half B, this step included.
+    pub balance_m: f64,
+    /// Reels with fibre on them after this step, and how many of them are captive.
+    pub reels_left: usize,
+    pub captive_left: usize,
+}
+
+/// The fibre passing from a layer that is wound to this one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Crossing {
+    pub flange: Flange,
+    /// Counted from 1.
+    pub from_layer: usize,
+    /// In layers, inwards or outwards alike.
+    pub climb: usize,
+}
+
+impl Step {
+    pub fn to_flange(&self) -> Flange {
+        other(self.from_flange)
+    }
+}
+
+fn other(flange: Flange) -> Flange {
+    match flange {
+        Flange::First => Flange::Second,
+        Flange::Second => Flange::First,
+    }
+}
+
+/// A coil's winding, step by step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Schedule {
+    pattern: Pattern,
+    steps: Vec<Step>,
+    reels: Vec<Reel>,
+    length_m: f64,
+    start_mark_m: f64,
+}
+
+impl Schedule {
+    /// # Errors
+    /// A pattern of another layer count than the coil's.
+    pub fn new(coil: &Coil, pattern: &Pattern) -> Result<Self, RateError> {
+        if coil.layers() != pattern.layers() {
+            return Err(RateError::Layers { pattern: pattern.layers(), coil: coil.layers() });
+        }
+        let lengths_m = coil.layer_lengths_m();
+        let layers_by_segment = pattern.layers_by_segment();
+        let mut ends_m = vec![0.0];
+        for &layer in &layers_by_segment {
+            ends_m.push(ends_m[ends_m.len() - 1] + lengths_m[layer]);
+        }
+        let graph_steps = WindingGraph::new(pattern).steps();
+        let mut reels = Reels::new(pattern, &ends_m);
+        let mut balance_m = 0.0;
+        let mut steps = Vec::with_capacity(pattern.layers());
+        for (layer, graph_step) in graph_steps.iter().enumerate() {
+            let segment = pattern.segment(layer);
+            let start = match (graph_step.joined_low, graph_step.joined_high) {
+                (Some(_), _) => Start::Low,
+                (None, Some(_)) => Start::High,
+                (None, None) => island_start(pattern, layer),
+            };
+            let (low_flange, high_flange) = if pattern.axial_direction(layer) > 0.0 {
+                (Flange::First, Flange::Second)
+            } else {
+                (Flange::Second, Flange::First)
+            };
+            let crossing = |joined: Option<usize>, neighbour: usize, flange: Flange| {
+                joined.map(|climb| Crossing { flange, from_layer: layers_by_segment[neighbour - 1] + 1, climb })
+            };
+            // Layer 0 is never asked for: an end without a neighbour is not joined.
+            let mut crossovers: Vec<Crossing> = [
+                crossing(graph_step.joined_low, segment.max(2) - 1, low_flange),
+                crossing(graph_step.joined_high, (segment + 1).min(pattern.layers()), high_flange),
+            ]
+            .into_iter()
+            .flatten()
+            .collect();
+            let from_flange = if start == Start::Low { low_flange } else { high_flange };
+            crossovers.sort_by_key(|c| c.flange != from_flange);
+            let (supply_reel, cumulative_m) = reels.wind(layer + 1, segment, start);
+            let half = pattern.half(layer);
+            balance_m += if half == Half::A { lengths_m[layer] } else { -lengths_m[layer] };
+            steps.push(Step {
+                step: layer + 1,
+                layer: layer + 1,
+                half,
+                segment,
+                supply_reel,
+                from_flange,
+                turns: coil.turns()[layer],
+                fibre_from_m: ends_m[segment - 1],
+                fibre_to_m: ends_m[segment],
+                length_m: lengths_m[layer],
+                radius_m: coil.layer_radius_m(layer),
+                climb: graph_step.climb,
+                crossovers,
+                cumulative_m,
+                balance_m,
+                reels_left: graph_step.reels,
+                captive_left: graph_step.captive,
+            });
+        }
+        let start_mark_m = match island_start(pattern, 0) {
+            Start::Low => ends_m[pattern.segment(0) - 1],
+            Start::High => ends_m[pattern.segment(0)],
+        };
+        Ok(Self {
+            pattern: pattern.clone(),
+            steps,
+            reels: reels.into_list(),
+            length_m: ends_m[pattern.layers()],
+            start_mark_m,
+        })
+    }
+
+    pub fn pattern(&self) -> &Pattern {
+        &self.pattern
+    }
+
+    pub fn steps(&self) -> &[Step] {
+        &self.steps
+    }
+
+    /// In the order in which they come into use.
+    pub fn reels(&self) -> &[Reel] {
+        &self.reels
+    }
+
+    /// L.
+    pub fn length_m(&self) -> f64 {
+        self.length_m
+    }
+
+    /// The place of the fibre that is fixed at the first flange before layer 1: the midpoint, for most windings.
+    pub fn start_mark_m(&self) -> f64 {
+        self.start_mark_m
+    }
+
+    /// Segments of half A less those of half B: this much must be trimmed from end A (or, below zero, end B) for the
+    /// joint of the halves to be the middle of the fibre.
+    pub fn expected_trim_m(&self) -> f64 {
+        self.steps.last().map_or(0.0, |s| s.balance_m)
+    }
+}
+
+/// With which end a segment begins that continues nothing.
+fn island_start(pattern: &Pattern, layer: usize) -> Start {
+    let segment = pattern.segment(layer);
+    if segment == 1 || (segment != pattern.layers() && pattern.half(layer) == Half::B) {
+        Start::Low
+    } else {
+        Start::High
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coil::{CoilSpec, Fibre, LayerLength};
+    use crate::pattern::classic::Classic;
+
+    fn coil(layers: usize) -> Coil {
+        Coil::new(CoilSpec {
+            fibre: Fibre {
+                refractive_index: 1.45,
+                thermo_optic_per_k: 1e-5,
+                thermal_expansion_per_k: 0.0,
+                wavelength_m: 1.55e-6,
+                outer_diameter_m: 165e-6,
+            },
+            layers,
+            turns_per_layer: Some(50.0),
+            bore_radius_m: 0.04,
+            radial_pitch_m: 165e-6,
+            axial_pitch_m: 170e-6,
+            layer_length: LayerLength::Actual,
+            length_m: None,
+        })
+        .unwrap()
+    }
+
+    fn reels_of(schedule: &Schedule) -> Vec<String> {
+        schedule.steps().iter().map(|s| s.supply_reel.to_string()).collect()
+    }
+
+    #[test]
+    fn the_quadrupole_alternates_between_reels_a_and_b_and_starts_at_the_midpoint() {
+        let schedule = Schedule::new(&coil(8), &Classic::Qua.pattern(8).unwrap()).unwrap();
+        assert_eq!(reels_of(&schedule), ["A", "B", "B", "A", "A", "B", "B", "A"]);
+        let half_m: f64 = schedule.steps().iter().filter(|s| s.half == Half::A).map(|s| s.length_m).sum();
+        assert!((schedule.start_mark_m() - half_m).abs() < 1e-9);
+        // Both innermost layers start at the midpoint, at the first flange.
+        assert_eq!((schedule.steps()[0].from_flange, schedule.steps()[1].from_flange), (Flange::First, Flange::First));
+    }
+
+    #[test]
+    fn a_cylindrical_coil_comes_from_one_reel() {
+        let schedule = Schedule::new(&coil(6), &Classic::Zyl.pattern(6).unwrap()).unwrap();
+        assert_eq!(reels_of(&schedule), ["A"; 6]);
+        assert_eq!(schedule.reels().len(), 1);
+        assert!((schedule.steps()[5].cumulative_m - schedule.length_m()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_second_half_of_the_symmetric_winding_hangs_on_a_captive_reel() {
+        let schedule = Schedule::new(&coil(6), &Classic::Sym.pattern(6).unwrap()).unwrap();
+        assert_eq!(reels_of(&schedule), ["A", "A", "A", "C1", "C1", "C1"]);
+        let captive = schedule.reels().iter().find(|r| r.captive).unwrap();
+        assert_eq!((captive.prepared_before_step, captive.taken_from), (4, Some(ReelName::B)));
+        // The last layer closes the fibre at both its ends.
+        assert_eq!(schedule.steps()[5].crossovers.len(), 2);
+    }
+
+    #[test]
+    fn for_every_pattern_of_six_layers_the_fibre_is_continuous_and_every_reel_is_emptied() {
+        let coil = coil(6);
+        for_each_permutation(6, &mut |segments| {
+            let pattern = Pattern::new(segments.to_vec()).unwrap();
+            let schedule = Schedule::new(&coil, &pattern).unwrap();
+            let end_at = |segment: usize, high: bool| {
+                let step = &schedule.steps()[pattern.layers_by_segment()[segment - 1]];
+                let low = if pattern.axial_direction(step.layer - 1) > 0.0 { Flange::First } else { Flange::Second };
+                if high { other(low) } else { low }
+            };
+            for segment in 1..6 {
+                assert_eq!(end_at(segment, true), end_at(segment + 1, false), "{pattern}");
+            }
+            for reel in schedule.reels() {
+                let drawn_m: f64 =
+                    schedule.steps().iter().filter(|s| s.supply_reel == reel.name).map(|s| s.length_m).sum();
+                let given_m: f64 = schedule
+                    .reels()
+                    .iter()
+                    .filter(|r| r.taken_from == Some(reel.name))
+                    .map(|r| r.to_m - r.from_m)
+                    .sum();
+                assert!((drawn_m + given_m - (reel.to_m - reel.from_m)).abs() < 1e-9, "{pattern} {reel:?}");
+            }
+            for step in schedule.steps() {
+                assert_eq!(step.climb, step.crossovers.iter().map(|c| c.climb).max().unwrap_or(0));
+                if let Some(first) = step.crossovers.first() {
+                    assert_eq!(first.flange, step.from_flange, "{pattern} {step:?}");
+                }
+            }
+            let captive_reels = schedule.reels().iter().filter(|r| r.captive).count();
+            let captive_most = schedule.steps().iter().map(|s| s.captive_left).max().unwrap_or(0);
+            assert!(captive_reels >= captive_most, "{pattern}");
+        });
+    }
+
+    fn for_each_permutation(n: usize, visit: &mut dyn FnMut(&[usize])) {
+        fn descend(rest: &mut Vec<usize>, done: &mut Vec<usize>, visit: &mut dyn FnMut(&[usize])) {
+            if rest.is_empty() {
+                visit(done);
+            }
+            for i in 0..rest.len() {
+                let segment = rest.remove(i);
+                done.push(segment);
+                descend(rest, done, visit);
+                done.pop();
+                rest.insert(i, segment);
+            }
+        }
+        descend(&mut (1..=n).collect(), &mut Vec::new(), visit);
+    }
+}
