@@ -5,6 +5,7 @@ mod evaluate;
 mod new;
 mod patterns;
 pub mod progress;
+mod schedule;
 pub mod screen;
 
 use std::process::ExitCode;
@@ -66,6 +67,7 @@ enum Command {
     Patterns(patterns::Arguments),
     Check(check::Arguments),
     New(new::Arguments),
+    Schedule(schedule::Arguments),
 }
 
 /// How a command ended; errors aside.
@@ -92,6 +94,8 @@ pub enum CliError {
     Rate(#[from] RateError),
     #[error("error: {path} exists already: choose another name or remove it first")]
     Exists { path: String },
+    #[error("error: no pattern is stated: give --pattern, or winding.pattern in the model file")]
+    PatternMissing,
     #[error("error: cannot write to stdout: {0}")]
     Stdout(std::io::Error),
 }
@@ -105,6 +109,7 @@ pub fn run() -> ExitCode {
         Command::Patterns(arguments) => patterns::run(arguments, &screen),
         Command::Check(arguments) => check::run(arguments, &screen),
         Command::New(arguments) => new::run(arguments, &screen),
+        Command::Schedule(arguments) => schedule::run(arguments, &screen),
     };
     match ending {
         Ok(Ending::Done) => ExitCode::SUCCESS,

@@ -44,6 +44,19 @@ impl Screen {
         }
     }
 
+    /// As [`Screen::answer`], for a document that holds its schema version itself because it is also a file.
+    ///
+    /// # Errors
+    /// A stdout that cannot be written.
+    pub fn document<T: Serialize>(&self, document: &T, text: impl FnOnce(&T) -> String) -> Result<(), CliError> {
+        if self.is_json() {
+            let json = serde_json::to_string_pretty(document).map_err(|e| CliError::Stdout(e.into()))?;
+            self.write(&(json + "\n"))
+        } else {
+            self.write(&text(document))
+        }
+    }
+
     /// Writes to stdout as it is.
     ///
     /// # Errors

@@ -7,5 +7,7 @@ pub mod json;
 pub mod model_edit;
 pub mod model_file;
 pub mod pattern_file;
+mod production_table;
 mod profile_tables;
+pub mod schedule_file;
 pub mod toml_reader;

@@ -10,6 +10,7 @@ use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;
+use crate::schedule::production::Production;
 use crate::thermal::{self, Extent, Location, Material};
 use crate::units::{m_from_mm, m_from_nm, m_from_um};
 
@@ -17,6 +18,7 @@ use super::effect_tables::read_effects;
 use super::fault::{Fault, Faults};
 use super::files::read_text;
 use super::pattern_file::resolve_pattern;
+use super::production_table::read_production;
 use super::profile_tables::read_profiles;
 use super::toml_reader::{Limits, TableReader, TomlReader, parse};
 
@@ -31,6 +33,7 @@ pub struct ModelFile {
     pub pattern: Option<NamedPattern>,
     pub profiles: ProfileSpec,
     pub search: SearchSettings,
+    pub production: Production,
     pub advice: Vec<Advice>,
 }
 
@@ -91,6 +94,7 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
     let effect_tables = root.tables(r, "effect");
     let mut profiles_table = root.table(r, "profiles");
     let mut search_table = root.table(r, "search");
+    let mut production_table = root.table(r, "production");
     root.finish(r);
 
     let fibre = read_fibre(r, &mut fibre_table);
@@ -113,6 +117,8 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
     profiles_table.finish(r);
     let search = read_search(r, &mut search_table);
     search_table.finish(r);
+    let production = read_production(r, &mut production_table);
+    production_table.finish(r);
 
     let whole = (|| {
         let (extent, material) = thermal_parts?;
@@ -134,7 +140,16 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
     }
     let value = whole.map(|model| {
         let advice = advice_for(&model, has_profiles);
-        ModelFile { path: path.to_owned(), source: source.to_owned(), model, pattern, profiles, search, advice }
+        ModelFile {
+            path: path.to_owned(),
+            source: source.to_owned(),
+            model,
+            pattern,
+            profiles,
+            search,
+            production,
+            advice,
+        }
     });
     reader.finish(value)
 }

@@ -33,6 +33,8 @@ pub struct Step {
     pub supply_reel: ReelName,
     /// The flange at which the layer starts; it ends at the other one.
     pub from_flange: Flange,
+    /// How the spool turns, seen from the first flange, so that all fibre circulates the same way along arclength.
+    pub rotation: Rotation,
     pub turns: f64,
     /// Arclength from end A: the segment's low end, whichever end is wound first.
     pub fibre_from_m: f64,
@@ -50,6 +52,15 @@ pub struct Step {
     /// Reels with fibre on them after this step, and how many of them are captive.
     pub reels_left: usize,
     pub captive_left: usize,
+}
+
+/// Seen from the first flange.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rotation {
+    /// A layer that is wound from its low end.
+    Clockwise,
+    /// A layer that is wound from its high end.
+    Counterclockwise,
 }
 
 /// The fibre passing from a layer that is wound to this one.
@@ -137,6 +148,7 @@ impl Schedule {
                 segment,
                 supply_reel,
                 from_flange,
+                rotation: if start == Start::Low { Rotation::Clockwise } else { Rotation::Counterclockwise },
                 turns: coil.turns()[layer],
                 fibre_from_m: ends_m[segment - 1],
                 fibre_to_m: ends_m[segment],
