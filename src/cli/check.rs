@@ -41,7 +41,7 @@ fn faults_json(faults: &Faults) -> Vec<FaultJson> {
         .iter()
         .map(|fault| FaultJson {
             message: fault.message.clone(),
-            line: fault.span.as_ref().map(|s| faults.source[..s.start].lines().count().max(1)),
+            line: fault.span.as_ref().map(|s| faults.source[..s.start].matches('\n').count() + 1),
             note: fault.note.clone(),
         })
         .collect()

@@ -34,7 +34,11 @@ pub(super) fn read_effects(r: &mut TomlReader, tables: Vec<TableReader>) -> Opti
 fn read_effect(r: &mut TomlReader, table: &mut TableReader) -> Option<DeclaredEffect> {
     let kinds: Vec<&str> = CATALOGUE.iter().chain([&CHANNEL, &CUSTOM]).map(|s| s.kind).collect();
     if !table.has("kind") {
-        r.fault(Fault::new(format!("missing key effect.kind: expected one of {}", kinds.join(", ")), table.span()));
+        let misspelt = table.keys().into_iter().find(|key| nearest(key, &["kind"]).is_some());
+        r.fault(match misspelt {
+            Some(key) => Fault::new(format!("unknown key effect.{key}: did you mean kind?"), table.span_of(&key)),
+            None => Fault::new(format!("missing key effect.kind: expected one of {}", kinds.join(", ")), table.span()),
+        });
         return None;
     }
     let kind = table.text(r, "kind")?;

@@ -5,7 +5,7 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use crate::coil::{Coil, CoilSpec, Fibre, LayerLength};
+use crate::coil::{Coil, CoilError, CoilSpec, Fibre, LayerLength};
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::profile::ProfileSpec;
@@ -99,8 +99,9 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
 
     let fibre = read_fibre(r, &mut fibre_table);
     fibre_table.finish(r);
-    let coil = read_coil(r, &mut winding, fibre);
-    let pattern = read_pattern(r, &mut winding, path);
+    let layers = read_layers(r, &mut winding);
+    let coil = read_coil(r, &mut winding, layers, fibre);
+    let pattern = read_pattern(r, &mut winding, layers, path);
     winding.finish(r);
     let thermal_parts = read_thermal(r, &mut thermal);
     let thermal_span = thermal.span();
@@ -184,17 +185,17 @@ fn read_fibre(r: &mut TomlReader, table: &mut TableReader) -> Option<Fibre> {
 /// The most layers that a model may have: matrices grow with the square.
 const MOST_LAYERS: i64 = 400;
 
-fn read_coil(r: &mut TomlReader, table: &mut TableReader, fibre: Option<Fibre>) -> Option<Coil> {
+fn read_layers(r: &mut TomlReader, table: &mut TableReader) -> Option<usize> {
+    let layers = table.needed_integer(r, "layers", 1, MOST_LAYERS)? as usize;
+    if !layers.is_multiple_of(2) {
+        r.fault(Fault::new(CoilError::Layers { found: layers }.to_string(), table.span_of("layers")));
+        return None;
+    }
+    Some(layers)
+}
+
+fn read_coil(r: &mut TomlReader, table: &mut TableReader, layers: Option<usize>, fibre: Option<Fibre>) -> Option<Coil> {
     let pitch = Limits::between(10.0, 10_000.0);
-    let layers = table.needed_integer(r, "layers", 1, MOST_LAYERS);
-    let layers = layers.filter(|&found| {
-        let even = found % 2 == 0;
-        if !even {
-            let message = crate::coil::CoilError::Layers { found: found as usize }.to_string();
-            r.fault(Fault::new(message, table.span_of("layers")));
-        }
-        even
-    });
     let turns_per_layer = table.number(r, "turns_per_layer", Limits::between(1.0, 1e5));
     let inner_diameter_mm = table.number(r, "inner_diameter_mm", Limits::between(1.0, 1e4));
     let mean_diameter_mm = table.number(r, "mean_diameter_mm", Limits::between(1.0, 1e4));
@@ -203,18 +204,35 @@ fn read_coil(r: &mut TomlReader, table: &mut TableReader, fibre: Option<Fibre>) 
     let layer_length = table.needed_word(r, "layer_length", &["actual", "equal"]);
     let length_m = table.number(r, "length_m", Limits::between(0.1, 1e6));
     let diameters_stated = (table.has("inner_diameter_mm"), table.has("mean_diameter_mm"));
-    if diameters_stated == (false, false) && table.is_present() {
-        let message =
-            "missing key winding.inner_diameter_mm: expected a number between 1 and 10000 (or mean_diameter_mm)";
-        r.fault(Fault::new(message, table.span()));
+    if diameters_stated == (false, false) {
+        let expected = "a number between 1 and 10000 (or mean_diameter_mm)";
+        table.note_missing_one_of(&["inner_diameter_mm", "mean_diameter_mm"], expected.to_owned());
     }
     if diameters_stated == (true, true) {
         let message = "winding.inner_diameter_mm and winding.mean_diameter_mm exclude each other: keep one of them";
         r.fault(Fault::new(message, table.span_of("mean_diameter_mm")));
         return None;
     }
-    let (fibre, layers) = (fibre?, layers?);
     let layer_length = if layer_length? == 0 { LayerLength::Actual } else { LayerLength::Equal };
+    match layer_length {
+        LayerLength::Actual if !table.has("turns_per_layer") => {
+            table.note_missing_one_of(&["turns_per_layer"], "a number, because layer_length = \"actual\"".to_owned());
+        }
+        LayerLength::Equal if !table.has("length_m") && !table.has("turns_per_layer") => {
+            let expected = "a number between 0.1 and 1000000 (or turns_per_layer)";
+            table.note_missing_one_of(&["length_m", "turns_per_layer"], expected.to_owned());
+        }
+        _ => {}
+    }
+    // What is stated but wrong is reported already and must not pass for absent.
+    let readable = |key: &str, read: Option<f64>| read.is_some() || !table.has(key);
+    if !readable("length_m", length_m) || !readable("turns_per_layer", turns_per_layer) {
+        return None;
+    }
+    if turns_per_layer.is_none() && (layer_length == LayerLength::Actual || length_m.is_none()) {
+        return None;
+    }
+    let (fibre, layers) = (fibre?, layers?);
     let radial_pitch_m = radial_pitch_um.map_or(fibre.outer_diameter_m, m_from_um);
     let bore_radius_m = match (inner_diameter_mm, mean_diameter_mm) {
         (Some(inner_mm), None) => 0.5 * m_from_mm(inner_mm),
@@ -222,7 +240,7 @@ fn read_coil(r: &mut TomlReader, table: &mut TableReader, fibre: Option<Fibre>) 
         _ => return None,
     };
     let spec = CoilSpec {
-        layers: layers as usize,
+        layers,
         turns_per_layer,
         bore_radius_m,
         radial_pitch_m,
@@ -235,7 +253,7 @@ fn read_coil(r: &mut TomlReader, table: &mut TableReader, fibre: Option<Fibre>) 
         Ok(coil) => Some(coil),
         Err(error) => {
             let span = match error {
-                crate::coil::CoilError::LengthDisagrees { .. } => table.span_of("length_m"),
+                CoilError::LengthDisagrees { .. } => table.span_of("length_m"),
                 _ => table.span(),
             };
             r.fault(Fault::new(error.to_string(), span));
@@ -244,11 +262,15 @@ fn read_coil(r: &mut TomlReader, table: &mut TableReader, fibre: Option<Fibre>) 
     }
 }
 
-fn read_pattern(r: &mut TomlReader, table: &mut TableReader, path: &Path) -> Option<NamedPattern> {
+fn read_pattern(
+    r: &mut TomlReader,
+    table: &mut TableReader,
+    layers: Option<usize>,
+    path: &Path,
+) -> Option<NamedPattern> {
     let stated = table.text(r, "pattern")?;
     let span = table.span_of("pattern");
-    let layers = table.integer(r, "layers", 1, MOST_LAYERS).filter(|l| l % 2 == 0)? as usize;
-    match resolve_pattern(stated, layers, path.parent()) {
+    match resolve_pattern(stated, layers?, path.parent()) {
         Ok(named) => Some(named),
         Err(error) => {
             r.fault(Fault::new(error.to_string(), span));
@@ -272,12 +294,15 @@ fn read_thermal(r: &mut TomlReader, table: &mut TableReader) -> Option<(Extent, 
         }
         (true, false) => diffusivity.map(|m2_per_s| Material::Diffusivity { m2_per_s }),
         (false, _) => {
-            for key in ["conductivity_w_per_m_k", "volumetric_heat_capacity_j_per_m3_k"] {
-                if table.is_present() && !table.has(key) {
-                    let message =
-                        format!("missing key thermal.{key}: expected a number (or give diffusivity_m2_per_s)");
-                    r.fault(Fault::new(message, table.span()));
+            let pair = ["conductivity_w_per_m_k", "volumetric_heat_capacity_j_per_m3_k"];
+            match pair.map(|key| table.has(key)) {
+                [true, false] => table.note_missing_one_of(&pair[1..], "a number".to_owned()),
+                [false, true] => table.note_missing_one_of(&pair[..1], "a number".to_owned()),
+                [false, false] => {
+                    let expected = format!("a number, and {} (or diffusivity_m2_per_s alone)", pair[1]);
+                    table.note_missing_one_of(&[pair[0], pair[1], "diffusivity_m2_per_s"], expected);
                 }
+                [true, true] => {}
             }
             conductivity.zip(capacity).map(|(w_per_m_k, heat_capacity_j_per_m3_k)| Material::Conductivity {
                 w_per_m_k,

@@ -51,11 +51,10 @@ fn read_ramp(r: &mut TomlReader, table: &mut TableReader, max_rate_c_per_h: Opti
     let name = table.needed_text(r, "name", "a string");
     let pieces_span = table.span_of("pieces").or_else(|| table.span());
     if !table.has("pieces") {
-        let message = "missing key profiles.ramp.pieces: expected an array of { rate_c_per_h, duration_s }";
-        r.fault(Fault::new(message, table.span()));
+        table.note_missing_one_of(&["pieces"], "an array of { rate_c_per_h, duration_s }".to_owned());
     }
     let mut pieces = Vec::new();
-    let mut clean = true;
+    let faults_before = r.fault_count();
     for mut piece in table.tables(r, "pieces") {
         let rate = piece.needed_number(r, "rate_c_per_h", Limits::between(-1e6, 1e6));
         let duration = piece.needed_number(r, "duration_s", Limits::between(1e-6, 1e8));
@@ -68,14 +67,13 @@ fn read_ramp(r: &mut TomlReader, table: &mut TableReader, max_rate_c_per_h: Opti
             );
             r.fault(Fault::new(message, piece.span_of("rate_c_per_h")));
         }
-        match rate.zip(duration) {
-            Some((rate, duration_s)) => pieces.push(Piece { rate_k_per_s: k_per_s_from_c_per_h(rate), duration_s }),
-            None => clean = false,
+        if let Some((rate, duration_s)) = rate.zip(duration) {
+            pieces.push(Piece { rate_k_per_s: k_per_s_from_c_per_h(rate), duration_s });
         }
         piece.finish(r);
     }
     let name = name?;
-    if !clean || !table.has("pieces") {
+    if r.fault_count() > faults_before || !table.has("pieces") {
         return None;
     }
     match Profile::new(name, pieces) {

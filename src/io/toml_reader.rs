@@ -40,7 +40,8 @@ pub struct TableReader<'d> {
 }
 
 struct Missing {
-    key: &'static str,
+    /// The first is reported; any of them would do.
+    keys: Vec<&'static str>,
     expected: String,
 }
 
@@ -74,8 +75,9 @@ impl TomlReader {
         self.faults.push(fault);
     }
 
-    pub fn is_clean(&self) -> bool {
-        self.faults.is_empty()
+    /// To be compared before and after reading a part: whether that part has faults.
+    pub fn fault_count(&self) -> usize {
+        self.faults.len()
     }
 
     /// The value if there was no fault, else all faults in the order of the source.
@@ -154,8 +156,13 @@ impl<'d> TableReader<'d> {
     }
 
     fn note_missing(&mut self, key: &'static str, expected: String) {
+        self.note_missing_one_of(&[key], expected);
+    }
+
+    /// Reports at the end that the first of `keys` is missing, unless an unknown key seems to be one of them misspelt.
+    pub fn note_missing_one_of(&mut self, keys: &[&'static str], expected: String) {
         if self.table.is_some() {
-            self.missing.push(Missing { key, expected });
+            self.missing.push(Missing { keys: keys.to_vec(), expected });
         }
     }
 
@@ -375,7 +382,7 @@ impl<'d> TableReader<'d> {
             let mut message = format!("unknown key {}{key}", self.prefix);
             if let Some(near) = near {
                 message.push_str(&format!(": did you mean {near}?"));
-                self.missing.retain(|m| m.key != near);
+                self.missing.retain(|m| !m.keys.contains(&near));
             } else if self.known.is_empty() {
                 message.push_str(": none is expected here");
             }
@@ -389,7 +396,7 @@ impl<'d> TableReader<'d> {
             reader.fault(fault);
         }
         for missing in &self.missing {
-            let message = format!("missing key {}{}: expected {}", self.prefix, missing.key, missing.expected);
+            let message = format!("missing key {}{}: expected {}", self.prefix, missing.keys[0], missing.expected);
             reader.fault(Fault::new(message, self.span.clone()));
         }
     }

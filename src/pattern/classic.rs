@@ -29,7 +29,10 @@ pub enum Classic {
 
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
 pub enum ClassicError {
-    #[error("winding.layers must be a multiple of {multiple} for a {name}, found {found}: use {nearby}")]
+    #[error(
+        "winding.layers must be a multiple of {multiple} for {article} {name}, found {found}: use {nearby}",
+        article = if .name.starts_with('o') { "an" } else { "a" }
+    )]
     Multiple { name: &'static str, multiple: usize, found: usize, nearby: Nearby },
     #[error("no winding is called {found}: use one of zyl, sym, sym-text, dip, qua, oct, hex, or a pattern file")]
     Unknown { found: String },
