@@ -1,6 +1,8 @@
 //! Mathematics without domain words; what a well-kept library has is called, not written again.
 
+pub mod allan;
 pub mod expression;
 pub mod maximise;
 pub mod piecewise;
 pub mod state_space;
+pub mod statistics;

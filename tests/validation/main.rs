@@ -1,4 +1,6 @@
 //! Numbers checked against something outside the program; each file's head names its reference.
 
+mod allan;
 mod exact_integers;
+mod nist_strd;
 mod paper;
