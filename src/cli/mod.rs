@@ -1,11 +1,14 @@
 //! The command line: one file a subcommand — parse, call, print. Documents go to stdout, words and progress to stderr.
 
 mod check;
+mod completions;
 mod evaluate;
+mod man;
 mod new;
 mod patterns;
 pub mod progress;
 mod schedule;
+mod schema;
 pub mod screen;
 
 use std::process::ExitCode;
@@ -68,6 +71,9 @@ enum Command {
     Check(check::Arguments),
     New(new::Arguments),
     Schedule(schedule::Arguments),
+    Schema(schema::Arguments),
+    Completions(completions::Arguments),
+    Man(man::Arguments),
 }
 
 /// How a command ended; errors aside.
@@ -110,6 +116,9 @@ pub fn run() -> ExitCode {
         Command::Check(arguments) => check::run(arguments, &screen),
         Command::New(arguments) => new::run(arguments, &screen),
         Command::Schedule(arguments) => schedule::run(arguments, &screen),
+        Command::Schema(arguments) => schema::run(arguments, &screen),
+        Command::Completions(arguments) => completions::run(arguments, &screen),
+        Command::Man(arguments) => man::run(arguments, &screen),
     };
     match ending {
         Ok(Ending::Done) => ExitCode::SUCCESS,

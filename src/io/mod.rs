@@ -10,4 +10,5 @@ pub mod pattern_file;
 mod production_table;
 mod profile_tables;
 pub mod schedule_file;
+pub mod schema;
 pub mod toml_reader;

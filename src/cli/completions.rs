@@ -1,0 +1,24 @@
+//! `completions`: what a shell needs to complete coilwright's commands.
+
+use clap::CommandFactory;
+use clap_complete::Shell;
+
+use super::screen::Screen;
+use super::{Cli, CliError, Ending};
+
+/// Completions for a shell, on stdout
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  coilwright completions bash > ~/.local/share/bash-completion/completions/coilwright"
+)]
+pub struct Arguments {
+    #[arg(value_enum)]
+    shell: Shell,
+}
+
+pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, &mut Cli::command(), "coilwright", &mut script);
+    screen.write(&String::from_utf8_lossy(&script))?;
+    Ok(Ending::Done)
+}

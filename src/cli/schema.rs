@@ -1,0 +1,33 @@
+//! `schema`: the JSON Schema of a file format.
+
+use clap::ValueEnum;
+
+use super::screen::Screen;
+use super::{CliError, Ending};
+use crate::io::schema::{model_schema, pattern_schema, record_schema};
+
+/// The JSON Schema of a file format, for editors
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  coilwright schema model > coilwright-model.schema.json")]
+pub struct Arguments {
+    /// Which files it is about
+    #[arg(value_enum)]
+    kind: Kind,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Kind {
+    Model,
+    Pattern,
+    Record,
+}
+
+pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+    let schema = match arguments.kind {
+        Kind::Model => model_schema(),
+        Kind::Pattern => pattern_schema(),
+        Kind::Record => record_schema(),
+    };
+    screen.write(&format!("{schema:#}\n"))?;
+    Ok(Ending::Done)
+}

@@ -1,0 +1,260 @@
+//! JSON Schemas of the file formats, for editors that complete and check while one types.
+//!
+//! Effects come from the catalogue; a test holds the keys against what the readers know.
+
+use serde_json::{Map, Value, json};
+
+use crate::effect::{CATALOGUE, CHANNEL, CUSTOM, EffectSpec};
+use crate::pattern::classic::Classic;
+
+const DIALECT: &str = "https://json-schema.org/draft/2020-12/schema";
+
+fn table(title: &str, needed: &[&str], properties: Value) -> Value {
+    json!({
+        "title": title,
+        "type": "object",
+        "additionalProperties": false,
+        "required": needed,
+        "properties": properties,
+    })
+}
+
+fn described(kind: &str, description: &str) -> Value {
+    json!({ "type": kind, "description": description })
+}
+
+fn with_dialect(mut schema: Value) -> Value {
+    if let Value::Object(map) = &mut schema {
+        map.insert("$schema".to_owned(), DIALECT.into());
+    }
+    schema
+}
+
+/// The schema of a model file.
+pub fn model_schema() -> Value {
+    let windings: Vec<&str> = Classic::ALL.iter().map(|c| c.key()).collect();
+    let fibre = table(
+        "fibre",
+        &["refractive_index", "thermo_optic_per_k", "wavelength_nm", "outer_diameter_um"],
+        json!({
+            "refractive_index": described("number", "of the guided mode"),
+            "thermo_optic_per_k": described("number", "dn/dT"),
+            "thermal_expansion_per_k": described("number", "alpha in dn/dT + n·alpha; 0 leaves it out"),
+            "wavelength_nm": described("number", "of the light in vacuum"),
+            "outer_diameter_um": described("number", "over the coating"),
+        }),
+    );
+    let winding = table(
+        "winding",
+        &["layers", "layer_length"],
+        json!({
+            "layers": { "type": "integer", "minimum": 2, "multipleOf": 2 },
+            "turns_per_layer": described("number", "needed for layer_length = \"actual\""),
+            "inner_diameter_mm": described("number", "of the spool; or mean_diameter_mm"),
+            "mean_diameter_mm": described("number", "of the coil; or inner_diameter_mm"),
+            "radial_pitch_um": described("number", "default: the fibre's outer diameter"),
+            "axial_pitch_um": described("number", "default: the fibre's outer diameter"),
+            "layer_length": { "enum": ["actual", "equal"] },
+            "length_m": described("number", "of the whole fibre"),
+            "pattern": {
+                "description": "a classic winding or the path of a pattern file",
+                "anyOf": [{ "enum": windings }, { "type": "string" }],
+            },
+        }),
+    );
+    let thermal = table(
+        "thermal",
+        &["model"],
+        json!({
+            "model": { "enum": ["pack", "half_space"] },
+            "conductivity_w_per_m_k": described("number", "effective, of the pack"),
+            "volumetric_heat_capacity_j_per_m3_k": described("number", "effective, of the pack"),
+            "diffusivity_m2_per_s": described("number", "instead of conductivity and heat capacity"),
+        }),
+    );
+    let sensor = table(
+        "sensor",
+        &[],
+        json!({
+            "location": { "enum": ["outer_layer", "ambient"] },
+            "rate_mean_s": described("number", "each rate is the mean over this interval, which ends at its stamp"),
+        }),
+    );
+    let search = table(
+        "search",
+        &[],
+        json!({
+            "windability": { "type": "string", "pattern": "^(standard|any|captive:[0-9]+)$" },
+            "seed": { "type": "integer", "minimum": 0 },
+        }),
+    );
+    let effects: Vec<Value> = CATALOGUE.iter().map(|spec| effect_schema(spec)).chain([channel(), custom()]).collect();
+    with_dialect(table(
+        "coilwright model file",
+        &["name", "fibre", "winding", "thermal"],
+        json!({
+            "name": { "type": "string" },
+            "fibre": fibre,
+            "winding": winding,
+            "thermal": thermal,
+            "sensor": sensor,
+            "effect": { "type": "array", "items": { "oneOf": effects } },
+            "profiles": profiles(),
+            "search": search,
+            "production": production(),
+        }),
+    ))
+}
+
+fn production() -> Value {
+    table(
+        "production",
+        &[],
+        json!({
+            "part_number": { "type": "string" },
+            "revision": { "type": "string" },
+            "spool": { "type": "string" },
+            "adhesive": { "type": "string" },
+            "cure": { "type": "string" },
+            "tension_n": described("number", "tension set-point of the first layer"),
+            "tension_taper_percent_per_layer": described("number", "how much less each further layer gets"),
+            "allowance_m": described("number", "fibre on each reel beyond what is wound"),
+            "potting_every_layers": { "type": "integer", "minimum": 0 },
+            "winding_speed_turns_per_min": { "type": "number" },
+        }),
+    )
+}
+
+fn profiles() -> Value {
+    let piece = table(
+        "piece",
+        &["rate_c_per_h", "duration_s"],
+        json!({ "rate_c_per_h": { "type": "number" }, "duration_s": { "type": "number", "exclusiveMinimum": 0 } }),
+    );
+    let ramp = table(
+        "ramp",
+        &["name", "pieces"],
+        json!({ "name": { "type": "string" }, "pieces": { "type": "array", "minItems": 1, "items": piece } }),
+    );
+    table(
+        "profiles",
+        &["max_rate_c_per_h"],
+        json!({
+            "max_rate_c_per_h": described("number", "no ramp is steeper; bound of the guaranteed worst case"),
+            "count": { "type": "integer", "minimum": 0 },
+            "segments": { "type": "integer", "minimum": 1 },
+            "duration_s": { "type": "number", "exclusiveMinimum": 0 },
+            "seed": { "type": "integer", "minimum": 0 },
+            "ramp": { "type": "array", "items": ramp },
+        }),
+    )
+}
+
+fn effect_schema(spec: &EffectSpec) -> Value {
+    let mut properties = Map::from_iter([("kind".to_owned(), json!({ "const": spec.kind }))]);
+    let mut needed = vec!["kind"];
+    for p in spec.parameters {
+        let description = format!("{} [{}]", p.meaning, p.unit.symbol());
+        let number = json!({ "type": "number", "minimum": p.lower, "maximum": p.upper, "description": description });
+        properties.insert(p.key.to_owned(), number);
+        if p.default.is_none() {
+            needed.push(p.key);
+        }
+    }
+    for choice in spec.choices {
+        properties.insert(choice.key.to_owned(), json!({ "enum": choice.options, "description": choice.meaning }));
+        needed.push(choice.key);
+    }
+    table(spec.summary, &needed, Value::Object(properties))
+}
+
+fn channel() -> Value {
+    let gain = CHANNEL.parameters[0].key;
+    let mut schema = effect_schema(CHANNEL);
+    schema["properties"]["kind"] = json!({ "type": "string", "pattern": "^channel:.+$" });
+    schema["required"] = json!(["kind", gain]);
+    schema
+}
+
+fn custom() -> Value {
+    table(
+        CUSTOM.summary,
+        &["kind", "formula"],
+        json!({
+            "kind": { "const": CUSTOM.kind },
+            "formula": { "type": "string" },
+            "parameters": { "type": "object", "additionalProperties": { "type": "number" } },
+        }),
+    )
+}
+
+/// The schema of a pattern file.
+pub fn pattern_schema() -> Value {
+    with_dialect(table(
+        "coilwright pattern file",
+        &["name", "layers", "segments"],
+        json!({
+            "name": { "type": "string" },
+            "layers": { "type": "integer", "minimum": 2, "multipleOf": 2 },
+            "segments": {
+                "type": "array",
+                "description": "the segment on each layer, innermost layer first: a permutation of 1 … layers",
+                "uniqueItems": true,
+                "items": { "type": "integer", "minimum": 1 },
+            },
+        }),
+    ))
+}
+
+/// The schema of one row of a record, as a table schema for CSV tools.
+pub fn record_schema() -> Value {
+    with_dialect(json!({
+        "title": "coilwright record: one row of the CSV",
+        "type": "object",
+        "required": ["time_s", "temperature_c", "rate_deg_per_h"],
+        "properties": {
+            "time_s": described("number", "increases from row to row"),
+            "temperature_c": described("number", "what the sensor showed"),
+            "rate_deg_per_h": described("number", "what the gyro showed, at rest"),
+            "temperature_inner_c": described("number", "at the bore"),
+            "temperature_ambient_c": described("number", "of the air"),
+        },
+        "additionalProperties": { "type": "number", "description": "a further channel by its name" },
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::io::model_file::parse_model;
+
+    /// The keys that the reader knows in a table, from its own answer to a key that it does not know.
+    fn known(table: &str) -> Vec<String> {
+        let source = format!("{table}\nzzzzzz = 1\n");
+        let faults = parse_model(Path::new("x.toml"), &source).unwrap_err();
+        let note = faults.faults.iter().filter(|f| f.message.contains("zzzzzz")).find_map(|f| f.note.clone()).unwrap();
+        note.trim_start_matches("known here: ").split(", ").map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn the_schema_has_exactly_the_keys_that_the_reader_knows() {
+        let schema = model_schema();
+        let keys = |value: &Value| {
+            let mut keys: Vec<String> = value["properties"].as_object().unwrap().keys().cloned().collect();
+            keys.sort();
+            keys
+        };
+        assert_eq!(keys(&schema), known(""));
+        for name in ["fibre", "winding", "thermal", "sensor", "profiles", "search", "production"] {
+            assert_eq!(keys(&schema["properties"][name]), known(&format!("[{name}]")), "{name}");
+        }
+        for spec in CATALOGUE {
+            let mut expected: Vec<String> =
+                effect_schema(spec)["properties"].as_object().unwrap().keys().cloned().collect();
+            expected.sort();
+            assert_eq!(expected, known(&format!("[[effect]]\nkind = \"{}\"", spec.kind)), "{}", spec.kind);
+        }
+    }
+}
