@@ -6,3 +6,4 @@ pub mod maximise;
 pub mod piecewise;
 pub mod state_space;
 pub mod statistics;
+pub mod tridiagonal;

@@ -18,7 +18,7 @@
 
 use libm::erfc;
 
-use super::{Drive, HeatPath, Instant, Side, ThermalHistory};
+use super::{Drive, HeatPath, Instant, Side, ThermalHistory, Wanted};
 
 #[derive(Debug, Clone)]
 pub struct HalfSpace {
@@ -105,7 +105,7 @@ impl HalfSpaceField {
         Self { half_space, drive: drive.clone(), kinks }
     }
 
-    pub fn at(&self, instants: &[Instant]) -> ThermalHistory {
+    pub(super) fn at(&self, instants: &[Instant], wanted: Wanted) -> ThermalHistory {
         let layers = self.half_space.depths_m.len();
         let mut history = ThermalHistory::with_capacity(layers, instants.len());
         let start_k = self.drive.boundary_k.first_value();
@@ -115,14 +115,20 @@ impl HalfSpaceField {
                 Side::After => self.kinks.partition_point(|k| k.0 <= instant.time_s),
                 Side::Before => self.kinks.partition_point(|k| k.0 < instant.time_s),
             };
+            let kinks = &self.kinks[..acting];
             for &depth_m in &self.half_space.depths_m {
-                let (mut rate, mut temperature) = (0.0, start_k);
-                for &(time_s, change) in &self.kinks[..acting] {
-                    rate += change * self.half_space.step_rate(depth_m, instant.time_s - time_s);
-                    temperature += change * self.half_space.ramp_temperature(depth_m, instant.time_s - time_s);
+                let superposed = |response: fn(&HalfSpace, f64, f64) -> f64| -> f64 {
+                    kinks
+                        .iter()
+                        .map(|&(time_s, change)| change * response(&self.half_space, depth_m, instant.time_s - time_s))
+                        .sum()
+                };
+                if wanted.rates() {
+                    history.rate_k_per_s.push(superposed(HalfSpace::step_rate));
                 }
-                history.rate_k_per_s.push(rate);
-                history.temperature_k.push(temperature);
+                if wanted.temperatures() {
+                    history.temperature_k.push(start_k + superposed(HalfSpace::ramp_temperature));
+                }
             }
             super::push_ambient(&mut history, &self.drive, *instant);
         }
@@ -145,7 +151,7 @@ mod tests {
         let field = HalfSpaceField::new(HalfSpace::new(&path), &drive);
         let steps = 40_000;
         let times: Vec<Instant> = (0..=steps).map(|i| Instant::after(60.0 * i as f64 / steps as f64)).collect();
-        let history = field.at(&times);
+        let history = field.at(&times, Wanted::All);
         for layer in 0..12 {
             let trapezium: f64 = (0..steps)
                 .map(|i| {

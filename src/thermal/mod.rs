@@ -4,6 +4,8 @@
 //! gives a [`Field`], which can be asked for any instants. The field does not depend on the winding pattern.
 
 pub mod half_space;
+mod modal;
+mod network;
 pub mod pack;
 
 use thiserror::Error;
@@ -11,7 +13,8 @@ use thiserror::Error;
 use crate::coil::Coil;
 use crate::numeric::piecewise::PiecewiseLinear;
 use half_space::HalfSpaceField;
-use pack::{Pack, PackField};
+use modal::PackField;
+use pack::Pack;
 
 /// What the pack is made of, thermally.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -132,7 +135,8 @@ pub struct HeatPath {
     pub cells_per_layer: usize,
 }
 
-/// Cells a layer that put the layer rates within 1e-4 of the continuum for the packs in `examples/`.
+/// Cells a layer that put the layer rates of a pack of 24 layers of 165 µm within 0.14 % of a change of ramp, from one
+/// second after it on (`tests/validation/pack.rs`).
 pub const DEFAULT_CELLS_PER_LAYER: usize = 2;
 
 impl HeatPath {
@@ -212,6 +216,8 @@ pub struct ThermalHistory {
     /// ∫ Ṫ ζ dζ over −½ ≤ ζ ≤ ½, ζ the axial coordinate over the height, growing away from the first flange; empty
     /// where nothing varies along the axis.
     pub axial_moment_k_per_s: Vec<f64>,
+    /// ∫ T ζ dζ; empty where nothing varies along the axis.
+    pub axial_moment_k: Vec<f64>,
     pub ambient_k: Vec<f64>,
     pub ambient_rate_k_per_s: Vec<f64>,
 }
@@ -224,6 +230,7 @@ impl ThermalHistory {
             temperature_k: Vec::with_capacity(times * layers),
             rate_k_per_s: Vec::with_capacity(times * layers),
             axial_moment_k_per_s: Vec::new(),
+            axial_moment_k: Vec::new(),
             ambient_k: Vec::with_capacity(times),
             ambient_rate_k_per_s: Vec::with_capacity(times),
         }
@@ -375,26 +382,53 @@ pub fn check(path: &HeatPath) -> Result<(), ThermalError> {
     Ok(())
 }
 
+/// Which columns of a history are wanted; the others stay empty.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Wanted {
+    All,
+    Rates,
+    Temperatures,
+}
+
+impl Wanted {
+    fn rates(self) -> bool {
+        self != Wanted::Temperatures
+    }
+
+    fn temperatures(self) -> bool {
+        self != Wanted::Rates
+    }
+}
+
 impl Field {
     /// The field at given instants.
     pub fn at(&self, instants: &[Instant]) -> ThermalHistory {
+        self.sample(instants, Wanted::All)
+    }
+
+    /// As [`Field::at`] without the temperatures, which stay empty: half the work.
+    pub fn rates_at(&self, instants: &[Instant]) -> ThermalHistory {
+        self.sample(instants, Wanted::Rates)
+    }
+
+    fn sample(&self, instants: &[Instant], wanted: Wanted) -> ThermalHistory {
         match self {
-            Field::HalfSpace(field) => field.at(instants),
-            Field::Pack(field) => field.at(instants),
+            Field::HalfSpace(field) => field.at(instants, wanted),
+            Field::Pack(field) => field.at(instants, wanted),
         }
     }
 
     /// The mean over the window that ends at each time: what a logger that averages sees.
     ///
     /// A layer's mean rate over a window is exactly its change of temperature over the window; its temperature is
-    /// taken as the mean of both ends. A window of zero gives the instants themselves.
+    /// taken as the mean of both ends. The same holds for axial moments. A window of zero gives the instants themselves.
     pub fn means(&self, ends_s: &[f64], window_s: f64) -> ThermalHistory {
         if window_s <= 0.0 {
             return self.at(&ends_s.iter().map(|&t| Instant::after(t)).collect::<Vec<_>>());
         }
-        let ends = self.at(&ends_s.iter().map(|&t| Instant::before(t)).collect::<Vec<_>>());
-        let starts = self.at(&ends_s.iter().map(|&t| Instant::after(t - window_s)).collect::<Vec<_>>());
-        let moments = self.moment_means(ends_s, window_s);
+        let ends = self.sample(&ends_s.iter().map(|&t| Instant::before(t)).collect::<Vec<_>>(), Wanted::Temperatures);
+        let starts = self
+            .sample(&ends_s.iter().map(|&t| Instant::after(t - window_s)).collect::<Vec<_>>(), Wanted::Temperatures);
         let middle = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| 0.5 * (a + b)).collect::<Vec<f64>>();
         let change = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (b - a) / window_s).collect::<Vec<f64>>();
         ThermalHistory {
@@ -402,15 +436,11 @@ impl Field {
             times_s: ends_s.to_vec(),
             temperature_k: middle(&starts.temperature_k, &ends.temperature_k),
             rate_k_per_s: change(&starts.temperature_k, &ends.temperature_k),
-            axial_moment_k_per_s: moments,
+            axial_moment_k: middle(&starts.axial_moment_k, &ends.axial_moment_k),
+            axial_moment_k_per_s: change(&starts.axial_moment_k, &ends.axial_moment_k),
             ambient_k: middle(&starts.ambient_k, &ends.ambient_k),
             ambient_rate_k_per_s: change(&starts.ambient_k, &ends.ambient_k),
         }
-    }
-
-    /// The axial moment's mean over each window; empty where nothing varies along the axis.
-    fn moment_means(&self, _ends_s: &[f64], _window_s: f64) -> Vec<f64> {
-        Vec::new()
     }
 }
 

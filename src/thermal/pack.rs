@@ -1,4 +1,4 @@
-//! A real winding pack: radial conduction in a finite cylinder, solved exactly in time by its eigenmodes.
+//! A real winding pack: conduction in a finite cylinder, solved exactly in time by its eigenmodes.
 //!
 //! ```text
 //! C dT/dt = −G T + b u(t) + b_a a(t) + b_q q(t)
@@ -9,138 +9,109 @@
 //!
 //! | symbol | meaning | unit | in code |
 //! |---|---|---|---|
-//! | C | heat capacity of a cell, per radian and height | J/(m K rad) | `capacity` |
-//! | G | conductances between cells and to the boundary | W/(m K rad) | `conductance` |
+//! | C | heat capacity of a cell, per radian and height | J/(m K rad) | `Network::capacity` |
+//! | G | conductances between cells and to the boundary | W/(m K rad) | `Network::links` |
 //! | u, k | drive temperature and its rate, piecewise linear and constant | K, K/s | `Drive::boundary_k` |
 //! | a | ambient temperature, where it is known apart from the drive | K | `Drive::ambient_k` |
 //! | q | heat into the bore | W/m² | `BoreHeat` |
 //! | λ_i | decay rate of mode i | 1/s | `decay_per_s` |
-//! | s_j, a_ji | steady response and modal amplitude of layer j | 1 | `steady`, `amplitude` |
+//! | s_j, a_ji | steady response and modal amplitude of output j | 1 | `steady`, `amplitude` |
 //!
-//! Holds for constant properties and no axial variation; the outermost layer's temperature is imposed at its middle
-//! (`OuterLayer`), or its surface exchanges heat with the air (`Ambient`). Conductances between cell centres are those
-//! of a cylinder, k/ln(r₂/r₁), so a steady radial flow is exact; the scheme is of second order in the cell's size.
+//! Outputs are the layers' means and, where a flange is heated, their first axial moments. A flange makes the field
+//! two-dimensional but keeps it separable: each mode of the axial operator carries a radial network of its own, with
+//! K μ_m added to every cell of the pack (the spool does not conduct along the axis).
+//!
+//! Holds for constant properties; the outermost layer's temperature is imposed at its middle (`OuterLayer`), or its
+//! surface exchanges heat with the air (`Ambient`).
 //!
 //! # Source
-//! Finite volumes after Patankar (1980), chapter 4; modal solution of a linear system driven by ramps, any text on
-//! linear systems. The semi-discrete operator is exact in time: there is no time step.
+//! Modal solution of a linear system driven by ramps, any text on linear systems; separation of variables, Carslaw and
+//! Jaeger (1959), section 5.6. The semi-discrete operator is exact in time: there is no time step.
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 
-use super::{BoreHeat, Drive, HeatPath, Instant, Location, Material, Side, ThermalError, ThermalHistory};
-use crate::numeric::piecewise::PiecewiseLinear;
-
-/// How one input acts: the layers' steady response to it and what each mode takes away from that.
-#[derive(Debug, Clone)]
-struct InputResponse {
-    steady: Vec<f64>,
-    /// Row-major, layers × modes.
-    amplitude: Vec<f64>,
-}
+use super::modal::Response;
+use super::network::{Network, Slices};
+use super::{BoreHeat, HeatPath, ThermalError};
+use crate::numeric::tridiagonal::diagonalise;
 
 /// The modal form of a pack's heat path.
 #[derive(Debug, Clone)]
 pub struct Pack {
-    layers: usize,
-    decay_per_s: Vec<f64>,
-    boundary: InputResponse,
-    /// Present where something is mounted to the ambient and the ambient is not the drive itself.
-    ambient: Option<InputResponse>,
-    /// Row-major layers × modes: the temperature of a layer per mode content that the bore's heat excites.
-    heat: Option<(BoreHeat, Vec<f64>)>,
-    shortest_s: f64,
+    pub(super) layers: usize,
+    /// Layer means, then (with a heated flange) first axial moments.
+    pub(super) outputs: usize,
+    /// Ascending.
+    pub(super) decay_per_s: Vec<f64>,
+    pub(super) boundary: Response,
+    /// Present where something exchanges heat with the ambient besides the outer surface.
+    pub(super) ambient: Option<Response>,
+    /// Outputs × modes: the temperature of an output per mode content that the bore's heat excites.
+    pub(super) heat: Option<(BoreHeat, DMatrix<f64>)>,
 }
 
-/// The discretised operator: cells from the bore outwards, the spool (if any) in front of them.
-struct Network {
-    capacity: Vec<f64>,
-    /// Between node i and node i+1.
-    links: Vec<f64>,
-    /// To the drive, to the ambient; only the outermost node and the spool have any.
-    to_boundary: Vec<f64>,
-    to_ambient: Vec<f64>,
-    /// Share of the bore's heat flux that a node takes, per unit flux.
-    heated: Vec<f64>,
-    /// Nodes in front of the pack's first cell.
-    spool_nodes: usize,
+/// A mode whose share of every response is smaller than this is rounding.
+const NEGLIGIBLE: f64 = 1e-14;
+
+/// Eigenmodes along the axis; without a heated flange there is one, uniform.
+struct AxialModes {
+    /// μ_m [1/m²].
+    decay_per_m2: Vec<f64>,
+    /// What a mode's content adds to the mean over the axis, and what a uniform input adds to its content.
+    mean: Vec<f64>,
+    uniform: Vec<f64>,
+    /// Mode content per unit of the flange's air [1/m²], and the mode's first moment; both empty without a flange.
+    flange_per_m2: Vec<f64>,
+    moment: Vec<f64>,
 }
 
-impl Network {
-    fn new(path: &HeatPath) -> Self {
-        let shape = &path.shape;
-        let cells = path.cells_per_layer;
-        let width_m = shape.radial_pitch_m / cells as f64;
-        let (conductivity, heat_capacity) = match path.material {
-            Material::Conductivity { w_per_m_k, heat_capacity_j_per_m3_k } => (w_per_m_k, heat_capacity_j_per_m3_k),
-            // Only the ratio matters where nothing else exchanges heat with the pack.
-            Material::Diffusivity { m2_per_s } => (m2_per_s, 1.0),
+impl AxialModes {
+    fn new(path: &HeatPath, network: &Network) -> Result<Self, ThermalError> {
+        let Some(flange) = path.flange else {
+            return Ok(Self {
+                decay_per_m2: vec![0.0],
+                mean: vec![1.0],
+                uniform: vec![1.0],
+                flange_per_m2: Vec::new(),
+                moment: Vec::new(),
+            });
         };
-        let edge_m = |i: usize| shape.bore_radius_m + i as f64 * width_m;
-        let centre_m = |i: usize| edge_m(i) + 0.5 * width_m;
-        let count = match path.location {
-            // The outermost layer's middle carries the drive: only its inner half is left to solve.
-            Location::OuterLayer => (shape.layers - 1) * cells + cells / 2,
-            Location::Ambient => shape.layers * cells,
-        };
-        let spool_nodes = usize::from(path.spool.is_some());
-        let nodes = count + spool_nodes;
-        let mut network = Network {
-            capacity: Vec::with_capacity(nodes),
-            links: Vec::with_capacity(nodes),
-            to_boundary: vec![0.0; nodes],
-            to_ambient: vec![0.0; nodes],
-            heated: vec![0.0; nodes],
-            spool_nodes,
-        };
-        if let Some(spool) = path.spool {
-            network.capacity.push(spool.heat_capacity_j_per_m2_k * shape.bore_radius_m);
-            let half_cell = (centre_m(0) / shape.bore_radius_m).ln() / conductivity;
-            network.links.push(1.0 / (1.0 / (spool.contact_w_per_m2_k * shape.bore_radius_m) + half_cell));
-            network.to_ambient[0] = spool.mount_w_per_m2_k * shape.bore_radius_m;
-        }
-        for i in 0..count {
-            network.capacity.push(heat_capacity * 0.5 * (edge_m(i + 1).powi(2) - edge_m(i).powi(2)));
-            if i + 1 < count {
-                network.links.push(conductivity / (centre_m(i + 1) / centre_m(i)).ln());
-            }
-        }
-        let last_m = centre_m(count - 1);
-        network.to_boundary[nodes - 1] = match path.location {
-            Location::OuterLayer => {
-                let drive_m = shape.bore_radius_m + (shape.layers as f64 - 0.5) * shape.radial_pitch_m;
-                conductivity / (drive_m / last_m).ln()
-            }
-            Location::Ambient => {
-                let outer_m = edge_m(count);
-                let half_cell = (outer_m / last_m).ln() / conductivity;
-                let film = path.film_w_per_m2_k.map_or(0.0, |h| 1.0 / (h * outer_m));
-                1.0 / (half_cell + film)
-            }
-        };
-        // The bore's heat enters the spool if there is one, else the innermost cell.
-        network.heated[0] = shape.bore_radius_m;
-        network
+        let slices = Slices::new(path, flange);
+        let (n, heated) = (slices.count, slices.at_flange());
+        let link = slices.width_m.powi(-2);
+        let k = network.conductivity_w_per_m_k;
+        let to_air = slices.flange_w_per_m2_k(k) / (slices.width_m * k);
+        let mut diagonal: Vec<f64> = (0..n).map(|i| link * (f64::from(i > 0) + f64::from(i + 1 < n))).collect();
+        diagonal[heated] += to_air;
+        let moment = slices.moment_weights();
+        let mut rows = DMatrix::from_fn(3, n, |row, i| match row {
+            0 => 1.0,
+            1 => f64::from(i == heated) * to_air,
+            _ => moment[i],
+        });
+        diagonalise(&mut diagonal, &vec![-link; n - 1], &mut rows).map_err(|_| ThermalError::Eigen)?;
+        let row = |r: usize| rows.row(r).iter().copied().collect::<Vec<f64>>();
+        Ok(Self {
+            decay_per_m2: diagonal,
+            mean: row(0).iter().map(|v| v / n as f64).collect(),
+            uniform: row(0),
+            flange_per_m2: row(1),
+            moment: row(2),
+        })
     }
 
-    /// C^{−1/2} G C^{−1/2}.
-    fn symmetrised(&self) -> DMatrix<f64> {
-        let n = self.capacity.len();
-        let mut matrix = DMatrix::zeros(n, n);
-        for i in 0..n {
-            let mut diagonal = self.to_boundary[i] + self.to_ambient[i];
-            if i > 0 {
-                diagonal += self.links[i - 1];
-            }
-            if i + 1 < n {
-                diagonal += self.links[i];
-                let off = -self.links[i] / (self.capacity[i] * self.capacity[i + 1]).sqrt();
-                matrix[(i, i + 1)] = off;
-                matrix[(i + 1, i)] = off;
-            }
-            matrix[(i, i)] = diagonal / self.capacity[i];
-        }
-        matrix
+    fn has_moments(&self) -> bool {
+        !self.moment.is_empty()
     }
+}
+
+/// One mode: its decay, what each output sees of it, and what each input puts into it.
+struct Mode {
+    decay_per_s: f64,
+    seen: Vec<f64>,
+    boundary: f64,
+    ambient: f64,
+    heat: f64,
 }
 
 impl Pack {
@@ -148,247 +119,156 @@ impl Pack {
     /// Values so extreme that the eigenvalues do not converge or are not positive.
     pub fn new(path: &HeatPath) -> Result<Self, ThermalError> {
         let network = Network::new(path);
-        let nodes = network.capacity.len();
-        let matrix = network.symmetrised();
-        if matrix.iter().any(|v| !v.is_finite()) {
+        let axial = AxialModes::new(path, &network)?;
+        let layers = network.layers;
+        let outputs = layers * if axial.has_moments() { 2 } else { 1 };
+        let diffusivity = path.material.diffusivity_m2_per_s();
+        let mut modes = Vec::with_capacity(network.nodes() * axial.mean.len());
+        for m in 0..axial.mean.len() {
+            modes.extend(radial_modes(&network, &axial, m, diffusivity)?);
+        }
+        if modes.iter().any(|mode| !(mode.decay_per_s > 0.0)) {
             return Err(ThermalError::Eigen);
         }
-        let eigen = SymmetricEigen::try_new(matrix, f64::EPSILON, 100 * nodes).ok_or(ThermalError::Eigen)?;
-        let decay_per_s: Vec<f64> = eigen.eigenvalues.iter().copied().collect();
-        if decay_per_s.iter().any(|l| !(*l > 0.0)) {
-            return Err(ThermalError::Eigen);
-        }
-        let layers = path.shape.layers;
-        let projected = layer_projection(path, &network, &eigen.eigenvectors);
-        let excitation = |input: &[f64]| -> Vec<f64> {
-            (0..nodes)
-                .map(|mode| {
-                    (0..nodes).map(|i| eigen.eigenvectors[(i, mode)] * input[i] / network.capacity[i].sqrt()).sum()
-                })
-                .collect()
-        };
-        let response = |input: &[f64], is_boundary: bool| -> InputResponse {
-            let excitation = excitation(input);
-            let mut amplitude: Vec<f64> = projected.clone();
-            for row in amplitude.chunks_exact_mut(nodes) {
-                for (mode, value) in row.iter_mut().enumerate() {
-                    *value *= excitation[mode] / decay_per_s[mode];
+        modes.sort_by(|a, b| a.decay_per_s.total_cmp(&b.decay_per_s));
+
+        let has_ambient = network.mount != 0.0 || axial.has_moments();
+        let steady_of = |input: fn(&Mode) -> f64| {
+            let mut steady = DVector::zeros(outputs);
+            for mode in &modes {
+                for (s, seen) in steady.iter_mut().zip(&mode.seen) {
+                    *s += seen * input(mode) / mode.decay_per_s;
                 }
             }
-            let mut steady: Vec<f64> = amplitude.chunks_exact(nodes).map(|row| row.iter().sum()).collect();
-            if is_boundary && path.location == Location::OuterLayer {
-                // The outermost layer is the drive itself.
-                steady[layers - 1] = 1.0;
-            }
-            InputResponse { steady, amplitude }
+            steady
         };
-        let mounted = network.to_ambient.iter().any(|&g| g != 0.0);
-        let boundary = response(&network.to_boundary, true);
-        let ambient = mounted.then(|| response(&network.to_ambient, false));
+        let mut boundary_steady = steady_of(|mode| mode.boundary);
+        if network.outermost_is_drive {
+            boundary_steady[layers - 1] = 1.0;
+        }
+        let ambient_steady = steady_of(|mode| mode.ambient);
+
+        drop_negligible(&mut modes);
+        let decay_per_s: Vec<f64> = modes.iter().map(|mode| mode.decay_per_s).collect();
+        let amplitude = |input: fn(&Mode) -> f64| {
+            DMatrix::from_fn(outputs, modes.len(), |j, i| modes[i].seen[j] * input(&modes[i]) / modes[i].decay_per_s)
+        };
+        let boundary = Response::new(boundary_steady, amplitude(|mode| mode.boundary), &decay_per_s);
+        let ambient = has_ambient.then(|| Response::new(ambient_steady, amplitude(|mode| mode.ambient), &decay_per_s));
         let heat = path.bore_heat.map(|bore_heat| {
-            let excitation = excitation(&network.heated);
-            let mut content = projected.clone();
-            for row in content.chunks_exact_mut(nodes) {
-                for (mode, value) in row.iter_mut().enumerate() {
-                    *value *= excitation[mode];
-                }
-            }
-            (bore_heat, content)
+            (bore_heat, DMatrix::from_fn(outputs, modes.len(), |j, i| modes[i].seen[j] * modes[i].heat))
         });
-        let shortest_s = 1.0 / decay_per_s.iter().copied().fold(0.0, f64::max);
-        Ok(Self { layers, decay_per_s, boundary, ambient, heat, shortest_s })
+        Ok(Self { layers, outputs, decay_per_s, boundary, ambient, heat })
     }
 
-    fn modes(&self) -> usize {
+    pub(super) fn modes(&self) -> usize {
         self.decay_per_s.len()
     }
 
-    /// λ_i [1/s], in no particular order.
+    /// λ_i [1/s], ascending.
     pub fn decays_per_s(&self) -> &[f64] {
         &self.decay_per_s
     }
 
     /// a_ji: what mode `mode` takes away from a layer's steady response while drive and ambient are one temperature.
     pub fn amplitude(&self, layer: usize, mode: usize) -> f64 {
-        let place = layer * self.modes() + mode;
-        self.boundary.amplitude[place] + self.ambient.as_ref().map_or(0.0, |a| a.amplitude[place])
+        self.boundary.amplitude[(layer, mode)] + self.ambient.as_ref().map_or(0.0, |a| a.amplitude[(layer, mode)])
+    }
+
+    /// Drive and ambient as one temperature.
+    pub(super) fn joint(&self) -> Response {
+        match &self.ambient {
+            None => self.boundary.clone(),
+            Some(ambient) => self.boundary.plus(ambient),
+        }
     }
 
     /// The rate of every layer after a unit step of the drive's rate; the ambient, if apart, does the same step.
     pub fn step_rates(&self, time_s: f64, layers: &mut [f64]) {
-        let decayed: Vec<f64> = self.decay_per_s.iter().map(|l| (-l * time_s.max(0.0)).exp()).collect();
         layers.fill(0.0);
         if time_s < 0.0 {
             return;
         }
         for response in std::iter::once(&self.boundary).chain(&self.ambient) {
             for (j, rate) in layers.iter_mut().enumerate() {
-                *rate += response.steady[j] - dot(response.row(j, self.modes()), &decayed);
+                *rate += response.steady[j];
+            }
+            for (i, l) in self.decay_per_s.iter().enumerate() {
+                let left = (-l * time_s).exp();
+                for (j, rate) in layers.iter_mut().enumerate() {
+                    *rate -= response.amplitude[(j, i)] * left;
+                }
             }
         }
     }
 
     /// Fifty time constants of the slowest mode: nothing is left then but rounding.
     pub fn settling_s(&self) -> f64 {
-        50.0 / self.decay_per_s.iter().copied().fold(f64::INFINITY, f64::min)
+        50.0 / self.decay_per_s[0]
     }
 
     pub fn shortest_s(&self) -> f64 {
-        self.shortest_s
+        1.0 / self.decay_per_s[self.modes() - 1]
     }
 }
 
-impl InputResponse {
-    fn row(&self, layer: usize, modes: usize) -> &[f64] {
-        &self.amplitude[layer * modes..(layer + 1) * modes]
+/// The radial modes that belong to axial mode `m`.
+fn radial_modes(
+    network: &Network,
+    axial: &AxialModes,
+    m: usize,
+    diffusivity_m2_per_s: f64,
+) -> Result<Vec<Mode>, ThermalError> {
+    let (n, layers, solved) = (network.nodes(), network.layers, network.solved_layers());
+    let (mut decays, off) = network.symmetrised(diffusivity_m2_per_s * axial.decay_per_m2[m]);
+    let has_moments = axial.has_moments();
+    let (boundary_row, mount_row, heat_row, flange_row) = (solved, solved + 1, solved + 2, solved + 3);
+    let mut rows = DMatrix::zeros(solved + 3 + usize::from(has_moments), n);
+    for layer in 0..solved {
+        let capacity = network.layer_capacity(layer);
+        for i in network.nodes_of(layer) {
+            rows[(layer, i)] = network.capacity[i].sqrt() / capacity;
+        }
     }
+    let inner_root = network.capacity[0].sqrt();
+    rows[(boundary_row, n - 1)] =
+        network.to_boundary.conductance(network.conductivity_w_per_m_k) / network.capacity[n - 1].sqrt();
+    rows[(mount_row, 0)] = network.mount / inner_root;
+    rows[(heat_row, 0)] = network.heated / inner_root;
+    if has_moments {
+        for i in network.spool_nodes..n {
+            rows[(flange_row, i)] = network.capacity[i].sqrt() * diffusivity_m2_per_s;
+        }
+    }
+    diagonalise(&mut decays, &off, &mut rows).map_err(|_| ThermalError::Eigen)?;
+    Ok((0..n)
+        .map(|i| {
+            let mut seen = vec![0.0; layers * if has_moments { 2 } else { 1 }];
+            for layer in 0..solved {
+                seen[layer] = axial.mean[m] * rows[(layer, i)];
+                if has_moments {
+                    seen[layers + layer] = axial.moment[m] * rows[(layer, i)];
+                }
+            }
+            let from_flange = if has_moments { axial.flange_per_m2[m] * rows[(flange_row, i)] } else { 0.0 };
+            Mode {
+                decay_per_s: decays[i],
+                seen,
+                boundary: axial.uniform[m] * rows[(boundary_row, i)],
+                ambient: axial.uniform[m] * rows[(mount_row, i)] + from_flange,
+                heat: axial.uniform[m] * rows[(heat_row, i)],
+            }
+        })
+        .collect())
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// Row-major layers × modes: the volume mean of each layer per unit of each mode. A layer that is the drive has zeros.
-fn layer_projection(path: &HeatPath, network: &Network, vectors: &DMatrix<f64>) -> Vec<f64> {
-    let nodes = network.capacity.len();
-    let cells = path.cells_per_layer;
-    let layers = path.shape.layers;
-    let mut projected = vec![0.0; layers * nodes];
-    let solved_layers = match path.location {
-        Location::OuterLayer => layers - 1,
-        Location::Ambient => layers,
+/// Keeps the modes that any output sees of any input; a flange makes many that none does.
+fn drop_negligible(modes: &mut Vec<Mode>) {
+    let inputs: [fn(&Mode) -> f64; 3] = [|m| m.boundary, |m| m.ambient, |m| m.heat];
+    let share = |mode: &Mode, input: fn(&Mode) -> f64| {
+        let seen = mode.seen.iter().map(|s| s.abs()).fold(0.0, f64::max);
+        (seen * input(mode) / mode.decay_per_s).abs()
     };
-    for layer in 0..solved_layers {
-        let of_layer = network.spool_nodes + layer * cells..network.spool_nodes + (layer + 1) * cells;
-        let volume: f64 = network.capacity[of_layer.clone()].iter().sum();
-        for mode in 0..nodes {
-            projected[layer * nodes + mode] =
-                of_layer.clone().map(|i| network.capacity[i].sqrt() * vectors[(i, mode)]).sum::<f64>() / volume;
-        }
-    }
-    projected
-}
-
-/// The contents of the modes that one piecewise-linear input excites, at each of its knots.
-#[derive(Debug, Clone)]
-struct ModalTrack {
-    input: PiecewiseLinear,
-    /// Row-major knots × modes, just after each knot: Σ_q Δk_q e^{−λ_i (t−t_q)}.
-    content: Vec<f64>,
-}
-
-impl ModalTrack {
-    fn new(input: &PiecewiseLinear, decay_per_s: &[f64]) -> Self {
-        let modes = decay_per_s.len();
-        let knots = input.knots();
-        let mut content = Vec::with_capacity(knots.len() * modes);
-        let mut state = vec![0.0; modes];
-        let mut slope = 0.0;
-        for (i, &time_s) in knots.iter().enumerate() {
-            if i > 0 {
-                let elapsed_s = time_s - knots[i - 1];
-                for (s, l) in state.iter_mut().zip(decay_per_s) {
-                    *s *= (-l * elapsed_s).exp();
-                }
-            }
-            let change = input.slope_of(i) - slope;
-            slope = input.slope_of(i);
-            for s in &mut state {
-                *s += change;
-            }
-            content.extend_from_slice(&state);
-        }
-        Self { input: input.clone(), content }
-    }
-
-    /// Writes the modes' contents at an instant; returns the input's value and slope there.
-    fn at(&self, instant: Instant, decay_per_s: &[f64], state: &mut [f64]) -> (f64, f64) {
-        let modes = decay_per_s.len();
-        let knots = self.input.knots();
-        let past = match instant.side {
-            Side::After => knots.partition_point(|&k| k <= instant.time_s),
-            Side::Before => knots.partition_point(|&k| k < instant.time_s),
-        };
-        let Some(knot) = past.checked_sub(1) else {
-            state.fill(0.0);
-            return (self.input.first_value(), 0.0);
-        };
-        let elapsed_s = instant.time_s - knots[knot];
-        let stored = &self.content[knot * modes..(knot + 1) * modes];
-        for ((s, stored), l) in state.iter_mut().zip(stored).zip(decay_per_s) {
-            *s = stored * (-l * elapsed_s).exp();
-        }
-        (self.input.values()[knot] + self.input.slope_of(knot) * elapsed_s, self.input.slope_of(knot))
-    }
-}
-
-/// A pack under one drive.
-#[derive(Debug, Clone)]
-pub struct PackField {
-    pack: Pack,
-    drive: Drive,
-    boundary: ModalTrack,
-    ambient: Option<ModalTrack>,
-}
-
-impl PackField {
-    pub fn new(pack: Pack, drive: &Drive) -> Self {
-        let boundary = ModalTrack::new(&drive.boundary_k, &pack.decay_per_s);
-        let ambient = pack.ambient.is_some().then(|| ModalTrack::new(drive.ambient_k(), &pack.decay_per_s));
-        Self { pack, drive: drive.clone(), boundary, ambient }
-    }
-
-    pub fn at(&self, instants: &[Instant]) -> ThermalHistory {
-        let (layers, modes) = (self.pack.layers, self.pack.modes());
-        let mut history = ThermalHistory::with_capacity(layers, instants.len());
-        let mut state = vec![0.0; modes];
-        let mut lagging = vec![0.0; modes];
-        for &instant in instants {
-            history.times_s.push(instant.time_s);
-            let start = history.rate_k_per_s.len();
-            history.rate_k_per_s.resize(start + layers, 0.0);
-            history.temperature_k.resize(start + layers, 0.0);
-            let tracks = std::iter::once((&self.boundary, &self.pack.boundary))
-                .chain(self.ambient.as_ref().zip(self.pack.ambient.as_ref()));
-            for (track, response) in tracks {
-                let (value, slope) = track.at(instant, &self.pack.decay_per_s, &mut state);
-                for ((lag, s), l) in lagging.iter_mut().zip(&state).zip(&self.pack.decay_per_s) {
-                    *lag = (slope - s) / l;
-                }
-                for j in 0..layers {
-                    let row = response.row(j, modes);
-                    history.rate_k_per_s[start + j] += response.steady[j] * slope - dot(row, &state);
-                    history.temperature_k[start + j] += response.steady[j] * value - dot(row, &lagging);
-                }
-            }
-            if let Some((heat, content)) = &self.pack.heat {
-                let since_s = instant.time_s - self.drive.start_s();
-                for (mode, &l) in self.pack.decay_per_s.iter().enumerate() {
-                    (lagging[mode], state[mode]) = heated_mode(heat, l, since_s);
-                }
-                for j in 0..layers {
-                    let row = &content[j * modes..(j + 1) * modes];
-                    history.temperature_k[start + j] += dot(row, &lagging);
-                    history.rate_k_per_s[start + j] += dot(row, &state);
-                }
-            }
-            super::push_ambient(&mut history, &self.drive, instant);
-        }
-        history
-    }
-}
-
-/// c and dc/dt of c' = −λ c + q∞ (1 − e^{−t/τ}), c(0) = 0.
-fn heated_mode(heat: &BoreHeat, decay_per_s: f64, time_s: f64) -> (f64, f64) {
-    if time_s <= 0.0 {
-        return (0.0, 0.0);
-    }
-    let (l, m) = (decay_per_s, 1.0 / heat.time_constant_s);
-    let (el, em) = ((-l * time_s).exp(), (-m * time_s).exp());
-    // (e^{−mt} − e^{−lt})/(l − m) without cancellation where l ≈ m.
-    let difference =
-        if ((l - m) * time_s).abs() < 1e-8 { time_s * em } else { em * -(-(l - m) * time_s).exp_m1() / (l - m) };
-    let content = (1.0 - el) / l - difference;
-    let rate = m * difference;
-    (heat.power_w_per_m2 * content, heat.power_w_per_m2 * rate)
+    let largest = inputs.map(|input| modes.iter().map(|mode| share(mode, input)).fold(0.0, f64::max));
+    modes.retain(|mode| inputs.iter().zip(largest).any(|(&input, largest)| share(mode, input) > NEGLIGIBLE * largest));
 }

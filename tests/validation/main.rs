@@ -3,4 +3,5 @@
 mod allan;
 mod exact_integers;
 mod nist_strd;
+mod pack;
 mod paper;

@@ -1,0 +1,242 @@
+//! A modal system under piecewise-linear inputs: exact at any instant, without time steps.
+//!
+//! All instants of a request are gathered into one matrix of mode contents, so that outputs are one matrix product.
+//!
+//! ```text
+//! c_i(t) = Σ_q Δk_q e^{−λ_i (t−t_q)},   Ṫ = s k − A c,   T = s u − (A Λ⁻¹ 1) k + A Λ⁻¹ c
+//! ```
+
+use nalgebra::{DMatrix, DVector};
+
+use super::pack::Pack;
+use super::{BoreHeat, Drive, Instant, Side, ThermalHistory, Wanted};
+use crate::numeric::piecewise::PiecewiseLinear;
+
+/// How one input acts: the outputs' steady response to it and what each mode takes away from that.
+#[derive(Debug, Clone)]
+pub(super) struct Response {
+    pub steady: DVector<f64>,
+    /// A, outputs × modes.
+    pub amplitude: DMatrix<f64>,
+    /// A Λ⁻¹.
+    lag: DMatrix<f64>,
+    /// A Λ⁻¹ 1.
+    lag_sum: DVector<f64>,
+}
+
+impl Response {
+    pub fn new(steady: DVector<f64>, amplitude: DMatrix<f64>, decay_per_s: &[f64]) -> Self {
+        let mut lag = amplitude.clone();
+        for (mut column, l) in lag.column_iter_mut().zip(decay_per_s) {
+            column /= *l;
+        }
+        let lag_sum = lag.column_sum();
+        Self { steady, amplitude, lag, lag_sum }
+    }
+
+    pub fn plus(&self, other: &Self) -> Self {
+        Self {
+            steady: &self.steady + &other.steady,
+            amplitude: &self.amplitude + &other.amplitude,
+            lag: &self.lag + &other.lag,
+            lag_sum: &self.lag_sum + &other.lag_sum,
+        }
+    }
+}
+
+/// Instants that are turned into one matrix product; more would leave the cache.
+const BATCH: usize = 256;
+
+/// Behind this many time constants a mode's content is zero: e^−100 is below any rounding.
+const FORGOTTEN: f64 = 100.0;
+
+/// e^{−λ_i t} for a time that is often the same as the last one.
+struct Decay<'a> {
+    decay_per_s: &'a [f64],
+    elapsed_s: f64,
+    left: Vec<f64>,
+}
+
+impl<'a> Decay<'a> {
+    fn new(decay_per_s: &'a [f64]) -> Self {
+        Self { decay_per_s, elapsed_s: 0.0, left: vec![1.0; decay_per_s.len()] }
+    }
+
+    fn after(&mut self, elapsed_s: f64) -> &[f64] {
+        if elapsed_s != self.elapsed_s {
+            self.elapsed_s = elapsed_s;
+            // Decays ascend, so what is behind a forgotten mode is forgotten too.
+            let remembered = self.decay_per_s.partition_point(|l| l * elapsed_s < FORGOTTEN);
+            for (left, l) in self.left[..remembered].iter_mut().zip(self.decay_per_s) {
+                *left = (-l * elapsed_s).exp();
+            }
+            self.left[remembered..].fill(0.0);
+        }
+        &self.left
+    }
+}
+
+/// The contents of the modes that one piecewise-linear input excites, at each of its knots.
+#[derive(Debug, Clone)]
+struct Track {
+    input: PiecewiseLinear,
+    response: Response,
+    /// Row-major knots × modes, just after each knot: Σ_q Δk_q e^{−λ_i (t−t_q)}.
+    content: Vec<f64>,
+}
+
+impl Track {
+    fn new(input: &PiecewiseLinear, response: Response, decay_per_s: &[f64]) -> Self {
+        let knots = input.knots();
+        let mut content = Vec::with_capacity(knots.len() * decay_per_s.len());
+        let mut state = vec![0.0; decay_per_s.len()];
+        let mut decay = Decay::new(decay_per_s);
+        let mut slope = 0.0;
+        for (i, &time_s) in knots.iter().enumerate() {
+            let change = input.slope_of(i) - slope;
+            slope = input.slope_of(i);
+            let left = decay.after(if i > 0 { time_s - knots[i - 1] } else { 0.0 });
+            for (s, left) in state.iter_mut().zip(left) {
+                *s = *s * left + change;
+            }
+            content.extend_from_slice(&state);
+        }
+        Self { input: input.clone(), response, content }
+    }
+
+    /// Writes the modes' contents at an instant; returns the input's value and slope there.
+    fn at(&self, instant: Instant, decay: &mut Decay, state: &mut [f64]) -> (f64, f64) {
+        let modes = state.len();
+        let knots = self.input.knots();
+        let past = match instant.side {
+            Side::After => knots.partition_point(|&k| k <= instant.time_s),
+            Side::Before => knots.partition_point(|&k| k < instant.time_s),
+        };
+        let Some(knot) = past.checked_sub(1) else {
+            state.fill(0.0);
+            return (self.input.first_value(), 0.0);
+        };
+        let elapsed_s = instant.time_s - knots[knot];
+        let stored = &self.content[knot * modes..(knot + 1) * modes];
+        for ((s, stored), left) in state.iter_mut().zip(stored).zip(decay.after(elapsed_s)) {
+            *s = stored * left;
+        }
+        (self.input.values()[knot] + self.input.slope_of(knot) * elapsed_s, self.input.slope_of(knot))
+    }
+}
+
+/// A pack under one drive.
+#[derive(Debug, Clone)]
+pub struct PackField {
+    layers: usize,
+    outputs: usize,
+    decay_per_s: Vec<f64>,
+    heat: Option<(BoreHeat, DMatrix<f64>)>,
+    drive: Drive,
+    tracks: Vec<Track>,
+}
+
+impl PackField {
+    pub fn new(pack: Pack, drive: &Drive) -> Self {
+        let decay_per_s = &pack.decay_per_s;
+        let tracks = match (&pack.ambient, &drive.ambient_k) {
+            (Some(ambient), Some(ambient_k)) => vec![
+                Track::new(&drive.boundary_k, pack.boundary.clone(), decay_per_s),
+                Track::new(ambient_k, ambient.clone(), decay_per_s),
+            ],
+            _ => vec![Track::new(&drive.boundary_k, pack.joint(), decay_per_s)],
+        };
+        Self {
+            layers: pack.layers,
+            outputs: pack.outputs,
+            tracks,
+            drive: drive.clone(),
+            decay_per_s: pack.decay_per_s,
+            heat: pack.heat,
+        }
+    }
+
+    pub(super) fn at(&self, instants: &[Instant], wanted: Wanted) -> ThermalHistory {
+        let mut history = ThermalHistory::with_capacity(self.layers, instants.len());
+        for batch in instants.chunks(BATCH) {
+            self.add_batch(batch, wanted, &mut history);
+        }
+        for &instant in instants {
+            history.times_s.push(instant.time_s);
+            super::push_ambient(&mut history, &self.drive, instant);
+        }
+        history
+    }
+
+    fn add_batch(&self, batch: &[Instant], wanted: Wanted, history: &mut ThermalHistory) {
+        let modes = self.decay_per_s.len();
+        let mut state = DMatrix::zeros(modes, batch.len());
+        let mut temperature = wanted.temperatures().then(|| DMatrix::zeros(self.outputs, batch.len()));
+        let mut rate = wanted.rates().then(|| DMatrix::zeros(self.outputs, batch.len()));
+        let mut decay = Decay::new(&self.decay_per_s);
+        let mut inputs = vec![(0.0, 0.0); batch.len()];
+        for track in &self.tracks {
+            for ((&instant, column), input) in
+                batch.iter().zip(state.as_mut_slice().chunks_exact_mut(modes)).zip(&mut inputs)
+            {
+                *input = track.at(instant, &mut decay, column);
+            }
+            let response = &track.response;
+            if let Some(temperature) = &mut temperature {
+                temperature.gemm(1.0, &response.lag, &state, 1.0);
+                for (mut column, &(value, slope)) in temperature.column_iter_mut().zip(&inputs) {
+                    column.axpy(value, &response.steady, 1.0);
+                    column.axpy(-slope, &response.lag_sum, 1.0);
+                }
+            }
+            if let Some(rate) = &mut rate {
+                rate.gemm(-1.0, &response.amplitude, &state, 1.0);
+                for (mut column, &(_, slope)) in rate.column_iter_mut().zip(&inputs) {
+                    column.axpy(slope, &response.steady, 1.0);
+                }
+            }
+        }
+        if let Some((heat, content)) = &self.heat {
+            let mut warming = DMatrix::zeros(modes, batch.len());
+            for (c, instant) in batch.iter().enumerate() {
+                for (i, &l) in self.decay_per_s.iter().enumerate() {
+                    (state[(i, c)], warming[(i, c)]) = heated_mode(heat, l, instant.time_s - self.drive.start_s());
+                }
+            }
+            if let Some(temperature) = &mut temperature {
+                temperature.gemm(1.0, content, &state, 1.0);
+            }
+            if let Some(rate) = &mut rate {
+                rate.gemm(1.0, content, &warming, 1.0);
+            }
+        }
+        let share = |block: Option<DMatrix<f64>>, means: &mut Vec<f64>, moments: &mut Vec<f64>| {
+            for column in block.iter().flat_map(|b| b.as_slice().chunks_exact(self.outputs)) {
+                means.extend_from_slice(&column[..self.layers]);
+                moments.extend_from_slice(&column[self.layers..]);
+            }
+        };
+        share(temperature, &mut history.temperature_k, &mut history.axial_moment_k);
+        share(rate, &mut history.rate_k_per_s, &mut history.axial_moment_k_per_s);
+    }
+}
+
+/// c and dc/dt of c' = −λ c + q∞ (1 − e^{−t/τ}), c(0) = 0.
+fn heated_mode(heat: &BoreHeat, decay_per_s: f64, time_s: f64) -> (f64, f64) {
+    if time_s <= 0.0 {
+        return (0.0, 0.0);
+    }
+    let (l, m) = (decay_per_s, 1.0 / heat.time_constant_s);
+    let (el, em) = ((-l * time_s).exp(), (-m * time_s).exp());
+    // (e^{−mt} − e^{−lt})/(l − m) without cancellation where l ≈ m.
+    let difference = if ((l - m) * time_s).abs() < 1e-8 {
+        time_s * em
+    } else if (l - m).abs() * time_s < 1.0 {
+        em * -(-(l - m) * time_s).exp_m1() / (l - m)
+    } else {
+        (em - el) / (l - m)
+    };
+    let content = (1.0 - el) / l - difference;
+    let rate = m * difference;
+    (heat.power_w_per_m2 * content, heat.power_w_per_m2 * rate)
+}
