@@ -287,7 +287,7 @@ pub enum ThermalError {
 #[derive(Debug, Clone)]
 pub enum StepResponse {
     HalfSpace(half_space::HalfSpace),
-    Pack(Pack),
+    Pack(Box<Pack>),
 }
 
 impl StepResponse {
@@ -300,7 +300,7 @@ impl StepResponse {
         }
         Ok(match path.extent {
             Extent::HalfSpace => StepResponse::HalfSpace(half_space::HalfSpace::new(path)),
-            Extent::Pack => StepResponse::Pack(Pack::new(path)?),
+            Extent::Pack => StepResponse::Pack(Box::new(Pack::new(path)?)),
         })
     }
 
