@@ -115,6 +115,7 @@ fn the_hard_bound_is_attained_when_one_half_warms_and_the_other_does_not() {
         temperature_k: vec![293.15; 12],
         rate_k_per_s: rates,
         axial_moment_k_per_s: vec![],
+        axial_moment_k: vec![],
         ambient_k: vec![293.15],
         ambient_rate_k_per_s: vec![0.0],
     };
