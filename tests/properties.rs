@@ -30,6 +30,7 @@ impl Case {
             temperature_k: vec![293.15; rates_k_per_s.len()],
             rate_k_per_s: rates_k_per_s.to_vec(),
             axial_moment_k_per_s: vec![],
+            axial_moment_k: vec![],
             ambient_k: vec![293.15],
             ambient_rate_k_per_s: vec![0.0],
         };
