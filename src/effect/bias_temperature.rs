@@ -52,6 +52,10 @@ struct BiasTemperature {
 }
 
 impl Effect for BiasTemperature {
+    fn is_linear(&self) -> bool {
+        false
+    }
+
     fn outside_rate_rad_per_s(&self, state: &PackState) -> f64 {
         let above_k = state.mean_temperature_k - REFERENCE_TEMPERATURE_K;
         (self.linear_rad_per_s_k + self.quadratic_rad_per_s_k2 * above_k) * above_k

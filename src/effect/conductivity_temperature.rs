@@ -38,6 +38,10 @@ struct ConductivityTemperature {
 }
 
 impl Effect for ConductivityTemperature {
+    fn is_linear(&self) -> bool {
+        false
+    }
+
     fn change_heat_path(&self, path: &mut HeatPath) {
         path.conductivity_slope_per_k = self.slope_per_k;
     }

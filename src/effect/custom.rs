@@ -153,6 +153,11 @@ fn known(state: &PackState) -> [f64; VARIABLES.len()] {
 }
 
 impl Effect for CustomBias {
+    /// A formula may be anything.
+    fn is_linear(&self) -> bool {
+        false
+    }
+
     fn outside_rate_rad_per_s(&self, state: &PackState) -> f64 {
         let Some(expression) = &self.expression else { return 0.0 };
         let known = known(state);

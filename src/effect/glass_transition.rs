@@ -62,6 +62,10 @@ struct GlassTransition {
 }
 
 impl Effect for GlassTransition {
+    fn is_linear(&self) -> bool {
+        false
+    }
+
     fn path_factor(&self, place: &FibrePlace) -> f64 {
         let glassy = 1.0 / (1.0 + ((place.temperature_k - self.transition_k) / self.width_k).exp());
         match place.half {

@@ -37,6 +37,10 @@ struct HeatingCoolingAsymmetry {
 }
 
 impl Effect for HeatingCoolingAsymmetry {
+    fn is_linear(&self) -> bool {
+        false
+    }
+
     fn coil_gain(&self, state: &PackState) -> f64 {
         let rate = state.mean_rate_k_per_s;
         if rate == 0.0 { 1.0 } else { 1.0 + self.gain * rate.signum() }

@@ -91,6 +91,11 @@ pub trait Effect: std::fmt::Debug + Send + Sync {
         1.0
     }
 
+    /// Whether Ω stays linear in the rates of temperature, with no part that is independent of them.
+    fn is_linear(&self) -> bool {
+        true
+    }
+
     /// Rate that does not come from the coil [rad/s]; those of several effects add.
     fn outside_rate_rad_per_s(&self, _state: &PackState) -> f64 {
         0.0

@@ -38,6 +38,10 @@ struct ThermoOpticTemperature {
 }
 
 impl Effect for ThermoOpticTemperature {
+    fn is_linear(&self) -> bool {
+        false
+    }
+
     fn path_factor(&self, place: &FibrePlace) -> f64 {
         1.0 + self.slope_per_k * (place.temperature_k - REFERENCE_TEMPERATURE_K)
     }

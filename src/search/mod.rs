@@ -1,5 +1,6 @@
 //! What the best pattern is: worst cases, objectives, annealing, proofs.
 
 pub mod columns;
+pub mod guaranteed;
 pub mod samples;
 pub mod worst_case;
