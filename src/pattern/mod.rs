@@ -101,11 +101,16 @@ impl Pattern {
     /// The fibre fills a layer from flange to flange, so segments alternate. Layer 1 starts with the end of its
     /// segment that is nearer to the fibre's middle, or with the fibre's own end if it is wound with that.
     pub fn axial_direction(&self, layer: usize) -> f64 {
-        let first = self.segments[0];
-        let starts_low = first == 1 || (first != self.layers() && self.half(0) == Half::B);
-        let same_parity = (self.segments[layer] + first).is_multiple_of(2);
-        if starts_low == same_parity { 1.0 } else { -1.0 }
+        axial_direction(&self.segments, layer)
     }
+}
+
+/// As [`Pattern::axial_direction`], of segments that are known to be a permutation.
+pub(crate) fn axial_direction(segments: &[usize], layer: usize) -> f64 {
+    let (first, last) = (segments[0], segments.len());
+    let starts_low = first == 1 || (first != last && first > last / 2);
+    let same_parity = (segments[layer] + first).is_multiple_of(2);
+    if starts_low == same_parity { 1.0 } else { -1.0 }
 }
 
 impl TryFrom<Vec<usize>> for Pattern {

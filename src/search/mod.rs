@@ -3,4 +3,6 @@
 pub mod columns;
 pub mod guaranteed;
 pub mod samples;
+pub mod signs;
+pub mod walk;
 pub mod worst_case;

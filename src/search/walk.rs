@@ -1,0 +1,397 @@
+//! Moves that stay inside a windability class, and what they change in the coefficients of the sample matrix.
+//!
+//! | class | position | moves |
+//! |---|---|---|
+//! | `standard` | the end at which each layer lies | one end, or the ends of two layers |
+//! | `captive:K` | permutation | swaps and insertions that leave at most K captive runs |
+//! | `any` | permutation | swaps and insertions |
+//!
+//! With equal lengths a swap changes two layers' weights. With actual lengths it also shifts every segment between
+//! the two; their changes are in the list as well, so a proposal is always exact.
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::Rng;
+
+use super::columns::{Change, Columns};
+use super::samples::SampleMatrix;
+use super::signs::{segments_of_signs, sign_columns, sign_value, signs_of_segments};
+use crate::pattern::axial_direction;
+use crate::pattern::windability::WindabilityClass;
+
+/// A number below `count`, the same on every machine.
+pub(super) fn pick(random: &mut ChaCha8Rng, count: usize) -> usize {
+    ((u64::from(random.next_u32()) * count as u64) >> 32) as usize
+}
+
+/// Uniform in (0, 1].
+pub(super) fn uniform(random: &mut ChaCha8Rng) -> f64 {
+    ((random.next_u64() >> 11) + 1) as f64 * (1.0 / (1u64 << 53) as f64)
+}
+
+/// What is walked over: the class, and the columns that fit it.
+#[derive(Debug, Clone)]
+pub struct Space {
+    matrix: SampleMatrix,
+    class: WindabilityClass,
+    /// The columns of the signs, where the class is `standard` and the error linear in them.
+    signs: Option<Columns>,
+    /// With equal lengths: each segment's weight in either half.
+    fixed: Option<SegmentWeights>,
+}
+
+/// The weight of each segment wherever it lies [m²].
+#[derive(Debug, Clone)]
+struct SegmentWeights {
+    half_a_m2: Vec<f64>,
+    half_b_m2: Vec<f64>,
+}
+
+impl Space {
+    pub fn new(matrix: SampleMatrix, class: WindabilityClass) -> Self {
+        let signs = if class == WindabilityClass::Standard { sign_columns(&matrix) } else { None };
+        let fixed = matrix.equal_lengths().then(|| {
+            let length_m = matrix.lengths_m().iter().sum::<f64>();
+            let mut fixed = SegmentWeights { half_a_m2: Vec::new(), half_b_m2: Vec::new() };
+            let mut from_m = 0.0;
+            for &l in matrix.lengths_m() {
+                let (a, b) = segment_weights_m2(from_m, from_m + l, length_m);
+                fixed.half_a_m2.push(a);
+                fixed.half_b_m2.push(b);
+                from_m += l;
+            }
+            fixed
+        });
+        Self { matrix, class, signs, fixed }
+    }
+
+    pub fn class(&self) -> WindabilityClass {
+        self.class
+    }
+
+    pub fn matrix(&self) -> &SampleMatrix {
+        &self.matrix
+    }
+
+    pub fn layers(&self) -> usize {
+        self.matrix.layers()
+    }
+
+    /// The columns that a walk's coefficients and changes refer to.
+    pub fn columns(&self) -> &Columns {
+        self.signs.as_ref().unwrap_or(&self.matrix.columns)
+    }
+
+    /// Whether the class admits P(j).
+    pub fn admits(&self, segments: &[usize]) -> bool {
+        match self.class {
+            WindabilityClass::Standard => signs_of_segments(segments).is_some(),
+            WindabilityClass::Captive(most) => most_captive(segments) <= most,
+            WindabilityClass::Any => true,
+        }
+    }
+
+    /// A pattern of the class drawn at random; `captive:K` starts from a standard one.
+    pub fn draw(&self, random: &mut ChaCha8Rng) -> Vec<usize> {
+        let layers = self.layers();
+        match self.class {
+            WindabilityClass::Any => {
+                let mut segments: Vec<usize> = (1..=layers).collect();
+                for i in (1..layers).rev() {
+                    segments.swap(i, pick(random, i + 1));
+                }
+                segments
+            }
+            _ => segments_of_signs(&(1..layers).map(|_| random.next_u32() & 1 == 1).collect::<Vec<bool>>()),
+        }
+    }
+
+    /// A position at a pattern of the class.
+    pub fn walk(&self, segments: Vec<usize>) -> Walk {
+        let mut walk = Walk {
+            high: match self.class {
+                WindabilityClass::Standard => signs_of_segments(&segments).unwrap_or_default(),
+                _ => Vec::new(),
+            },
+            layers_by_segment: invert(&segments),
+            candidate: segments.clone(),
+            segments,
+            coefficients: Vec::new(),
+            changes: Vec::new(),
+            flips: Vec::new(),
+        };
+        walk.coefficients = walk.recomputed_coefficients(self);
+        walk
+    }
+}
+
+/// The two halves' parts of ∫(2z − L)dz over a piece of fibre.
+fn segment_weights_m2(from_m: f64, to_m: f64, length_m: f64) -> (f64, f64) {
+    let middle_m = (0.5 * length_m).clamp(from_m, to_m);
+    ((middle_m - from_m) * (from_m + middle_m - length_m), (to_m - middle_m) * (middle_m + to_m - length_m))
+}
+
+fn invert(segments: &[usize]) -> Vec<usize> {
+    let mut layers = vec![0; segments.len()];
+    for (layer, &segment) in segments.iter().enumerate() {
+        layers[segment - 1] = layer;
+    }
+    layers
+}
+
+/// Most captive runs at any step: one less than the intervals that the wound segments form.
+pub(super) fn most_captive(segments: &[usize]) -> usize {
+    let mut wound = vec![false; segments.len() + 2];
+    let (mut intervals, mut most) = (0usize, 0);
+    for &segment in segments {
+        wound[segment] = true;
+        intervals = intervals + 1 - usize::from(wound[segment - 1]) - usize::from(wound[segment + 1]);
+        most = most.max(intervals);
+    }
+    most - 1
+}
+
+/// A pattern, its coefficients, and the proposal made last.
+#[derive(Debug, Clone)]
+pub struct Walk {
+    segments: Vec<usize>,
+    layers_by_segment: Vec<usize>,
+    /// The ends, for the class `standard`; otherwise empty.
+    high: Vec<bool>,
+    coefficients: Vec<f64>,
+    candidate: Vec<usize>,
+    flips: Vec<usize>,
+    changes: Vec<Change>,
+}
+
+impl Walk {
+    /// P(j), innermost layer first.
+    pub fn segments(&self) -> Vec<usize> {
+        if self.high.is_empty() { self.segments.clone() } else { segments_of_signs(&self.high) }
+    }
+
+    pub fn coefficients(&self) -> &[f64] {
+        &self.coefficients
+    }
+
+    /// Computes the coefficients again, so that rounding of many changes is gone.
+    pub fn refresh(&mut self, space: &Space) {
+        self.segments = self.segments();
+        self.layers_by_segment = invert(&self.segments);
+        self.candidate.clone_from(&self.segments);
+        self.coefficients = self.recomputed_coefficients(space);
+    }
+
+    fn recomputed_coefficients(&self, space: &Space) -> Vec<f64> {
+        if space.signs.is_some() {
+            return self.high.iter().map(|&h| sign_value(h)).collect();
+        }
+        let layout = space.matrix.layout;
+        let lengths_m = space.matrix.lengths_m();
+        let length_m = lengths_m.iter().sum::<f64>();
+        let mut coefficients = vec![0.0; layout.columns()];
+        let mut from_m = 0.0;
+        for &layer in &self.layers_by_segment {
+            let to_m = from_m + lengths_m[layer];
+            let (a, b) = segment_weights_m2(from_m, to_m, length_m);
+            coefficients[layout.column_a(layer)] += a;
+            coefficients[layout.column_b(layer)] += b;
+            if layout.axial {
+                coefficients[layout.column_axial(layer)] =
+                    2.0 * axial_direction(&self.segments, layer) * lengths_m[layer].powi(2);
+            }
+            from_m = to_m;
+        }
+        coefficients
+    }
+
+    /// Draws a move; its changes of the coefficients, or `None` if it would leave the class.
+    pub fn propose(&mut self, space: &Space, random: &mut ChaCha8Rng) -> Option<&[Change]> {
+        let layers = space.layers();
+        self.changes.clear();
+        if space.class == WindabilityClass::Standard {
+            self.draw_flips(layers, random);
+            if space.signs.is_some() {
+                let change = |&m: &usize| Change { column: m, by: -2.0 * sign_value(self.high[m]) };
+                self.changes.extend(self.flips.iter().map(change));
+                return Some(&self.changes);
+            }
+            let mut high = self.high.clone();
+            for &m in &self.flips {
+                high[m] = !high[m];
+            }
+            self.candidate = segments_of_signs(&high);
+        } else {
+            self.draw_permutation(layers, random);
+            if let WindabilityClass::Captive(most) = space.class
+                && most_captive(&self.candidate) > most
+            {
+                self.candidate.clone_from(&self.segments);
+                return None;
+            }
+        }
+        self.collect_changes(space);
+        Some(&self.changes)
+    }
+
+    fn draw_flips(&mut self, layers: usize, random: &mut ChaCha8Rng) {
+        self.flips.clear();
+        let first = pick(random, layers - 1);
+        self.flips.push(first);
+        if layers > 2 && random.next_u32() & 1 == 1 {
+            let second = pick(random, layers - 2);
+            self.flips.push(if second >= first { second + 1 } else { second });
+        }
+    }
+
+    /// Three swaps to one insertion.
+    fn draw_permutation(&mut self, layers: usize, random: &mut ChaCha8Rng) {
+        let from = pick(random, layers);
+        let other = pick(random, layers - 1);
+        let to = if other >= from { other + 1 } else { other };
+        if layers == 2 || random.next_u32() & 3 != 0 {
+            self.candidate.swap(from, to);
+        } else if from < to {
+            self.candidate[from..=to].rotate_left(1);
+        } else {
+            self.candidate[to..=from].rotate_right(1);
+        }
+    }
+
+    /// From `segments` to `candidate`.
+    fn collect_changes(&mut self, space: &Space) {
+        let layout = space.matrix.layout;
+        let lengths_m = space.matrix.lengths_m();
+        let changed = || (0..self.segments.len()).filter(|&j| self.segments[j] != self.candidate[j]);
+        let mut push = |column: usize, by: f64| {
+            if by != 0.0 {
+                self.changes.push(Change { column, by });
+            }
+        };
+        if let Some(fixed) = &space.fixed {
+            for layer in changed() {
+                let (new, old) = (self.candidate[layer] - 1, self.segments[layer] - 1);
+                let (a, b) = (fixed.half_a_m2[new] - fixed.half_a_m2[old], fixed.half_b_m2[new] - fixed.half_b_m2[old]);
+                if layout.halves_alike {
+                    push(layer, a + b);
+                } else {
+                    push(layout.column_a(layer), a);
+                    push(layout.column_b(layer), b);
+                }
+            }
+        } else {
+            let length_m = lengths_m.iter().sum::<f64>();
+            let of_change = |ends: fn(usize, usize) -> usize, start: usize| {
+                changed().fold(start, |at, j| ends(ends(at, self.segments[j]), self.candidate[j]))
+            };
+            let (first, last) = (of_change(usize::min, usize::MAX), of_change(usize::max, 0));
+            let mut order = self.layers_by_segment.clone();
+            for layer in changed() {
+                order[self.candidate[layer] - 1] = layer;
+            }
+            let mut from_m: f64 = order[..first - 1].iter().map(|&j| lengths_m[j]).sum();
+            for &layer in &order[first - 1..last] {
+                let to_m = from_m + lengths_m[layer];
+                let (a, b) = segment_weights_m2(from_m, to_m, length_m);
+                if layout.halves_alike {
+                    push(layer, a + b - self.coefficients[layer]);
+                } else {
+                    push(layout.column_a(layer), a - self.coefficients[layout.column_a(layer)]);
+                    push(layout.column_b(layer), b - self.coefficients[layout.column_b(layer)]);
+                }
+                from_m = to_m;
+            }
+        }
+        if layout.axial {
+            for (layer, l) in lengths_m.iter().enumerate() {
+                let change = axial_direction(&self.candidate, layer) - axial_direction(&self.segments, layer);
+                push(layout.column_axial(layer), 2.0 * change * l * l);
+            }
+        }
+    }
+
+    /// Goes where the last proposal leads.
+    pub fn accept(&mut self, space: &Space) {
+        for change in &self.changes {
+            self.coefficients[change.column] += change.by;
+        }
+        if space.class == WindabilityClass::Standard {
+            for &m in &self.flips {
+                self.high[m] = !self.high[m];
+            }
+            if space.signs.is_some() {
+                return;
+            }
+        }
+        for (layer, &segment) in self.candidate.iter().enumerate() {
+            if self.segments[layer] != segment {
+                self.segments[layer] = segment;
+                self.layers_by_segment[segment - 1] = layer;
+            }
+        }
+    }
+
+    /// Forgets the last proposal.
+    pub fn refuse(&mut self, space: &Space) {
+        if space.class != WindabilityClass::Standard {
+            self.candidate.copy_from_slice(&self.segments);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_chacha::rand_core::SeedableRng;
+
+    use super::*;
+    use crate::coil::LayerLength;
+    use crate::pattern::Pattern;
+    use crate::pattern::windability::WindingGraph;
+    use crate::search::columns::{Norm, Values};
+    use crate::search::samples::tests::{model, profiles};
+    use crate::search::worst_case::SolvedProfiles;
+
+    #[test]
+    fn counting_intervals_agrees_with_the_winding_graph() {
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        for _ in 0..500 {
+            let mut segments: Vec<usize> = (1..=10).collect();
+            for i in (1..10).rev() {
+                segments.swap(i, pick(&mut random, i + 1));
+            }
+            let graph = WindingGraph::new(&Pattern::new(segments.clone()).unwrap());
+            assert_eq!(most_captive(&segments), graph.windability().captive);
+        }
+    }
+
+    #[test]
+    fn a_thousand_accepted_moves_cost_what_recomputation_says_and_stay_in_the_class() {
+        use WindabilityClass::{Any, Captive, Standard};
+        for effects in [&[][..], &["strain_mismatch", "axial_gradient", "midpoint_offset"][..]] {
+            for layer_length in [LayerLength::Equal, LayerLength::Actual] {
+                let model = model(10, layer_length, effects);
+                let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
+                let (matrix, _) = SampleMatrix::of_profiles(&model, &solved).unwrap();
+                for class in [Standard, Captive(1), Any] {
+                    let space = Space::new(matrix.clone(), class);
+                    let mut random = ChaCha8Rng::seed_from_u64(7);
+                    let mut walk = space.walk(space.draw(&mut random));
+                    for norm in [Norm::Largest, Norm::RootMeanSquare, Norm::Sum] {
+                        let mut values = Values::new(space.columns(), walk.coefficients(), norm);
+                        for _ in 0..1000 {
+                            let Some(changes) = walk.propose(&space, &mut random) else { continue };
+                            values.propose(space.columns(), changes, f64::INFINITY).unwrap();
+                            values.accept();
+                            walk.accept(&space);
+                        }
+                        let pattern = Pattern::new(walk.segments()).unwrap();
+                        assert!(class.admits(&pattern));
+                        let expected = matrix.cost(&model, &pattern, norm).unwrap();
+                        let scale = matrix.cost(&model, &Pattern::new((1..=10).collect()).unwrap(), norm).unwrap();
+                        let found = values.cost();
+                        assert!((found - expected).abs() < 1e-12 * scale, "{class} {norm:?}: {found} {expected}");
+                    }
+                }
+            }
+        }
+    }
+}
