@@ -1,7 +1,10 @@
 //! What the best pattern is: worst cases, objectives, annealing, proofs.
 
+pub mod anneal;
 pub mod columns;
 pub mod guaranteed;
+pub mod objective;
+pub mod optimise;
 pub mod samples;
 pub mod signs;
 pub mod walk;

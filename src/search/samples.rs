@@ -120,6 +120,14 @@ impl SampleMatrix {
         Self { layout: self.layout, columns: self.columns.select(samples), lengths_m: self.lengths_m.clone() }
     }
 
+    /// The same matrix with every sample multiplied by its own factor.
+    pub fn scaled(&self, factors: &[f64]) -> Self {
+        let scale = |column: &[f64]| column.iter().zip(factors).map(|(v, f)| v * f).collect::<Vec<f64>>();
+        let columns: Vec<Vec<f64>> = (0..self.columns.count()).map(|k| scale(self.columns.column(k))).collect();
+        let columns = Columns::new(&scale(self.columns.constant()), &columns);
+        Self { layout: self.layout, columns, lengths_m: self.lengths_m.clone() }
+    }
+
     pub fn layers(&self) -> usize {
         self.layout.layers
     }

@@ -1,0 +1,339 @@
+//! Many restarts in rounds, until a rule says that it is enough.
+//!
+//! A round is a fixed number of restarts, advanced slice by slice in parallel. Each has a generator of its own, and
+//! what they found is gathered in their order, so the result depends on the seed alone and not on threads. Between
+//! slices the whole state is a plain value ([`Optimisation::state`]) that can be saved and taken up again.
+//!
+//! Under a largest-value objective the restarts run on a working set of samples: a thinned grid and whatever was seen
+//! to bind. What a restart found is judged on all samples; every sample that exceeds the working set's value joins the
+//! set for the next rounds. The working set's cost is never above the true one, so nothing good is lost by it, and
+//! nothing is reported that was not judged in full.
+
+use rayon::prelude::*;
+
+use super::anneal::{Cooling, Restart, cooling_for, generator};
+use super::columns::{BLOCK, Norm, Values, Work};
+use super::samples::SampleMatrix;
+use super::walk::Space;
+use crate::pattern::windability::WindabilityClass;
+
+/// When a search ends; whichever rule fires first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rules {
+    /// Rounds at most.
+    pub rounds: u64,
+    /// Rounds without a better pattern.
+    pub patience: u64,
+    /// Moves at most, counted at the end of each round.
+    pub moves: Option<u64>,
+    /// A cost that is good enough.
+    pub target: Option<f64>,
+}
+
+/// What is searched for and how.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    pub seed: u64,
+    pub norm: Norm,
+    pub restarts_per_round: usize,
+    pub moves_per_restart: u64,
+    pub rules: Rules,
+    /// Patterns of the class to begin with; the first restarts start from them.
+    pub starts: Vec<Vec<usize>>,
+}
+
+/// Moves a restart for a layer count: enough for the schedule to settle in the packs of `examples/`.
+pub fn default_moves_per_restart(layers: usize) -> u64 {
+    (layers as u64).pow(2) * 128
+}
+
+pub const DEFAULT_RESTARTS_PER_ROUND: usize = 8;
+pub const DEFAULT_PATIENCE: u64 = 6;
+
+/// Why a search ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stop {
+    Rounds,
+    Moves,
+    Patience,
+    Target,
+}
+
+impl std::fmt::Display for Stop {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            Stop::Rounds => "rounds",
+            Stop::Moves => "moves",
+            Stop::Patience => "no improvement",
+            Stop::Target => "target",
+        })
+    }
+}
+
+/// A pattern that was found, judged on all samples.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    pub cost: f64,
+    /// P(j), innermost layer first.
+    pub segments: Vec<usize>,
+}
+
+/// The state after a round.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RoundRecord {
+    pub round: u64,
+    pub evaluations: u64,
+    pub best_cost: f64,
+    pub working_samples: usize,
+}
+
+/// The part of a search that changes: save it between slices, and the search goes on from it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct State {
+    pub round: u64,
+    pub restarts: Vec<Restart>,
+    /// Best first, no two alike, at most [`MOST_FOUND`].
+    pub found: Vec<Found>,
+    pub rounds_without_improvement: u64,
+    /// Indices of the samples that the restarts run on, those that bind most first.
+    pub working: Vec<usize>,
+    pub work: Work,
+    pub history: Vec<RoundRecord>,
+    pub stop: Option<Stop>,
+}
+
+/// Patterns kept for the final judgement by the reference.
+pub const MOST_FOUND: usize = 24;
+
+/// A search under way.
+#[derive(Debug)]
+pub struct Optimisation {
+    full: Space,
+    plan: Plan,
+    cooling: Cooling,
+    working: Space,
+    state: State,
+}
+
+impl Optimisation {
+    pub fn new(matrix: SampleMatrix, class: WindabilityClass, plan: Plan) -> Self {
+        let full = Space::new(matrix, class);
+        let working = first_working_set(&full, &plan);
+        let found = Vec::new();
+        let state = State {
+            round: 0,
+            restarts: Vec::new(),
+            found,
+            rounds_without_improvement: 0,
+            working,
+            work: Work::default(),
+            history: Vec::new(),
+            stop: None,
+        };
+        let mut search = Self::resume_parts(full, plan, state);
+        for start in search.plan.starts.clone() {
+            search.judge(start);
+        }
+        search.begin_round();
+        search
+    }
+
+    /// Goes on from a saved state; everything else must be as it was when it was saved.
+    pub fn resume(matrix: SampleMatrix, class: WindabilityClass, plan: Plan, state: State) -> Self {
+        Self::resume_parts(Space::new(matrix, class), plan, state)
+    }
+
+    fn resume_parts(full: Space, plan: Plan, state: State) -> Self {
+        let working = Space::new(full.matrix().select(&state.working), full.class());
+        let cooling = cooling_for(&full, plan.norm, plan.seed, plan.moves_per_restart);
+        Self { full, plan, cooling, working, state }
+    }
+
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The best pattern so far; there is one as soon as a round has ended or a start was given.
+    pub fn best(&self) -> Option<&Found> {
+        self.state.found.first()
+    }
+
+    /// Moves judged so far.
+    pub fn evaluations(&self) -> u64 {
+        self.state.work.moves + self.state.restarts.iter().map(|r| r.work.moves).sum::<u64>()
+    }
+
+    /// How much of the present round is done, from 0 to 1.
+    pub fn round_progress(&self) -> f64 {
+        let done: u64 = self.state.restarts.iter().map(|r| r.moves).sum();
+        done as f64 / (self.plan.moves_per_restart * self.plan.restarts_per_round as u64) as f64
+    }
+
+    /// Advances every restart by one slice; true while there is more to do.
+    pub fn advance(&mut self) -> bool {
+        if self.state.stop.is_some() {
+            return false;
+        }
+        let (space, cooling, norm) = (&self.working, &self.cooling, self.plan.norm);
+        self.state.restarts.par_iter_mut().filter(|r| !r.is_done(cooling)).for_each(|restart| {
+            restart.advance(space, norm, cooling);
+        });
+        if self.state.restarts.iter().all(|r| r.is_done(&self.cooling)) {
+            self.end_round();
+        }
+        self.state.stop.is_none()
+    }
+
+    fn begin_round(&mut self) {
+        let count = self.plan.restarts_per_round as u64;
+        let first = self.state.round * count;
+        self.state.restarts = (first..first + count)
+            .map(|index| {
+                let start = self.plan.starts.get(index as usize).map(Vec::as_slice);
+                Restart::new(&self.working, self.plan.seed, index, start)
+            })
+            .collect();
+    }
+
+    fn end_round(&mut self) {
+        let before = self.best().map_or(f64::INFINITY, |f| f.cost);
+        let restarts = std::mem::take(&mut self.state.restarts);
+        let mut joining = Vec::new();
+        for restart in restarts {
+            self.state.work += restart.work;
+            joining.extend(self.judge(restart.best_segments));
+        }
+        self.state.round += 1;
+        let best_cost = self.best().map_or(f64::INFINITY, |f| f.cost);
+        // Rounding between mirror images is no improvement.
+        let improved = best_cost < before * (1.0 - 1e-12);
+        self.state.rounds_without_improvement = if improved { 0 } else { self.state.rounds_without_improvement + 1 };
+        self.state.history.push(RoundRecord {
+            round: self.state.round,
+            evaluations: self.state.work.moves,
+            best_cost,
+            working_samples: self.state.working.len(),
+        });
+        let rules = &self.plan.rules;
+        self.state.stop = if rules.target.is_some_and(|target| best_cost <= target) {
+            Some(Stop::Target)
+        } else if rules.moves.is_some_and(|moves| self.state.work.moves >= moves) {
+            Some(Stop::Moves)
+        } else if self.state.rounds_without_improvement >= rules.patience {
+            Some(Stop::Patience)
+        } else if self.state.round >= rules.rounds {
+            Some(Stop::Rounds)
+        } else {
+            None
+        };
+        if self.state.stop.is_none() {
+            self.renew_working_set(joining);
+            self.begin_round();
+        }
+    }
+
+    /// Judges a pattern on all samples and keeps it if it is among the best; the samples that exceed the working set.
+    fn judge(&mut self, segments: Vec<usize>) -> Vec<usize> {
+        let layers = segments.len();
+        let values = values_of(&self.full, &segments);
+        let cost = self.plan.norm.of(&values);
+        // Of a pattern and its mirror image, if both cost the same, the one that comes first.
+        let mirrored: Vec<usize> = segments.iter().map(|s| layers + 1 - s).collect();
+        let mirrored_cost = self.plan.norm.of(&values_of(&self.full, &mirrored));
+        let same = (mirrored_cost - cost).abs() <= 1e-12 * cost;
+        let kept = if same && mirrored < segments { mirrored } else { segments };
+        if !self.state.found.iter().any(|f| f.segments == kept) {
+            let at = self.state.found.partition_point(|f| (f.cost, &f.segments) < (cost, &kept));
+            self.state.found.insert(at, Found { cost, segments: kept });
+            self.state.found.truncate(MOST_FOUND);
+        }
+        if self.plan.norm != Norm::Largest {
+            return Vec::new();
+        }
+        let working = self.state.working.iter().map(|&s| values[s].abs()).fold(0.0, f64::max);
+        peaks(&values, working * (1.0 + 1e-9))
+    }
+
+    /// Adds samples and puts those first that bind the best patterns.
+    fn renew_working_set(&mut self, mut joining: Vec<usize>) {
+        joining.sort_unstable();
+        joining.dedup();
+        let mut is_in = vec![false; self.full.matrix().samples()];
+        for &s in &self.state.working {
+            is_in[s] = true;
+        }
+        joining.retain(|&s| !is_in[s]);
+        self.state.working.extend(joining);
+        if self.plan.norm == Norm::Largest {
+            let patterns: Vec<&[usize]> = self.state.found.iter().map(|f| f.segments.as_slice()).collect();
+            order_by_binding(&self.full, &patterns, &mut self.state.working);
+        }
+        self.working = Space::new(self.full.matrix().select(&self.state.working), self.full.class());
+    }
+}
+
+fn values_of(space: &Space, segments: &[usize]) -> Vec<f64> {
+    space.columns().values(space.walk(segments.to_vec()).coefficients())
+}
+
+/// The local maxima of |v| above a limit.
+fn peaks(values: &[f64], limit: f64) -> Vec<usize> {
+    let size = |i: usize| values[i].abs();
+    (0..values.len())
+        .filter(|&i| {
+            size(i) > limit && (i == 0 || size(i) >= size(i - 1)) && (i + 1 == values.len() || size(i) >= size(i + 1))
+        })
+        .collect()
+}
+
+/// Every so many-th sample is in the first working set.
+const THINNING: usize = 8;
+const PROBED_PATTERNS: usize = 64;
+
+/// A thinned grid and the samples that bind random patterns; all samples where they are few or all of them count.
+fn first_working_set(full: &Space, plan: &Plan) -> Vec<usize> {
+    let samples = full.matrix().samples();
+    if plan.norm != Norm::Largest {
+        return (0..samples).collect();
+    }
+    let mut random = generator(plan.seed, 0);
+    let drawn: Vec<Vec<usize>> = (0..PROBED_PATTERNS).map(|_| full.draw(&mut random)).collect();
+    let mut working: Vec<usize> = if samples <= THINNING * BLOCK {
+        (0..samples).collect()
+    } else {
+        let binding = drawn.iter().chain(&plan.starts).flat_map(|segments| {
+            let values = values_of(full, segments);
+            peaks(&values, 0.9 * plan.norm.of(&values))
+        });
+        binding.chain((0..samples).step_by(THINNING)).collect()
+    };
+    working.sort_unstable();
+    working.dedup();
+    let patterns: Vec<&[usize]> = drawn.iter().map(Vec::as_slice).collect();
+    order_by_binding(full, &patterns, &mut working);
+    working
+}
+
+/// Puts first the samples that come nearest to the largest value under given patterns.
+fn order_by_binding(full: &Space, patterns: &[&[usize]], samples: &mut [usize]) {
+    let mut scores = vec![0.0_f64; full.matrix().samples()];
+    for segments in patterns {
+        let values = values_of(full, segments);
+        let largest = Norm::Largest.of(&values);
+        if largest > 0.0 {
+            for (score, v) in scores.iter_mut().zip(&values) {
+                *score += (v / largest).powi(8);
+            }
+        }
+    }
+    samples.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]).then(a.cmp(&b)));
+}
+
+/// The values of a pattern computed from nothing, for tests of what a search reports.
+pub fn full_cost(space: &Space, norm: Norm, segments: &[usize]) -> f64 {
+    Values::new(space.columns(), space.walk(segments.to_vec()).coefficients(), norm).cost()
+}
