@@ -9,8 +9,8 @@ pub struct Maximum {
 
 /// Golden-section search for a maximum of `f` in [`low`, `high`], where `f` is unimodal.
 ///
-/// Stops when the bracket is shorter than 1e-10 of its own start; a maximum's value is then off by the square
-/// of that, so by rounding only. Returns the best point that was evaluated.
+/// Stops when the bracket is shorter than 1e-10 of its own start, or than rounding at its place lets it become; a
+/// maximum's value is then off by the square of that, so by rounding only. Returns the best point that was evaluated.
 pub fn golden_section(mut f: impl FnMut(f64) -> f64, low: f64, high: f64) -> Maximum {
     let ratio = (5.0_f64.sqrt() - 1.0) / 2.0;
     let (mut a, mut b) = (low, high);
@@ -18,7 +18,8 @@ pub fn golden_section(mut f: impl FnMut(f64) -> f64, low: f64, high: f64) -> Max
     let mut right = Maximum { at: a + ratio * (b - a), value: 0.0 };
     left.value = f(left.at);
     right.value = f(right.at);
-    let tolerance = (high - low) * 1e-10;
+    // A short bracket far from zero cannot shrink below the spacing of the numbers there.
+    let tolerance = ((high - low) * 1e-10).max(8.0 * f64::EPSILON * low.abs().max(high.abs()));
     while b - a > tolerance {
         if left.value >= right.value {
             b = right.at;
@@ -38,6 +39,12 @@ pub fn golden_section(mut f: impl FnMut(f64) -> f64, low: f64, high: f64) -> Max
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_short_bracket_far_from_zero_comes_to_an_end() {
+        let found = golden_section(|x| -(x - 6000.001).powi(2), 6000.0, 6000.002);
+        assert!((found.at - 6000.001).abs() < 1e-6);
+    }
 
     #[test]
     fn the_maximum_of_x_exp_minus_x_is_found_at_one() {

@@ -7,5 +7,6 @@ pub mod objective;
 pub mod optimise;
 pub mod samples;
 pub mod signs;
+pub mod verdict;
 pub mod walk;
 pub mod worst_case;

@@ -3,7 +3,7 @@
 use super::columns::Norm;
 use super::samples::SampleMatrix;
 use super::worst_case::{SearchError, SolvedProfiles};
-use crate::rate::CoilModel;
+use crate::rate::{CoilModel, RateModel};
 
 /// What a search makes small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -54,6 +54,12 @@ impl Objective {
             }
         })
     }
+}
+
+/// √(mean Ω²) over all profiles' time, by the reference.
+pub fn rms_rad_per_s(rate_model: &RateModel, solved: &SolvedProfiles) -> f64 {
+    let series = solved.profiles().iter().flat_map(|p| rate_model.series_rad_per_s(&p.history));
+    series.zip(time_shares(solved)).map(|(rate, share)| share * rate * rate).sum::<f64>().sqrt()
 }
 
 /// The share of each sample in an integral over all profiles' time by the trapezium rule; they add up to one.

@@ -12,7 +12,7 @@
 use rayon::prelude::*;
 
 use super::anneal::{Cooling, Restart, cooling_for, generator};
-use super::columns::{BLOCK, Norm, Values, Work};
+use super::columns::{BLOCK, Norm, Work};
 use super::samples::SampleMatrix;
 use super::walk::Space;
 use crate::pattern::windability::WindabilityClass;
@@ -331,9 +331,4 @@ fn order_by_binding(full: &Space, patterns: &[&[usize]], samples: &mut [usize]) 
         }
     }
     samples.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]).then(a.cmp(&b)));
-}
-
-/// The values of a pattern computed from nothing, for tests of what a search reports.
-pub fn full_cost(space: &Space, norm: Norm, segments: &[usize]) -> f64 {
-    Values::new(space.columns(), space.walk(segments.to_vec()).coefficients(), norm).cost()
 }

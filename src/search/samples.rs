@@ -111,7 +111,11 @@ impl SampleMatrix {
             .flat_map(|(index, solved)| {
                 solved.pieces.iter().flatten().map(move |&instant| Origin { profile: index, instant })
             })
-            .collect();
+            .collect::<Vec<Origin>>();
+        if let Some((_, origin)) = responses.iter().zip(&origins).find(|(response, _)| !is_finite(response)) {
+            let profile = solved.profiles()[origin.profile].profile.name().to_owned();
+            return Err(SearchError::NotFinite { profile, time_s: origin.instant.time_s });
+        }
         Ok((Self::new(model, &responses)?, origins))
     }
 
@@ -175,6 +179,11 @@ impl SampleMatrix {
     pub fn cost(&self, model: &CoilModel, pattern: &Pattern, norm: Norm) -> Result<f64, RateError> {
         Ok(norm.of(&self.rates_rad_per_s(model, pattern)?))
     }
+}
+
+fn is_finite(response: &WeightResponse) -> bool {
+    let parts = [&response.half_a_rad_per_s_m2, &response.half_b_rad_per_s_m2, &response.axial_rad_per_s_m2];
+    response.constant_rad_per_s.is_finite() && parts.into_iter().flatten().all(|v| v.is_finite())
 }
 
 /// A rate model with a pattern that does not matter, to ask for responses.

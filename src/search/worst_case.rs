@@ -25,6 +25,10 @@ pub enum SearchError {
     Coil(#[from] CoilError),
     #[error("there is no profile to search over: list one in [profiles] or set profiles.count above 0")]
     NoProfiles,
+    #[error(
+        "the rate error is not a finite number under profile {profile} at {time_s} s: check the effects' parameters"
+    )]
+    NotFinite { profile: String, time_s: f64 },
 }
 
 /// The fields of all profiles, solved once: they do not depend on the pattern.

@@ -4,4 +4,5 @@ mod allan;
 mod exact_integers;
 mod nist_strd;
 mod pack;
+mod exhaustive;
 mod paper;

@@ -1,0 +1,164 @@
+//! The final judgement: what was found and the classic windings, all by the reference, and what to say about it.
+
+use super::objective::Objective;
+use super::optimise::Found;
+use super::worst_case::{SearchError, SolvedProfiles, WorstCase};
+use crate::pattern::Pattern;
+use crate::pattern::classic::Classic;
+use crate::pattern::windability::WindabilityClass;
+use crate::rate::{CoilModel, RateModel};
+use crate::thermal::Location;
+use crate::units::deg_per_h_from_rad_per_s;
+
+/// A pattern with its reference values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Judged {
+    pub name: String,
+    pub pattern: Pattern,
+    pub worst: WorstCase,
+    /// Δφ at the worst rate [rad].
+    pub phase_rad: f64,
+    /// The objective by the reference, in rad/s: the worst rate, or the rate's rms.
+    pub objective_rad_per_s: f64,
+}
+
+/// What a pattern is judged by.
+#[derive(Debug, Clone, Copy)]
+pub struct Bench<'a> {
+    pub model: &'a CoilModel,
+    pub solved: &'a SolvedProfiles,
+    pub objective: Objective,
+}
+
+/// Classics in the order in which one is named where several are equally good.
+const PREFERENCE: [Classic; 7] =
+    [Classic::Qua, Classic::Oct, Classic::Hex, Classic::Dip, Classic::SymText, Classic::Sym, Classic::Zyl];
+
+/// Relative difference below which two patterns count as equally good.
+const EQUALLY_GOOD: f64 = 1e-9;
+
+impl Bench<'_> {
+    /// # Errors
+    /// A pattern of another layer count.
+    pub fn judge(&self, name: &str, pattern: &Pattern) -> Result<Judged, SearchError> {
+        let rate_model = RateModel::new(self.model, pattern, &[])?;
+        let worst = self.solved.worst_case(self.model, pattern)?;
+        let objective_rad_per_s = match self.objective {
+            Objective::WorstRate | Objective::WorstPhase => worst.rate_rad_per_s.abs(),
+            Objective::RootMeanSquare => super::objective::rms_rad_per_s(&rate_model, self.solved),
+        };
+        let phase_rad = rate_model.phase_rad(worst.rate_rad_per_s);
+        Ok(Judged { name: name.to_owned(), pattern: pattern.clone(), worst, phase_rad, objective_rad_per_s })
+    }
+
+    /// Every classic that fits the layer count.
+    ///
+    /// # Errors
+    /// None that a model which could be solved would cause.
+    pub fn baselines(&self) -> Result<Vec<Judged>, SearchError> {
+        let layers = self.model.coil.layers();
+        Classic::ALL
+            .into_iter()
+            .filter_map(|classic| Some((classic, classic.pattern(layers).ok()?)))
+            .map(|(classic, pattern)| self.judge(classic.key(), &pattern))
+            .collect()
+    }
+
+    /// The best of what was found and of the baselines of the class, by the reference.
+    ///
+    /// `found` is in the order of its sampled cost, which never exceeds the reference: the judging ends where no
+    /// further pattern can be better. A baseline stays unless something is better by more than rounding.
+    ///
+    /// # Errors
+    /// None that a model which could be solved would cause.
+    pub fn best(
+        &self,
+        class: WindabilityClass,
+        found: &[Found],
+        baselines: &[Judged],
+    ) -> Result<Option<Judged>, SearchError> {
+        let mut best: Option<Judged> = None;
+        let is_better = |value: f64, best: &Option<Judged>| {
+            best.as_ref().is_none_or(|b| value < b.objective_rad_per_s * (1.0 - EQUALLY_GOOD))
+        };
+        let preferred = PREFERENCE.iter().filter_map(|c| baselines.iter().find(|b| b.name == c.key()));
+        for baseline in preferred.filter(|b| class.admits(&b.pattern)) {
+            if is_better(baseline.objective_rad_per_s, &best) {
+                best = Some(baseline.clone());
+            }
+        }
+        for candidate in found {
+            if !is_better(candidate.cost, &best) {
+                break;
+            }
+            let pattern = Pattern::new(candidate.segments.clone()).expect("a walk visits permutations only");
+            let judged = self.judge(&format!("searched-{}", pattern.layers()), &pattern)?;
+            if is_better(judged.objective_rad_per_s, &best) {
+                best = Some(judged);
+            }
+        }
+        Ok(best)
+    }
+
+    /// In words: how much better than QUA, under which class, boundary and objective.
+    pub fn statement(&self, best: &Judged, baselines: &[Judged], class: WindabilityClass) -> String {
+        let boundary = match self.model.location {
+            Location::OuterLayer => "with the outermost layer's temperature prescribed",
+            Location::Ambient => "with the ambient temperature prescribed",
+        };
+        let what = match self.objective {
+            Objective::WorstRate => "worst rate error",
+            Objective::WorstPhase => "worst phase error",
+            Objective::RootMeanSquare => "rms rate error",
+        };
+        let shown = |judged: &Judged| deg_per_h_from_rad_per_s(judged.objective_rad_per_s);
+        let count = self.solved.profiles().len();
+        let scope = format!("in the class {class}, {boundary}, over {count} profiles");
+        let Some(qua) = baselines.iter().find(|b| b.name == Classic::Qua.key()) else {
+            return format!(
+                "There is no QUA to compare with: {} layers are no multiple of 4. The best pattern found has a {what} \
+                 of {:.4} °/h {scope}.",
+                best.pattern.layers(),
+                shown(best)
+            );
+        };
+        if best.objective_rad_per_s >= qua.objective_rad_per_s * (1.0 - EQUALLY_GOOD) {
+            let others: Vec<&str> = baselines
+                .iter()
+                .filter(|b| {
+                    b.name != qua.name
+                        && (b.objective_rad_per_s - qua.objective_rad_per_s).abs()
+                            <= EQUALLY_GOOD * qua.objective_rad_per_s
+                })
+                .map(|b| b.name.as_str())
+                .collect();
+            let also = if others.is_empty() { String::new() } else { format!(" (and so is {})", others.join(", ")) };
+            return format!(
+                "QUA is as good as it gets{also}: no pattern with a smaller {what} than its {:.4} °/h was found {scope}.",
+                shown(qua)
+            );
+        }
+        let factor = qua.objective_rad_per_s / best.objective_rad_per_s;
+        format!(
+            "The best pattern found has a {what} of {:.4} °/h, {} times less than QUA's {:.4} °/h, {scope}.",
+            shown(best),
+            three_figures(factor),
+            shown(qua)
+        )
+    }
+}
+
+/// QUA's objective over the best pattern's; none where QUA does not fit the layer count or the error is zero.
+pub fn improvement_over_qua(best: &Judged, baselines: &[Judged]) -> Option<f64> {
+    let qua = baselines.iter().find(|b| b.name == Classic::Qua.key())?;
+    (best.objective_rad_per_s > 0.0).then(|| qua.objective_rad_per_s / best.objective_rad_per_s)
+}
+
+fn three_figures(factor: f64) -> String {
+    match factor {
+        f if f >= 100.0 => format!("{f:.0}"),
+        f if f >= 10.0 => format!("{f:.1}"),
+        f if f >= 1.01 => format!("{f:.2}"),
+        f => format!("{f:.4}"),
+    }
+}
