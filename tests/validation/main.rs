@@ -2,7 +2,7 @@
 
 mod allan;
 mod exact_integers;
+mod exhaustive;
 mod nist_strd;
 mod pack;
-mod exhaustive;
 mod paper;
