@@ -21,6 +21,7 @@ pub mod rate;
 pub mod boundary;
 pub mod fit;
 pub mod predict;
+pub mod reproduce;
 pub mod schedule;
 pub mod search;
 // Floor 5: files and pages.

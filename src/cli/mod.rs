@@ -7,6 +7,7 @@ mod man;
 mod new;
 mod patterns;
 pub mod progress;
+mod reproduce;
 mod schedule;
 mod schema;
 pub mod screen;
@@ -70,6 +71,7 @@ enum Command {
     Patterns(patterns::Arguments),
     Check(check::Arguments),
     New(new::Arguments),
+    Reproduce(reproduce::Arguments),
     Schedule(schedule::Arguments),
     Schema(schema::Arguments),
     Completions(completions::Arguments),
@@ -115,6 +117,7 @@ pub fn run() -> ExitCode {
         Command::Patterns(arguments) => patterns::run(arguments, &screen),
         Command::Check(arguments) => check::run(arguments, &screen),
         Command::New(arguments) => new::run(arguments, &screen),
+        Command::Reproduce(arguments) => reproduce::run(arguments, &screen),
         Command::Schedule(arguments) => schedule::run(arguments, &screen),
         Command::Schema(arguments) => schema::run(arguments, &screen),
         Command::Completions(arguments) => completions::run(arguments, &screen),

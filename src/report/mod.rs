@@ -1,3 +1,4 @@
 //! What a reader sees: charts, drawings and pages.
 
 pub mod plot;
+pub mod yan1998;

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod commands;
+mod reproduce;
 
 use std::path::{Path, PathBuf};
 use std::process::Output;

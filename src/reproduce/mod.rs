@@ -1,0 +1,3 @@
+//! Published results worked through again: what was printed beside what the equations give, every difference named.
+
+pub mod yan1998;
