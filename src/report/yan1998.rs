@@ -66,7 +66,7 @@ impl ReproductionJson {
 
 /// A printed value back to its printed digits, which the way through radians blurs.
 fn rounded(published_deg_per_h: f64) -> f64 {
-    (published_deg_per_h * 1000.0).round() / 1000.0
+    format!("{published_deg_per_h:.3}").parse().unwrap_or(published_deg_per_h)
 }
 
 /// The rows of Table 2: length, winding, printed, computed, when, bound, verdict.

@@ -189,6 +189,14 @@ pub const ERRATA: &[Erratum] = &[
 /// # Errors
 /// A length that is not positive.
 pub fn model(length_m: f64) -> Result<CoilModel, CoilError> {
+    model_of_layers(length_m, LAYERS)
+}
+
+/// The paper's coil with another layer count on the same mean diameter.
+///
+/// # Errors
+/// A length that is not positive, an odd layer count, more layers than the diameter has room for.
+pub fn model_of_layers(length_m: f64, layers: usize) -> Result<CoilModel, CoilError> {
     let diameter_m = m_from_um(250.0);
     let fibre = Fibre {
         refractive_index: 1.447,
@@ -199,16 +207,16 @@ pub fn model(length_m: f64) -> Result<CoilModel, CoilError> {
     };
     let coil = Coil::new(CoilSpec {
         fibre,
-        layers: LAYERS,
+        layers,
         turns_per_layer: None,
-        bore_radius_m: 0.5 * m_from_mm(75.0) - 0.5 * LAYERS as f64 * diameter_m,
+        bore_radius_m: 0.5 * m_from_mm(75.0) - 0.5 * layers as f64 * diameter_m,
         radial_pitch_m: diameter_m,
         axial_pitch_m: diameter_m,
         layer_length: LayerLength::Equal,
         length_m: Some(length_m),
     })?;
     Ok(CoilModel {
-        name: format!("paper {length_m} m"),
+        name: format!("paper {length_m} m, {layers} layers"),
         coil,
         extent: Extent::HalfSpace,
         material: Material::Diffusivity { m2_per_s: DIFFUSIVITY_M2_PER_S },

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod commands;
+mod examples;
 mod reproduce;
 
 use std::path::{Path, PathBuf};
