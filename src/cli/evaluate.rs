@@ -4,11 +4,14 @@ use std::path::PathBuf;
 
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
+use crate::io::files::{read_text, write_atomically};
 use crate::io::json::{EvaluateJson, PatternJson};
+use crate::io::model_edit::with_ramps;
 use crate::io::model_file::{ModelFile, NamedPattern, read_model};
 use crate::io::pattern_file::resolve_pattern;
 use crate::pattern::classic::Classic;
 use crate::rate::RateModel;
+use crate::search::guaranteed::{GuaranteedError, UnitStep};
 use crate::search::worst_case::SolvedProfiles;
 
 /// Worst rate error of windings over a model's profiles
@@ -23,6 +26,9 @@ pub struct Arguments {
     /// model's own and all classics that fit
     #[arg(long, short, value_name = "PATTERN")]
     pattern: Vec<String>,
+    /// Write a copy of the model file in which the profiles that attain the guaranteed worst cases are listed
+    #[arg(long, value_name = "FILE")]
+    bang_bang: Option<PathBuf>,
 }
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
@@ -37,11 +43,29 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         arguments.pattern.iter().map(|stated| resolve_pattern(stated, layers, None)).collect::<Result<_, _>>()?
     };
     let solved = SolvedProfiles::new(&file.model, &file.profiles.profiles())?;
+    let step = UnitStep::new(&file.model, file.profiles.max_rate_k_per_s);
+    if let Err(reason @ GuaranteedError::Effect { .. }) = &step {
+        screen.note(&format!("note: {reason}"));
+    }
     let mut answers = Vec::with_capacity(patterns.len());
+    let mut extremes = Vec::new();
     for NamedPattern { name, pattern } in &patterns {
         let worst = solved.worst_case(&file.model, pattern)?;
         let phase_rad = RateModel::new(&file.model, pattern, &[])?.phase_rad(worst.rate_rad_per_s);
-        answers.push(PatternJson::new(name, pattern, &worst, phase_rad, None));
+        let bound = match &step {
+            Ok(step) => Some(step.guaranteed(&file.model, pattern)?),
+            Err(_) => None,
+        };
+        let bound_rad_per_s = bound.as_ref().map(|b| b.rate_rad_per_s);
+        answers.push(PatternJson::new(name, pattern, &worst, phase_rad, bound_rad_per_s));
+        extremes.extend(bound.map(|b| b.profile(&format!("bang-bang-{name}"))));
+    }
+    if let Some(path) = &arguments.bang_bang {
+        step?;
+        let source = read_text(&arguments.model)?;
+        let listed = with_ramps(&arguments.model.display().to_string(), &source, &extremes)?;
+        write_atomically(path, listed.as_bytes())?;
+        screen.note(&format!("{} profiles listed in {}", extremes.len(), path.display()));
     }
     let body = EvaluateJson { model: file.model.name.clone(), patterns: answers };
     screen.answer(body, |body| {
@@ -49,6 +73,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
             vec![
                 p.name.clone(),
                 format!("{:.4}", p.worst_rate_deg_per_h),
+                p.guaranteed_worst_rate_deg_per_h.map_or("-".to_owned(), |g| format!("{g:.4}")),
                 format!("{:.3e}", p.worst_phase_rad),
                 p.worst_profile.clone(),
                 format!("{:.2}", p.worst_time_s),
@@ -57,7 +82,10 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
                 p.windability.max_climb.to_string(),
             ]
         });
-        table(&["pattern", "worst °/h", "phase rad", "profile", "at s", "class", "reels", "climb"], rows)
+        table(
+            &["pattern", "worst °/h", "guaranteed °/h", "phase rad", "profile", "at s", "class", "reels", "climb"],
+            rows,
+        )
     })?;
     Ok(Ending::Done)
 }

@@ -21,6 +21,7 @@ use crate::io::fault::Faults;
 use crate::io::files::WriteError;
 use crate::io::pattern_file::ResolveError;
 use crate::rate::RateError;
+use crate::search::guaranteed::GuaranteedError;
 use crate::search::worst_case::SearchError;
 use progress::ProgressMode;
 use screen::Screen;
@@ -98,6 +99,8 @@ pub enum CliError {
     Resolve(#[from] ResolveError),
     #[error("error: {0}")]
     Search(#[from] SearchError),
+    #[error("error: {0}")]
+    Guaranteed(#[from] GuaranteedError),
     #[error("error: {0}")]
     Rate(#[from] RateError),
     #[error("error: {path} exists already: choose another name or remove it first")]

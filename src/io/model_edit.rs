@@ -1,9 +1,11 @@
 //! Edits of model files that keep the user's comments and layout.
 
-use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, value};
+use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, value};
 
 use super::fault::{Fault, Faults};
 use crate::effect::{DeclaredEffect, Subject};
+use crate::profile::Profile;
+use crate::units::c_per_h_from_k_per_s;
 
 /// A remark written behind a parameter's value, such as its standard error.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -46,6 +48,48 @@ pub fn with_effect(file: &str, source: &str, effect: &DeclaredEffect, remarks: &
         declare(table, effect, remarks);
     }
     Ok(document.to_string())
+}
+
+/// The source with further listed profiles.
+///
+/// # Errors
+/// A source that is no TOML or whose `profiles.ramp` is no array of tables.
+pub fn with_ramps(file: &str, source: &str, profiles: &[Profile]) -> Result<String, Faults> {
+    let mut document: DocumentMut = source
+        .parse()
+        .map_err(|e: toml_edit::TomlError| Faults::one(file, source, Fault::new(e.message(), e.span())))?;
+    let section = document.entry("profiles").or_insert_with(|| Item::Table(Table::new()));
+    let ramps = section
+        .as_table_mut()
+        .map(|table| table.entry("ramp").or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new())))
+        .and_then(Item::as_array_of_tables_mut);
+    let Some(ramps) = ramps else {
+        let message = "profiles.ramp must be written as [[profiles.ramp]] tables to be extended";
+        return Err(Faults::one(file, source, Fault::new(message, None)));
+    };
+    for profile in profiles {
+        let pieces: Array = profile
+            .pieces()
+            .iter()
+            .map(|piece| {
+                let mut table = InlineTable::new();
+                table.insert("rate_c_per_h", shortest(c_per_h_from_k_per_s(piece.rate_k_per_s)).into());
+                table.insert("duration_s", piece.duration_s.into());
+                table
+            })
+            .collect();
+        let mut table = Table::new();
+        table.decor_mut().set_prefix("\n");
+        table["name"] = value(profile.name());
+        table["pieces"] = value(pieces);
+        ramps.push(table);
+    }
+    Ok(document.to_string())
+}
+
+/// Without the last digits, which a conversion of units leaves: 10 °C/h stays 10.
+fn shortest(number: f64) -> f64 {
+    format!("{number:.13e}").parse().unwrap_or(number)
 }
 
 fn declare(table: &mut Table, effect: &DeclaredEffect, remarks: &[Remark]) {
@@ -112,6 +156,15 @@ max_rate_c_per_h = 10.0  # steep
             edited,
             SOURCE.to_owned() + "\n[[effect]]\nkind = \"strain_mismatch\"\nmismatch = 0.004   # ± 0.0001, fitted\n"
         );
+    }
+
+    #[test]
+    fn a_ramp_is_listed_behind_the_others_with_round_rates() {
+        let piece = crate::profile::Piece { rate_k_per_s: -10.0 / 3600.0, duration_s: 12.5 };
+        let profile = Profile::new("worst", vec![piece]).unwrap();
+        let edited = with_ramps("x.toml", SOURCE, &[profile]).unwrap();
+        let added = "\n[[profiles.ramp]]\nname = \"worst\"\npieces = [{ rate_c_per_h = -10.0, duration_s = 12.5 }]\n";
+        assert_eq!(edited, SOURCE.to_owned() + added);
     }
 
     #[test]

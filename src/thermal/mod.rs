@@ -7,6 +7,7 @@ pub mod half_space;
 mod modal;
 mod network;
 pub mod pack;
+mod stepped;
 
 use thiserror::Error;
 
@@ -15,6 +16,7 @@ use crate::numeric::piecewise::PiecewiseLinear;
 use half_space::HalfSpaceField;
 use modal::PackField;
 use pack::Pack;
+use stepped::SteppedField;
 
 /// What the pack is made of, thermally.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -334,6 +336,7 @@ impl StepResponse {
 pub enum Field {
     HalfSpace(HalfSpaceField),
     Pack(Box<PackField>),
+    Stepped(Box<SteppedField>),
 }
 
 /// Solves a heat path under a drive.
@@ -344,6 +347,9 @@ pub fn solve(path: &HeatPath, drive: &Drive) -> Result<Field, ThermalError> {
     check(path)?;
     Ok(match path.extent {
         Extent::HalfSpace => Field::HalfSpace(HalfSpaceField::new(half_space::HalfSpace::new(path), drive)),
+        Extent::Pack if path.conductivity_slope_per_k != 0.0 => {
+            Field::Stepped(Box::new(SteppedField::new(path, drive)?))
+        }
         Extent::Pack => Field::Pack(Box::new(PackField::new(Pack::new(path)?, drive))),
     })
 }
@@ -415,6 +421,7 @@ impl Field {
         match self {
             Field::HalfSpace(field) => field.at(instants, wanted),
             Field::Pack(field) => field.at(instants, wanted),
+            Field::Stepped(field) => field.at(instants, wanted),
         }
     }
 
