@@ -2,6 +2,7 @@
 
 mod check;
 mod completions;
+mod effects;
 mod evaluate;
 mod man;
 mod new;
@@ -69,6 +70,7 @@ pub enum Format {
 #[derive(Debug, Subcommand)]
 enum Command {
     Evaluate(evaluate::Arguments),
+    Effects(effects::Arguments),
     Patterns(patterns::Arguments),
     Check(check::Arguments),
     New(new::Arguments),
@@ -103,6 +105,8 @@ pub enum CliError {
     Guaranteed(#[from] GuaranteedError),
     #[error("error: {0}")]
     Rate(#[from] RateError),
+    #[error("error: there is no effect {stated}: did you mean {nearest}? `coilwright effects` lists all")]
+    UnknownEffect { stated: String, nearest: &'static str },
     #[error("error: {path} exists already: choose another name or remove it first")]
     Exists { path: String },
     #[error("error: no pattern is stated: give --pattern, or winding.pattern in the model file")]
@@ -117,6 +121,7 @@ pub fn run() -> ExitCode {
     let screen = Screen::new(&cli.output);
     let ending = match &cli.command {
         Command::Evaluate(arguments) => evaluate::run(arguments, &screen),
+        Command::Effects(arguments) => effects::run(arguments, &screen),
         Command::Patterns(arguments) => patterns::run(arguments, &screen),
         Command::Check(arguments) => check::run(arguments, &screen),
         Command::New(arguments) => new::run(arguments, &screen),

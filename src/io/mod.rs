@@ -1,6 +1,7 @@
 //! Files in, files out: the only place (with `report`) that knows serde, paths, TOML, CSV and JSON.
 
 mod effect_tables;
+pub mod effects_json;
 pub mod fault;
 pub mod files;
 pub mod json;
