@@ -24,6 +24,7 @@ pub mod predict;
 pub mod reproduce;
 pub mod schedule;
 pub mod search;
+pub mod verify;
 // Floor 5: files and pages.
 pub mod io;
 pub mod report;

@@ -12,6 +12,7 @@ mod reproduce;
 mod schedule;
 mod schema;
 pub mod screen;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -79,6 +80,7 @@ enum Command {
     Schema(schema::Arguments),
     Completions(completions::Arguments),
     Man(man::Arguments),
+    Verify(verify::Arguments),
 }
 
 /// How a command ended; errors aside.
@@ -130,6 +132,7 @@ pub fn run() -> ExitCode {
         Command::Schema(arguments) => schema::run(arguments, &screen),
         Command::Completions(arguments) => completions::run(arguments, &screen),
         Command::Man(arguments) => man::run(arguments, &screen),
+        Command::Verify(arguments) => verify::run(arguments, &screen),
     };
     match ending {
         Ok(Ending::Done) => ExitCode::SUCCESS,

@@ -114,3 +114,24 @@ pub struct ClassicJson {
 pub struct PatternsJson {
     pub patterns: Vec<ClassicJson>,
 }
+
+#[derive(Debug, Serialize)]
+pub struct ViolationJson {
+    /// Counted from 1; null for the file as a whole.
+    pub row: Option<usize>,
+    pub field: String,
+    pub expected: String,
+    pub found: String,
+    pub remedy: String,
+    pub message: String,
+}
+
+#[derive(Debug, Serialize)]
+pub struct VerifyJson {
+    pub model: String,
+    pub schedule: String,
+    pub checks: usize,
+    pub rate_check: String,
+    pub independent_worst_rate_deg_per_h: Option<f64>,
+    pub violations: Vec<ViolationJson>,
+}

@@ -1,0 +1,79 @@
+//! `verify`: whether a schedule, a traveller or a machine program is right for a coil.
+
+use std::path::PathBuf;
+
+use super::screen::Screen;
+use super::{CliError, Ending};
+use crate::io::json::{VerifyJson, ViolationJson};
+use crate::io::model_file::read_model;
+use crate::io::schedule_file::sha256_hex;
+use crate::io::schedule_reader::{read_claim, shop_of};
+use crate::units::deg_per_h_from_rad_per_s;
+use crate::verify::{RateCheck, Truth, verify};
+
+/// Checks an emitted file against the coil with code of its own: all violations at once
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  coilwright verify examples/paper-200m.toml results/paper-200m/schedule.csv\n\nExit code 1 if anything is violated."
+)]
+pub struct Arguments {
+    /// The model file
+    model: PathBuf,
+    /// A schedule, traveller or machine program, as JSON, CSV, HTML or G-code
+    schedule: PathBuf,
+}
+
+pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+    let file = read_model(&arguments.model)?;
+    let claim = read_claim(&arguments.schedule)?;
+    let truth = Truth {
+        model: &file.model,
+        profiles: &file.profiles,
+        model_sha256: &sha256_hex(&file.source),
+        shop: &shop_of(&file.production),
+    };
+    let found = verify(&truth, &claim);
+    let clean = found.violations.is_empty();
+    let body = VerifyJson {
+        model: arguments.model.display().to_string(),
+        schedule: arguments.schedule.display().to_string(),
+        checks: found.checks,
+        rate_check: match found.rate_check {
+            RateCheck::None => "not claimed or not possible",
+            RateCheck::Independent { .. } => "independent solution",
+            RateCheck::ReferenceOnly => "reference model only",
+        }
+        .to_owned(),
+        independent_worst_rate_deg_per_h: match found.rate_check {
+            RateCheck::Independent { worst_rad_per_s } => Some(deg_per_h_from_rad_per_s(worst_rad_per_s)),
+            _ => None,
+        },
+        violations: found
+            .violations
+            .iter()
+            .map(|v| ViolationJson {
+                row: v.row,
+                field: v.field.clone(),
+                expected: v.expected.clone(),
+                found: v.found.clone(),
+                remedy: v.remedy.to_owned(),
+                message: v.to_string(),
+            })
+            .collect(),
+    };
+    screen.answer(body, |body| {
+        let mut text: String = body.violations.iter().map(|v| format!("{}\n", v.message)).collect();
+        let rate = match body.independent_worst_rate_deg_per_h {
+            Some(rate) => format!("; an independent solution finds a worst rate error of {rate:.4} °/h"),
+            None => format!("; rate error: {}", body.rate_check),
+        };
+        let count = match body.violations.len() {
+            0 => "no violations".to_owned(),
+            1 => "1 violation".to_owned(),
+            n => format!("{n} violations"),
+        };
+        text.push_str(&format!("{}: {count} in {} checks{rate}\n", body.schedule, body.checks));
+        text
+    })?;
+    Ok(if clean { Ending::Done } else { Ending::No })
+}

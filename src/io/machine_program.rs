@@ -1,0 +1,231 @@
+//! A neutral program for a computer-controlled winder, version 1: CSV and plain G-code with comments.
+//!
+//! It says what has to happen, in the words that most controllers share; nothing is claimed about any maker's format.
+//!
+//! | word | meaning |
+//! |---|---|
+//! | `G21` `G90` | millimetres, absolute positions |
+//! | `T1 M6` | supply reel into the feed: 1 is A, 2 is B, 11 is C1, 12 is C2, … |
+//! | `G0 X` | carriage to the flange at which the layer starts; X = 0 is the first flange |
+//! | `G92 C0` | the spool's counter to zero |
+//! | `G1 X C F` | wind: carriage to X [mm] while the spool turns by C [turns, clockwise seen from the first flange]; F [turns/min] |
+//! | `M0` | stop for adhesive |
+//! | `M30` | end |
+
+use crate::schedule::{Schedule, production::Production};
+use crate::units::mm_from_m;
+
+use super::fault::{Fault, Faults};
+use super::schedule_file::{
+    LENGTH_DECIMALS, MM_DECIMALS, ProductionJson, ScheduleJson, StepJson, TURNS_DECIMALS, crossover_words,
+    rotation_word, rounded,
+};
+
+/// Raised when a word of the program changes its meaning.
+pub const PROGRAM_VERSION: u32 = 1;
+
+/// The schedule with everything that a machine needs; `axial_pitch_m` as the coil has it.
+pub fn machine_program(
+    plain: &ScheduleJson,
+    schedule: &Schedule,
+    production: &Production,
+    axial_pitch_m: f64,
+) -> ScheduleJson {
+    let mut document = plain.clone();
+    document.document = format!("machine program {PROGRAM_VERSION}");
+    document.production = Some(ProductionJson::new(production));
+    for (row, reel) in document.reels.iter_mut().zip(schedule.reels()) {
+        // A captive run has no end of its own to spare.
+        let allowance_m = if reel.captive { 0.0 } else { production.allowance_m };
+        row.load_m = Some(rounded(reel.to_m - reel.from_m + allowance_m, LENGTH_DECIMALS));
+    }
+    let layers = schedule.steps().len();
+    let mut previous = None;
+    for (row, step) in document.steps.iter_mut().zip(schedule.steps()) {
+        row.crossover = Some(crossover_words(step));
+        row.rotation = Some(rotation_word(step.rotation).to_owned());
+        row.axial_pitch_mm = Some(rounded(mm_from_m(axial_pitch_m), MM_DECIMALS));
+        row.tension_n = Some(rounded(production.tension_n_at(step.layer), TURNS_DECIMALS));
+        row.turns_per_min = Some(rounded(production.winding_speed_turns_per_min, TURNS_DECIMALS));
+        row.reel_change = Some(previous != Some(step.supply_reel));
+        row.potting = Some(production.pots_after(step.layer, layers));
+        previous = Some(step.supply_reel);
+    }
+    document
+}
+
+fn reel_number(name: &str) -> i64 {
+    match name {
+        "A" => 1,
+        "B" => 2,
+        captive => captive.trim_start_matches('C').parse::<i64>().map_or(0, |n| n + 10),
+    }
+}
+
+fn reel_name(number: i64) -> String {
+    match number {
+        1 => "A".to_owned(),
+        2 => "B".to_owned(),
+        n => format!("C{}", n - 10),
+    }
+}
+
+/// The program as G-code; each datum stands in it once, as a word or, where no word has it, in a comment.
+pub fn gcode(document: &ScheduleJson) -> String {
+    let head = ScheduleJson { steps: Vec::new(), ..document.clone() };
+    let mut out = format!("; coilwright winding program, version {PROGRAM_VERSION}\n");
+    out.push_str("; X carriage in mm from the first flange, C spool in turns, clockwise seen from the first flange\n");
+    out.push_str("; F in turns/min; T1 reel A, T2 reel B, T11 reel C1; M0 apply adhesive\n");
+    out.push_str(&format!("; head {}\n", serde_json::to_string(&head).unwrap_or_default()));
+    out.push_str("G21\nG90\n");
+    for step in &document.steps {
+        let pitch_mm = step.axial_pitch_mm.unwrap_or(0.0);
+        let height_mm = rounded(step.turns * pitch_mm, MM_DECIMALS);
+        let outbound = step.direction == "first-to-second";
+        let (from_mm, to_mm) = if outbound { (0.0, height_mm) } else { (height_mm, 0.0) };
+        let sign = if step.rotation.as_deref() == Some("cw") { "" } else { "-" };
+        // What the words below say is left out of the comment.
+        out.push_str(&format!(
+            "; layer {} step {} half {} segment {} from {} to {} length {} radius {} climb {} cumulative {} pitch {} tension {}\n",
+            step.layer, step.step, step.half, step.segment, step.fibre_from_m, step.fibre_to_m, step.length_m,
+            step.radius_mm, step.climb, step.cumulative_m, pitch_mm, step.tension_n.unwrap_or(0.0),
+        ));
+        out.push_str(&format!("; crossover {}\n", step.crossover.as_deref().unwrap_or("")));
+        let change = if step.reel_change == Some(true) { " M6" } else { "" };
+        out.push_str(&format!("T{}{change}\n", reel_number(&step.supply_reel)));
+        out.push_str(&format!("G0 X{from_mm}\nG92 C0\n"));
+        out.push_str(&format!("G1 X{to_mm} C{sign}{} F{}\n", step.turns, step.turns_per_min.unwrap_or(0.0)));
+        if step.potting == Some(true) {
+            out.push_str("M0\n");
+        }
+    }
+    out.push_str("M30\n");
+    out
+}
+
+/// Reads a program back, to be verified.
+///
+/// # Errors
+/// Every line that is not as [`gcode`] writes it.
+pub fn parse_gcode(file: &str, text: &str) -> Result<ScheduleJson, Faults> {
+    let mut head: Option<ScheduleJson> = None;
+    let mut steps: Vec<StepJson> = Vec::new();
+    let mut faults = Vec::new();
+    let mut ended = false;
+    // What the carriage's start says, until the winding move confirms it.
+    let mut start_mm = f64::NAN;
+    let mut offset = 0;
+    for line in text.split_inclusive('\n') {
+        let span = offset..offset + line.trim_end().len();
+        offset += line.len();
+        let line = line.trim();
+        let mut fault = |message: String| faults.push(Fault::new(message, Some(span.clone())));
+        if let Some(json) = line.strip_prefix("; head ") {
+            match serde_json::from_str(json) {
+                Ok(found) => head = Some(found),
+                Err(error) => fault(format!("the head cannot be understood: {error}")),
+            }
+        } else if let Some(words) = line.strip_prefix("; layer ") {
+            match step_of_comment(words) {
+                Some(step) => steps.push(step),
+                None => fault("the comment of a layer cannot be understood: emit the program again".to_owned()),
+            }
+        } else if let (Some(words), Some(step)) = (line.strip_prefix("; crossover"), steps.last_mut()) {
+            step.crossover = Some(words.trim().to_owned());
+        } else if line.is_empty() || line == "%" || line.starts_with(';') || ["G21", "G90", "G92 C0"].contains(&line) {
+        } else if line == "M30" {
+            ended = true;
+        } else if let Some(step) = steps.last_mut() {
+            if !obey(step, line, &mut start_mm) {
+                fault(format!("the line \"{line}\" is not of this program's words, or contradicts another line"));
+            }
+        } else {
+            fault(format!("the line \"{line}\" stands before the first layer"));
+        }
+    }
+    if !ended {
+        faults.push(Fault::new("the program does not end with M30: is it whole?", None));
+    }
+    if head.is_none() {
+        faults.push(Fault::new("the comment that begins with \"; head\" is missing", None));
+    }
+    match head {
+        Some(head) if faults.is_empty() => Ok(ScheduleJson { steps, ..head }),
+        _ => Err(Faults { file: file.to_owned(), source: text.to_owned(), faults }),
+    }
+}
+
+fn step_of_comment(words: &str) -> Option<StepJson> {
+    let words: Vec<&str> = words.split_whitespace().collect();
+    let keys = ["step", "half", "segment", "from", "to", "length", "radius", "climb", "cumulative", "pitch", "tension"];
+    if words.len() != 1 + 2 * keys.len() || !keys.iter().enumerate().all(|(i, key)| words[1 + 2 * i] == *key) {
+        return None;
+    }
+    let value = |key: &str| keys.iter().position(|k| *k == key).map(|i| words[2 + 2 * i]);
+    let number = |key: &str| value(key)?.parse::<f64>().ok().filter(|v| v.is_finite());
+    let whole = |key: &str| value(key)?.parse::<i64>().ok();
+    Some(StepJson {
+        step: whole("step")?,
+        layer: words[0].parse().ok()?,
+        half: value("half")?.to_owned(),
+        segment: whole("segment")?,
+        supply_reel: String::new(),
+        direction: String::new(),
+        turns: 0.0,
+        fibre_from_m: number("from")?,
+        fibre_to_m: number("to")?,
+        length_m: number("length")?,
+        radius_mm: number("radius")?,
+        climb: whole("climb")?,
+        cumulative_m: number("cumulative")?,
+        crossover: None,
+        balance_m: None,
+        rotation: None,
+        axial_pitch_mm: Some(number("pitch")?),
+        tension_n: Some(number("tension")?),
+        turns_per_min: None,
+        reel_change: Some(false),
+        potting: Some(false),
+        measured_length_m: None,
+        checked_by: None,
+    })
+}
+
+/// Enters what a line commands into the step; whether it could be understood and contradicts nothing.
+fn obey(step: &mut StepJson, line: &str, start_mm: &mut f64) -> bool {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let number = |word: &str, letter: char| word.strip_prefix(letter)?.parse::<f64>().ok().filter(|v| v.is_finite());
+    match words.as_slice() {
+        [tool] | [tool, "M6"] if tool.starts_with('T') => {
+            let Ok(reel) = tool[1..].parse::<i64>() else { return false };
+            step.supply_reel = reel_name(reel);
+            step.reel_change = Some(words.len() == 2);
+            true
+        }
+        ["G0", x] => match number(x, 'X') {
+            Some(from_mm) => {
+                *start_mm = from_mm;
+                true
+            }
+            None => false,
+        },
+        ["G1", x, c, f] => {
+            let (Some(to_mm), Some(turns), Some(speed)) = (number(x, 'X'), number(c, 'C'), number(f, 'F')) else {
+                return false;
+            };
+            step.direction = if to_mm > *start_mm { "first-to-second" } else { "second-to-first" }.to_owned();
+            step.rotation = Some(if turns > 0.0 { "cw" } else { "ccw" }.to_owned());
+            step.turns = turns.abs();
+            step.turns_per_min = Some(speed);
+            // The way of the carriage is the turns times the pitch, from a flange to the other.
+            let way_mm = (to_mm - *start_mm).abs();
+            let expected_mm = step.turns * step.axial_pitch_mm.unwrap_or(0.0);
+            (way_mm - expected_mm).abs() < 5.001e-5 && to_mm.min(*start_mm) == 0.0
+        }
+        ["M0"] => {
+            step.potting = Some(true);
+            true
+        }
+        _ => false,
+    }
+}

@@ -1,0 +1,370 @@
+//! Works a winding out again from nothing but the order of the segments, and compares.
+
+use super::{Claim, Findings, Printed, Truth};
+use crate::coil::LayerLength;
+
+const COUNT_FROM_ONE: &str = "keep one row a layer, innermost first, numbered from 1";
+const WIND_ONCE: &str = "every segment is wound exactly once: correct the segment or the missing row";
+
+/// The order of the segments, if the rows are a winding of this coil at all.
+pub(super) fn permutation(truth: &Truth, claim: &Claim, findings: &mut Findings) -> Option<Vec<usize>> {
+    let layers = truth.model.coil.layers();
+    findings.checks += 1;
+    let mut clean = claim.rows.len() == layers;
+    if !clean {
+        findings.add(None, "rows", layers.to_string(), claim.rows.len().to_string(), COUNT_FROM_ONE);
+    }
+    let mut wound_on = vec![0usize; layers + 1];
+    for (i, row) in claim.rows.iter().enumerate() {
+        let here = Some(i + 1);
+        for (field, found) in [("step", row.step), ("layer", row.layer)] {
+            findings.checks += 1;
+            if found != i as i64 + 1 {
+                findings.add(here, field, (i + 1).to_string(), found.to_string(), COUNT_FROM_ONE);
+            }
+        }
+        findings.checks += 1;
+        match usize::try_from(row.segment).ok().filter(|s| (1..=layers).contains(s)) {
+            None => {
+                clean = false;
+                findings.add(here, "segment", format!("from 1 to {layers}"), row.segment.to_string(), WIND_ONCE);
+            }
+            Some(segment) if wound_on[segment] > 0 => {
+                clean = false;
+                let expected = format!("a segment that is not wound yet (it is in row {})", wound_on[segment]);
+                findings.add(here, "segment", expected, segment.to_string(), WIND_ONCE);
+            }
+            Some(segment) => wound_on[segment] = i + 1,
+        }
+    }
+    clean.then(|| claim.rows.iter().map(|row| row.segment as usize).collect())
+}
+
+/// l_j again: from radius and turns, or equal shares.
+pub(super) fn layer_lengths_m(truth: &Truth) -> Vec<f64> {
+    let raw = &truth.model.coil;
+    let wound = wound_turns(truth);
+    let layers = raw.layers();
+    let share_m = raw.length_m() / layers as f64;
+    (0..layers)
+        .map(|j| match raw.layer_length() {
+            LayerLength::Equal => share_m * wound[j] / raw.turns()[j],
+            LayerLength::Actual => {
+                let radius_m = raw.bore_radius_m() + raw.radial_pitch_m() * (j as f64 + 0.5);
+                2.0 * std::f64::consts::PI * radius_m * wound[j]
+            }
+        })
+        .collect()
+}
+
+/// The declared turns, every second layer less those that nesting takes.
+fn wound_turns(truth: &Truth) -> Vec<f64> {
+    truth.model.wound_coil().map_or_else(|_| truth.model.coil.turns().to_vec(), |coil| coil.turns().to_vec())
+}
+
+/// The arclength at which each segment begins, and the fibre's end.
+pub(super) fn starts_m(lengths_m: &[f64], segments: &[usize]) -> Vec<f64> {
+    let mut starts_m = vec![0.0; segments.len() + 1];
+    for s in 1..=segments.len() {
+        let layer = segments.iter().position(|&found| found == s).unwrap_or(0);
+        starts_m[s] = starts_m[s - 1] + lengths_m[layer];
+    }
+    starts_m
+}
+
+/// Whether arclength grows from the first flange to the second, a layer: segments alternate along the fibre.
+pub(super) fn runs_outbound(segments: &[usize]) -> Vec<bool> {
+    let count = segments.len();
+    let first_from_low_end = begins_low(segments[0], count);
+    segments.iter().map(|s| ((s % 2) == (segments[0] % 2)) == first_from_low_end).collect()
+}
+
+/// A segment that continues nothing begins with the fibre's own end, else with the end nearer to the middle.
+fn begins_low(segment: usize, count: usize) -> bool {
+    segment == 1 || (segment < count && 2 * segment > count)
+}
+
+/// A reel as it comes into use: (name, before which step, from which reel, first and last segment).
+type Loaded = (String, usize, Option<String>, usize, usize);
+
+/// Follows the fibre: which reel holds which segment, which reel feeds which layer.
+struct Supply {
+    /// Of each segment (index 0 is unused): the reel that holds it, and none once it is wound.
+    holder: Vec<Option<usize>>,
+    loaded: Vec<Loaded>,
+    captive_now: Vec<usize>,
+    reels_now: Vec<usize>,
+}
+
+impl Supply {
+    fn follow(segments: &[usize]) -> (Self, Vec<usize>, Vec<bool>) {
+        let count = segments.len();
+        let mut supply =
+            Self { holder: vec![None; count + 1], loaded: Vec::new(), captive_now: Vec::new(), reels_now: Vec::new() };
+        let first = segments[0];
+        let last_of_a = if begins_low(first, count) { first - 1 } else { first };
+        let single = last_of_a == 0 || last_of_a == count;
+        for (name, from, to) in [("A", 1, last_of_a), ("B", last_of_a + 1, count)] {
+            if from <= to {
+                let name = match (single, first == 1) {
+                    (true, true) => "A",
+                    (true, false) => "B",
+                    _ => name,
+                };
+                supply.load(name.to_owned(), 1, None, from, to);
+            }
+        }
+        let (mut fed_by, mut from_low) = (Vec::new(), Vec::new());
+        for (i, &segment) in segments.iter().enumerate() {
+            let wound = |s: usize| s >= 1 && s <= count && supply.holder[s].is_none();
+            let (low_joined, high_joined) = (segment > 1 && wound(segment - 1), segment < count && wound(segment + 1));
+            let low = if low_joined { true } else { !high_joined && begins_low(segment, count) };
+            let (mut a, mut b) = (segment, segment);
+            while a > 1 && supply.holder[a - 1].is_some() && supply.same_run(a - 1, a) {
+                a -= 1;
+            }
+            while b < count && supply.holder[b + 1].is_some() && supply.same_run(b, b + 1) {
+                b += 1;
+            }
+            if !low_joined && !high_joined && i > 0 {
+                // An island: what is now held at both ends moves to a reel of its own.
+                let (feed, left) =
+                    if low { ((segment, b), (a, segment - 1)) } else { ((a, segment), (segment + 1, b)) };
+                let held = supply.holder[segment].is_some_and(|reel| supply.loaded[reel].0.starts_with('C'));
+                let feed_is_held = if low { feed.1 < count } else { feed.0 > 1 };
+                if feed_is_held && !held {
+                    supply.load_captive(i + 1, feed.0, feed.1);
+                }
+                if left.0 <= left.1 && left.0 > 1 && left.1 < count {
+                    supply.load_captive(i + 1, left.0, left.1);
+                }
+            }
+            fed_by.push(supply.holder[segment].unwrap_or(0));
+            from_low.push(low);
+            supply.holder[segment] = None;
+            supply.count_runs(count);
+        }
+        (supply, fed_by, from_low)
+    }
+
+    /// Neighbouring unwound segments are always one run, except across the cut before the first layer.
+    fn same_run(&self, low: usize, high: usize) -> bool {
+        self.holder[low] == self.holder[high]
+    }
+
+    fn load(&mut self, name: String, step: usize, from: Option<String>, first: usize, last: usize) {
+        let reel = self.loaded.len();
+        self.loaded.push((name, step, from, first, last));
+        self.holder[first..=last].fill(Some(reel));
+    }
+
+    fn load_captive(&mut self, step: usize, first: usize, last: usize) {
+        let number = self.loaded.iter().filter(|l| l.0.starts_with('C')).count() + 1;
+        let from = self.holder[first].map(|reel| self.loaded[reel].0.clone());
+        self.load(format!("C{number}"), step, from, first, last);
+    }
+
+    fn count_runs(&mut self, count: usize) {
+        let (mut runs, mut captive) = (0, 0);
+        let mut s = 1;
+        while s <= count {
+            if self.holder[s].is_none() {
+                s += 1;
+                continue;
+            }
+            let first = s;
+            while s <= count && self.holder[s].is_some() {
+                s += 1;
+            }
+            runs += 1;
+            captive += usize::from(first > 1 && s <= count);
+        }
+        self.reels_now.push(runs);
+        self.captive_now.push(captive);
+    }
+}
+
+/// Compares every field of every row, and what is claimed of the whole.
+pub(super) fn check(truth: &Truth, claim: &Claim, segments: &[usize], findings: &mut Findings) {
+    let count = segments.len();
+    let coil = &truth.model.coil;
+    let lengths_m = layer_lengths_m(truth);
+    let starts_m = starts_m(&lengths_m, segments);
+    let turns = wound_turns(truth);
+    let outbound = runs_outbound(segments);
+    let (supply, fed_by, from_low) = Supply::follow(segments);
+    let mut layer_of = vec![0usize; count + 2];
+    for (layer, &segment) in segments.iter().enumerate() {
+        layer_of[segment] = layer + 1;
+    }
+    let mut drawn_m = vec![0.0; supply.loaded.len()];
+    let mut balance_m = 0.0;
+    let mut max_climb = 0;
+    for (i, (row, &segment)) in claim.rows.iter().zip(segments).enumerate() {
+        let here = Some(i + 1);
+        let layer = i + 1;
+        let half = if 2 * segment <= count { "A" } else { "B" };
+        findings.same(here, "half", &half.to_owned(), &row.half);
+        findings.same(here, "supply_reel", &supply.loaded[fed_by[i]].0, &row.supply_reel);
+        let starts_at_first = outbound[i] == from_low[i];
+        let (first_to_second, second_to_first) = ("first-to-second", "second-to-first");
+        let direction = if starts_at_first { first_to_second } else { second_to_first };
+        findings.same(here, "direction", &direction.to_owned(), &row.direction);
+        findings.near(here, "turns", turns[i], row.turns, Printed::Plain);
+        findings.near(here, "fibre_from_m", starts_m[segment - 1], row.fibre_from_m, Printed::Metres);
+        findings.near(here, "fibre_to_m", starts_m[segment], row.fibre_to_m, Printed::Metres);
+        findings.near(here, "length_m", lengths_m[i], row.length_m, Printed::Metres);
+        let radius_m = coil.bore_radius_m() + coil.radial_pitch_m() * (i as f64 + 0.5);
+        findings.near(here, "radius_mm", radius_m, row.radius_m, Printed::Millimetres);
+        // Crossovers to layers that are wound already, the one at the start of this layer first.
+        let mut joints: Vec<(bool, usize)> = Vec::new();
+        for (neighbour, at_low) in [(segment.wrapping_sub(1), true), (segment + 1, false)] {
+            let wound_before = (1..=count).contains(&neighbour) && layer_of[neighbour] < layer;
+            if wound_before {
+                joints.push((at_low, layer_of[neighbour]));
+            }
+        }
+        joints.sort_by_key(|(at_low, _)| *at_low != from_low[i]);
+        let climb = joints.iter().map(|(_, from)| layer - from).max().unwrap_or(0);
+        max_climb = max_climb.max(climb);
+        findings.same(here, "climb", &(climb as i64), &row.climb);
+        drawn_m[fed_by[i]] += lengths_m[i];
+        findings.near(here, "cumulative_m", drawn_m[fed_by[i]], row.cumulative_m, Printed::Metres);
+        balance_m += if half == "A" { lengths_m[i] } else { -lengths_m[i] };
+        findings.near_if(here, "balance_m", balance_m, row.balance_m, Printed::Metres);
+        let words: Vec<String> = joints
+            .iter()
+            .map(|(at_low, from)| {
+                let flange = if *at_low == outbound[i] { "first" } else { "second" };
+                let plural = if layer - from == 1 { "" } else { "s" };
+                format!("{flange} flange, from layer {from}, {} layer{plural}", layer - from)
+            })
+            .collect();
+        findings.same_if(here, "crossover", &words.join("; "), row.crossover.as_ref());
+        let rotation = if from_low[i] { "cw" } else { "ccw" };
+        findings.same_if(here, "rotation", &rotation.to_owned(), row.rotation.as_ref());
+        findings.near_if(here, "axial_pitch_mm", coil.axial_pitch_m(), row.axial_pitch_m, Printed::Millimetres);
+        let shop = truth.shop;
+        let tension_n = shop.tension_n * (1.0 - shop.tension_taper_per_layer * i as f64).max(0.0);
+        findings.near_if(here, "tension_n", tension_n, row.tension_n, Printed::Plain);
+        let speed = shop.winding_speed_turns_per_min;
+        findings.near_if(here, "turns_per_min", speed, row.turns_per_min, Printed::Plain);
+        let changed = i == 0 || fed_by[i] != fed_by[i - 1];
+        findings.same_if(here, "reel_change", &changed, row.reel_change.as_ref());
+        let every = shop.potting_every_layers;
+        let potting = layer == count || (every > 0 && layer as i64 % every == 0);
+        findings.same_if(here, "potting", &potting, row.potting.as_ref());
+    }
+    let claimed: Vec<i64> = segments.iter().map(|&s| s as i64).collect();
+    findings.checks += 1;
+    if let Some(found) = claim.segments.as_ref().filter(|found| **found != claimed) {
+        findings.add(
+            None,
+            "segments",
+            format!("{claimed:?}, as the rows have it"),
+            format!("{found:?}"),
+            super::EMIT_AGAIN,
+        );
+    }
+    check_name(claim, segments, findings);
+    check_whole(claim, &supply, max_climb, findings);
+    check_reels(truth, claim, &supply, &starts_m, findings);
+    findings.near_if(None, "length_m", starts_m[count], claim.length_m, Printed::Metres);
+    let start = if begins_low(segments[0], count) { segments[0] - 1 } else { segments[0] };
+    findings.near_if(None, "start_mark_m", starts_m[start], claim.start_mark_m, Printed::Metres);
+    findings.near_if(None, "expected_trim_m", balance_m, claim.expected_trim_m, Printed::Metres);
+    if let Some(found) = &claim.shop {
+        check_shop(truth, found, findings);
+    }
+}
+
+fn check_whole(claim: &Claim, supply: &Supply, max_climb: usize, findings: &mut Findings) {
+    let captive = supply.captive_now.iter().copied().max().unwrap_or(0);
+    let class = if captive == 0 { "standard".to_owned() } else { format!("captive:{captive}") };
+    findings.same_if(None, "windability.class", &class, claim.class.as_ref());
+    let reels = supply.reels_now.iter().copied().max().unwrap_or(0).max(1);
+    findings.same_if(None, "windability.reels", &(reels as i64), claim.reels.as_ref());
+    findings.same_if(None, "windability.captive", &(captive as i64), claim.captive.as_ref());
+    findings.same_if(None, "windability.max_climb", &(max_climb as i64), claim.max_climb.as_ref());
+}
+
+fn check_reels(truth: &Truth, claim: &Claim, supply: &Supply, starts_m: &[f64], findings: &mut Findings) {
+    let Some(reels) = &claim.supply else { return };
+    findings.same(None, "reels", &supply.loaded.len(), &reels.len());
+    for (i, (reel, (name, step, from, first, last))) in reels.iter().zip(&supply.loaded).enumerate() {
+        let field = |key: &str| format!("reels[{i}].{key}");
+        findings.same(None, &field("name"), name, &reel.name);
+        findings.same(None, &field("captive"), &name.starts_with('C'), &reel.captive);
+        findings.same(None, &field("prepared_before_step"), &(*step as i64), &reel.prepared_before_step);
+        let shown = |from: &Option<String>| from.clone().unwrap_or_else(|| "none".to_owned());
+        findings.same(None, &field("taken_from"), &shown(from), &shown(&reel.taken_from));
+        findings.near(None, &field("from_m"), starts_m[first - 1], reel.from_m, Printed::Metres);
+        findings.near(None, &field("to_m"), starts_m[*last], reel.to_m, Printed::Metres);
+        let allowance_m = if name.starts_with('C') { 0.0 } else { truth.shop.allowance_m };
+        let load_m = starts_m[*last] - starts_m[first - 1] + allowance_m;
+        findings.near_if(None, &field("load_m"), load_m, reel.load_m, Printed::Metres);
+    }
+}
+
+fn check_shop(truth: &Truth, found: &super::Shop, findings: &mut Findings) {
+    let shop = truth.shop;
+    for ((name, expected), (_, found)) in shop.words.iter().zip(&found.words) {
+        findings.same(None, &format!("production.{name}"), expected, found);
+    }
+    for (name, expected, found) in [
+        ("tension_n", shop.tension_n, found.tension_n),
+        ("tension_taper_percent_per_layer", shop.tension_taper_per_layer, found.tension_taper_per_layer),
+        ("allowance_m", shop.allowance_m, found.allowance_m),
+        ("winding_speed_turns_per_min", shop.winding_speed_turns_per_min, found.winding_speed_turns_per_min),
+    ] {
+        findings.checks += 1;
+        // Copied, not computed: equal but for the last bit.
+        if !((expected - found).abs() <= 1e-12 * expected.abs()) {
+            let name = format!("production.{name}");
+            findings.add(None, &name, expected.to_string(), found.to_string(), super::EMIT_AGAIN);
+        }
+    }
+    let every = "production.potting_every_layers";
+    findings.same(None, every, &shop.potting_every_layers, &found.potting_every_layers);
+}
+
+/// A classic winding's name must stand for that winding.
+fn check_name(claim: &Claim, segments: &[usize], findings: &mut Findings) {
+    let Some(name) = &claim.pattern else { return };
+    let count = segments.len();
+    let h = count / 2;
+    let of_word = |word: &str| {
+        let (mut low, mut high) = (h + 1, h);
+        let letters: Vec<char> = word.chars().collect();
+        (0..count)
+            .map(|i| {
+                if letters[i % letters.len()] == 'A' {
+                    low -= 1;
+                    low
+                } else {
+                    high += 1;
+                    high
+                }
+            })
+            .collect::<Vec<usize>>()
+    };
+    let word = match name.as_str() {
+        "dip" => "AB",
+        "qua" => "ABBA",
+        "oct" => "ABBABAAB",
+        "hex" => "ABBABAABBAABABBA",
+        _ => "",
+    };
+    let expected: Vec<usize> = match name.as_str() {
+        "zyl" => (1..=count).collect(),
+        "sym" => (1..=h).rev().chain((h + 1..=count).rev()).collect(),
+        "sym-text" => (1..=h).rev().chain(h + 1..=count).collect(),
+        _ if !word.is_empty() && count % word.len() == 0 => of_word(word),
+        _ => return,
+    };
+    findings.checks += 1;
+    if expected != segments {
+        let remedy = "name the pattern by what it is, or wind the one that is named";
+        findings.add(None, "pattern", format!("the name of {segments:?}"), name.clone(), remedy);
+    }
+}

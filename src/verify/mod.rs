@@ -1,0 +1,238 @@
+//! Checks a schedule against the coil that it is for, with code of its own.
+//!
+//! Nothing here is shared with what emits schedules: geometry, reels, flanges, classes and the rate error are worked
+//! out again from the raw coil. All violations come at once, each with its row and what to do.
+//!
+//! What is compared how closely: lengths, radii and turns to the last printed digit; words and counts exactly; the
+//! worst rate error to its last printed digit against the reference model at the stated profile and time, and against
+//! [`rate`]'s own solution of the heat equation where the model declares nothing that this solution leaves out.
+
+mod expected;
+mod rate;
+
+use crate::profile::ProfileSpec;
+use crate::rate::CoilModel;
+use crate::units::{deg_per_h_from_rad_per_s, mm_from_m};
+
+/// What a file claims, in SI; absent fields are not checked.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Claim {
+    pub model: Option<String>,
+    pub model_sha256: Option<String>,
+    pub pattern: Option<String>,
+    pub segments: Option<Vec<i64>>,
+    pub class: Option<String>,
+    pub reels: Option<i64>,
+    pub captive: Option<i64>,
+    pub max_climb: Option<i64>,
+    pub worst_rate_rad_per_s: Option<f64>,
+    pub worst_profile: Option<String>,
+    pub worst_time_s: Option<f64>,
+    pub length_m: Option<f64>,
+    pub start_mark_m: Option<f64>,
+    pub expected_trim_m: Option<f64>,
+    pub supply: Option<Vec<ClaimedReel>>,
+    pub shop: Option<Shop>,
+    pub rows: Vec<Row>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct ClaimedReel {
+    pub name: String,
+    pub captive: bool,
+    pub prepared_before_step: i64,
+    pub taken_from: Option<String>,
+    pub from_m: f64,
+    pub to_m: f64,
+    pub load_m: Option<f64>,
+}
+
+/// One row of a schedule; further columns are checked where they are present.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Row {
+    pub step: i64,
+    pub layer: i64,
+    pub half: String,
+    pub segment: i64,
+    pub supply_reel: String,
+    pub direction: String,
+    pub turns: f64,
+    pub fibre_from_m: f64,
+    pub fibre_to_m: f64,
+    pub length_m: f64,
+    pub radius_m: f64,
+    pub climb: i64,
+    pub cumulative_m: f64,
+    pub crossover: Option<String>,
+    pub balance_m: Option<f64>,
+    pub rotation: Option<String>,
+    pub axial_pitch_m: Option<f64>,
+    pub tension_n: Option<f64>,
+    pub turns_per_min: Option<f64>,
+    pub reel_change: Option<bool>,
+    pub potting: Option<bool>,
+}
+
+/// The winding shop's settings.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shop {
+    /// Words that are copied, not computed, each with its name.
+    pub words: Vec<(&'static str, String)>,
+    pub tension_n: f64,
+    pub tension_taper_per_layer: f64,
+    pub allowance_m: f64,
+    pub potting_every_layers: i64,
+    pub winding_speed_turns_per_min: f64,
+}
+
+/// What the schedule should be for.
+#[derive(Debug, Clone, Copy)]
+pub struct Truth<'a> {
+    pub model: &'a CoilModel,
+    pub profiles: &'a ProfileSpec,
+    pub model_sha256: &'a str,
+    pub shop: &'a Shop,
+}
+
+/// One thing that is not as it should be.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Violation {
+    /// Counted from 1; none for the file as a whole.
+    pub row: Option<usize>,
+    pub field: String,
+    pub expected: String,
+    pub found: String,
+    pub remedy: &'static str,
+}
+
+impl std::fmt::Display for Violation {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if let Some(row) = self.row {
+            write!(f, "row {row}: ")?;
+        }
+        write!(f, "{} must be {}, found {}: {}", self.field, self.expected, self.found, self.remedy)
+    }
+}
+
+/// What was found, and how the rate error was checked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Verification {
+    pub violations: Vec<Violation>,
+    /// Comparisons made.
+    pub checks: usize,
+    pub rate_check: RateCheck,
+}
+
+/// How far the claimed rate error could be checked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RateCheck {
+    /// Not claimed, or the rows are no winding.
+    None,
+    /// Against an independent solution, which found this worst rate error.
+    Independent { worst_rad_per_s: f64 },
+    /// The model declares effects that only the reference model knows.
+    ReferenceOnly,
+}
+
+const EMIT_AGAIN: &str = "emit the schedule again from the model, do not edit it";
+
+/// Collects violations and counts comparisons.
+#[derive(Debug, Default)]
+struct Findings {
+    violations: Vec<Violation>,
+    checks: usize,
+}
+
+impl Findings {
+    fn add(&mut self, row: Option<usize>, field: &str, expected: String, found: String, remedy: &'static str) {
+        self.violations.push(Violation { row, field: field.to_owned(), expected, found, remedy });
+    }
+
+    fn same<T: PartialEq + std::fmt::Display>(&mut self, row: Option<usize>, field: &str, expected: &T, found: &T) {
+        self.checks += 1;
+        if expected != found {
+            self.add(row, field, expected.to_string(), found.to_string(), EMIT_AGAIN);
+        }
+    }
+
+    /// As [`Findings::same`], where the file has the field.
+    fn same_if<T: PartialEq + std::fmt::Display>(
+        &mut self,
+        row: Option<usize>,
+        field: &str,
+        expected: &T,
+        found: Option<&T>,
+    ) {
+        if let Some(found) = found {
+            self.same(row, field, expected, found);
+        }
+    }
+
+    /// Not NaN either.
+    fn near(&mut self, row: Option<usize>, field: &str, expected: f64, found: f64, printed: Printed) {
+        self.checks += 1;
+        if !((expected - found).abs() <= printed.tolerance()) {
+            self.add(row, field, printed.show(expected), printed.show(found), EMIT_AGAIN);
+        }
+    }
+
+    fn near_if(&mut self, row: Option<usize>, field: &str, expected: f64, found: Option<f64>, printed: Printed) {
+        if let Some(found) = found {
+            self.near(row, field, expected, found, printed);
+        }
+    }
+}
+
+/// How a number is printed, and so how closely it can be compared: half the last digit.
+#[derive(Debug, Clone, Copy)]
+enum Printed {
+    /// Metres, six digits.
+    Metres,
+    /// Millimetres, four digits; held in metres.
+    Millimetres,
+    /// Turns, newtons and the like, four digits.
+    Plain,
+    /// Degrees per hour, six digits; held in rad/s.
+    DegPerHour,
+}
+
+impl Printed {
+    fn tolerance(self) -> f64 {
+        match self {
+            Printed::Metres => 5.001e-7,
+            Printed::Millimetres => 5.001e-8,
+            Printed::Plain => 5.001e-5,
+            Printed::DegPerHour => 5.1e-7 * crate::units::rad_per_s_from_deg_per_h(1.0),
+        }
+    }
+
+    fn show(self, value: f64) -> String {
+        match self {
+            Printed::Metres => format!("{value:.6} m"),
+            Printed::Millimetres => format!("{:.4} mm", mm_from_m(value)),
+            Printed::Plain => format!("{value:.4}"),
+            Printed::DegPerHour => format!("{:.6} °/h", deg_per_h_from_rad_per_s(value)),
+        }
+    }
+}
+
+/// Checks everything that a file claims.
+pub fn verify(truth: &Truth, claim: &Claim) -> Verification {
+    let mut findings = Findings::default();
+    findings.same_if(None, "model", &truth.model.name, claim.model.as_ref());
+    if let Some(found) = &claim.model_sha256 {
+        findings.checks += 1;
+        if found != truth.model_sha256 {
+            let remedy =
+                "the model file is not the one that the schedule was made from: use that revision or emit again";
+            findings.add(None, "model_sha256", truth.model_sha256.to_owned(), found.clone(), remedy);
+        }
+    }
+    let segments = expected::permutation(truth, claim, &mut findings);
+    let mut rate_check = RateCheck::None;
+    if let Some(segments) = segments {
+        expected::check(truth, claim, &segments, &mut findings);
+        rate_check = rate::check(truth, claim, &segments, &mut findings);
+    }
+    Verification { violations: findings.violations, checks: findings.checks, rate_check }
+}
