@@ -12,6 +12,6 @@ pub mod pattern_file;
 mod production_table;
 mod profile_tables;
 pub mod schedule_file;
-pub mod schema;
 pub mod schedule_reader;
+pub mod schema;
 pub mod toml_reader;
