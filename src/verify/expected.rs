@@ -359,7 +359,7 @@ fn check_name(claim: &Claim, segments: &[usize], findings: &mut Findings) {
         "zyl" => (1..=count).collect(),
         "sym" => (1..=h).rev().chain((h + 1..=count).rev()).collect(),
         "sym-text" => (1..=h).rev().chain(h + 1..=count).collect(),
-        _ if !word.is_empty() && count % word.len() == 0 => of_word(word),
+        _ if !word.is_empty() && count.is_multiple_of(word.len()) => of_word(word),
         _ => return,
     };
     findings.checks += 1;

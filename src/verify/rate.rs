@@ -128,8 +128,8 @@ impl Response {
         } else {
             let depth_m = |j: usize| (layers - 1 - j) as f64 * coil.radial_pitch_m();
             let share = |j: usize, t: f64| match (depth_m(j), t) {
-                (x, _) if x == 0.0 => 1.0,
-                (_, t) if t == 0.0 => 0.0,
+                (0.0, _) => 1.0,
+                (_, 0.0) => 0.0,
                 (x, t) => libm::erfc(x / (2.0 * (diffusivity * t).sqrt())),
             };
             times_s.iter().map(|&t| weights.iter().enumerate().map(|(j, w)| w * share(j, t)).sum()).collect()
