@@ -2,12 +2,30 @@
 
 use thiserror::Error;
 
+use crate::numeric::statistics::{gross_errors, robust_deviation};
+
 /// A further column of a record, by its name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
     pub name: String,
     pub values: Vec<f64>,
 }
+
+/// A value that stands alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GrossError {
+    /// Index 0 is the first.
+    pub row: usize,
+    /// "temperature" or "rate".
+    pub column: &'static str,
+}
+
+/// Rows to each side that a value is compared with.
+const NEIGHBOURS: usize = 3;
+/// A gross error is this many spreads of its neighbours away from their median,
+const SPREAD_FACTOR: f64 = 8.0;
+/// and this many times the usual change from row to row.
+const FLOOR_FACTOR: f64 = 8.0;
 
 /// One record of a gyro at rest in a temperature chamber.
 ///
@@ -148,10 +166,76 @@ impl Record {
         &self.channels
     }
 
+    /// Single values of temperature and rate that do not belong to their neighbours.
+    pub fn gross_errors(&self) -> Vec<GrossError> {
+        let find = |values: &[f64], column: &'static str| -> Vec<GrossError> {
+            let changes: Vec<f64> = values.windows(2).map(|w| w[1] - w[0]).collect();
+            let floor = FLOOR_FACTOR * robust_deviation(&changes);
+            let rows = gross_errors(values, NEIGHBOURS, SPREAD_FACTOR, floor);
+            rows.into_iter().map(|row| GrossError { row, column }).collect()
+        };
+        let mut found = find(&self.temperature_k, "temperature");
+        found.extend(find(&self.rate_rad_per_s, "rate"));
+        found.sort_by_key(|e| e.row);
+        found
+    }
+
+    /// The same record without some of its rows; they become gaps.
+    ///
+    /// # Errors
+    /// Too few rows left.
+    pub fn without_rows(&self, rows: &[usize]) -> Result<Self, RecordError> {
+        let mut kept = vec![true; self.rows()];
+        for &row in rows {
+            if let Some(keep) = kept.get_mut(row) {
+                *keep = false;
+            }
+        }
+        let keep = |values: &[f64]| -> Vec<f64> {
+            values.iter().zip(&kept).filter(|(_, keep)| **keep).map(|(v, _)| *v).collect()
+        };
+        let mut record =
+            Self::new(self.name.clone(), keep(&self.times_s), keep(&self.temperature_k), keep(&self.rate_rad_per_s))?;
+        record.inner_k = self.inner_k.as_deref().map(keep);
+        record.ambient_k = self.ambient_k.as_deref().map(keep);
+        record.channels =
+            self.channels.iter().map(|c| Channel { name: c.name.clone(), values: keep(&c.values) }).collect();
+        Ok(record)
+    }
+
+    /// Intervals between rows that are at least twice the usual one: the row after the gap and its length.
+    pub fn gaps(&self) -> Vec<(usize, f64)> {
+        let usual_s = self.interval_s();
+        let steps = self.times_s.windows(2).enumerate().map(|(i, w)| (i + 1, w[1] - w[0]));
+        steps.filter(|(_, step_s)| *step_s >= 2.0 * usual_s).collect()
+    }
+
     /// The usual interval between rows: the median.
     pub fn interval_s(&self) -> f64 {
         let mut steps: Vec<f64> = self.times_s.windows(2).map(|w| w[1] - w[0]).collect();
         steps.sort_by(f64::total_cmp);
         steps[steps.len() / 2]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gross_errors_of_a_ramp_are_found_and_can_be_left_out() {
+        let times_s: Vec<f64> = (0..200).map(f64::from).collect();
+        let temperature_k: Vec<f64> = times_s.iter().map(|t| 290.0 + 0.02 * t.min(100.0)).collect();
+        let mut rate: Vec<f64> = (0..200).map(|i| 1e-6 * f64::from(i % 7)).collect();
+        rate[50] = 1.0;
+        let mut spoilt = temperature_k.clone();
+        spoilt[120] = 0.0;
+        let record = Record::new("x", times_s, spoilt, rate).unwrap();
+        let found = record.gross_errors();
+        assert_eq!(found, [GrossError { row: 50, column: "rate" }, GrossError { row: 120, column: "temperature" }]);
+        let rows: Vec<usize> = found.iter().map(|e| e.row).collect();
+        let clean = record.without_rows(&rows).unwrap();
+        assert_eq!(clean.rows(), 198);
+        assert_eq!(clean.gaps(), [(50, 2.0), (119, 2.0)]);
     }
 }

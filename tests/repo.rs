@@ -30,6 +30,7 @@ const FLOORS: &[(&str, u8)] = &[
     ("schedule", 4),
     ("verify", 4),
     ("reproduce", 4),
+    ("metrics", 4),
     ("io", 5),
     ("report", 5),
     ("cli", 6),

@@ -5,10 +5,12 @@ mod completions;
 mod effects;
 mod evaluate;
 mod man;
+mod metrics;
 mod new;
 mod patterns;
 pub mod progress;
 mod reproduce;
+mod records;
 mod schedule;
 mod schema;
 pub mod screen;
@@ -22,8 +24,10 @@ use thiserror::Error;
 use crate::io::fault::Faults;
 use crate::io::files::WriteError;
 use crate::io::pattern_file::ResolveError;
+use crate::metrics::MetricsError;
 use crate::rate::RateError;
 use crate::search::guaranteed::GuaranteedError;
+use crate::record::RecordError;
 use crate::search::worst_case::SearchError;
 use progress::ProgressMode;
 use screen::Screen;
@@ -77,6 +81,7 @@ enum Command {
     New(new::Arguments),
     Reproduce(reproduce::Arguments),
     Schedule(schedule::Arguments),
+    Metrics(metrics::Arguments),
     Schema(schema::Arguments),
     Completions(completions::Arguments),
     Man(man::Arguments),
@@ -109,6 +114,10 @@ pub enum CliError {
     Rate(#[from] RateError),
     #[error("error: there is no effect {stated}: did you mean {nearest}? `coilwright effects` lists all")]
     UnknownEffect { stated: String, nearest: &'static str },
+    #[error("error: {0}")]
+    Metrics(#[from] MetricsError),
+    #[error("error: {0}")]
+    Record(#[from] RecordError),
     #[error("error: {path} exists already: choose another name or remove it first")]
     Exists { path: String },
     #[error("error: no pattern is stated: give --pattern, or winding.pattern in the model file")]
@@ -129,6 +138,7 @@ pub fn run() -> ExitCode {
         Command::New(arguments) => new::run(arguments, &screen),
         Command::Reproduce(arguments) => reproduce::run(arguments, &screen),
         Command::Schedule(arguments) => schedule::run(arguments, &screen),
+        Command::Metrics(arguments) => metrics::run(arguments, &screen),
         Command::Schema(arguments) => schema::run(arguments, &screen),
         Command::Completions(arguments) => completions::run(arguments, &screen),
         Command::Man(arguments) => man::run(arguments, &screen),

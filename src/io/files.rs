@@ -23,17 +23,22 @@ pub enum WriteError {
 /// # Errors
 /// A file that is missing, a folder, empty, binary or too large.
 pub fn read_text(path: &Path) -> Result<String, Faults> {
+    read_text_up_to(path, LARGEST_TEXT_BYTES)
+}
+
+/// As [`read_text`], for files of another size.
+///
+/// # Errors
+/// As [`read_text`].
+pub fn read_text_up_to(path: &Path, largest_bytes: u64) -> Result<String, Faults> {
     let shown = path.display().to_string();
     let fault = |message: String| Faults::of_file(&shown, message);
     let found = std::fs::metadata(path).map_err(|e| fault(format!("cannot be read: {e}")))?;
     if found.is_dir() {
         return Err(fault("expected a file, found a folder".to_owned()));
     }
-    if found.len() > LARGEST_TEXT_BYTES {
-        return Err(fault(format!(
-            "expected a text file of at most {LARGEST_TEXT_BYTES} bytes, found {}",
-            found.len()
-        )));
+    if found.len() > largest_bytes {
+        return Err(fault(format!("expected a text file of at most {largest_bytes} bytes, found {}", found.len())));
     }
     let bytes = std::fs::read(path).map_err(|e| fault(format!("cannot be read: {e}")))?;
     let text = String::from_utf8(bytes).map_err(|e| {
