@@ -93,15 +93,18 @@ pub fn white_by_slope(points: &[AllanPoint]) -> Option<(f64, bool)> {
     };
     let falls = |i: &usize| (slope(*i) + 0.5).abs() < 0.15;
     let square = |p: &AllanPoint| p.deviation * p.deviation * p.tau_s;
-    let first = (0..usable.len()).find(falls);
-    if let Some(first) = first {
-        let stretch: Vec<&AllanPoint> = (first..usable.len()).take_while(falls).map(|i| usable[i]).collect();
-        let freedom: f64 = stretch.iter().map(|p| weight(p) * weight(p)).sum();
-        let sum: f64 = stretch.iter().map(|p| weight(p) * weight(p) * square(p)).sum();
-        return Some(((sum / freedom).sqrt(), true));
-    }
-    usable.iter().map(|p| square(p).sqrt()).min_by(f64::total_cmp).map(|least| (least, false))
+    let least = usable.iter().map(|p| square(p)).min_by(f64::total_cmp)?;
+    // Beyond a hump of something slow the curve may fall with -1/2 too, far above the noise.
+    let is_low = |i: &usize| square(usable[*i]) < LOW * least;
+    let Some(first) = (0..usable.len()).find(|i| falls(i) && is_low(i)) else { return Some((least.sqrt(), false)) };
+    let stretch: Vec<&AllanPoint> = (first..usable.len()).take_while(falls).map(|i| usable[i]).collect();
+    let freedom: f64 = stretch.iter().map(|p| weight(p) * weight(p)).sum();
+    let sum: f64 = stretch.iter().map(|p| weight(p) * weight(p) * square(p)).sum();
+    Some(((sum / freedom).sqrt(), true))
 }
+
+/// A stretch of white noise has no other point of the curve further below it than this, in σ²τ.
+const LOW: f64 = 2.0;
 
 /// A quantised angle falls with −1 where it is seen first; what falls less steeply than this is not quantised.
 const QUANTISED_SLOPE: f64 = -0.75;
