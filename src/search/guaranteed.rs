@@ -72,6 +72,9 @@ const SETTLED_SHARE: f64 = 1e-10;
 /// The share of the bound that the bang-bang profile may miss because it is finite.
 const MISSED_SHARE: f64 = 1e-3;
 
+/// One endless ramp: only its rate counts, so its end may lie anywhere behind the grid's last time.
+const BEHIND_THE_GRID: f64 = 1000.0;
+
 impl UnitStep {
     /// # Errors
     /// Models that are not linear, by the effect that makes them so; heat paths that cannot be solved.
@@ -87,8 +90,7 @@ impl UnitStep {
         let times_s: Vec<f64> = std::iter::once(0.0)
             .chain((0..=count).map(|i| first_s * (last_s / first_s).powf(i as f64 / count as f64)))
             .collect();
-        // One endless ramp: only its rate counts, so its end may lie anywhere behind the grid.
-        let end_s = 1e3 * last_s;
+        let end_s = BEHIND_THE_GRID * last_s;
         let ramp = PiecewiseLinear::new(vec![0.0, end_s], vec![0.0, max_rate_k_per_s * end_s])
             .map_err(|_| SearchError::Thermal(crate::thermal::ThermalError::Eigen))?;
         let field = solve(&path, &Drive::boundary(ramp)).map_err(SearchError::from)?;
