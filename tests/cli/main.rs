@@ -3,6 +3,7 @@
 mod bad_input;
 mod commands;
 mod examples;
+mod readme;
 mod reproduce;
 
 use std::path::{Path, PathBuf};
