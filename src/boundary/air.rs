@@ -62,6 +62,26 @@ pub(super) struct AirSpace {
     dynamics: DMatrix<f64>,
 }
 
+/// Directions in which disturbances enter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Shock {
+    Jerk,
+    /// A kink.
+    Slope,
+    /// What a kink that comes earlier by dt adds, per its size times dt: air, modes and sensor as one second of a unit
+    /// slope leaves them.
+    Earlier,
+}
+
+impl Shock {
+    const COUNT: usize = 3;
+
+    /// Where this direction's score is.
+    pub fn place(self, stage: usize) -> usize {
+        stage * Self::COUNT + self as usize
+    }
+}
+
 /// Where each state is.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Layout {
@@ -277,15 +297,13 @@ impl Scene {
                 }
                 Event::Kink(kink) => {
                     kink_stages[kink] = index;
-                    disturbances.push((layout.slope(), KINK_VARIANCE_K2_PER_S2));
-                    if with_rate {
-                        let slack_k = air.kinks[kink].slope_change_k_per_s * self.interval_s;
-                        disturbances.push((layout.temperature(), slack_k * slack_k));
-                    }
+                    disturbances.push((Shock::Slope as usize, KINK_VARIANCE_K2_PER_S2));
+                    let slack_k = air.kinks[kink].slope_change_k_per_s * self.interval_s;
+                    disturbances.push((Shock::Earlier as usize, slack_k * slack_k));
                 }
                 Event::WindowStart => {}
             }
-            disturbances.push((layout.jerk(), air.jerk_noise_k2_per_s7 * step_s));
+            disturbances.push((Shock::Jerk as usize, air.jerk_noise_k2_per_s7 * step_s));
             let key = ((step_s / SAME_TIME_S).round() as u64, begins_window);
             let transition = *known.entry(key).or_insert_with(|| {
                 transitions.push(transition(&dynamics, step_s, layout, begins_window.then_some(&functional[..])));
@@ -316,7 +334,21 @@ impl Scene {
             }
             covariance[(start, start)] = (0..start).map(|i| functional[i] * spread[i]).sum();
         }
-        let space = StateSpace { size: n, rows, transitions, stages, mean, covariance: covariance.as_slice().to_vec() };
+        let mut directions = vec![vec![0.0; n]; Shock::COUNT];
+        directions[Shock::Jerk as usize][layout.jerk()] = 1.0;
+        directions[Shock::Slope as usize][layout.slope()] = 1.0;
+        for state in 0..moving {
+            directions[Shock::Earlier as usize][state] = dynamics[(state, layout.slope())];
+        }
+        let space = StateSpace {
+            size: n,
+            rows,
+            directions,
+            transitions,
+            stages,
+            mean,
+            covariance: covariance.as_slice().to_vec(),
+        };
         Ok(AirSpace {
             space,
             layout,
@@ -413,32 +445,47 @@ impl Scene {
 }
 
 impl AirSpace {
-    pub fn layout(&self) -> Layout {
-        self.layout
-    }
-
     /// The expected disturbance of each moving state right after a stage.
     fn shock(&self, smoothed: &Smoothed, stage: usize) -> Vec<f64> {
-        let n = self.layout.size();
         let mut shock = vec![0.0; self.layout.moving()];
-        for &(state, variance) in &self.space.stages[stage].disturbances {
-            shock[state] = variance * smoothed.score[stage * n + state];
+        for &(direction, variance) in &self.space.stages[stage].disturbances {
+            let size = variance * smoothed.score[stage * Shock::COUNT + direction];
+            for (s, d) in shock.iter_mut().zip(&self.space.directions[direction]) {
+                *s += size * d;
+            }
         }
         shock
     }
 
     /// Expected size of each kink, and how many of its own standard deviations that is.
     pub fn kink_sizes(&self, smoothed: &Smoothed) -> Vec<(f64, f64)> {
-        let (n, slope) = (self.layout.size(), self.layout.slope());
         self.kink_stages
             .iter()
             .map(|&stage| {
-                let place = stage * n + slope;
+                let place = Shock::Slope.place(stage);
                 let size = KINK_VARIANCE_K2_PER_S2 * smoothed.score[place];
                 let variance = KINK_VARIANCE_K2_PER_S2 * (1.0 - KINK_VARIANCE_K2_PER_S2 * smoothed.information[place]);
                 (size, size.abs() / variance.max(f64::MIN_POSITIVE).sqrt())
             })
             .collect()
+    }
+}
+
+impl AirSpace {
+    /// By how much each kink comes earlier than assumed, all at once [s].
+    pub fn kink_leads_s(&self, smoothed: &Smoothed, air: &Air) -> Vec<f64> {
+        let lead_s = |(&stage, kink): (&usize, &Kink), size_k_per_s: f64| {
+            let place = Shock::Earlier.place(stage);
+            let prior = self.space.stages[stage].disturbances.iter().find(|d| d.0 == Shock::Earlier as usize);
+            let shift_k = match prior {
+                Some(&(_, variance)) if kink.slope_change_k_per_s != 0.0 => variance * smoothed.score[place],
+                // A new kink has no size yet and so no prior: as if it moved alone.
+                _ => smoothed.score[place] / smoothed.information[place].max(f64::MIN_POSITIVE),
+            };
+            shift_k / size_k_per_s
+        };
+        let sizes = self.kink_sizes(smoothed);
+        self.kink_stages.iter().zip(&air.kinks).zip(sizes).map(|(at, (size, _))| lead_s(at, size)).collect()
     }
 }
 

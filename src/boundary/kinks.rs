@@ -1,6 +1,6 @@
 //! Maximum likelihood of the air's kinks, the film and the jerk's noise.
 
-use super::air::{AirSpace, Scene};
+use super::air::{AirSpace, Scene, Shock};
 use super::{Air, BoundaryError, Kink};
 use crate::numeric::state_space::Smoothed;
 use crate::thermal::Location;
@@ -110,7 +110,6 @@ fn log_likelihood(scene: &Scene, air: &Air) -> Result<f64, BoundaryError> {
 /// Times at which a further shock to the slope would be most significant.
 fn significant_shocks(scene: &Scene, air: &Air) -> Result<Vec<f64>, BoundaryError> {
     let (built, smoothed) = smooth(scene, air)?;
-    let (n, slope) = (built.space.size, built.layout().slope());
     let near_s = 1.2 * scene.interval_s;
     let mut shocks: Vec<(f64, f64)> = built
         .reading_stages
@@ -118,7 +117,7 @@ fn significant_shocks(scene: &Scene, air: &Air) -> Result<Vec<f64>, BoundaryErro
         .zip(&scene.times_s)
         .filter(|&(_, &time_s)| air.kinks.iter().all(|k| (k.time_s - time_s).abs() > near_s))
         .map(|(&stage, &time_s)| {
-            let place = stage * n + slope;
+            let place = Shock::Slope.place(stage);
             (smoothed.score[place].powi(2) / smoothed.information[place].max(f64::MIN_POSITIVE), time_s)
         })
         .collect();
@@ -134,7 +133,7 @@ fn significant_shocks(scene: &Scene, air: &Air) -> Result<Vec<f64>, BoundaryErro
     Ok(added)
 }
 
-/// Newton steps for the kinks' times: moving a kink of size σ by dt is a shift of the temperature by −σ dt.
+/// Newton steps for the kinks' times and sizes, all at once.
 fn place_kinks(scene: &Scene, air: &mut Air, steps: usize) -> Result<(), BoundaryError> {
     let (first_s, last_s) = (scene.times_s[0], scene.times_s[scene.times_s.len() - 1]);
     let (longest_s, closest_s) = (3.0 * scene.interval_s, 0.6 * scene.interval_s);
@@ -143,14 +142,12 @@ fn place_kinks(scene: &Scene, air: &mut Air, steps: usize) -> Result<(), Boundar
             return Ok(());
         }
         let (built, smoothed) = smooth(scene, air)?;
-        let (n, temperature) = (built.space.size, built.layout().temperature());
         let sizes = built.kink_sizes(&smoothed);
+        let leads_s = built.kink_leads_s(&smoothed, air);
         let mut farthest_s = 0.0_f64;
         for (i, kink) in air.kinks.iter_mut().enumerate() {
             kink.slope_change_k_per_s = sizes[i].0;
-            let place = built.kink_stages[i] * n + temperature;
-            let shift_k = smoothed.score[place] / smoothed.information[place].max(f64::MIN_POSITIVE);
-            let move_s = (-shift_k / sizes[i].0).clamp(-longest_s, longest_s);
+            let move_s = (-leads_s[i]).clamp(-longest_s, longest_s);
             if step < steps && move_s.is_finite() {
                 let inside_s = 0.1 * scene.interval_s;
                 kink.time_s = (kink.time_s + move_s).clamp(first_s + inside_s, last_s - inside_s);

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! z_k = h x_k + v,  v ~ N(0, r)         any number of scalar measurements at stage k
-//! x_{k+1} = F_k (x_k + w_k),  w_k ~ N(0, diag q_k)
+//! x_{k+1} = F_k (x_k + Σ_d u_d w_kd),  w_kd ~ N(0, q_kd)      u_d: the directions of the disturbances
 //! ```
 //!
 //! Measurements are taken in one at a time (their errors are independent), so there is no matrix to invert. Smoothing
@@ -13,8 +13,8 @@
 //! x̂ = x + P r,   var(d x) = d P dᵀ − d P N P dᵀ
 //! ```
 //!
-//! and r, N at a stage are also score and information of a further disturbance there: r²/N is χ² with one degree of
-//! freedom where there is none.
+//! and u·r, u N u at a stage are also score and information of a further disturbance there: (u·r)²/(u N u) is χ² with
+//! one degree of freedom where there is none.
 //!
 //! # Source
 //! Kalman, J. Basic Eng. 82 (1960) 35; de Jong, J. Am. Stat. Assoc. 84 (1989) 1085 (smoothing without inverses); de Jong
@@ -33,18 +33,20 @@ pub struct Measurement {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stage {
     pub measurements: Vec<Measurement>,
-    /// State and variance of each disturbance that enters after the measurements.
+    /// Direction and variance of each disturbance that enters after the measurements.
     pub disturbances: Vec<(usize, f64)>,
     /// Index into [`StateSpace::transitions`]; unused at the last stage.
     pub transition: usize,
 }
 
 /// # Shapes
-/// `size` states; `rows` and `mean` of that length; `transitions` and `covariance` row-major `size` × `size`.
+/// `size` states; each of `rows` and `directions`, and `mean`, of that length; `transitions` and `covariance` row-major `size` × `size`.
 #[derive(Debug, Clone)]
 pub struct StateSpace {
     pub size: usize,
     pub rows: Vec<Vec<f64>>,
+    /// In which disturbances enter.
+    pub directions: Vec<Vec<f64>>,
     pub transitions: Vec<Vec<f64>>,
     pub stages: Vec<Stage>,
     pub mean: Vec<f64>,
@@ -60,7 +62,7 @@ pub struct Smoothed {
     pub measurements: usize,
     /// Row-major stages × states.
     pub states: Vec<f64>,
-    /// Score of a disturbance of each state at each stage, and its information; row-major stages × states.
+    /// Score of a disturbance in each direction at each stage, and its information; row-major stages × directions.
     pub score: Vec<f64>,
     pub information: Vec<f64>,
     /// Variance of the functional asked for, at each stage.
@@ -129,8 +131,8 @@ impl StateSpace {
             if index + 1 == self.stages.len() {
                 break;
             }
-            for &(state, variance) in &stage.disturbances {
-                covariance[state * n + state] += variance;
+            for &(direction, variance) in &stage.disturbances {
+                spread(&self.directions[direction], variance, &mut covariance);
             }
             let transition = &self.transitions[stage.transition];
             mean = transition.chunks_exact(n).map(|row| dot(row, &mean)).collect();
@@ -150,8 +152,8 @@ impl StateSpace {
             squared_innovations,
             measurements: trace.innovations.len(),
             states: vec![0.0; stages * n],
-            score: vec![0.0; stages * n],
-            information: vec![0.0; stages * n],
+            score: vec![0.0; stages * self.directions.len()],
+            information: vec![0.0; stages * self.directions.len()],
             functional_variance: vec![0.0; stages],
         };
         let (mut r, mut information, mut product) = (vec![0.0; n], vec![0.0; n * n], vec![0.0; n * n]);
@@ -162,9 +164,10 @@ impl StateSpace {
                 let transition = &self.transitions[stage.transition];
                 r = transposed_product(transition, &r, n);
                 pull_back(transition, &mut information, &mut product, n);
-                for state in 0..n {
-                    smoothed.score[index * n + state] = r[state];
-                    smoothed.information[index * n + state] = information[state * n + state];
+                for (d, direction) in self.directions.iter().enumerate() {
+                    let place = index * self.directions.len() + d;
+                    smoothed.score[place] = dot(direction, &r);
+                    smoothed.information[place] = quadratic(direction, &information);
                 }
             }
             for measurement in stage.measurements.iter().rev() {
@@ -178,9 +181,9 @@ impl StateSpace {
             for state in 0..n {
                 smoothed.states[index * n + state] = mean[state] + dot(&covariance[state * n..(state + 1) * n], &r);
             }
-            let spread: Vec<f64> = covariance.chunks_exact(n).map(|row| dot(row, functional)).collect();
-            let reduced: Vec<f64> = information.chunks_exact(n).map(|row| dot(row, &spread)).collect();
-            smoothed.functional_variance[index] = (dot(functional, &spread) - dot(&spread, &reduced)).max(0.0);
+            let along: Vec<f64> = covariance.chunks_exact(n).map(|row| dot(row, functional)).collect();
+            let reduced: Vec<f64> = information.chunks_exact(n).map(|row| dot(row, &along)).collect();
+            smoothed.functional_variance[index] = (dot(functional, &along) - dot(&along, &reduced)).max(0.0);
         }
         smoothed
     }
@@ -258,6 +261,22 @@ impl Whitener {
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// P ← P + u q uᵀ.
+fn spread(direction: &[f64], variance: f64, covariance: &mut [f64]) {
+    let n = direction.len();
+    for (i, a) in direction.iter().enumerate().filter(|(_, a)| **a != 0.0) {
+        for (c, b) in covariance[i * n..(i + 1) * n].iter_mut().zip(direction) {
+            *c += variance * a * b;
+        }
+    }
+}
+
+/// uᵀ N u.
+fn quadratic(direction: &[f64], information: &[f64]) -> f64 {
+    let rows = direction.iter().zip(information.chunks_exact(direction.len()));
+    rows.filter(|(a, _)| **a != 0.0).map(|(a, row)| a * dot(row, direction)).sum()
 }
 
 /// P ← F P Fᵀ, kept symmetric.
@@ -339,6 +358,7 @@ mod tests {
         StateSpace {
             size: 2,
             rows: vec![vec![1.0, 0.0]],
+            directions: vec![vec![1.0, 0.0], vec![0.0, 1.0]],
             transitions: vec![vec![1.0, 1.0, 0.0, 1.0]],
             stages: values
                 .iter()
