@@ -2,6 +2,7 @@
 
 pub mod anneal;
 pub mod columns;
+pub mod exact;
 pub mod guaranteed;
 pub mod objective;
 pub mod optimise;

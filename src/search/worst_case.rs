@@ -10,6 +10,7 @@ use thiserror::Error;
 use crate::coil::CoilError;
 use crate::numeric::maximise::golden_section;
 use crate::pattern::Pattern;
+use crate::pattern::windability::WindabilityClass;
 use crate::profile::Profile;
 use crate::rate::{CoilModel, RateError, RateModel};
 use crate::thermal::{Drive, Field, HeatPath, Instant, ThermalError, ThermalHistory, solve};
@@ -29,6 +30,10 @@ pub enum SearchError {
         "the rate error is not a finite number under profile {profile} at {time_s} s: check the effects' parameters"
     )]
     NotFinite { profile: String, time_s: f64 },
+    #[error("winding.layers must be at most {most} for a proof, found {found}: use optimise without --prove")]
+    TooManyLayers { found: usize, most: usize },
+    #[error("a proof must begin with a pattern of the class {class}, found none: give one of that class")]
+    NoStart { class: WindabilityClass },
 }
 
 /// The fields of all profiles, solved once: they do not depend on the pattern.

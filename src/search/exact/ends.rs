@@ -1,0 +1,180 @@
+//! The class `standard`, searched as a choice of signs: which end of what is inside it each layer lies at.
+//!
+//! With the columns d_m of [`signs`](crate::search::signs) the error is c + Σ ε_m d_m in every sample, for any layer
+//! lengths, plus what lies between known bounds where the halves respond differently or something varies along the
+//! axis. The signs are cut into two sets of at most 2^20 sums each; [`pairs`](super::pairs) finds every pair of sums
+//! that stays under the limit. What signs are left over are tried one choice after the other. Where a pattern's mirror
+//! image has the opposite error, the outermost sign is fixed.
+
+use std::ops::ControlFlow;
+
+use rayon::prelude::*;
+
+use super::judge::{Finding, Judge};
+use super::pairs::{Matching, Step, Target, Tree};
+use super::rows::{Range, Row};
+use super::{Outcome, Watch};
+use crate::search::signs::segments_of_signs;
+
+/// Sums in either set, as a power of two: 16 samples of them fit 64 MB.
+const MOST_BITS: usize = 20;
+
+/// Single precision loses less than this of a sample's scale.
+const ROUNDING: f64 = 1e-6;
+
+/// Pieces of work that are shared out: more than threads, and always the same.
+const SHARES: usize = 256;
+
+/// Patterns that one share may judge in full before it asks for more samples to refute them by.
+const MOST_JUDGED: u64 = 4096;
+
+/// A choice of samples, made ready.
+#[derive(Debug)]
+pub struct Ends {
+    rows: Vec<PreparedRow>,
+    left: Tree,
+    right: Tree,
+    /// Which sign each column of the trees belongs to.
+    left_signs: Vec<usize>,
+    right_signs: Vec<usize>,
+    /// Signs that are tried one choice after the other, in the order of the bits.
+    outer_signs: Vec<usize>,
+    signs: usize,
+    mirrored: bool,
+}
+
+#[derive(Debug)]
+struct PreparedRow {
+    constant: f64,
+    columns: Vec<f64>,
+    curved: Range,
+    rounding: f64,
+}
+
+impl Ends {
+    pub fn new(rows: &[Row], lengths_m: &[f64], mirrored: bool) -> Self {
+        let signs = lengths_m.len() - 1;
+        let rows: Vec<PreparedRow> = rows
+            .iter()
+            .map(|row| PreparedRow {
+                constant: row.constant,
+                columns: sign_columns(row, lengths_m),
+                curved: row.curved_range(lengths_m),
+                rounding: ROUNDING * row.scale(lengths_m),
+            })
+            .collect();
+        let free = signs - usize::from(mirrored);
+        let inside = free.min(2 * MOST_BITS);
+        let left_signs: Vec<usize> = (0..inside).step_by(2).collect();
+        let right_signs: Vec<usize> = (1..inside).step_by(2).collect();
+        let columns = |signs: &[usize]| -> Vec<Vec<f64>> {
+            signs.iter().map(|&m| rows.iter().map(|row| row.columns[m]).collect()).collect()
+        };
+        let start = vec![0.0; rows.len()];
+        let left = Tree::of_corners(&start, &columns(&left_signs));
+        let right = Tree::of_corners(&start, &columns(&right_signs));
+        Self { rows, left, right, left_signs, right_signs, outer_signs: (inside..free).collect(), signs, mirrored }
+    }
+
+    /// Every choice of signs that may stay under the limit is judged.
+    pub fn search(&self, judge: &Judge, limit_rad_per_s: f64, watch: &Watch) -> Outcome {
+        let choices = 1u64 << self.outer_signs.len();
+        let mut outcome = Outcome::default();
+        for choice in 0..choices {
+            outcome.absorb(self.search_choice(choice, judge, limit_rad_per_s, watch));
+            if watch.report((choice + 1) as f64 / choices as f64).is_break() && choice + 1 < choices {
+                outcome.complete = false;
+            }
+            if !outcome.complete {
+                break;
+            }
+        }
+        outcome
+    }
+
+    fn search_choice(&self, choice: u64, judge: &Judge, limit_rad_per_s: f64, watch: &Watch) -> Outcome {
+        let target = Target::new(self.rows.iter().map(|row| {
+            let outer = self.outer_signs.iter().enumerate();
+            let sum: f64 =
+                outer.map(|(k, &m)| if choice >> k & 1 == 1 { row.columns[m] } else { -row.columns[m] }).sum();
+            let known = row.constant + sum + if self.mirrored { row.columns[self.signs - 1] } else { 0.0 };
+            let reach = limit_rad_per_s + row.rounding;
+            (-reach - known - row.curved.high, reach - known - row.curved.low)
+        }));
+        let matching = Matching { left: &self.left, right: &self.right };
+        let mut outcome = Outcome::default();
+        let shares = matching.shares(&target, SHARES, &mut outcome.nodes);
+        let found: Vec<Outcome> = shares
+            .par_iter()
+            .map(|&share| {
+                let mut mine = Outcome::default();
+                let mut nodes = 0;
+                let end = matching.search(share, &target, &mut nodes, &mut |step| match step {
+                    Step::Pause => watch.pause(),
+                    Step::Match { left, right } => {
+                        let segments = segments_of_signs(&self.high(choice, left, right));
+                        mine.judge(judge, &segments, limit_rad_per_s);
+                        if mine.judged > MOST_JUDGED {
+                            mine.overflowed = true;
+                            return ControlFlow::Break(());
+                        }
+                        watch.pause()
+                    }
+                });
+                mine.complete = end.is_continue();
+                mine.nodes += nodes;
+                mine
+            })
+            .collect();
+        found.into_iter().for_each(|o| outcome.absorb(o));
+        outcome
+    }
+
+    fn high(&self, choice: u64, left: u32, right: u32) -> Vec<bool> {
+        let mut high = vec![true; self.signs];
+        let sets =
+            [(&self.left_signs, u64::from(left)), (&self.right_signs, u64::from(right)), (&self.outer_signs, choice)];
+        for (signs, number) in sets {
+            for (k, &m) in signs.iter().enumerate() {
+                high[m] = number >> k & 1 == 1;
+            }
+        }
+        high
+    }
+}
+
+/// d_m of one sample's mean responses; entry k belongs to layer index k + 1.
+fn sign_columns(row: &Row, lengths_m: &[f64]) -> Vec<f64> {
+    let (mut inside_m, mut inside) = (0.0, 0.0);
+    let mut columns = Vec::with_capacity(lengths_m.len());
+    for (s, l) in row.mean.iter().zip(lengths_m) {
+        columns.push(l * (inside_m * s - inside));
+        inside += l * s;
+        inside_m += l;
+    }
+    columns.remove(0);
+    columns
+}
+
+impl Outcome {
+    /// Judges one pattern and keeps what comes of it.
+    pub(super) fn judge(&mut self, judge: &Judge, segments: &[usize], limit_rad_per_s: f64) {
+        self.judged += 1;
+        let limit = self.best.as_ref().map_or(limit_rad_per_s, |b| b.rate_rad_per_s);
+        match judge.judge(segments, limit) {
+            Finding::Better(candidate) => {
+                self.best = Some(match self.best.take() {
+                    Some(best) => best.better(candidate),
+                    None => candidate,
+                });
+            }
+            Finding::Refuted { sample: Some(sample) } if self.refuting.len() < MOST_REFUTING => {
+                self.refuting.push(sample);
+            }
+            Finding::Refuted { .. } => {}
+        }
+    }
+}
+
+/// Refuting samples that one share remembers.
+const MOST_REFUTING: usize = 64;

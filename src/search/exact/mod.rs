@@ -1,0 +1,296 @@
+//! The best pattern of a class with a proof: branch and bound for the largest |Ω| over all profiles and times.
+//!
+//! ```text
+//! min over P of sup over t of |Ω(P, t)|
+//! ```
+//!
+//! What is proved is about the supremum itself and not about its samples. A lower bound over some instants is a lower
+//! bound over all of them, so parts of the space are refuted on a few samples; every pattern that is not refuted so is
+//! judged by the reference worst case, refined in time ([`worst_case`](crate::search::worst_case)). `Optimal` therefore
+//! means: no pattern of the class has a refined worst rate below the best one's by more than one part in 10⁹.
+//!
+//! The proof is built in passes. Each refutes every pattern whose worst rate is below a share of the best known rate;
+//! a share that was refuted in whole is a lower bound, also if the next pass is stopped. Work is cut into pieces in a
+//! fixed order, each with the limit that held at the start of the pass, so the pattern found, the bound and the nodes
+//! counted depend neither on the number of threads nor, unless a pass is stopped, on time.
+//!
+//! | class | space | method |
+//! |---|---|---|
+//! | `standard` | 2^(N−1) choices of ends | [`ends`]: two sets of sums and pairs of boxes |
+//! | `captive:K`, `any` | permutations | [`orders`]: outermost layer first, bounds by rearrangement |
+//!
+//! Where nothing tells the halves of the fibre apart and nothing is added outside the coil, a pattern and its mirror
+//! image s → N+1−s have opposite errors and one of the two is searched.
+//!
+//! Holds for the worst rate (and so the worst phase, a fixed multiple of it). Leaves out the rms objective.
+
+pub mod ends;
+pub mod judge;
+pub mod orders;
+pub mod pairs;
+pub mod rows;
+mod sampling;
+mod starts;
+#[cfg(test)]
+mod tests;
+
+pub use starts::starting_patterns;
+
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use judge::{Candidate, Judge};
+use sampling::Proof;
+
+use super::worst_case::{SearchError, SolvedProfiles};
+use crate::pattern::Pattern;
+use crate::pattern::windability::WindabilityClass;
+use crate::rate::CoilModel;
+
+/// What is to be proved.
+#[derive(Debug, Clone, Copy)]
+pub struct Task<'a> {
+    pub model: &'a CoilModel,
+    pub solved: &'a SolvedProfiles,
+    pub class: WindabilityClass,
+}
+
+/// How much of the proof is done.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress {
+    /// The best worst rate known.
+    pub best_rad_per_s: f64,
+    /// No pattern is below this.
+    pub lower_bound_rad_per_s: f64,
+    /// The limit of the present pass over the best worst rate.
+    pub pass: f64,
+    /// How much of the present pass is done, from 0 to 1.
+    pub share_done: f64,
+}
+
+/// How far a proof went.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// No pattern of the class is better.
+    Optimal,
+    /// Patterns between the lower bound and the best rate have not been ruled out.
+    Gap,
+    /// Nothing better than zero is known as a lower bound.
+    None,
+}
+
+impl std::fmt::Display for Status {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            Status::Optimal => "optimal",
+            Status::Gap => "gap",
+            Status::None => "none",
+        })
+    }
+}
+
+/// The best pattern known and what is known about all others.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Certificate {
+    pub pattern: Pattern,
+    /// Its worst rate, refined in time.
+    pub best_rad_per_s: f64,
+    /// No pattern of the class has a smaller worst rate.
+    pub lower_bound_rad_per_s: f64,
+    pub status: Status,
+    /// Nodes whose bound was computed.
+    pub nodes: u64,
+    /// Patterns judged on all samples.
+    pub judged: u64,
+    /// Samples that the last pass refuted by.
+    pub rows: usize,
+}
+
+/// Told from time to time; answers whether to go on.
+pub type Watcher<'a> = &'a (dyn Fn(Progress) -> ControlFlow<()> + Sync);
+
+/// Limits of the passes over the best known rate.
+const LIMITS: [f64; 9] = [0.25, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 1.0];
+
+/// What a pass may cost that only raises the lower bound, while the last one has not been tried.
+const CHEAP_NODES: u64 = 1 << 18;
+
+/// What the last pass may cost before lower bounds are worth their own effort.
+const DEAR_NODES: u64 = 1 << 28;
+
+/// One pass: its limit over the best known rate, and the nodes that it may look at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Pass {
+    over_best: f64,
+    most_nodes: u64,
+}
+
+/// Which pass comes next: cheap ones until one costs too much, the last one, and after that, if even that costs too
+/// much, the others in their order for as long as it takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+struct Passes {
+    index: usize,
+    effort: Effort,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Effort {
+    #[default]
+    Cheap,
+    Dear,
+    Unlimited,
+}
+
+impl Passes {
+    fn next(&self) -> Pass {
+        let last = LIMITS[LIMITS.len() - 1];
+        match self.effort {
+            Effort::Cheap if self.index + 1 < LIMITS.len() => {
+                Pass { over_best: LIMITS[self.index], most_nodes: CHEAP_NODES }
+            }
+            Effort::Cheap | Effort::Dear => Pass { over_best: last, most_nodes: DEAR_NODES },
+            Effort::Unlimited => Pass { over_best: LIMITS[self.index], most_nodes: u64::MAX },
+        }
+    }
+
+    fn advance(&mut self, complete: bool) {
+        let tried_last = self.next().over_best == 1.0;
+        match self.effort {
+            Effort::Cheap | Effort::Dear if tried_last => self.effort = Effort::Unlimited,
+            Effort::Cheap if !complete => self.effort = Effort::Dear,
+            _ => self.index = (self.index + 1).min(LIMITS.len() - 1),
+        }
+    }
+}
+
+/// Two rates closer than this count as equal.
+pub const RELATIVE_TOLERANCE: f64 = 1e-9;
+
+/// Proves which pattern is best, beginning with the best of given patterns.
+///
+/// # Errors
+/// A model that cannot be solved, a start that does not fit it; more than [`orders::MOST_LAYERS`] layers, or none
+/// of the class among the starts.
+pub fn prove(task: &Task, starts: &[Pattern], watcher: Watcher) -> Result<Certificate, SearchError> {
+    let layers = task.model.coil.layers();
+    if layers > orders::MOST_LAYERS {
+        return Err(SearchError::TooManyLayers { found: layers, most: orders::MOST_LAYERS });
+    }
+    let mut judge = Judge::new(task.model, task.solved)?;
+    let mut best: Option<Candidate> = None;
+    for start in starts.iter().filter(|p| task.class.admits(p)) {
+        let candidate = judge.candidate(start)?;
+        best = Some(match best {
+            Some(best) => best.better(candidate),
+            None => candidate,
+        });
+    }
+    let mut best = best.ok_or(SearchError::NoStart { class: task.class })?;
+    let mut proof = Proof::new(task.class, &mut judge, starts, best.rate_rad_per_s);
+    let mut lower_bound_rad_per_s = 0.0;
+    let mut closed = best.rate_rad_per_s == 0.0;
+    let (mut nodes, mut judged) = (0, 0);
+    let stop = AtomicBool::new(false);
+    let mut passes = Passes::default();
+    while !closed {
+        let Pass { over_best, most_nodes } = passes.next();
+        let at =
+            Progress { best_rad_per_s: best.rate_rad_per_s, lower_bound_rad_per_s, pass: over_best, share_done: 0.0 };
+        let watch = Watch { stop: &stop, watcher, at, most_nodes };
+        let limit = best.rate_rad_per_s * over_best * (1.0 - RELATIVE_TOLERANCE);
+        let outcome = proof.pass(&mut judge, limit, &watch);
+        nodes += outcome.nodes;
+        judged += outcome.judged;
+        if let Some(candidate) = outcome.best {
+            best = best.better(candidate);
+            // Everything below the limit was judged: the best of it is the best of all.
+            closed = outcome.complete;
+        } else if outcome.complete {
+            lower_bound_rad_per_s = limit;
+            closed = over_best == 1.0;
+        }
+        if watch.is_stopped() {
+            break;
+        }
+        passes.advance(outcome.complete);
+    }
+    let status = if closed {
+        lower_bound_rad_per_s = best.rate_rad_per_s * (1.0 - RELATIVE_TOLERANCE);
+        Status::Optimal
+    } else if lower_bound_rad_per_s > 0.0 {
+        Status::Gap
+    } else {
+        Status::None
+    };
+    Ok(Certificate {
+        pattern: Pattern::new(best.segments).expect("a search makes permutations only"),
+        best_rad_per_s: best.rate_rad_per_s,
+        lower_bound_rad_per_s,
+        status,
+        nodes,
+        judged,
+        rows: proof.rows(),
+    })
+}
+
+/// What a pass, or a piece of one, found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// Everything below the limit was judged.
+    pub complete: bool,
+    /// Too many patterns could not be refuted by the samples.
+    pub overflowed: bool,
+    pub nodes: u64,
+    pub judged: u64,
+    pub best: Option<Candidate>,
+    /// Samples that refuted what was judged.
+    pub refuting: Vec<usize>,
+}
+
+impl Default for Outcome {
+    fn default() -> Self {
+        Self { complete: true, overflowed: false, nodes: 0, judged: 0, best: None, refuting: Vec::new() }
+    }
+}
+
+impl Outcome {
+    /// Adds what the next piece found.
+    pub fn absorb(&mut self, other: Self) {
+        self.complete &= other.complete;
+        self.overflowed |= other.overflowed;
+        self.nodes += other.nodes;
+        self.judged += other.judged;
+        self.refuting.extend(other.refuting);
+        self.best = match (self.best.take(), other.best) {
+            (Some(a), Some(b)) => Some(a.better(b)),
+            (a, b) => a.or(b),
+        };
+    }
+}
+
+/// The caller's wish to stop, seen by every piece of work.
+pub struct Watch<'a> {
+    stop: &'a AtomicBool,
+    watcher: Watcher<'a>,
+    at: Progress,
+    /// The pass ends incomplete beyond so many.
+    pub most_nodes: u64,
+}
+
+impl Watch<'_> {
+    /// Asks whether to go on, without news.
+    pub fn pause(&self) -> ControlFlow<()> {
+        self.report(self.at.share_done)
+    }
+
+    pub fn report(&self, share_done: f64) -> ControlFlow<()> {
+        if (self.watcher)(Progress { share_done, ..self.at }).is_break() {
+            self.stop.store(true, Ordering::Relaxed);
+        }
+        if self.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+
+    pub fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}

@@ -1,0 +1,45 @@
+//! Patterns that a proof begins with: the classics of the class and what a short search finds.
+
+use super::Task;
+use crate::pattern::Pattern;
+use crate::pattern::classic::Classic;
+use crate::search::columns::Norm;
+use crate::search::optimise::{DEFAULT_RESTARTS_PER_ROUND, Optimisation, Plan, Rules, default_moves_per_restart};
+use crate::search::samples::SampleMatrix;
+use crate::search::worst_case::SearchError;
+
+/// Rounds without a better pattern after which the short search ends.
+const PATIENCE: u64 = 2;
+
+/// A restart takes this part of the moves that a search of its own would give it.
+const SHORTENED: u64 = 8;
+
+/// Patterns of the search that are kept.
+const MOST_FOUND: usize = 6;
+
+/// The classics of the class and the best patterns of a short search; the same seed gives the same patterns.
+///
+/// # Errors
+/// Effects that leave a layer no turns; rates that are not finite.
+pub fn starting_patterns(task: &Task, seed: u64) -> Result<Vec<Pattern>, SearchError> {
+    let layers = task.model.coil.layers();
+    let classics = Classic::ALL.into_iter().filter_map(|classic| classic.pattern(layers).ok());
+    let classics: Vec<Pattern> = classics.filter(|p| task.class.admits(p)).collect();
+    if layers < 4 {
+        return Ok(classics);
+    }
+    let (matrix, _) = SampleMatrix::of_profiles(task.model, task.solved)?;
+    let plan = Plan {
+        seed,
+        norm: Norm::Largest,
+        restarts_per_round: DEFAULT_RESTARTS_PER_ROUND,
+        moves_per_restart: default_moves_per_restart(layers) / SHORTENED,
+        rules: Rules { rounds: u64::MAX, patience: PATIENCE, moves: None, target: None },
+        starts: Vec::new(),
+    };
+    let mut search = Optimisation::new(matrix, task.class, plan);
+    while search.advance() {}
+    let found = search.state().found.iter().take(MOST_FOUND);
+    let found = found.map(|f| Pattern::new(f.segments.clone()).expect("a walk visits permutations only"));
+    Ok(found.chain(classics).collect())
+}

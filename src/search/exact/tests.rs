@@ -1,0 +1,158 @@
+//! Proofs against enumeration: every pattern of the class, judged by the reference.
+
+use std::ops::ControlFlow;
+
+use super::*;
+use crate::coil::LayerLength;
+use crate::search::columns::Norm;
+use crate::search::samples::SampleMatrix;
+use crate::search::samples::tests::{model, profiles};
+use crate::search::signs::segments_of_signs;
+
+fn patterns_of(class: WindabilityClass, layers: usize) -> Vec<Pattern> {
+    if class == WindabilityClass::Standard {
+        let high = |bits: u32| (0..layers - 1).map(|m| bits >> m & 1 == 1).collect::<Vec<bool>>();
+        return (0..1 << (layers - 1)).map(|bits| Pattern::new(segments_of_signs(&high(bits))).unwrap()).collect();
+    }
+    let mut found = Vec::new();
+    extend(&mut Vec::new(), layers, &mut found);
+    found.retain(|p| class.admits(p));
+    found
+}
+
+fn extend(done: &mut Vec<usize>, layers: usize, found: &mut Vec<Pattern>) {
+    if done.len() == layers {
+        found.push(Pattern::new(done.clone()).unwrap());
+    }
+    for segment in 1..=layers {
+        if !done.contains(&segment) {
+            done.push(segment);
+            extend(done, layers, found);
+            done.pop();
+        }
+    }
+}
+
+/// The smallest refined worst rate. The sampled one never exceeds it, so most patterns need no refinement.
+fn smallest_by_enumeration(task: &Task) -> f64 {
+    let (matrix, _) = SampleMatrix::of_profiles(task.model, task.solved).unwrap();
+    let mut sampled: Vec<(f64, Pattern)> = patterns_of(task.class, task.model.coil.layers())
+        .into_iter()
+        .map(|p| (matrix.cost(task.model, &p, Norm::Largest).unwrap(), p))
+        .collect();
+    sampled.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut smallest = f64::INFINITY;
+    for (cost, pattern) in sampled {
+        if cost >= smallest {
+            break;
+        }
+        smallest = smallest.min(task.solved.worst_case(task.model, &pattern).unwrap().rate_rad_per_s.abs());
+    }
+    smallest
+}
+
+fn go_on(_: Progress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+/// Proves from a poor start, compares with enumeration, and returns the certificate.
+fn check(class: WindabilityClass, layers: usize, layer_length: LayerLength, effects: &[&str]) -> Certificate {
+    let model = model(layers, layer_length, effects);
+    let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
+    let task = Task { model: &model, solved: &solved, class };
+    let start = Pattern::new((1..=layers).collect()).unwrap();
+    let found = prove(&task, &[start], &go_on).unwrap();
+    let smallest = smallest_by_enumeration(&task);
+    let context = format!("{class} {layers} {layer_length:?} {effects:?}");
+    assert_eq!(found.status, Status::Optimal, "{context}");
+    assert!((found.best_rad_per_s / smallest - 1.0).abs() < 1e-8, "{context}: {} {smallest}", found.best_rad_per_s);
+    assert!(found.lower_bound_rad_per_s <= smallest, "{context}");
+    assert!(class.admits(&found.pattern), "{context}");
+    found
+}
+
+const LENGTHS: [LayerLength; 2] = [LayerLength::Equal, LayerLength::Actual];
+
+#[test]
+fn every_standard_winding_of_up_to_14_layers_is_proved_as_enumeration_finds_it() {
+    for layers in (2..=14).step_by(2) {
+        for layer_length in LENGTHS {
+            for effects in [&[][..], &["stress_gradient"], &["midpoint_offset", "surface_film"]] {
+                check(WindabilityClass::Standard, layers, layer_length, effects);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_permutation_of_up_to_8_layers_is_proved_as_enumeration_finds_it() {
+    for layers in (2..=8).step_by(2) {
+        for layer_length in LENGTHS {
+            for effects in [&[][..], &["midpoint_offset"]] {
+                check(WindabilityClass::Any, layers, layer_length, effects);
+                check(WindabilityClass::Captive(1), layers, layer_length, effects);
+            }
+        }
+    }
+}
+
+#[test]
+fn halves_that_differ_and_axial_moments_are_proved_as_enumeration_finds_them() {
+    for layer_length in LENGTHS {
+        for effects in [&["strain_mismatch"][..], &["axial_gradient"], &["strain_mismatch", "axial_gradient"]] {
+            check(WindabilityClass::Standard, 10, layer_length, effects);
+            check(WindabilityClass::Captive(1), 6, layer_length, effects);
+            check(WindabilityClass::Any, 6, layer_length, effects);
+        }
+    }
+}
+
+#[test]
+fn a_proof_looks_at_a_small_part_of_the_space() {
+    let standard = check(WindabilityClass::Standard, 14, LayerLength::Actual, &[]);
+    let any = check(WindabilityClass::Any, 8, LayerLength::Equal, &[]);
+    println!("standard, 2^13 patterns: {standard:?}\nany, 8! patterns: {any:?}");
+    assert!(standard.nodes + standard.judged < 1 << 13, "{standard:?}");
+    assert!(any.nodes + any.judged < 40_320, "{any:?}");
+}
+
+#[test]
+fn a_proof_that_is_stopped_at_once_says_that_nothing_is_known_and_keeps_its_start() {
+    let model = model(12, LayerLength::Actual, &[]);
+    let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
+    let start = Pattern::new((1..=12).collect()).unwrap();
+    for class in [WindabilityClass::Standard, WindabilityClass::Any] {
+        let task = Task { model: &model, solved: &solved, class };
+        let found = prove(&task, std::slice::from_ref(&start), &|_| ControlFlow::Break(())).unwrap();
+        let known = solved.worst_case(&model, &start).unwrap().rate_rad_per_s.abs();
+        assert!(found.best_rad_per_s <= known && found.lower_bound_rad_per_s <= found.best_rad_per_s);
+        assert_ne!(found.status, Status::Optimal);
+    }
+}
+
+#[test]
+fn one_thread_and_two_find_the_same_pattern_bound_and_nodes() {
+    let model = model(10, LayerLength::Actual, &[]);
+    let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
+    for class in [WindabilityClass::Standard, WindabilityClass::Captive(1)] {
+        let task = Task { model: &model, solved: &solved, class };
+        let on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| prove(&task, &starting_patterns(&task, 1).unwrap(), &go_on).unwrap())
+        };
+        assert_eq!(on(1), on(2));
+    }
+}
+
+#[test]
+fn a_start_of_another_class_is_refused_in_words() {
+    let model = model(6, LayerLength::Equal, &[]);
+    let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
+    let task = Task { model: &model, solved: &solved, class: WindabilityClass::Standard };
+    let start = Pattern::new(vec![1, 6, 2, 5, 3, 4]).unwrap();
+    let error = prove(&task, &[start], &go_on).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "a proof must begin with a pattern of the class standard, found none: give one of that class"
+    );
+}
