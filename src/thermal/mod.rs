@@ -3,6 +3,7 @@
 //! [`HeatPath`] says what the heat flows through; effects edit it. [`solve`] takes a heat path and a [`Drive`] and
 //! gives a [`Field`], which can be asked for any instants. The field does not depend on the winding pattern.
 
+mod course;
 pub mod half_space;
 mod modal;
 mod network;

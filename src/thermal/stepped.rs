@@ -17,6 +17,7 @@
 //! Verwer, Spee, Blom, Hundsdorfer, SIAM J. Sci. Comput. 20 (1999) 1456 (ROS2 with approximate factorisation); Hairer
 //! and Wanner, Solving Ordinary Differential Equations II, sections II.4 and IV.7.
 
+use super::course::Course;
 use super::network::{Link, Network, Slices};
 use super::pack::Pack;
 use super::{Drive, HeatPath, Instant, Side, ThermalError, ThermalHistory, Wanted};
@@ -60,15 +61,6 @@ struct System {
     diffusivity_m2_per_s: f64,
     heat: Option<super::BoreHeat>,
     start_s: f64,
-}
-
-/// The course of one output: its value and its rate at each step.
-#[derive(Debug, Clone, Default)]
-struct Course {
-    times_s: Vec<f64>,
-    /// Row-major, steps × outputs.
-    value: Vec<f64>,
-    rate: Vec<f64>,
 }
 
 /// A pack with variable conductivity under one drive.
@@ -431,32 +423,6 @@ impl SteppedField {
             super::push_ambient(&mut history, &self.drive, instant);
         }
         history
-    }
-}
-
-impl Course {
-    /// Cubic Hermite between steps; constant before the first and behind the last.
-    fn at(&self, time_s: f64, outputs: usize, value: &mut [f64], rate: &mut [f64]) {
-        let row = |data: &'_ [f64], i: usize, j: usize| data[i * outputs + j];
-        let last = self.times_s.len() - 1;
-        let after = self.times_s.partition_point(|&t| t <= time_s);
-        if after == 0 || after > last {
-            let i = if after == 0 { 0 } else { last };
-            value.copy_from_slice(&self.value[i * outputs..(i + 1) * outputs]);
-            rate.fill(0.0);
-            return;
-        }
-        let (a, b) = (after - 1, after);
-        let h = self.times_s[b] - self.times_s[a];
-        let x = (time_s - self.times_s[a]) / h;
-        for j in 0..outputs {
-            let (y0, y1) = (row(&self.value, a, j), row(&self.value, b, j));
-            let (f0, f1) = (row(&self.rate, a, j), row(&self.rate, b, j));
-            let change = (y1 - y0) / h;
-            let (bend0, bend1) = (f0 - change, f1 - change);
-            value[j] = y0 + (y1 - y0) * x + h * x * (1.0 - x) * ((1.0 - x) * bend0 - x * bend1);
-            rate[j] = change + (1.0 - x) * (1.0 - 3.0 * x) * bend0 - x * (2.0 - 3.0 * x) * bend1;
-        }
     }
 }
 
