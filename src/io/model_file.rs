@@ -19,7 +19,7 @@ use super::fault::{Fault, Faults};
 use super::files::read_text;
 use super::pattern_file::resolve_pattern;
 use super::production_table::read_production;
-use super::profile_tables::read_profiles;
+use super::profile_tables::{read_profiles, too_many_ramps};
 use super::toml_reader::{Limits, TableReader, TomlReader, parse};
 
 /// A model file, understood.
@@ -127,6 +127,9 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
     })();
     if let Some(model) = &whole {
         check_whole(r, model, thermal_span);
+        if let Some(message) = too_many_ramps(&profiles, model.coil.layers()) {
+            r.fault(Fault::new(message, span_in(source, "count").or_else(|| span_in(source, "segments"))));
+        }
     }
     if let (Some(model), Some(named)) = (&whole, &pattern)
         && named.pattern.layers() != model.coil.layers()

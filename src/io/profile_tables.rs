@@ -47,6 +47,22 @@ pub(super) fn read_profiles(r: &mut TomlReader, table: &mut TableReader) -> Prof
     }
 }
 
+/// The field is kept at about a hundred instants a ramp in every layer; this many of them take about a gigabyte.
+const MOST_RAMPS_TIMES_LAYERS: usize = 500_000;
+
+/// Why profiles cannot all be held at once, if they cannot.
+pub(super) fn too_many_ramps(profiles: &ProfileSpec, layers: usize) -> Option<String> {
+    let listed: usize = profiles.listed.iter().map(|p| p.pieces().len()).sum();
+    let ramps = profiles.count.saturating_mul(profiles.segments).saturating_add(listed);
+    let most = MOST_RAMPS_TIMES_LAYERS / layers;
+    (ramps > most).then(|| {
+        format!(
+            "profiles.count × profiles.segments make {ramps} ramps, found with {layers} layers: expected at most {most}, \
+             more do not fit into memory"
+        )
+    })
+}
+
 fn read_ramp(r: &mut TomlReader, table: &mut TableReader, max_rate_c_per_h: Option<f64>) -> Option<Profile> {
     let name = table.needed_text(r, "name", "a string");
     let pieces_span = table.span_of("pieces").or_else(|| table.span());

@@ -230,6 +230,28 @@ fn lengths_and_turns_that_disagree_are_refused() {
 }
 
 #[test]
+fn more_profiles_than_fit_into_memory_are_refused() {
+    let source = example("coil-998m.toml").replace("count = 64", "count = 100000");
+    let (_folder, path) = folder_with("coil.toml", source);
+    let found = faults(&path);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert!(found[0].0.starts_with("profiles.count × profiles.segments make 400002 ramps"), "{found:?}");
+    assert_refused(&path);
+}
+
+#[test]
+fn places_that_cannot_be_written_are_named() {
+    let (_folder, file) = folder_with("file", "in the way");
+    let inside = file.join("results").display().to_string();
+    for arguments in [&["reproduce", "yan1998", "-o", &inside][..], &["new", &inside]] {
+        let output = run(arguments);
+        assert_eq!(code(&output), 2, "{arguments:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains("cannot"), "{arguments:?}: {}", stderr(&output));
+        assert_eq!(stdout(&output), "");
+    }
+}
+
+#[test]
 fn effects_that_are_not_known_twice_or_out_of_bounds_are_refused() {
     let source = example("coil-998m.toml");
     let film = "film_w_per_m2_k = 20.0";
