@@ -5,9 +5,13 @@ use std::path::PathBuf;
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
 use crate::io::files::write_atomically;
+use crate::io::machine_program::{gcode, machine_program};
 use crate::io::model_file::{ModelFile, NamedPattern, read_model};
 use crate::io::pattern_file::resolve_pattern;
 use crate::io::schedule_file::{ScheduleJson, crossover_words};
+use crate::io::traveller::traveller;
+use crate::report::cross_section::cross_section;
+use crate::report::traveller::traveller_page;
 use crate::schedule::Schedule;
 use crate::search::worst_case::SolvedProfiles;
 
@@ -22,7 +26,8 @@ pub struct Arguments {
     /// A winding's name or a pattern file; without it, the model's own
     #[arg(long, short, value_name = "PATTERN")]
     pattern: Option<String>,
-    /// Writes schedule.csv and schedule.json into this folder
+    /// Writes the schedule (CSV, JSON), the traveller (HTML, CSV, JSON), the winder's program (G-code, CSV) and the
+    /// cross-section (SVG) into this folder
     #[arg(long, short, value_name = "DIR")]
     output: Option<PathBuf>,
 }
@@ -32,10 +37,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let named = pattern_of(&file, arguments.pattern.as_deref())?;
     let (schedule, document) = plan(&file, &named)?;
     if let Some(folder) = &arguments.output {
-        let json = serde_json::to_string_pretty(&document).map_err(|e| CliError::Stdout(e.into()))? + "\n";
-        for (name, text) in
-            [("schedule.csv", document.csv().map_err(|e| CliError::Stdout(e.into()))?), ("schedule.json", json)]
-        {
+        for (name, text) in files(&file, &named, &schedule, &document)? {
             let path = folder.join(name);
             write_atomically(&path, text.as_bytes())?;
             screen.note(&format!("wrote {}", path.display()));
@@ -43,6 +45,37 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     }
     screen.document(&document, |document| text(&schedule, document))?;
     Ok(Ending::Done)
+}
+
+/// Everything that leaves for the shop floor, by file name.
+fn files(
+    file: &ModelFile,
+    named: &NamedPattern,
+    schedule: &Schedule,
+    document: &ScheduleJson,
+) -> Result<Vec<(&'static str, String)>, CliError> {
+    let axial_pitch_m = file.model.coil.axial_pitch_m();
+    let traveller = traveller(document, schedule, &file.production, axial_pitch_m);
+    let program = machine_program(document, schedule, &file.production, axial_pitch_m);
+    let title = format!("{}, {}", file.model.name, named.name);
+    Ok(vec![
+        ("schedule.csv", csv(document)?),
+        ("schedule.json", json(document)?),
+        ("traveller.html", traveller_page(&traveller, &named.pattern)),
+        ("traveller.csv", csv(&traveller)?),
+        ("traveller.json", json(&traveller)?),
+        ("program.gcode", gcode(&program)),
+        ("program.csv", csv(&program)?),
+        ("cross-section.svg", cross_section(&title, &named.pattern)),
+    ])
+}
+
+fn csv(document: &ScheduleJson) -> Result<String, CliError> {
+    document.csv().map_err(|e| CliError::Stdout(e.into()))
+}
+
+fn json(document: &ScheduleJson) -> Result<String, CliError> {
+    Ok(serde_json::to_string_pretty(document).map_err(|e| CliError::Stdout(e.into()))? + "\n")
 }
 
 /// The pattern that was asked for, else the model's own.

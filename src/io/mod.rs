@@ -17,3 +17,4 @@ pub mod schedule_file;
 pub mod schedule_reader;
 pub mod schema;
 pub mod toml_reader;
+pub mod traveller;

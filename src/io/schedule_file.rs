@@ -121,7 +121,7 @@ pub struct StepJson {
     pub potting: Option<bool>,
     /// Entered by hand.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub measured_length_m: Option<f64>,
+    pub measured_length_m: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub checked_by: Option<String>,
 }

@@ -19,7 +19,8 @@ pub const DATA_ELEMENT: &str = "<script type=\"application/json\" id=\"coilwrigh
 /// Columns that hold whole numbers; the others with a unit in their name hold numbers, the rest words.
 const WHOLE: &[&str] = &["step", "layer", "segment", "climb"];
 const FLAGS: &[&str] = &["reel_change", "potting"];
-const WORDS: &[&str] = &["half", "supply_reel", "direction", "crossover", "rotation", "checked_by"];
+const WORDS: &[&str] =
+    &["half", "supply_reel", "direction", "crossover", "rotation", "measured_length_m", "checked_by"];
 const CLAIMS: &[&str] = &["model", "model_sha256", "pattern", "windability_class", "worst_rate_deg_per_h"];
 
 /// Reads a file that claims to be a winding's schedule.

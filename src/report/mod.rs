@@ -1,4 +1,7 @@
 //! What a reader sees: charts, drawings and pages.
 
+pub mod cross_section;
+mod page;
 pub mod plot;
+pub mod traveller;
 pub mod yan1998;

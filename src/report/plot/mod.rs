@@ -23,6 +23,8 @@ mod axis;
 mod draw;
 mod layout;
 
+pub(super) use draw::STYLE;
+
 pub use axis::Axis;
 
 /// What a series looks like.

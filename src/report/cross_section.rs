@@ -1,0 +1,88 @@
+//! A pack's cross-section: which piece of fibre lies where, which way it runs, and where it passes from layer to layer.
+
+use maud::{PreEscaped, html};
+
+use super::plot;
+use crate::pattern::{Half, Pattern};
+
+const ROW_PX: f64 = 17.0;
+const WIDTH_PX: f64 = 560.0;
+const LEFT_PX: f64 = 150.0;
+const RIGHT_PX: f64 = 410.0;
+const TOP_PX: f64 = 58.0;
+const COLOURS: [&str; 2] = ["#2f7fd6", "#d9730d"];
+
+/// The drawing as one `<svg>` element: layers from the spool (bottom) outwards, coloured by half.
+///
+/// Arrows show the way of increasing arclength, arcs beside the flanges the crossovers.
+pub fn cross_section(title: &str, pattern: &Pattern) -> String {
+    let layers = pattern.layers();
+    let height_px = TOP_PX + ROW_PX * layers as f64 + 44.0;
+    let middle_px = |layer: usize| TOP_PX + ROW_PX * (layers - 1 - layer) as f64 + ROW_PX / 2.0;
+    let by_segment = pattern.layers_by_segment();
+    let outbound = |layer: usize| pattern.axial_direction(layer) > 0.0;
+    let colour = |half: Half| COLOURS[usize::from(half == Half::B)];
+    let centre_px = (LEFT_PX + RIGHT_PX) / 2.0;
+    html! {
+        svg xmlns="http://www.w3.org/2000/svg" class="chart" role="img" width=(WIDTH_PX) height=(height_px)
+            viewBox={ "0 0 " (WIDTH_PX) " " (height_px) } {
+            title { (title) }
+            style { (PreEscaped(plot::STYLE)) }
+            text x="12" y="20" font-size="14" font-weight="bold" fill="currentColor" { (title) }
+            @for (i, (half, words)) in [(Half::A, "half A"), (Half::B, "half B")].into_iter().enumerate() {
+                rect x=(LEFT_PX + 80.0 * i as f64) y="31" width="14" height="11" fill=(colour(half)) {}
+                text x=(LEFT_PX + 20.0 + 80.0 * i as f64) y="41" font-size="12" fill="currentColor" { (words) }
+            }
+            text x="12" y=(TOP_PX - 6.0) font-size="11" fill="currentColor" { "layer" }
+            text x=(WIDTH_PX - 12.0) y=(TOP_PX - 6.0) font-size="11" text-anchor="end" fill="currentColor" { "segment" }
+            @for layer in 0..layers {
+                @let y = middle_px(layer);
+                @let half = pattern.half(layer);
+                rect x=(LEFT_PX) y=(y - ROW_PX / 2.0 + 1.0) width=(RIGHT_PX - LEFT_PX) height=(ROW_PX - 2.0)
+                    rx="3" fill=(colour(half)) fill-opacity="0.85" {}
+                @let (from, to) = if outbound(layer) { (centre_px - 45.0, centre_px + 45.0) } else { (centre_px + 45.0, centre_px - 45.0) };
+                @let head = if outbound(layer) { -7.0 } else { 7.0 };
+                path d={ "M" (from) " " (y) "H" (to) "M" (to + head) " " (y - 4.0) "L" (to) " " (y) "L" (to + head) " " (y + 4.0) }
+                    fill="none" stroke="#fff" stroke-width="1.6" {}
+                text x="34" y=(y + 4.0) font-size="11" text-anchor="end" fill="currentColor" { (layer + 1) }
+                text x=(WIDTH_PX - 12.0) y=(y + 4.0) font-size="11" text-anchor="end" fill="currentColor" {
+                    (half) " " (pattern.segment(layer))
+                }
+            }
+            @for s in 1..layers {
+                @let (from, to) = (by_segment[s - 1], by_segment[s]);
+                // Where a layer with growing arclength outbound ends: at the second flange.
+                @let right = outbound(from);
+                @let climb = from.abs_diff(to) as f64;
+                @let bulge = (8.0 + 5.0 * climb).min(90.0) * 4.0 / 3.0 * if right { 1.0 } else { -1.0 };
+                @let x = if right { RIGHT_PX + 2.0 } else { LEFT_PX - 2.0 };
+                @let half = if 2 * s < layers { Half::A } else { Half::B };
+                path d={ "M" (x) " " (middle_px(from)) "C" (x + bulge) " " (middle_px(from)) " " (x + bulge) " " (middle_px(to)) " " (x) " " (middle_px(to)) }
+                    fill="none" stroke=(if 2 * s == layers { "currentColor" } else { colour(half) })
+                    stroke-width=(if 2 * s == layers { 2.2 } else { 1.2 }) {}
+            }
+            @let below = height_px - 26.0;
+            line x1=(LEFT_PX - 6.0) x2=(RIGHT_PX + 6.0) y1=(below - 12.0) y2=(below - 12.0) stroke="currentColor" stroke-width="3" {}
+            text x=(LEFT_PX) y=(below + 4.0) font-size="11" text-anchor="middle" fill="currentColor" { "first flange" }
+            text x=(centre_px) y=(below + 4.0) font-size="11" text-anchor="middle" fill="currentColor" { "spool" }
+            text x=(RIGHT_PX) y=(below + 4.0) font-size="11" text-anchor="middle" fill="currentColor" { "second flange" }
+            text x=(centre_px) y=(below + 20.0) font-size="10.5" text-anchor="middle" fill="currentColor" {
+                "arrows: from end A to end B; arcs: crossovers, black or white at the midpoint"
+            }
+        }
+    }
+    .into_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pattern::classic::Classic;
+
+    #[test]
+    fn every_layer_and_every_crossover_is_drawn_once() {
+        let svg = cross_section("qua", &Classic::Qua.pattern(12).unwrap());
+        assert_eq!(svg.matches("fill-opacity=\"0.85\"").count(), 12);
+        assert_eq!(svg.matches("stroke-width=\"1.2\"").count() + svg.matches("stroke-width=\"2.2\"").count(), 11);
+    }
+}

@@ -1,0 +1,87 @@
+//! The shell of a page: one file that opens offline, on a screen, a phone or paper, light or dark.
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+/// A whole page.
+pub(super) fn page(title: &str, body: &Markup) -> String {
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { (title) }
+                // No icon: a browser would ask the network for one.
+                link rel="icon" href="data:,";
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                main { (body) }
+                script { (PreEscaped(ZOOM)) }
+            }
+        }
+    }
+    .into_string()
+}
+
+/// A picture that can be enlarged, with its caption.
+pub(super) fn figure(svg: &str, caption: &str) -> Markup {
+    html! {
+        figure {
+            div.zoom tabindex="0" role="button" aria-label="enlarge this picture" { (PreEscaped(svg)) }
+            figcaption { (caption) }
+        }
+    }
+}
+
+const STYLE: &str = "
+:root{--ink:#1b1f24;--paper:#fff;--soft:#f3f5f7;--line:#cfd5db;--a:#2f7fd6;--b:#d9730d}
+@media(prefers-color-scheme:dark){:root{--ink:#e3e6ea;--paper:#15181c;--soft:#1f242a;--line:#3b424a}}
+*{box-sizing:border-box}
+html{-webkit-text-size-adjust:100%}
+body{margin:0;background:var(--paper);color:var(--ink);font:16px/1.5 system-ui,'DejaVu Sans',Arial,sans-serif}
+main{max-width:78rem;margin:0 auto;padding:1rem}
+h1{font-size:1.6rem;line-height:1.25;margin:.5rem 0}h2{font-size:1.2rem;margin:1.8rem 0 .5rem}
+p{max-width:46rem}
+.scroll{overflow-x:auto;padding-right:1px}
+table{border-collapse:collapse;font-size:.86rem;font-variant-numeric:tabular-nums}
+th,td{border:1px solid var(--line);padding:.25rem .5rem;text-align:right;vertical-align:top}
+th{background:var(--soft);font-weight:600}
+td.word,th.word{text-align:left}
+tr.best td{font-weight:700}
+dl.facts{display:grid;grid-template-columns:max-content 1fr;gap:.15rem 1rem;margin:.5rem 0}
+dl.facts dt{color:var(--ink);opacity:.75}dl.facts dd{margin:0;overflow-wrap:anywhere}
+.big{font-size:1.35rem;font-weight:700}
+figure{margin:1rem 0}figcaption{font-size:.86rem;opacity:.8;max-width:46rem}
+.pair{display:flex;flex-wrap:wrap;gap:1rem}.pair figure{flex:1 1 20rem;min-width:0;margin:0}
+figure svg{max-width:100%;height:auto;display:block}
+.zoom{cursor:zoom-in}
+.zoom.open{position:fixed;inset:0;z-index:9;background:var(--paper);overflow:hidden;cursor:grab;touch-action:none}
+.zoom.open svg{max-width:none;width:100%;height:100%;transform-origin:0 0}
+.fill{min-width:5rem}.long{min-width:10.5rem}.keep{white-space:nowrap}
+.a{color:var(--a)}.b{color:var(--b)}
+code,pre{font-family:ui-monospace,'DejaVu Sans Mono',monospace;font-size:.86em;overflow-wrap:anywhere;white-space:pre-wrap}
+@media(max-width:40rem){body{font-size:15px}dl.facts{grid-template-columns:1fr}dl.facts dt{margin-top:.3rem}}
+@page{margin:14mm 12mm 16mm;@bottom-right{content:'page ' counter(page) ' of ' counter(pages);font:9pt sans-serif}}
+@media print{
+:root{--ink:#000;--paper:#fff;--soft:#eee;--line:#888}
+body{font-size:10pt}main{max-width:none;padding:0}
+h1{font-size:15pt}h2{font-size:12pt;break-after:avoid}
+table{font-size:7.6pt;width:100%}th,td{padding:1.5pt 3pt}thead{display:table-header-group}tr{break-inside:avoid}
+figure{break-inside:avoid}figure svg{max-height:225mm}.scroll{overflow:visible;padding-right:1.5pt}.fill{min-width:0}.long{min-width:26mm}.screen{display:none}
+}
+";
+
+/// Opens a picture over the whole window; wheel and drag zoom and move it, Escape or a click closes it.
+const ZOOM: &str = "
+for(const z of document.querySelectorAll('.zoom')){let k=1,x=0,y=0,p=null,moved=false;const s=()=>z.querySelector('svg');
+const set=()=>s().style.transform=z.classList.contains('open')?`translate(${x}px,${y}px) scale(${k})`:'';
+const close=()=>{z.classList.remove('open');k=1;x=y=0;set()};
+z.addEventListener('click',()=>{if(moved){moved=false;return}z.classList.contains('open')?close():z.classList.add('open');set()});
+z.addEventListener('keydown',e=>{if(e.key==='Escape')close();if(e.key==='Enter'){z.classList.toggle('open');set()}});
+z.addEventListener('wheel',e=>{if(!z.classList.contains('open'))return;e.preventDefault();const f=e.deltaY<0?1.2:1/1.2;x=e.clientX-(e.clientX-x)*f;y=e.clientY-(e.clientY-y)*f;k*=f;set()},{passive:false});
+z.addEventListener('pointerdown',e=>{if(z.classList.contains('open'))p=[e.clientX-x,e.clientY-y]});
+z.addEventListener('pointermove',e=>{if(p&&e.buttons){x=e.clientX-p[0];y=e.clientY-p[1];moved=true;set()}});
+z.addEventListener('pointerup',()=>p=null)}
+";
