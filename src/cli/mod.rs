@@ -1,5 +1,6 @@
 //! The command line: one file a subcommand — parse, call, print. Documents go to stdout, words and progress to stderr.
 
+mod budget;
 mod check;
 mod completions;
 mod effects;
@@ -7,6 +8,7 @@ mod evaluate;
 mod man;
 mod metrics;
 mod new;
+mod optimise;
 mod patterns;
 pub mod progress;
 mod records;
@@ -28,6 +30,7 @@ use crate::metrics::MetricsError;
 use crate::rate::RateError;
 use crate::record::RecordError;
 use crate::search::guaranteed::GuaranteedError;
+use crate::search::objective::ObjectiveError;
 use crate::search::worst_case::SearchError;
 use progress::ProgressMode;
 use screen::Screen;
@@ -80,6 +83,7 @@ enum Command {
     Check(check::Arguments),
     New(new::Arguments),
     Reproduce(reproduce::Arguments),
+    Optimise(optimise::Arguments),
     Schedule(schedule::Arguments),
     Metrics(metrics::Arguments),
     Schema(schema::Arguments),
@@ -122,6 +126,12 @@ pub enum CliError {
     Exists { path: String },
     #[error("error: no pattern is stated: give --pattern, or winding.pattern in the model file")]
     PatternMissing,
+    #[error("error: {0}")]
+    Objective(#[from] ObjectiveError),
+    #[error("error: {option}: {message}")]
+    Option { option: &'static str, message: String },
+    #[error("error: {path} does not fit the model: begin again with --fresh", path = .path.display())]
+    Checkpoint { path: std::path::PathBuf },
     #[error("error: cannot write to stdout: {0}")]
     Stdout(std::io::Error),
 }
@@ -137,6 +147,7 @@ pub fn run() -> ExitCode {
         Command::Check(arguments) => check::run(arguments, &screen),
         Command::New(arguments) => new::run(arguments, &screen),
         Command::Reproduce(arguments) => reproduce::run(arguments, &screen),
+        Command::Optimise(arguments) => optimise::run(arguments, &screen),
         Command::Schedule(arguments) => schedule::run(arguments, &screen),
         Command::Metrics(arguments) => metrics::run(arguments, &screen),
         Command::Schema(arguments) => schema::run(arguments, &screen),

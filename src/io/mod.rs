@@ -1,5 +1,6 @@
 //! Files in, files out: the only place (with `report`) that knows serde, paths, TOML, CSV and JSON.
 
+pub mod checkpoint;
 mod effect_tables;
 pub mod effects_json;
 pub mod fault;
@@ -13,6 +14,7 @@ pub mod pattern_file;
 mod production_table;
 mod profile_tables;
 pub mod record_file;
+pub mod run_directory;
 pub mod schedule_file;
 pub mod schedule_reader;
 pub mod schema;

@@ -1,9 +1,20 @@
 //! What a search makes small.
 
+use thiserror::Error;
+
 use super::columns::Norm;
+use super::guaranteed::{GuaranteedError, UnitStep};
 use super::samples::SampleMatrix;
 use super::worst_case::{SearchError, SolvedProfiles};
 use crate::rate::{CoilModel, RateModel};
+
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum ObjectiveError {
+    #[error(transparent)]
+    Search(#[from] SearchError),
+    #[error(transparent)]
+    Guaranteed(#[from] GuaranteedError),
+}
 
 /// What a search makes small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -14,10 +25,13 @@ pub enum Objective {
     WorstPhase,
     /// √(mean Ω²) over time and profiles.
     RootMeanSquare,
+    /// The largest |Ω| over all profiles of any length within the largest rate.
+    GuaranteedRate,
 }
 
 impl Objective {
-    pub const ALL: [Objective; 3] = [Objective::WorstRate, Objective::WorstPhase, Objective::RootMeanSquare];
+    pub const ALL: [Objective; 4] =
+        [Objective::WorstRate, Objective::WorstPhase, Objective::RootMeanSquare, Objective::GuaranteedRate];
 
     /// As written on the command line and in campaign files.
     pub fn key(self) -> &'static str {
@@ -25,6 +39,7 @@ impl Objective {
             Objective::WorstRate => "worst-rate",
             Objective::WorstPhase => "worst-phase",
             Objective::RootMeanSquare => "rms",
+            Objective::GuaranteedRate => "guaranteed-rate",
         }
     }
 
@@ -36,17 +51,26 @@ impl Objective {
         match self {
             Objective::WorstRate | Objective::WorstPhase => Norm::Largest,
             Objective::RootMeanSquare => Norm::RootMeanSquare,
+            Objective::GuaranteedRate => Norm::Sum,
         }
     }
 
     /// The samples whose norm is the objective, in rad/s.
     ///
     /// # Errors
-    /// Effects that leave a layer no turns.
-    pub fn compile(self, model: &CoilModel, solved: &SolvedProfiles) -> Result<SampleMatrix, SearchError> {
+    /// Rates that are not finite; the guaranteed worst case of a model that has none.
+    pub fn compile(
+        self,
+        model: &CoilModel,
+        solved: &SolvedProfiles,
+        max_rate_k_per_s: f64,
+    ) -> Result<SampleMatrix, ObjectiveError> {
+        if self == Objective::GuaranteedRate {
+            return Ok(UnitStep::new(model, max_rate_k_per_s)?.samples(model)?);
+        }
         let (matrix, origins) = SampleMatrix::of_profiles(model, solved)?;
         Ok(match self {
-            Objective::WorstRate | Objective::WorstPhase => matrix,
+            Objective::WorstRate | Objective::WorstPhase | Objective::GuaranteedRate => matrix,
             Objective::RootMeanSquare => {
                 let samples = origins.len() as f64;
                 let factors: Vec<f64> = time_shares(solved).iter().map(|share| (share * samples).sqrt()).collect();

@@ -15,6 +15,7 @@ use super::anneal::{Cooling, Restart, cooling_for, generator};
 use super::columns::{BLOCK, Norm, Work};
 use super::samples::SampleMatrix;
 use super::walk::Space;
+use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 
 /// When a search ends; whichever rule fires first.
@@ -44,7 +45,7 @@ pub struct Plan {
 
 /// Moves a restart for a layer count: enough for the schedule to settle in the packs of `examples/`.
 pub fn default_moves_per_restart(layers: usize) -> u64 {
-    (layers as u64).pow(2) * 128
+    ((layers as u64).pow(2) * 128).min(1_000_000)
 }
 
 pub const DEFAULT_RESTARTS_PER_ROUND: usize = 8;
@@ -59,14 +60,21 @@ pub enum Stop {
     Target,
 }
 
-impl std::fmt::Display for Stop {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.pad(match self {
+impl Stop {
+    const ALL: [Stop; 4] = [Stop::Rounds, Stop::Moves, Stop::Patience, Stop::Target];
+
+    /// As written in results.
+    pub fn key(self) -> &'static str {
+        match self {
             Stop::Rounds => "rounds",
             Stop::Moves => "moves",
             Stop::Patience => "no improvement",
             Stop::Target => "target",
-        })
+        }
+    }
+
+    pub fn from_key(key: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|stop| stop.key() == key)
     }
 }
 
@@ -138,9 +146,19 @@ impl Optimisation {
         search
     }
 
-    /// Goes on from a saved state; everything else must be as it was when it was saved.
-    pub fn resume(matrix: SampleMatrix, class: WindabilityClass, plan: Plan, state: State) -> Self {
-        Self::resume_parts(Space::new(matrix, class), plan, state)
+    /// Goes on from a saved state; everything else must be as it was when it was saved. `None` for a state that no
+    /// search over this matrix and class can have been in.
+    pub fn resume(matrix: SampleMatrix, class: WindabilityClass, plan: Plan, state: State) -> Option<Self> {
+        let full = Space::new(matrix, class);
+        let is_pattern = |segments: &Vec<usize>| {
+            segments.len() == full.layers() && Pattern::new(segments.clone()).is_ok() && full.admits(segments)
+        };
+        let samples = full.matrix().samples();
+        let fits = state.working.iter().all(|&s| s < samples)
+            && state.found.iter().all(|f| is_pattern(&f.segments))
+            && state.restarts.iter().all(|r| is_pattern(&r.segments) && is_pattern(&r.best_segments))
+            && (state.stop.is_some() || state.restarts.len() == plan.restarts_per_round);
+        fits.then(|| Self::resume_parts(full, plan, state))
     }
 
     fn resume_parts(full: Space, plan: Plan, state: State) -> Self {
@@ -186,6 +204,14 @@ impl Optimisation {
             self.end_round();
         }
         self.state.stop.is_none()
+    }
+
+    /// Judges what the restarts of an unfinished round have found so far. For the last answer of a search that is
+    /// stopped from outside; save its state before.
+    pub fn gather(&mut self) {
+        for restart in self.state.restarts.clone() {
+            self.judge(restart.best_segments);
+        }
     }
 
     fn begin_round(&mut self) {

@@ -1,5 +1,6 @@
 //! The final judgement: what was found and the classic windings, all by the reference, and what to say about it.
 
+use super::guaranteed::{GuaranteedError, UnitStep};
 use super::objective::Objective;
 use super::optimise::Found;
 use super::worst_case::{SearchError, SolvedProfiles, WorstCase};
@@ -18,6 +19,8 @@ pub struct Judged {
     pub worst: WorstCase,
     /// Δφ at the worst rate [rad].
     pub phase_rad: f64,
+    /// None for models that have no guaranteed worst case.
+    pub guaranteed_rad_per_s: Option<f64>,
     /// The objective by the reference, in rad/s: the worst rate, or the rate's rms.
     pub objective_rad_per_s: f64,
 }
@@ -28,6 +31,8 @@ pub struct Bench<'a> {
     pub model: &'a CoilModel,
     pub solved: &'a SolvedProfiles,
     pub objective: Objective,
+    /// None for models that have no guaranteed worst case.
+    pub unit_step: Option<&'a UnitStep>,
 }
 
 /// Classics in the order in which one is named where several are equally good.
@@ -43,12 +48,25 @@ impl Bench<'_> {
     pub fn judge(&self, name: &str, pattern: &Pattern) -> Result<Judged, SearchError> {
         let rate_model = RateModel::new(self.model, pattern, &[])?;
         let worst = self.solved.worst_case(self.model, pattern)?;
+        let guaranteed_rad_per_s = match self.unit_step.map(|step| step.guaranteed(self.model, pattern)) {
+            Some(Ok(found)) => Some(found.rate_rad_per_s),
+            Some(Err(GuaranteedError::Search(error))) => return Err(error),
+            Some(Err(GuaranteedError::Effect { .. })) | None => None,
+        };
         let objective_rad_per_s = match self.objective {
             Objective::WorstRate | Objective::WorstPhase => worst.rate_rad_per_s.abs(),
             Objective::RootMeanSquare => super::objective::rms_rad_per_s(&rate_model, self.solved),
+            // A search for it ends before where there is none.
+            Objective::GuaranteedRate => guaranteed_rad_per_s.unwrap_or(f64::INFINITY),
         };
-        let phase_rad = rate_model.phase_rad(worst.rate_rad_per_s);
-        Ok(Judged { name: name.to_owned(), pattern: pattern.clone(), worst, phase_rad, objective_rad_per_s })
+        Ok(Judged {
+            name: name.to_owned(),
+            pattern: pattern.clone(),
+            phase_rad: rate_model.phase_rad(worst.rate_rad_per_s),
+            guaranteed_rad_per_s,
+            worst,
+            objective_rad_per_s,
+        })
     }
 
     /// Every classic that fits the layer count.
@@ -110,10 +128,16 @@ impl Bench<'_> {
             Objective::WorstRate => "worst rate error",
             Objective::WorstPhase => "worst phase error",
             Objective::RootMeanSquare => "rms rate error",
+            Objective::GuaranteedRate => "guaranteed worst rate error",
         };
         let shown = |judged: &Judged| deg_per_h_from_rad_per_s(judged.objective_rad_per_s);
         let count = self.solved.profiles().len();
-        let scope = format!("in the class {class}, {boundary}, over {count} profiles");
+        let over = match self.objective {
+            Objective::GuaranteedRate => "all profiles within the largest rate".to_owned(),
+            _ if count == 1 => "one profile".to_owned(),
+            _ => format!("{count} profiles"),
+        };
+        let scope = format!("in the class {class}, {boundary}, over {over}");
         let Some(qua) = baselines.iter().find(|b| b.name == Classic::Qua.key()) else {
             return format!(
                 "There is no QUA to compare with: {} layers are no multiple of 4. The best pattern found has a {what} \

@@ -1,0 +1,366 @@
+//! `optimise`: searches the winding pattern with the smallest error.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use super::budget::parse_duration;
+use super::progress::StopFlag;
+use super::screen::{Screen, table};
+use super::{CliError, Ending, schedule};
+use crate::io::checkpoint::{CHECKPOINT_FILE, read_checkpoint, write_checkpoint};
+use crate::io::fault::Faults;
+use crate::io::files::write_atomically;
+use crate::io::json::PatternJson;
+use crate::io::model_file::{ModelFile, NamedPattern, read_model};
+use crate::io::pattern_file::resolve_pattern;
+use crate::io::run_directory::{OptimiseJson, ProofJson, Request, write_request, write_results};
+use crate::pattern::windability::WindabilityClass;
+use crate::search::guaranteed::UnitStep;
+use crate::search::objective::Objective;
+use crate::search::optimise::{
+    DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Optimisation, Plan, Rules, default_moves_per_restart,
+};
+use crate::search::verdict::{Bench, Judged, improvement_over_qua};
+use crate::search::worst_case::SolvedProfiles;
+use crate::units::{deg_per_h_from_rad_per_s, rad_per_s_from_deg_per_h};
+
+/// Search the winding pattern with the smallest error
+#[derive(Debug, Clone, clap::Args)]
+#[command(
+    alias = "optimize",
+    after_help = "The search ends with the first rule that fires: rounds without improvement, rounds, moves, target, or the clock.\n\
+    Without a clock the same seed gives the same bytes at any number of threads.\n\n\
+    Examples:\n  coilwright optimise examples/paper-200m.toml -o results/paper-200m\n  \
+    coilwright optimise examples/paper-200m.toml --windability any --seed 7 --budget 30s\n  \
+    coilwright optimise examples/paper-200m.toml -o results/paper-200m --resume"
+)]
+pub struct Arguments {
+    /// The model file
+    pub(super) model: PathBuf,
+    #[command(flatten)]
+    pub(super) search: SearchOptions,
+    /// Writes the run's results and checkpoints into this folder
+    #[arg(long, short, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Takes up the interrupted run in the output folder; begins one if there is none
+    #[arg(long, requires = "output", conflicts_with = "fresh")]
+    resume: bool,
+    /// Begins again although the output folder holds an unfinished run
+    #[arg(long, requires = "output")]
+    fresh: bool,
+    /// Threads to use; without it, as many as there are processors
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+/// What is searched for and how long; shared with commands that run searches.
+#[derive(Debug, Clone, clap::Args)]
+pub struct SearchOptions {
+    /// Seed of everything random; without it, the model's own
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// What can be wound: standard, captive:K or any; without it, the model's own
+    #[arg(long, value_name = "CLASS", value_parser = parse_class)]
+    pub windability: Option<WindabilityClass>,
+    /// What is made small: worst-rate, worst-phase, rms or guaranteed-rate
+    #[arg(long, value_name = "WHAT", value_parser = parse_objective, default_value = "worst-rate")]
+    pub objective: Objective,
+    /// Ends after this time, e.g. 30s or 5m (the result then depends on the machine)
+    #[arg(long, value_name = "TIME")]
+    pub budget: Option<String>,
+    /// Ends after so many rounds
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub rounds: Option<u64>,
+    /// Ends after the round in which so many moves have been judged
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub moves: Option<u64>,
+    /// Ends after so many rounds without a better pattern
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub patience: Option<u64>,
+    /// Ends when the objective is this small
+    #[arg(long, value_name = "DEG_PER_H")]
+    pub target: Option<f64>,
+    /// Restarts in a round
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_RESTARTS_PER_ROUND as u16, value_parser = clap::value_parser!(u16).range(1..=4096))]
+    pub restarts: u16,
+    /// Moves of one restart; without it, 128 N² for N layers, at most a million
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub moves_per_restart: Option<u64>,
+    /// The pattern to begin with: a winding's name or a pattern file
+    #[arg(long, value_name = "PATTERN")]
+    pub init: Option<String>,
+}
+
+fn parse_class(text: &str) -> Result<WindabilityClass, String> {
+    WindabilityClass::parse(text)
+        .ok_or_else(|| format!("expected standard, captive:K with a number K, or any, found \"{text}\""))
+}
+
+fn parse_objective(text: &str) -> Result<Objective, String> {
+    Objective::from_key(text).ok_or_else(|| {
+        let keys: Vec<&str> = Objective::ALL.iter().map(|o| o.key()).collect();
+        format!("expected one of {}, found \"{text}\"", keys.join(", "))
+    })
+}
+
+/// Patience where a budget of time says that the search may take long.
+const PATIENCE_WITH_BUDGET: u64 = 4 * DEFAULT_PATIENCE;
+
+impl SearchOptions {
+    pub(super) fn class(&self, file: &ModelFile) -> WindabilityClass {
+        self.windability.unwrap_or(file.search.windability)
+    }
+
+    pub(super) fn budget(&self) -> Result<Option<Duration>, CliError> {
+        let parse = |stated: &String| {
+            parse_duration(stated).map_err(|message| CliError::Option { option: "--budget", message })
+        };
+        self.budget.as_ref().map(parse).transpose()
+    }
+
+    /// The plan of a search of a model.
+    pub(super) fn plan(&self, file: &ModelFile) -> Result<Plan, CliError> {
+        let layers = file.model.coil.layers();
+        let class = self.class(file);
+        let starts = match &self.init {
+            None => Vec::new(),
+            Some(stated) => {
+                let NamedPattern { name, pattern } = resolve_pattern(stated, layers, None)?;
+                if !class.admits(&pattern) {
+                    let message = format!("the pattern {name} is not of the class {class}: choose a wider class");
+                    return Err(CliError::Option { option: "--init", message });
+                }
+                vec![pattern.segments().to_vec()]
+            }
+        };
+        if let Some(target) = self.target.filter(|t| !(*t >= 0.0 && t.is_finite())) {
+            let message = format!("expected a rate error of zero or more in °/h, found {target}");
+            return Err(CliError::Option { option: "--target", message });
+        }
+        let patience = if self.budget.is_some() { PATIENCE_WITH_BUDGET } else { DEFAULT_PATIENCE };
+        Ok(Plan {
+            seed: self.seed.unwrap_or(file.search.seed),
+            norm: self.objective.norm(),
+            restarts_per_round: self.restarts.into(),
+            moves_per_restart: self.moves_per_restart.unwrap_or_else(|| default_moves_per_restart(layers)),
+            rules: Rules {
+                rounds: self.rounds.unwrap_or(u64::MAX),
+                patience: self.patience.unwrap_or(patience),
+                moves: self.moves,
+                target: self.target.map(rad_per_s_from_deg_per_h),
+            },
+            starts,
+        })
+    }
+}
+
+/// A checkpoint is written when the last one is older than this.
+const CHECKPOINT_EVERY: Duration = Duration::from_secs(1);
+
+pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+    if let Some(threads) = arguments.threads {
+        // Fails only where a pool exists already, which then serves as well: results don't depend on it.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
+    }
+    let stop = StopFlag::listen();
+    let file = read_model(&arguments.model)?;
+    for advice in &file.advice {
+        screen.note(&format!("note: {advice}"));
+    }
+    let options = &arguments.search;
+    let (class, objective) = (options.class(&file), options.objective);
+    let budget = options.budget()?;
+    let plan = options.plan(&file)?;
+    let request = Request { file: &file, class, objective, plan: &plan, budget: options.budget.as_deref() };
+    let folder = arguments.output.as_deref();
+    let saved = match folder {
+        Some(folder) => saved_state(arguments, folder, &request, screen)?,
+        None => None,
+    };
+
+    let started = Instant::now();
+    let solved = SolvedProfiles::new(&file.model, &file.profiles.profiles())?;
+    let matrix = objective.compile(&file.model, &solved, file.profiles.max_rate_k_per_s)?;
+    let unit_step = UnitStep::new(&file.model, file.profiles.max_rate_k_per_s).ok();
+    let bench = Bench { model: &file.model, solved: &solved, objective, unit_step: unit_step.as_ref() };
+    let baselines = bench.baselines()?;
+    let mut search = match saved {
+        None => Optimisation::new(matrix, class, plan.clone()),
+        Some(state) => Optimisation::resume(matrix, class, plan.clone(), state).ok_or_else(|| {
+            CliError::Checkpoint { path: folder.map(|f| f.join(CHECKPOINT_FILE)).unwrap_or_default() }
+        })?,
+    };
+    if let Some(folder) = folder.filter(|f| !(arguments.resume && f.join(CHECKPOINT_FILE).exists())) {
+        write_request(folder, &request)?;
+        write_checkpoint(folder, &request.fingerprint(), search.state())?;
+    }
+    let evaluated_before = search.evaluations();
+    let ended = anneal(&mut search, budget, started, &stop, folder.map(|f| (f, request.fingerprint())), screen)?;
+    let seconds = started.elapsed().as_secs_f64();
+
+    let Some(best) = bench.best(class, &search.state().found, &baselines)? else {
+        screen.note("interrupted before anything was found");
+        return Ok(Ending::Interrupted);
+    };
+    let judged_now = (search.evaluations() - evaluated_before) as f64;
+    let answer = OptimiseJson {
+        model: file.model.name.clone(),
+        objective: objective.key().to_owned(),
+        windability: class.to_string(),
+        seed: plan.seed,
+        best: PatternJson::of(&best),
+        baselines: baselines.iter().map(PatternJson::of).collect(),
+        improvement_over_qua: improvement_over_qua(&best, &baselines),
+        statement: bench.statement(&best, &baselines, class),
+        proof: ProofJson::none(),
+        evaluations: search.evaluations(),
+        evaluations_per_s: Some(judged_now / seconds),
+        rounds: search.state().round,
+        stopped_by: ended.words(&search).to_owned(),
+        reproducible: ended == Ended::ByRule,
+    };
+    if let Some(folder) = folder {
+        write_folder(folder, &file, &answer, &best, &search, screen)?;
+    }
+    screen.answer(answer, text)?;
+    Ok(if ended == Ended::BySignal { Ending::Interrupted } else { Ending::Done })
+}
+
+/// The state to go on from; refuses to write over an unfinished run unasked.
+fn saved_state(
+    arguments: &Arguments,
+    folder: &Path,
+    request: &Request,
+    screen: &Screen,
+) -> Result<Option<crate::search::optimise::State>, CliError> {
+    if arguments.fresh {
+        return Ok(None);
+    }
+    let found = read_checkpoint(folder, &request.fingerprint());
+    if arguments.resume {
+        let state = found?;
+        screen.note(&match &state {
+            Some(state) => format!("resuming after {} rounds", state.round),
+            None => format!("nothing to resume in {}: beginning a new run", folder.display()),
+        });
+        return Ok(state);
+    }
+    let unfinished = match found {
+        Ok(state) => state.is_some_and(|s| s.stop.is_none()),
+        // Of another request, or no checkpoint at all: not ours to write over either.
+        Err(_) => !folder.join("summary.json").exists(),
+    };
+    if unfinished {
+        let path = folder.join(CHECKPOINT_FILE).display().to_string();
+        return Err(Faults::of_file(
+            path,
+            "belongs to an unfinished run: go on with --resume, or begin again with --fresh",
+        )
+        .into());
+    }
+    Ok(None)
+}
+
+/// How a search came to its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Ended {
+    ByRule,
+    ByClock,
+    BySignal,
+}
+
+impl Ended {
+    fn words(self, search: &Optimisation) -> &'static str {
+        match self {
+            Ended::ByRule => search.state().stop.map_or("rounds", |stop| stop.key()),
+            Ended::ByClock => "clock",
+            Ended::BySignal => "interrupted",
+        }
+    }
+}
+
+/// Advances a search to its end, writing checkpoints and showing progress.
+fn anneal(
+    search: &mut Optimisation,
+    budget: Option<Duration>,
+    started: Instant,
+    stop: &StopFlag,
+    checkpoint: Option<(&Path, String)>,
+    screen: &Screen,
+) -> Result<Ended, CliError> {
+    let total = search.plan().rules.moves;
+    let progress = screen.progress("optimise", total);
+    let mut last_checkpoint = Instant::now();
+    let ended = loop {
+        if !search.advance() {
+            break Ended::ByRule;
+        }
+        if let Some((folder, fingerprint)) = &checkpoint
+            && last_checkpoint.elapsed() >= CHECKPOINT_EVERY
+        {
+            write_checkpoint(folder, fingerprint, search.state())?;
+            last_checkpoint = Instant::now();
+        }
+        let message = search.best().map_or_else(String::new, |best| {
+            format!("round {}, best {:.4} °/h", search.state().round + 1, deg_per_h_from_rad_per_s(best.cost))
+        });
+        progress.at(search.evaluations(), &message);
+        if stop.is_set() {
+            break Ended::BySignal;
+        }
+        if budget.is_some_and(|budget| started.elapsed() >= budget) {
+            break Ended::ByClock;
+        }
+    };
+    if let Some((folder, fingerprint)) = &checkpoint {
+        write_checkpoint(folder, fingerprint, search.state())?;
+    }
+    search.gather();
+    Ok(ended)
+}
+
+fn write_folder(
+    folder: &Path,
+    file: &ModelFile,
+    answer: &OptimiseJson,
+    best: &Judged,
+    search: &Optimisation,
+    screen: &Screen,
+) -> Result<(), CliError> {
+    let named = NamedPattern { name: best.name.clone(), pattern: best.pattern.clone() };
+    let (_, document) = schedule::plan(file, &named)?;
+    let json = serde_json::to_string_pretty(&document).map_err(|e| CliError::Stdout(e.into()))? + "\n";
+    let csv = document.csv().map_err(|e| CliError::Stdout(e.into()))?;
+    write_atomically(&folder.join("schedule.csv"), csv.as_bytes())?;
+    write_atomically(&folder.join("schedule.json"), json.as_bytes())?;
+    write_results(folder, answer, best, search.state())?;
+    screen.note(&format!("wrote {}", folder.display()));
+    Ok(())
+}
+
+fn text(answer: &OptimiseJson) -> String {
+    let rows = answer.baselines.iter().chain(std::iter::once(&answer.best)).map(|p| {
+        vec![
+            p.name.clone(),
+            format!("{:.4}", p.worst_rate_deg_per_h),
+            p.guaranteed_worst_rate_deg_per_h.map_or_else(|| "–".to_owned(), |g| format!("{g:.4}")),
+            p.worst_profile.clone(),
+            format!("{:.2}", p.worst_time_s),
+            p.windability.class.clone(),
+            p.windability.reels.to_string(),
+            p.windability.max_climb.to_string(),
+        ]
+    });
+    let header = ["pattern", "worst °/h", "guaranteed °/h", "profile", "at s", "class", "reels", "climb"];
+    let segments: Vec<String> = answer.best.segments.iter().map(ToString::to_string).collect();
+    format!(
+        "{}\n\n{}\nbest pattern, innermost layer first: {}\n{} moves judged in {} rounds, ended by: {}{}\n",
+        answer.statement,
+        table(&header, rows),
+        segments.join(" "),
+        answer.evaluations,
+        answer.rounds,
+        answer.stopped_by,
+        if answer.reproducible { "" } else { " (another machine may end elsewhere)" },
+    )
+}
