@@ -48,6 +48,9 @@ pub struct Arguments {
     /// Begins again although the output folder holds an unfinished run
     #[arg(long, requires = "output")]
     fresh: bool,
+    /// Writes a checkpoint when the last one is older than this
+    #[arg(long, value_name = "TIME", default_value = "1s", value_parser = parse_duration)]
+    checkpoint_every: Duration,
     /// Threads to use; without it, as many as there are processors
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -154,9 +157,6 @@ impl SearchOptions {
     }
 }
 
-/// A checkpoint is written when the last one is older than this.
-const CHECKPOINT_EVERY: Duration = Duration::from_secs(1);
-
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     if let Some(threads) = arguments.threads {
         // Fails only where a pool exists already, which then serves as well: results don't depend on it.
@@ -195,7 +195,12 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         write_checkpoint(folder, &request.fingerprint(), search.state())?;
     }
     let evaluated_before = search.evaluations();
-    let ended = anneal(&mut search, budget, started, &stop, folder.map(|f| (f, request.fingerprint())), screen)?;
+    let checkpoint = folder.map(|folder| Checkpointing {
+        folder,
+        fingerprint: request.fingerprint(),
+        every: arguments.checkpoint_every,
+    });
+    let ended = anneal(&mut search, budget, started, &stop, checkpoint, screen)?;
     let seconds = started.elapsed().as_secs_f64();
 
     let Some(best) = bench.best(class, &search.state().found, &baselines)? else {
@@ -279,13 +284,20 @@ impl Ended {
     }
 }
 
+/// Where checkpoints go, what they belong to, and how often they are written.
+struct Checkpointing<'a> {
+    folder: &'a Path,
+    fingerprint: String,
+    every: Duration,
+}
+
 /// Advances a search to its end, writing checkpoints and showing progress.
 fn anneal(
     search: &mut Optimisation,
     budget: Option<Duration>,
     started: Instant,
     stop: &StopFlag,
-    checkpoint: Option<(&Path, String)>,
+    checkpoint: Option<Checkpointing>,
     screen: &Screen,
 ) -> Result<Ended, CliError> {
     let total = search.plan().rules.moves;
@@ -295,8 +307,8 @@ fn anneal(
         if !search.advance() {
             break Ended::ByRule;
         }
-        if let Some((folder, fingerprint)) = &checkpoint
-            && last_checkpoint.elapsed() >= CHECKPOINT_EVERY
+        if let Some(Checkpointing { folder, fingerprint, every }) = &checkpoint
+            && last_checkpoint.elapsed() >= *every
         {
             write_checkpoint(folder, fingerprint, search.state())?;
             last_checkpoint = Instant::now();
@@ -312,7 +324,7 @@ fn anneal(
             break Ended::ByClock;
         }
     };
-    if let Some((folder, fingerprint)) = &checkpoint {
+    if let Some(Checkpointing { folder, fingerprint, .. }) = &checkpoint {
         write_checkpoint(folder, fingerprint, search.state())?;
     }
     search.gather();

@@ -9,7 +9,7 @@ use crate::pattern::classic::Classic;
 use crate::pattern::windability::WindabilityClass;
 use crate::rate::{CoilModel, RateModel};
 use crate::thermal::Location;
-use crate::units::deg_per_h_from_rad_per_s;
+use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
 
 /// A pattern with its reference values.
 #[derive(Debug, Clone, PartialEq)]
@@ -164,9 +164,9 @@ impl Bench<'_> {
         }
         let factor = qua.objective_rad_per_s / best.objective_rad_per_s;
         format!(
-            "The best pattern found has a {what} of {:.4} °/h, {} times less than QUA's {:.4} °/h, {scope}.",
+            "The best pattern found has a {what} of {:.4} °/h, {} QUA's {:.4} °/h, {scope}.",
             shown(best),
-            three_figures(factor),
+            how_much_less(factor),
             shown(qua)
         )
     }
@@ -178,11 +178,11 @@ pub fn improvement_over_qua(best: &Judged, baselines: &[Judged]) -> Option<f64> 
     (best.objective_rad_per_s > 0.0).then(|| qua.objective_rad_per_s / best.objective_rad_per_s)
 }
 
-fn three_figures(factor: f64) -> String {
+fn how_much_less(factor: f64) -> String {
     match factor {
-        f if f >= 100.0 => format!("{f:.0}"),
-        f if f >= 10.0 => format!("{f:.1}"),
-        f if f >= 1.01 => format!("{f:.2}"),
-        f => format!("{f:.4}"),
+        f if f >= 100.0 => format!("{f:.0} times less than"),
+        f if f >= 10.0 => format!("{f:.1} times less than"),
+        f if f >= 2.0 => format!("{f:.2} times less than"),
+        f => format!("{:.2} % less than", percent_from_fraction(1.0 - 1.0 / f)),
     }
 }

@@ -1,0 +1,72 @@
+//! Interrupted searches: killed at any moment and resumed, they end as the unbroken one did, byte for byte; so do
+//! searches at one and two threads.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+const REQUEST: [&str; 6] = ["--windability", "any", "--checkpoint-every", "20ms", "--patience", "6"];
+const SHORT: [&str; 4] = ["--rounds", "6", "--seed", "5"];
+const OTHER_SEED: [&str; 4] = ["--rounds", "6", "--seed", "6"];
+
+fn optimise(folder: &Path, length: [&str; 4], more: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_coilwright"));
+    let model = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("examples/paper-200m.toml");
+    command.arg("optimise").arg(model).args(REQUEST).args(length).arg("-o").arg(folder).args(more);
+    command.stdout(Stdio::null()).stderr(Stdio::null());
+    command
+}
+
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let entries = std::fs::read_dir(folder).unwrap().map(Result::unwrap);
+    entries.map(|e| (e.file_name().into_string().unwrap(), std::fs::read(e.path()).unwrap())).collect()
+}
+
+#[test]
+fn one_and_two_threads_write_the_same_bytes() {
+    let root = tempfile::tempdir().unwrap();
+    let (one, two) = (root.path().join("one"), root.path().join("two"));
+    assert!(optimise(&one, SHORT, &["--threads", "1"]).status().unwrap().success());
+    assert!(optimise(&two, SHORT, &["--threads", "2"]).status().unwrap().success());
+    let found = files(&one);
+    assert!(found.contains_key("summary.json") && found.contains_key("best.toml"), "{:?}", found.keys());
+    assert_eq!(found, files(&two));
+}
+
+#[test]
+fn a_search_that_is_killed_again_and_again_ends_as_the_unbroken_one() {
+    let root = tempfile::tempdir().unwrap();
+    let (unbroken, broken) = (root.path().join("unbroken"), root.path().join("broken"));
+    assert!(optimise(&unbroken, SHORT, &[]).status().unwrap().success());
+    for after_ms in [30, 300, 110, 450, 200] {
+        let mut child = optimise(&broken, SHORT, &["--resume"]).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(after_ms));
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+    assert!(optimise(&broken, SHORT, &["--resume"]).status().unwrap().success());
+    let mut found = files(&broken);
+    // What a killed process was just writing under a temporary name may be left behind.
+    found.retain(|name, _| !name.starts_with(".coilwright-"));
+    assert_eq!(found, files(&unbroken));
+}
+
+#[test]
+fn an_unfinished_run_is_not_written_over_unasked_and_a_spoilt_checkpoint_is_refused() {
+    let root = tempfile::tempdir().unwrap();
+    let folder = root.path().join("run");
+    let mut child = optimise(&folder, SHORT, &[]).spawn().unwrap();
+    while !folder.join("checkpoint.json").exists() && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!(optimise(&folder, SHORT, &[]).status().unwrap().code(), Some(2));
+    assert_eq!(optimise(&folder, OTHER_SEED, &["--resume"]).status().unwrap().code(), Some(2));
+    for spoilt in ["", "{", "{\"schema_version\": 1}", "\u{0}\u{1}"] {
+        std::fs::write(folder.join("checkpoint.json"), spoilt).unwrap();
+        assert_eq!(optimise(&folder, SHORT, &["--resume"]).status().unwrap().code(), Some(2), "{spoilt:?}");
+    }
+    assert!(optimise(&folder, SHORT, &["--fresh"]).status().unwrap().success());
+}
