@@ -222,13 +222,13 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         evaluations_per_s: Some(judged_now / seconds),
         rounds: search.state().round,
         stopped_by: ended.words(&search).to_owned(),
-        reproducible: ended == Ended::ByRule,
+        reproducible: ended == Ended::Rule,
     };
     if let Some(folder) = folder {
         write_folder(folder, &file, &answer, &best, &search, screen)?;
     }
     screen.answer(answer, text)?;
-    Ok(if ended == Ended::BySignal { Ending::Interrupted } else { Ending::Done })
+    Ok(if ended == Ended::Signal { Ending::Interrupted } else { Ending::Done })
 }
 
 /// The state to go on from; refuses to write over an unfinished run unasked.
@@ -269,17 +269,17 @@ fn saved_state(
 /// How a search came to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Ended {
-    ByRule,
-    ByClock,
-    BySignal,
+    Rule,
+    Clock,
+    Signal,
 }
 
 impl Ended {
     fn words(self, search: &Optimisation) -> &'static str {
         match self {
-            Ended::ByRule => search.state().stop.map_or("rounds", |stop| stop.key()),
-            Ended::ByClock => "clock",
-            Ended::BySignal => "interrupted",
+            Ended::Rule => search.state().stop.map_or("rounds", |stop| stop.key()),
+            Ended::Clock => "clock",
+            Ended::Signal => "interrupted",
         }
     }
 }
@@ -305,7 +305,7 @@ fn anneal(
     let mut last_checkpoint = Instant::now();
     let ended = loop {
         if !search.advance() {
-            break Ended::ByRule;
+            break Ended::Rule;
         }
         if let Some(Checkpointing { folder, fingerprint, every }) = &checkpoint
             && last_checkpoint.elapsed() >= *every
@@ -318,10 +318,10 @@ fn anneal(
         });
         progress.at(search.evaluations(), &message);
         if stop.is_set() {
-            break Ended::BySignal;
+            break Ended::Signal;
         }
         if budget.is_some_and(|budget| started.elapsed() >= budget) {
-            break Ended::ByClock;
+            break Ended::Clock;
         }
     };
     if let Some(Checkpointing { folder, fingerprint, .. }) = &checkpoint {
