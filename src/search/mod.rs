@@ -10,4 +10,5 @@ pub mod samples;
 pub mod signs;
 pub mod verdict;
 pub mod walk;
+pub mod tolerance;
 pub mod worst_case;

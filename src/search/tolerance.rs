@@ -1,0 +1,432 @@
+//! How good a pattern is when it is built imperfectly: a seeded Monte Carlo of its worst case.
+//!
+//! ```text
+//! M_j → M_j + σ_M z_j,  pitch → pitch (1 + σ_p z),  δ → δ + σ_δ z,  K → K (1 + σ_K z),  h → h (1 + σ_h z),  m → m + σ_m z
+//! share_i = Var(worst | only spread i) / Σ_i Var(worst | only spread i)
+//! ```
+//!
+//! | symbol | meaning | in code |
+//! |---|---|---|
+//! | M_j | turns of layer j, each layer for itself | `turns_per_layer_sd` |
+//! | pitch | radial pitch | `radial_pitch_sd` |
+//! | δ | midpoint offset | `midpoint_offset_sd_m` |
+//! | K, h | diffusivity, film coefficient | `diffusivity_sd`, `film_sd` |
+//! | m | mismatch of the halves | `mismatch_sd` |
+//! | z | standard normal, one a sample and quantity | |
+//!
+//! The worst case is the guaranteed one where the model has it, else the sampled one over the declared profiles.
+//! All patterns see the same samples, so that they are compared with the same coils.
+//!
+//! # Source
+//! Shares one spread at a time: Saltelli et al., Global Sensitivity Analysis (2008), section 1.2.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use statrs::distribution::{ContinuousCDF, Normal};
+use thiserror::Error;
+
+use super::guaranteed::{GuaranteedError, UnitStep};
+use super::worst_case::{SearchError, SolvedProfiles};
+use crate::coil::CoilError;
+use crate::effect::{self, DeclaredEffect};
+use crate::pattern::Pattern;
+use crate::profile::ProfileSpec;
+use crate::rate::CoilModel;
+
+/// Spreads of what is built, as standard deviations; zero: exact.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ToleranceSpec {
+    /// Turns, independent from layer to layer.
+    pub turns_per_layer_sd: f64,
+    /// Relative.
+    pub radial_pitch_sd: f64,
+    pub midpoint_offset_sd_m: f64,
+    /// Relative.
+    pub diffusivity_sd: f64,
+    /// Relative; acts on `surface_film`.
+    pub film_sd: f64,
+    /// Absolute, of `strain_mismatch`.
+    pub mismatch_sd: f64,
+    pub samples: usize,
+    pub seed: u64,
+    /// A coil whose worst case is larger is scrap.
+    pub limit_rad_per_s: Option<f64>,
+}
+
+/// What may spread, in the order of the shares.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Spread {
+    Turns,
+    RadialPitch,
+    MidpointOffset,
+    Diffusivity,
+    Film,
+    Mismatch,
+}
+
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum ToleranceError {
+    #[error("tolerance.film_percent_sd needs a film: declare the effect surface_film or leave the spread out")]
+    NoFilm,
+    #[error("[tolerance] states no spread: give at least one standard deviation above 0")]
+    NoSpread,
+    #[error(transparent)]
+    Search(#[from] SearchError),
+}
+
+/// Whose worst case was drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Measure {
+    Guaranteed,
+    /// Over the declared profiles: the model has no guaranteed worst case.
+    Sampled,
+}
+
+/// The distribution of a pattern's worst case.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Distribution {
+    /// As declared, without spreads.
+    pub nominal_rad_per_s: f64,
+    /// Ascending.
+    pub worst_rad_per_s: Vec<f64>,
+    /// The share of coils within the limit, if there is one.
+    pub yield_share: Option<f64>,
+    /// Shares of the variance, largest first; only spreads that are above zero.
+    pub variance_shares: Vec<(Spread, f64)>,
+}
+
+impl Distribution {
+    /// The value that a share of the coils does not exceed, between the order statistics.
+    pub fn quantile_rad_per_s(&self, share: f64) -> f64 {
+        let place = share.clamp(0.0, 1.0) * (self.worst_rad_per_s.len() - 1) as f64;
+        let (below, above) = (place.floor() as usize, place.ceil() as usize);
+        let (a, b) = (self.worst_rad_per_s[below], self.worst_rad_per_s[above]);
+        a + (b - a) * (place - below as f64)
+    }
+
+    pub fn median_rad_per_s(&self) -> f64 {
+        self.quantile_rad_per_s(0.5)
+    }
+
+    pub fn p95_rad_per_s(&self) -> f64 {
+        self.quantile_rad_per_s(0.95)
+    }
+
+    pub fn p99_rad_per_s(&self) -> f64 {
+        self.quantile_rad_per_s(0.99)
+    }
+}
+
+impl Spread {
+    pub const ALL: [Spread; 6] = [
+        Spread::Turns,
+        Spread::RadialPitch,
+        Spread::MidpointOffset,
+        Spread::Diffusivity,
+        Spread::Film,
+        Spread::Mismatch,
+    ];
+
+    /// The key of its standard deviation in a model file.
+    pub fn key(self) -> &'static str {
+        match self {
+            Spread::Turns => "turns_per_layer_sd",
+            Spread::RadialPitch => "radial_pitch_percent_sd",
+            Spread::MidpointOffset => "midpoint_offset_mm_sd",
+            Spread::Diffusivity => "diffusivity_percent_sd",
+            Spread::Film => "film_percent_sd",
+            Spread::Mismatch => "mismatch_sd",
+        }
+    }
+
+    /// Whether the temperature field changes with it.
+    fn is_thermal(self) -> bool {
+        matches!(self, Spread::RadialPitch | Spread::Diffusivity | Spread::Film)
+    }
+}
+
+impl ToleranceSpec {
+    fn sd(&self, spread: Spread) -> f64 {
+        match spread {
+            Spread::Turns => self.turns_per_layer_sd,
+            Spread::RadialPitch => self.radial_pitch_sd,
+            Spread::MidpointOffset => self.midpoint_offset_sd_m,
+            Spread::Diffusivity => self.diffusivity_sd,
+            Spread::Film => self.film_sd,
+            Spread::Mismatch => self.mismatch_sd,
+        }
+    }
+
+    fn active(&self) -> Vec<Spread> {
+        Spread::ALL.into_iter().filter(|s| self.sd(*s) > 0.0).collect()
+    }
+}
+
+/// One coil's standard normal deviates.
+#[derive(Debug, Clone)]
+struct Deviates {
+    turns: Vec<f64>,
+    /// In the order of [`Spread::ALL`]; the first is not used.
+    others: [f64; 6],
+}
+
+/// A factor is not varied below this: a coil with less is no coil.
+const LEAST_FACTOR: f64 = 0.1;
+
+/// The Monte Carlo of some patterns, all over the same coils.
+///
+/// # Errors
+/// No spread at all, a film's spread without a film, models that cannot be solved.
+pub fn study(
+    model: &CoilModel,
+    profiles: &ProfileSpec,
+    spec: &ToleranceSpec,
+    patterns: &[Pattern],
+) -> Result<Vec<Distribution>, ToleranceError> {
+    let active = spec.active();
+    if active.is_empty() {
+        return Err(ToleranceError::NoSpread);
+    }
+    let has_film = model.effects.iter().any(|e| e.spec().kind == "surface_film");
+    if active.contains(&Spread::Film) && !has_film {
+        return Err(ToleranceError::NoFilm);
+    }
+    let judge = Judge::new(model, profiles)?;
+    let nominal = judge.worst(model, None, patterns)?;
+    let mut random = ChaCha8Rng::seed_from_u64(spec.seed);
+    let normal = Normal::standard();
+    let mut draw = || normal.inverse_cdf(random.random::<f64>().max(f64::MIN_POSITIVE));
+    let layers = model.coil.layers();
+    let coils: Vec<Deviates> = (0..spec.samples.max(2))
+        .map(|_| Deviates { turns: (0..layers).map(|_| draw()).collect(), others: std::array::from_fn(|_| draw()) })
+        .collect();
+    let of = |spreads: &[Spread]| -> Result<Vec<Vec<f64>>, ToleranceError> {
+        let reuse = (!spreads.iter().any(|s| s.is_thermal())).then_some(&judge.nominal);
+        coils.par_iter().map(|coil| Ok(judge.worst(&built(model, spec, spreads, coil)?, reuse, patterns)?)).collect()
+    };
+    let together = of(&active)?;
+    let alone: Vec<Vec<Vec<f64>>> = if active.len() == 1 {
+        vec![together.clone()]
+    } else {
+        active.iter().map(|s| of(&[*s])).collect::<Result<_, _>>()?
+    };
+    Ok((0..patterns.len())
+        .map(|p| {
+            let mut worst_rad_per_s: Vec<f64> = together.iter().map(|coil| coil[p]).collect();
+            worst_rad_per_s.sort_by(f64::total_cmp);
+            let within = |limit: f64| worst_rad_per_s.iter().filter(|w| **w <= limit).count();
+            let yield_share = spec.limit_rad_per_s.map(|l| within(l) as f64 / worst_rad_per_s.len() as f64);
+            let variances: Vec<f64> = alone.iter().map(|coils| variance(coils.iter().map(|c| c[p]))).collect();
+            let sum: f64 = variances.iter().sum();
+            let mut variance_shares: Vec<(Spread, f64)> = active
+                .iter()
+                .zip(&variances)
+                .map(|(spread, v)| (*spread, if sum > 0.0 { v / sum } else { 0.0 }))
+                .collect();
+            variance_shares.sort_by(|a, b| b.1.total_cmp(&a.1));
+            Distribution { nominal_rad_per_s: nominal[p], worst_rad_per_s, yield_share, variance_shares }
+        })
+        .collect())
+}
+
+/// Whether the worst cases of [`study`] are guaranteed ones.
+pub fn measure(model: &CoilModel, max_rate_k_per_s: f64) -> Result<Measure, ToleranceError> {
+    match UnitStep::new(model, max_rate_k_per_s) {
+        Ok(_) => Ok(Measure::Guaranteed),
+        Err(GuaranteedError::Effect { .. }) => Ok(Measure::Sampled),
+        Err(GuaranteedError::Search(error)) => Err(error.into()),
+    }
+}
+
+/// The field that worst cases are taken from; it does not depend on the pattern.
+enum Solved {
+    Step(UnitStep),
+    Profiles(SolvedProfiles),
+}
+
+struct Judge<'a> {
+    profiles: &'a ProfileSpec,
+    measure: Measure,
+    nominal: Solved,
+}
+
+impl<'a> Judge<'a> {
+    fn new(model: &CoilModel, profiles: &'a ProfileSpec) -> Result<Self, ToleranceError> {
+        let measure = measure(model, profiles.max_rate_k_per_s)?;
+        let nominal = solved(model, profiles, measure)?;
+        Ok(Self { profiles, measure, nominal })
+    }
+
+    /// The worst case of each pattern; `reuse` where the field is known.
+    fn worst(&self, model: &CoilModel, reuse: Option<&Solved>, patterns: &[Pattern]) -> Result<Vec<f64>, SearchError> {
+        let fresh;
+        let field = match reuse {
+            Some(field) => field,
+            None => {
+                fresh = solved(model, self.profiles, self.measure)?;
+                &fresh
+            }
+        };
+        patterns
+            .iter()
+            .map(|pattern| match field {
+                Solved::Step(step) => match step.guaranteed(model, pattern) {
+                    Ok(found) => Ok(found.rate_rad_per_s),
+                    Err(GuaranteedError::Search(error)) => Err(error),
+                    Err(GuaranteedError::Effect { .. }) => Ok(f64::INFINITY),
+                },
+                Solved::Profiles(profiles) => Ok(profiles.worst_case(model, pattern)?.rate_rad_per_s.abs()),
+            })
+            .collect()
+    }
+}
+
+fn solved(model: &CoilModel, profiles: &ProfileSpec, measure: Measure) -> Result<Solved, SearchError> {
+    if measure == Measure::Guaranteed {
+        match UnitStep::new(model, profiles.max_rate_k_per_s) {
+            Ok(step) => return Ok(Solved::Step(step)),
+            Err(GuaranteedError::Search(error)) => return Err(error),
+            // Spreads add no effect that would make a linear model nonlinear.
+            Err(GuaranteedError::Effect { .. }) => {}
+        }
+    }
+    Ok(Solved::Profiles(SolvedProfiles::new(model, &profiles.profiles())?))
+}
+
+/// The model of one coil as built, with the given spreads only.
+fn built(
+    model: &CoilModel,
+    spec: &ToleranceSpec,
+    spreads: &[Spread],
+    coil: &Deviates,
+) -> Result<CoilModel, SearchError> {
+    let mut model = model.clone();
+    for &spread in spreads {
+        let index = Spread::ALL.iter().position(|s| *s == spread).unwrap_or(0);
+        let change = spec.sd(spread) * coil.others[index];
+        let factor = (1.0 + change).max(LEAST_FACTOR);
+        match spread {
+            Spread::Turns => {
+                let turns = model.coil.turns().iter().zip(&coil.turns);
+                let turns = turns.map(|(m, z)| (m + spec.turns_per_layer_sd * z).max(LEAST_FACTOR * m)).collect();
+                model.coil = model.coil.with_turns(turns)?;
+            }
+            Spread::RadialPitch => {
+                model.coil = model.coil.with_radial_pitch(model.coil.radial_pitch_m() * factor)?;
+            }
+            Spread::MidpointOffset => change_effect(&mut model, "midpoint_offset", 0.0, |offset_m| offset_m + change),
+            Spread::Diffusivity => change_effect(&mut model, "diffusivity", 1.0, |f| f * factor),
+            Spread::Film => change_effect(&mut model, "surface_film", 0.0, |film| film * factor),
+            Spread::Mismatch => change_effect(&mut model, "strain_mismatch", 0.0, |m| m + change),
+        }
+    }
+    Ok(model)
+}
+
+/// Changes the first value of an effect within its bounds; one that is not declared begins with `neutral`.
+fn change_effect(model: &mut CoilModel, kind: &str, neutral: f64, change: impl Fn(f64) -> f64) {
+    let Some(spec) = effect::find(kind) else { return };
+    let parameter = &spec.parameters[0];
+    let within = |si: f64| si.clamp(parameter.unit.to_si(parameter.lower), parameter.unit.to_si(parameter.upper));
+    let declared = model.effects.iter_mut().find(|e| e.spec().kind == kind);
+    let before = declared.as_ref().map_or(neutral, |e| e.values()[0]);
+    let mut values = declared.as_ref().map_or(vec![neutral; spec.parameters.len()], |e| e.values().to_vec());
+    values[0] = within(change(before));
+    match declared {
+        Some(effect) => {
+            if let Ok(changed) = effect.with_values(values) {
+                *effect = changed;
+            }
+        }
+        None => model.effects.extend(DeclaredEffect::new(spec, values, vec![0; spec.choices.len()])),
+    }
+}
+
+fn variance(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    let count = values.clone().count() as f64;
+    let mean = values.clone().sum::<f64>() / count;
+    values.map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0)
+}
+
+impl From<CoilError> for ToleranceError {
+    fn from(error: CoilError) -> Self {
+        ToleranceError::Search(error.into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coil::LayerLength;
+    use crate::pattern::classic::Classic;
+    use crate::search::samples::tests::{model, profiles};
+
+    fn profile_spec() -> ProfileSpec {
+        let listed = profiles();
+        ProfileSpec { max_rate_k_per_s: 0.003, count: 0, segments: 1, duration_s: 100.0, seed: 1, listed }
+    }
+
+    fn exact() -> ToleranceSpec {
+        ToleranceSpec {
+            turns_per_layer_sd: 0.0,
+            radial_pitch_sd: 0.0,
+            midpoint_offset_sd_m: 0.0,
+            diffusivity_sd: 0.0,
+            film_sd: 0.0,
+            mismatch_sd: 0.0,
+            samples: 200,
+            seed: 3,
+            limit_rad_per_s: None,
+        }
+    }
+
+    #[test]
+    fn a_spread_of_the_mismatch_alone_has_the_quantiles_of_its_closed_form() {
+        // A pattern without any error of its own: the worst case of coil and mismatch is linear in |m| once m is large.
+        let model = model(8, LayerLength::Equal, &[]);
+        let spec = ToleranceSpec { mismatch_sd: 0.05, limit_rad_per_s: Some(1.0), ..exact() };
+        let qua = Classic::Qua.pattern(8).unwrap();
+        let found = &study(&model, &profile_spec(), &spec, &[qua]).unwrap()[0];
+        assert_eq!(found.variance_shares, vec![(Spread::Mismatch, 1.0)]);
+        assert_eq!(found.yield_share, Some(1.0));
+        assert!(found.median_rad_per_s() <= found.p95_rad_per_s() && found.p95_rad_per_s() <= found.p99_rad_per_s());
+        let fibre = model.coil.fibre();
+        let per_mismatch = fibre.refractive_index * fibre.path_per_k() * model.coil.length_m() * 0.003
+            / (4.0 * model.coil.mean_diameter_m());
+        // The settled part n κ m L Ṫ/4D is a lower bound of what a mismatch adds to |G(∞)|.
+        assert!(found.p95_rad_per_s() >= 1.5 * 0.05 * per_mismatch);
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_coils_and_another_seed_others() {
+        let model = model(8, LayerLength::Actual, &["surface_film"]);
+        let spec = ToleranceSpec {
+            turns_per_layer_sd: 0.3,
+            radial_pitch_sd: 0.01,
+            diffusivity_sd: 0.1,
+            film_sd: 0.2,
+            midpoint_offset_sd_m: 0.02,
+            samples: 12,
+            ..exact()
+        };
+        let patterns = [Classic::Dip.pattern(8).unwrap(), Classic::Qua.pattern(8).unwrap()];
+        let of = |threads: usize, seed: u64| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| study(&model, &profile_spec(), &ToleranceSpec { seed, ..spec.clone() }, &patterns).unwrap())
+        };
+        assert_eq!(of(1, 3), of(2, 3));
+        assert_ne!(of(1, 3), of(1, 4));
+        let shares: f64 = of(1, 3)[0].variance_shares.iter().map(|s| s.1).sum();
+        assert!((shares - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_film_that_is_not_there_cannot_spread_and_no_spread_is_no_study() {
+        let model = model(8, LayerLength::Equal, &[]);
+        let qua = [Classic::Qua.pattern(8).unwrap()];
+        let error = study(&model, &profile_spec(), &ToleranceSpec { film_sd: 0.1, ..exact() }, &qua).unwrap_err();
+        assert_eq!(error, ToleranceError::NoFilm);
+        assert_eq!(study(&model, &profile_spec(), &exact(), &qua).unwrap_err(), ToleranceError::NoSpread);
+    }
+}
