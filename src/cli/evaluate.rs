@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
-use crate::io::files::{read_text, write_atomically};
+use crate::io::files::write_atomically;
 use crate::io::json::{EvaluateJson, PatternJson};
 use crate::io::model_edit::with_ramps;
 use crate::io::model_file::{ModelFile, NamedPattern, read_model};
@@ -62,8 +62,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     }
     if let Some(path) = &arguments.bang_bang {
         step?;
-        let source = read_text(&arguments.model)?;
-        let listed = with_ramps(&arguments.model.display().to_string(), &source, &extremes)?;
+        let listed = with_ramps(&arguments.model.display().to_string(), &file.source, &extremes)?;
         write_atomically(path, listed.as_bytes())?;
         screen.note(&format!("{} profiles listed in {}", extremes.len(), path.display()));
     }
@@ -91,7 +90,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
 }
 
 /// The model's own pattern first, unless it is a classic anyway.
-fn own_and_classics(file: &ModelFile) -> Vec<NamedPattern> {
+pub(super) fn own_and_classics(file: &ModelFile) -> Vec<NamedPattern> {
     let layers = file.model.coil.layers();
     let classics = Classic::ALL.into_iter().filter_map(|classic| {
         let pattern = classic.pattern(layers).ok()?;

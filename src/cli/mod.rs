@@ -17,6 +17,7 @@ mod schedule;
 mod schema;
 pub mod screen;
 mod verify;
+mod tolerance;
 
 use std::process::ExitCode;
 
@@ -31,6 +32,7 @@ use crate::rate::RateError;
 use crate::record::RecordError;
 use crate::search::guaranteed::GuaranteedError;
 use crate::search::objective::ObjectiveError;
+use crate::search::tolerance::ToleranceError;
 use crate::search::worst_case::SearchError;
 use progress::ProgressMode;
 use screen::Screen;
@@ -79,6 +81,7 @@ pub enum Format {
 enum Command {
     Evaluate(evaluate::Arguments),
     Effects(effects::Arguments),
+    Tolerance(tolerance::Arguments),
     Patterns(patterns::Arguments),
     Check(check::Arguments),
     New(new::Arguments),
@@ -116,6 +119,10 @@ pub enum CliError {
     Guaranteed(#[from] GuaranteedError),
     #[error("error: {0}")]
     Rate(#[from] RateError),
+    #[error("error: {0}")]
+    Tolerance(#[from] ToleranceError),
+    #[error("error: {path} has no [tolerance]: state at least one spread there, such as turns_per_layer_sd = 0.3")]
+    NoTolerance { path: String },
     #[error("error: there is no effect {stated}: did you mean {nearest}? `coilwright effects` lists all")]
     UnknownEffect { stated: String, nearest: &'static str },
     #[error("error: {0}")]
@@ -143,6 +150,7 @@ pub fn run() -> ExitCode {
     let ending = match &cli.command {
         Command::Evaluate(arguments) => evaluate::run(arguments, &screen),
         Command::Effects(arguments) => effects::run(arguments, &screen),
+        Command::Tolerance(arguments) => tolerance::run(arguments, &screen),
         Command::Patterns(arguments) => patterns::run(arguments, &screen),
         Command::Check(arguments) => check::run(arguments, &screen),
         Command::New(arguments) => new::run(arguments, &screen),

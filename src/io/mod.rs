@@ -18,5 +18,7 @@ pub mod run_directory;
 pub mod schedule_file;
 pub mod schedule_reader;
 pub mod schema;
+pub mod tolerance_json;
+mod tolerance_table;
 pub mod toml_reader;
 pub mod traveller;

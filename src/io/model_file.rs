@@ -11,6 +11,7 @@ use crate::pattern::windability::WindabilityClass;
 use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;
 use crate::schedule::production::Production;
+use crate::search::tolerance::ToleranceSpec;
 use crate::thermal::{self, Extent, Location, Material};
 use crate::units::{m_from_mm, m_from_nm, m_from_um};
 
@@ -20,6 +21,7 @@ use super::files::read_text;
 use super::pattern_file::resolve_pattern;
 use super::production_table::read_production;
 use super::profile_tables::{read_profiles, too_many_ramps};
+use super::tolerance_table::read_tolerance;
 use super::toml_reader::{Limits, TableReader, TomlReader, parse};
 
 /// A model file, understood.
@@ -34,6 +36,7 @@ pub struct ModelFile {
     pub profiles: ProfileSpec,
     pub search: SearchSettings,
     pub production: Production,
+    pub tolerance: Option<ToleranceSpec>,
     pub advice: Vec<Advice>,
 }
 
@@ -95,6 +98,7 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
     let mut profiles_table = root.table(r, "profiles");
     let mut search_table = root.table(r, "search");
     let mut production_table = root.table(r, "production");
+    let mut tolerance_table = root.table(r, "tolerance");
     root.finish(r);
 
     let fibre = read_fibre(r, &mut fibre_table);
@@ -120,6 +124,8 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
     search_table.finish(r);
     let production = read_production(r, &mut production_table);
     production_table.finish(r);
+    let tolerance = read_tolerance(r, &mut tolerance_table);
+    tolerance_table.finish(r);
 
     let whole = (|| {
         let (extent, material) = thermal_parts?;
@@ -152,6 +158,7 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
             profiles,
             search,
             production,
+            tolerance,
             advice,
         }
     });

@@ -102,6 +102,7 @@ pub fn model_schema() -> Value {
             "profiles": profiles(),
             "search": search,
             "production": production(),
+            "tolerance": tolerance(),
         }),
     ))
 }
@@ -121,6 +122,24 @@ fn production() -> Value {
             "allowance_m": described("number", "fibre on each reel beyond what is wound"),
             "potting_every_layers": { "type": "integer", "minimum": 0 },
             "winding_speed_turns_per_min": { "type": "number" },
+        }),
+    )
+}
+
+fn tolerance() -> Value {
+    table(
+        "tolerance",
+        &[],
+        json!({
+            "turns_per_layer_sd": described("number", "standard deviation of each layer's turns"),
+            "radial_pitch_percent_sd": described("number", "of the radial pitch"),
+            "midpoint_offset_mm_sd": described("number", "of the midpoint's place along the fibre"),
+            "diffusivity_percent_sd": described("number", "of the conductivity or diffusivity"),
+            "film_percent_sd": described("number", "of the surface film's coefficient"),
+            "mismatch_sd": described("number", "of the relative difference of the halves"),
+            "samples": { "type": "integer", "minimum": 2 },
+            "seed": { "type": "integer", "minimum": 0 },
+            "limit_deg_per_h": described("number", "a coil with a larger worst case is scrap"),
         }),
     )
 }
@@ -247,7 +266,7 @@ mod tests {
             keys
         };
         assert_eq!(keys(&schema), known(""));
-        for name in ["fibre", "winding", "thermal", "sensor", "profiles", "search", "production"] {
+        for name in ["fibre", "winding", "thermal", "sensor", "profiles", "search", "production", "tolerance"] {
             assert_eq!(keys(&schema["properties"][name]), known(&format!("[{name}]")), "{name}");
         }
         for spec in CATALOGUE {

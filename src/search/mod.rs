@@ -8,7 +8,7 @@ pub mod objective;
 pub mod optimise;
 pub mod samples;
 pub mod signs;
+pub mod tolerance;
 pub mod verdict;
 pub mod walk;
-pub mod tolerance;
 pub mod worst_case;

@@ -1,0 +1,68 @@
+//! A tolerance study as a JSON document.
+
+use serde::Serialize;
+
+use crate::search::tolerance::{Distribution, Measure, ToleranceSpec};
+use crate::units::deg_per_h_from_rad_per_s;
+
+#[derive(Debug, Serialize)]
+pub struct ToleranceJson {
+    pub model: String,
+    pub samples: usize,
+    pub seed: u64,
+    /// "guaranteed": over all profiles within the largest rate; "sampled": over the declared profiles.
+    pub measure: &'static str,
+    pub limit_deg_per_h: Option<f64>,
+    pub patterns: Vec<DistributionJson>,
+}
+
+#[derive(Debug, Serialize)]
+pub struct DistributionJson {
+    pub name: String,
+    pub nominal_deg_per_h: f64,
+    pub median_deg_per_h: f64,
+    pub p95_deg_per_h: f64,
+    pub p99_deg_per_h: f64,
+    /// The share of coils within the limit; null without a limit.
+    #[serde(rename = "yield")]
+    pub yield_share: Option<f64>,
+    /// Largest first.
+    pub variance_shares: Vec<ShareJson>,
+}
+
+#[derive(Debug, Serialize)]
+pub struct ShareJson {
+    pub spread: &'static str,
+    pub share: f64,
+}
+
+impl ToleranceJson {
+    pub fn new(model: &str, spec: &ToleranceSpec, measure: Measure, patterns: Vec<DistributionJson>) -> Self {
+        Self {
+            model: model.to_owned(),
+            samples: spec.samples,
+            seed: spec.seed,
+            measure: match measure {
+                Measure::Guaranteed => "guaranteed",
+                Measure::Sampled => "sampled",
+            },
+            limit_deg_per_h: spec.limit_rad_per_s.map(deg_per_h_from_rad_per_s),
+            patterns,
+        }
+    }
+}
+
+impl DistributionJson {
+    pub fn new(name: &str, found: &Distribution) -> Self {
+        let shares = found.variance_shares.iter();
+        Self {
+            name: name.to_owned(),
+            nominal_deg_per_h: deg_per_h_from_rad_per_s(found.nominal_rad_per_s),
+            median_deg_per_h: deg_per_h_from_rad_per_s(found.median_rad_per_s()),
+            p95_deg_per_h: deg_per_h_from_rad_per_s(found.p95_rad_per_s()),
+            p99_deg_per_h: deg_per_h_from_rad_per_s(found.p99_rad_per_s()),
+            yield_share: found.yield_share,
+            variance_shares: shares.map(|&(spread, share)| ShareJson { spread: spread.key(), share }).collect(),
+        }
+    }
+}
