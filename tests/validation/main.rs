@@ -3,6 +3,7 @@
 mod allan;
 mod exact_integers;
 mod exhaustive;
+mod fog_v7;
 mod nist_strd;
 mod pack;
 mod paper;
