@@ -16,8 +16,8 @@ mod reproduce;
 mod schedule;
 mod schema;
 pub mod screen;
-mod verify;
 mod tolerance;
+mod verify;
 
 use std::process::ExitCode;
 
