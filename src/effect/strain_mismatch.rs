@@ -5,7 +5,7 @@
 //! ```
 //!
 //! # Source
-//! Mohr and Schadt, Proc. SPIE 5855 (2005): T-dot bias of 0.03 … 4.9 °/h at 5 °C/min.
+//! Mohr and Schadt, Proc. SPIE 5502, 410 (2004): bias from elasto-optic interactions; 0.03 … 4.9 °/h at 5 °C/min are reported.
 
 use super::{Acts, Effect, EffectSpec, FibrePlace, ParameterSpec};
 use crate::pattern::Half;
@@ -26,7 +26,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
         default: None,
     }],
     choices: &[],
-    source: "Mohr and Schadt, Proc. SPIE 5855 (2005): T-dot bias of 0.03 … 4.9 °/h at 5 °C/min",
+    source: "Mohr and Schadt, Proc. SPIE 5502, 410 (2004): bias from elasto-optic interactions; 0.03 … 4.9 °/h at 5 °C/min are reported",
     signature: "a step of the error that lasts as long as the ramp and is ∝ the pack's mean rate, the same at every temperature",
     experiment: "ramps of several rates long enough to settle; flip the coil (it changes sign), trim an end (it does not follow)",
     build: |values, _, _| Box::new(StrainMismatch { mismatch: values[0] }),

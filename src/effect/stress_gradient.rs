@@ -5,7 +5,7 @@
 //! ```
 //!
 //! # Source
-//! Lamé's thick ring: the stress of a ring held at its bore varies as 1/r².
+//! Lamé's thick ring, Timoshenko and Goodier, Theory of Elasticity (1951), section 26: the stress varies as 1/r².
 
 use super::{Acts, Binding, Effect, EffectSpec, FibrePlace, ParameterSpec};
 use crate::units::Unit;
@@ -25,7 +25,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
         default: None,
     }],
     choices: &[],
-    source: "Lamé's thick ring: the stress of a ring held at its bore varies as 1/r²",
+    source: "Lamé's thick ring, Timoshenko and Goodier, Theory of Elasticity (1951), section 26: the stress varies as 1/r²",
     signature: "an error ∝ the pack's mean rate during a ramp for patterns whose halves lie at different radii, besides changed transients",
     experiment: "coils of the same pattern potted with adhesives of different stiffness",
     build: |values, _, binding| Box::new(StressGradient { factors: factors(values[0], binding) }),

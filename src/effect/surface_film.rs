@@ -5,7 +5,7 @@
 //! ```
 //!
 //! # Source
-//! Newton's law of cooling; film coefficients of free and forced air 5 … 250 W/(m²K), Incropera et al., table 1.1.
+//! Newton's law of cooling; film coefficients of free and forced air 2 … 250 W/(m²K), Incropera et al., table 1.1.
 
 use super::{Acts, Effect, EffectSpec, ParameterSpec};
 use crate::thermal::{HeatPath, Location};
@@ -26,7 +26,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
         default: None,
     }],
     choices: &[],
-    source: "Newton's law of cooling; film coefficients of free and forced air 5 … 250 W/(m²K), Incropera et al., table 1.1",
+    source: "Newton's law of cooling; film coefficients of free and forced air 2 … 250 W/(m²K), Incropera et al., table 1.1",
     signature: "the measured error begins late and rounded after each change of the recorded temperature's rate; the delay is about the pack's heat capacity over h",
     experiment: "a second sensor under the outermost layer's lacquer, or another air speed in the chamber",
     build: |values, _, _| Box::new(SurfaceFilm { film_w_per_m2_k: values[0] }),

@@ -1,6 +1,7 @@
 //! Numbers checked against something outside the program; each file's head names its reference.
 
 mod allan;
+mod effects;
 mod exact_integers;
 mod exhaustive;
 mod fog_v7;
