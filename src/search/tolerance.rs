@@ -241,7 +241,7 @@ pub fn measure(model: &CoilModel, max_rate_k_per_s: f64) -> Result<Measure, Tole
 
 /// The field that worst cases are taken from; it does not depend on the pattern.
 enum Solved {
-    Step(UnitStep),
+    Step(Box<UnitStep>),
     Profiles(SolvedProfiles),
 }
 
@@ -285,7 +285,7 @@ impl<'a> Judge<'a> {
 fn solved(model: &CoilModel, profiles: &ProfileSpec, measure: Measure) -> Result<Solved, SearchError> {
     if measure == Measure::Guaranteed {
         match UnitStep::new(model, profiles.max_rate_k_per_s) {
-            Ok(step) => return Ok(Solved::Step(step)),
+            Ok(step) => return Ok(Solved::Step(Box::new(step))),
             Err(GuaranteedError::Search(error)) => return Err(error),
             // Spreads add no effect that would make a linear model nonlinear.
             Err(GuaranteedError::Effect { .. }) => {}
