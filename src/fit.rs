@@ -15,11 +15,15 @@
 //! Levenberg–Marquardt after Moré (1978) as in MINPACK, from the crate `levenberg-marquardt`; the transformations of the
 //! bounds are those of MINUIT (James and Roos, Comput. Phys. Commun. 10 (1975) 343).
 
+mod bounds;
+
 use std::cell::{Cell, RefCell};
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, TerminationReason};
 use nalgebra::{DMatrix, DVector, Dyn, Owned};
 use thiserror::Error;
+
+use bounds::Map;
 
 /// One parameter to fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -113,8 +117,6 @@ pub enum FitError {
 
 /// A parameter this close to a bound [share of the range, or of its own size] is at it.
 const AT_BOUND: f64 = 1e-6;
-/// A start at a bound is moved inside by this share of the range, where the derivative does not vanish.
-const INSIDE: f64 = 1e-3;
 /// Singular values below this share of the largest do not determine anything.
 const RANK: f64 = 1e-12;
 
@@ -287,77 +289,6 @@ fn covariance(
         }
     }
     (matrix, errors)
-}
-
-/// From the optimiser's unbounded u to a bounded p and back.
-#[derive(Debug, Clone, Copy)]
-enum Map {
-    Free,
-    Above { lower: f64 },
-    Below { upper: f64 },
-    Between { lower: f64, upper: f64 },
-    Decades { lower: f64, upper: f64 },
-}
-
-impl Map {
-    fn new(parameter: &Parameter) -> Self {
-        let Parameter { lower, upper, .. } = *parameter;
-        match (lower.is_finite(), upper.is_finite()) {
-            (false, false) => Map::Free,
-            (true, false) => Map::Above { lower },
-            (false, true) => Map::Below { upper },
-            (true, true) if Self::is_logarithmic(parameter) => Map::Decades { lower: lower.ln(), upper: upper.ln() },
-            (true, true) => Map::Between { lower, upper },
-        }
-    }
-
-    fn is_logarithmic(parameter: &Parameter) -> bool {
-        parameter.lower > 0.0 && parameter.upper.is_finite() && parameter.upper / parameter.lower >= 100.0
-    }
-
-    /// The value itself, or one a little inside where it is at a bound.
-    fn inside(&self, p: f64) -> f64 {
-        match *self {
-            Map::Free => p,
-            Map::Above { lower } => p.max(lower + INSIDE * p.abs().max(1.0)),
-            Map::Below { upper } => p.min(upper - INSIDE * p.abs().max(1.0)),
-            Map::Between { lower, upper } => {
-                let inset = INSIDE * (upper - lower);
-                // The middle of a narrow start is kept: only what is at a bound moves.
-                if p - lower < 1e-9 * (upper - lower) {
-                    lower + inset
-                } else if upper - p < 1e-9 * (upper - lower) {
-                    upper - inset
-                } else {
-                    p
-                }
-            }
-            Map::Decades { lower, upper } => {
-                let inset = INSIDE * (upper - lower);
-                p.ln().clamp(lower + inset, upper - inset).exp()
-            }
-        }
-    }
-
-    fn outer(&self, u: f64) -> f64 {
-        match *self {
-            Map::Free => u,
-            Map::Above { lower } => lower + (u * u + 1.0).sqrt() - 1.0,
-            Map::Below { upper } => upper - (u * u + 1.0).sqrt() + 1.0,
-            Map::Between { lower, upper } => 0.5 * (lower + upper) + 0.5 * (upper - lower) * u.sin(),
-            Map::Decades { lower, upper } => (0.5 * (lower + upper) + 0.5 * (upper - lower) * u.sin()).exp(),
-        }
-    }
-
-    fn inner(&self, p: f64) -> f64 {
-        match *self {
-            Map::Free => p,
-            Map::Above { lower } => ((p - lower + 1.0).powi(2) - 1.0).max(0.0).sqrt(),
-            Map::Below { upper } => ((upper - p + 1.0).powi(2) - 1.0).max(0.0).sqrt(),
-            Map::Between { lower, upper } => (2.0 * (p - lower) / (upper - lower) - 1.0).clamp(-1.0, 1.0).asin(),
-            Map::Decades { lower, upper } => (2.0 * (p.ln() - lower) / (upper - lower) - 1.0).clamp(-1.0, 1.0).asin(),
-        }
-    }
 }
 
 /// The problem as the optimiser sees it.

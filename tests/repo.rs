@@ -244,7 +244,9 @@ impl Source {
         let stream = TokenStream::from_str(&text).unwrap_or_else(|error| panic!("{name}: {error}"));
         let mut all_tokens = Vec::new();
         push_tokens(stream, false, &mut all_tokens);
-        Self { tokens: flatten(&text), all_tokens, name, text }
+        // `mod tests;` under `#[cfg(test)]` puts a module of tests into a file of its own.
+        let tokens = if name.ends_with("/tests.rs") { Vec::new() } else { flatten(&text) };
+        Self { tokens, all_tokens, name, text }
     }
 
     /// The module at the crate's root that the file belongs to.

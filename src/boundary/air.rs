@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use nalgebra::DMatrix;
 
+use super::layout::{Layout, Shock};
 use super::{Air, BoundaryError, Kink, Observation};
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::numeric::state_space::{Measurement, Smoothed, Stage, StateSpace};
@@ -60,64 +61,6 @@ pub(super) struct AirSpace {
     /// Change of the rate functional over the window, per window.
     rate_row: Vec<f64>,
     dynamics: DMatrix<f64>,
-}
-
-/// Directions in which disturbances enter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Shock {
-    Jerk,
-    /// A kink.
-    Slope,
-    /// What a kink that comes earlier by dt adds, per its size times dt: air, modes and sensor as one second of a unit
-    /// slope leaves them.
-    Earlier,
-}
-
-impl Shock {
-    const COUNT: usize = 3;
-
-    /// Where this direction's score is.
-    pub fn place(self, stage: usize) -> usize {
-        stage * Self::COUNT + self as usize
-    }
-}
-
-/// Where each state is.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Layout {
-    modes: usize,
-    lagging: bool,
-    with_rate: bool,
-}
-
-impl Layout {
-    /// The sensor's deviation from the air.
-    fn lag(&self) -> usize {
-        self.modes
-    }
-    pub fn temperature(&self) -> usize {
-        self.modes + usize::from(self.lagging)
-    }
-    pub fn slope(&self) -> usize {
-        self.temperature() + 1
-    }
-    pub fn curvature(&self) -> usize {
-        self.temperature() + 2
-    }
-    pub fn jerk(&self) -> usize {
-        self.temperature() + 3
-    }
-    /// The rate functional at the beginning of the window.
-    fn window_start(&self) -> usize {
-        self.temperature() + 4
-    }
-    /// States that move by themselves.
-    fn moving(&self) -> usize {
-        self.temperature() + 4
-    }
-    fn size(&self) -> usize {
-        self.moving() + usize::from(self.with_rate)
-    }
 }
 
 /// What a stage is there for.

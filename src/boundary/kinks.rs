@@ -1,6 +1,7 @@
 //! Maximum likelihood of the air's kinks, the film and the jerk's noise.
 
-use super::air::{AirSpace, Scene, Shock};
+use super::air::{AirSpace, Scene};
+use super::layout::Shock;
 use super::{Air, BoundaryError, Kink};
 use crate::numeric::state_space::Smoothed;
 use crate::thermal::Location;

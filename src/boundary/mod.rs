@@ -31,6 +31,7 @@
 
 mod air;
 mod kinks;
+mod layout;
 
 use thiserror::Error;
 
