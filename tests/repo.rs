@@ -38,8 +38,17 @@ const FLOORS: &[(&str, u8)] = &[
 ];
 
 /// Who may use a sibling on its own floor, in this direction only.
-const SIBLING_EDGES: &[(&str, &str)] =
-    &[("numeric", "units"), ("effect", "thermal"), ("predict", "boundary"), ("reproduce", "search"), ("report", "io")];
+const SIBLING_EDGES: &[(&str, &str)] = &[
+    ("numeric", "units"),
+    ("effect", "thermal"),
+    ("predict", "boundary"),
+    ("compare", "boundary"),
+    ("compare", "predict"),
+    ("compensate", "boundary"),
+    ("compensate", "predict"),
+    ("reproduce", "search"),
+    ("report", "io"),
+];
 
 /// A file that outgrows this holds two ideas.
 const LONGEST_FILE: usize = 500;

@@ -2,6 +2,7 @@
 
 mod budget;
 mod check;
+mod compare;
 mod completions;
 mod effects;
 mod evaluate;
@@ -28,6 +29,7 @@ use crate::io::fault::Faults;
 use crate::io::files::WriteError;
 use crate::io::pattern_file::ResolveError;
 use crate::metrics::MetricsError;
+use crate::predict::PredictError;
 use crate::rate::RateError;
 use crate::record::RecordError;
 use crate::search::guaranteed::GuaranteedError;
@@ -88,6 +90,7 @@ enum Command {
     Reproduce(reproduce::Arguments),
     Optimise(optimise::Arguments),
     Schedule(schedule::Arguments),
+    Compare(compare::Arguments),
     Metrics(metrics::Arguments),
     Schema(schema::Arguments),
     Completions(completions::Arguments),
@@ -126,11 +129,15 @@ pub enum CliError {
     #[error("error: there is no effect {stated}: did you mean {nearest}? `coilwright effects` lists all")]
     UnknownEffect { stated: String, nearest: &'static str },
     #[error("error: {0}")]
+    Predict(#[from] PredictError),
+    #[error("error: {0}")]
     Metrics(#[from] MetricsError),
     #[error("error: {0}")]
     Record(#[from] RecordError),
     #[error("error: {path} exists already: choose another name or remove it first")]
     Exists { path: String },
+    #[error("error: {file}: the model's effects read {}, which the record lacks: add the columns or leave the effects out", .columns.join(", "))]
+    ColumnsMissing { file: String, columns: Vec<String> },
     #[error("error: no pattern is stated: give --pattern, or winding.pattern in the model file")]
     PatternMissing,
     #[error("error: {0}")]
@@ -157,6 +164,7 @@ pub fn run() -> ExitCode {
         Command::Reproduce(arguments) => reproduce::run(arguments, &screen),
         Command::Optimise(arguments) => optimise::run(arguments, &screen),
         Command::Schedule(arguments) => schedule::run(arguments, &screen),
+        Command::Compare(arguments) => compare::run(arguments, &screen),
         Command::Metrics(arguments) => metrics::run(arguments, &screen),
         Command::Schema(arguments) => schema::run(arguments, &screen),
         Command::Completions(arguments) => completions::run(arguments, &screen),

@@ -1,6 +1,7 @@
 //! Files in, files out: the only place (with `report`) that knows serde, paths, TOML, CSV and JSON.
 
 pub mod checkpoint;
+pub mod comparison_json;
 mod effect_tables;
 pub mod effects_json;
 pub mod fault;

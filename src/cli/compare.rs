@@ -1,0 +1,103 @@
+//! `compare`: a model's prediction beside measured records, and where it fails.
+
+use std::path::PathBuf;
+
+use super::records::{GrossErrors, Noticed, read_noticed};
+use super::schedule::pattern_of;
+use super::screen::{Screen, table};
+use super::{CliError, Ending};
+use crate::compare::{Comparison, compare};
+use crate::io::comparison_json::{CompareJson, PartJson, RecordComparisonJson};
+use crate::io::model_file::read_model;
+use crate::record::Record;
+
+/// A model's prediction beside measured records, and where it fails
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  coilwright compare coil.toml calibration.csv validation.csv\n  coilwright compare coil.toml day-1.csv --strict --format json"
+)]
+pub struct Arguments {
+    /// The model file
+    model: PathBuf,
+    /// Records (CSV)
+    #[arg(required = true)]
+    records: Vec<PathBuf>,
+    /// A winding's name or a pattern file; without it, the model's own
+    #[arg(long, short, value_name = "PATTERN")]
+    pattern: Option<String>,
+    /// What to do with values that stand alone
+    #[arg(long, value_enum, default_value_t = GrossErrors::Keep)]
+    gross_errors: GrossErrors,
+    /// Exit code 1 when the model is not adequate
+    #[arg(long)]
+    strict: bool,
+}
+
+pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+    let file = read_model(&arguments.model)?;
+    let named = pattern_of(&file, arguments.pattern.as_deref())?;
+    let mut compared: Vec<(Record, Comparison)> = Vec::with_capacity(arguments.records.len());
+    let mut shown = Vec::with_capacity(arguments.records.len());
+    for path in &arguments.records {
+        let Noticed { record, gross_errors, gaps } = read_noticed(path, arguments.gross_errors, screen)?;
+        let names: Vec<String> = record.channels().iter().map(|c| c.name.clone()).collect();
+        let columns = file.model.missing_channels(&names);
+        let name = path.display().to_string();
+        if !columns.is_empty() {
+            return Err(CliError::ColumnsMissing { file: name, columns });
+        }
+        let found = compare(&file.model, &named.pattern, &record)?;
+        shown.push(RecordComparisonJson::new(&name, &found, gross_errors, gaps));
+        compared.push((record, found));
+    }
+    let body = CompareJson::new(&file.model.name, &named.name, shown);
+    let adequate = body.is_adequate();
+    screen.answer(body, text)?;
+    Ok(if arguments.strict && !adequate { Ending::No } else { Ending::Done })
+}
+
+fn text(body: &CompareJson) -> String {
+    let mut text = format!("{} with {}: {}\n", body.model, body.pattern, body.verdict);
+    for record in &body.records {
+        text += &format!("\n{}: {} rows, {}\n", record.file, record.rows, record.verdict);
+        for finding in &record.findings {
+            text += &format!("  {finding}\n");
+        }
+        let number = |value: Option<f64>, digits: usize| value.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
+        let measures = [
+            ("RMSE", format!("{:.5}", record.rmse_deg_per_h), "°/h"),
+            ("noise floor of the record", format!("{:.5}", record.noise_floor_deg_per_h), "°/h"),
+            ("offset", format!("{:.5}", record.offset_deg_per_h), "°/h"),
+            ("NRMSE fit", number(record.nrmse_fit_percent, 2), "%"),
+            ("R²", number(record.r_squared, 5), ""),
+            ("reduced chi-square", format!("{:.4}", record.reduced_chi_square), ""),
+            ("expected from the boundary", format!("{:.4}", record.boundary_chi_square), ""),
+            ("against noise and boundary", format!("{:.4}", record.whitened_chi_square), ""),
+            ("Ljung-Box p-value", format!("{:.4}", record.ljung_box.p_value), ""),
+            ("film found", number(record.estimated_film_w_per_m2_k, 2), "W/(m²K)"),
+        ];
+        text.push('\n');
+        text += &table(&["measure", "value", "unit"], measures.map(|(n, v, u)| vec![n.to_owned(), v, u.to_owned()]));
+        text.push('\n');
+        text += &table(
+            &["part of the record", "rows", "share of rows", "share of squared error", "RMSE °/h"],
+            record.regimes.iter().chain(&record.temperature_bands).chain(&record.rate_bands).map(part_row),
+        );
+        text.push('\n');
+        text += &table(
+            &["residual against", "correlation"],
+            record.correlations.iter().map(|c| vec![c.with.clone(), number(c.correlation, 3)]),
+        );
+    }
+    text
+}
+
+fn part_row(part: &PartJson) -> Vec<String> {
+    vec![
+        part.name.clone(),
+        part.rows.to_string(),
+        format!("{:.3}", part.share_of_rows),
+        format!("{:.3}", part.share_of_squared_error),
+        format!("{:.5}", part.rmse_deg_per_h),
+    ]
+}

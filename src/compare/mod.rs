@@ -1,0 +1,236 @@
+//! A model's prediction beside a measurement: how well it does, and where it fails.
+//!
+//! ```text
+//! r_k = Ω_k − Ω̂_k                                  residual, the offset fitted
+//! fit = 100 (1 − ‖Ω − Ω̂‖/‖Ω − mean Ω‖) %            NRMSE fit
+//! R² = 1 − Σ r²/Σ (Ω − mean Ω)²
+//! χ²_red = Σ r²/σ²/(n − 1)                          against the noise floor alone
+//! χ²_b = Σ var_k/σ²/(n − 1)                         expected share of the boundary's uncertainty in it
+//! χ²_w = rᵀ C⁻¹ r/(n − 1),  C = σ² I + C_boundary   what neither of them explains shows as an excess over 1
+//! ```
+//!
+//! | symbol | meaning | in code |
+//! |---|---|---|
+//! | σ | the record's white noise, from its own second differences: mean square within three robust spreads | `noise_rad_per_s` |
+//! | var_k, C_boundary | variance and covariance that the boundary's estimate gives the prediction | `boundary_chi_square`, `whitened_chi_square` |
+//!
+//! Holds for records with more than a few dozen rows. The white noise of a record whose signal jumps from row to row is
+//! overestimated.
+//!
+//! # Source
+//! NRMSE fit as in Ljung, System Identification (1999), section 16.4; whiteness after Ljung and Box (1978); noise floor as
+//! in [`crate::predict`].
+
+pub mod regimes;
+pub mod verdict;
+
+use crate::boundary::{Boundary, BoundaryError};
+use crate::numeric::statistics::{LjungBox, autocorrelation, autocorrelation_band_99, correlation, rms};
+use crate::pattern::Pattern;
+use crate::predict::{self, PredictError, Prediction};
+use crate::rate::{CoilModel, RateError, RateModel};
+use crate::record::Record;
+use crate::units::percent_from_fraction;
+use regimes::{Part, Regimes};
+use verdict::{Finding, Verdict};
+
+/// Everything that was found out about one record and one model.
+#[derive(Debug, Clone)]
+pub struct Comparison {
+    pub rows: usize,
+    pub offset_rad_per_s: f64,
+    pub noise_rad_per_s: f64,
+    pub rmse_rad_per_s: f64,
+    pub nrmse_fit_percent: f64,
+    /// None where the record does not vary.
+    pub r_squared: Option<f64>,
+    pub reduced_chi_square: f64,
+    pub boundary_chi_square: f64,
+    pub whitened_chi_square: f64,
+    pub largest: LargestError,
+    /// At lags 0, 1, …, of the residual in units of its expected deviation.
+    pub autocorrelation: Vec<f64>,
+    pub autocorrelation_band: f64,
+    pub ljung_box: LjungBox,
+    pub correlations: Vec<Correlation>,
+    pub regimes: Vec<Part>,
+    pub temperature_bands: Vec<Part>,
+    pub rate_bands: Vec<Part>,
+    pub findings: Vec<Finding>,
+    pub verdict: Verdict,
+    /// One entry a row.
+    pub prediction: Prediction,
+    pub residual_rad_per_s: Vec<f64>,
+    pub film_w_per_m2_k: Option<f64>,
+    pub kinks_s: Vec<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LargestError {
+    pub time_s: f64,
+    pub residual_rad_per_s: f64,
+}
+
+/// What the residual may go along with.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Quantity {
+    Temperature,
+    TemperatureRate,
+    /// Outermost less innermost layer.
+    Gradient,
+    GradientRate,
+    /// The model's own prediction: a scale error.
+    Prediction,
+    /// The prediction where it gets warmer less where it gets cooler.
+    PredictionByDirection,
+    Channel(String),
+}
+
+impl std::fmt::Display for Quantity {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Quantity::Temperature => f.write_str("T"),
+            Quantity::TemperatureRate => f.write_str("dT/dt"),
+            Quantity::Gradient => f.write_str("T_out - T_in"),
+            Quantity::GradientRate => f.write_str("d(T_out - T_in)/dt"),
+            Quantity::Prediction => f.write_str("the prediction"),
+            Quantity::PredictionByDirection => f.write_str("the prediction times the sign of dT/dt"),
+            Quantity::Channel(name) => f.write_str(name),
+        }
+    }
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Correlation {
+    pub with: Quantity,
+    /// None where the quantity does not vary.
+    pub value: Option<f64>,
+}
+
+/// Lags of the autocorrelation: at most this many, and a quarter of the rows.
+const MAX_LAGS: usize = 60;
+
+/// Compares a model with a record.
+///
+/// # Errors
+/// A pattern of another layer count, a heat path that cannot be solved, a record whose temperature says nothing.
+pub fn compare(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<Comparison, PredictError> {
+    let boundary = predict::estimate_boundary(model, pattern, record)?;
+    compare_with(model, pattern, record, &boundary)
+}
+
+/// As [`compare`], with a boundary that is known already.
+///
+/// # Errors
+/// As [`compare`].
+pub fn compare_with(
+    model: &CoilModel,
+    pattern: &Pattern,
+    record: &Record,
+    boundary: &Boundary,
+) -> Result<Comparison, PredictError> {
+    let prediction = predict::predict_from(model, pattern, record, boundary)?;
+    let measured = record.rate_rad_per_s();
+    let residual: Vec<f64> = measured.iter().zip(&prediction.rate_rad_per_s).map(|(m, p)| m - p).collect();
+    let rows = residual.len();
+    let freedom = (rows - 1) as f64;
+    let noise = prediction.noise_rad_per_s;
+    let variances = &prediction.boundary_variance_rad2_per_s2;
+    let square: f64 = residual.iter().map(|r| r * r).sum();
+    let mean = measured.iter().sum::<f64>() / rows as f64;
+    let spread: f64 = measured.iter().map(|m| (m - mean).powi(2)).sum();
+    let explained = (spread > 0.0).then(|| square / spread);
+    let scaled: Vec<f64> =
+        residual.iter().zip(variances).map(|(r, v)| r / (noise * noise + v).sqrt().max(f64::MIN_POSITIVE)).collect();
+    let autocorrelation = autocorrelation(&scaled, MAX_LAGS.min(rows / 4));
+    let (largest_row, _) =
+        residual.iter().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).unwrap_or((0, &0.0));
+    let states = States::new(model, pattern, record, &prediction)?;
+    let cut = Regimes::new(model, record, boundary, &prediction)?;
+    let mut found = Comparison {
+        rows,
+        offset_rad_per_s: prediction.offset_rad_per_s,
+        noise_rad_per_s: noise,
+        rmse_rad_per_s: rms(&residual),
+        nrmse_fit_percent: explained.map_or(f64::NEG_INFINITY, |e| percent_from_fraction(1.0 - e.sqrt())),
+        r_squared: explained.map(|e| 1.0 - e),
+        reduced_chi_square: square / (noise * noise) / freedom,
+        boundary_chi_square: variances.iter().sum::<f64>() / (noise * noise) / freedom,
+        whitened_chi_square: whitened_chi_square(boundary, noise, &residual)?,
+        largest: LargestError { time_s: record.times_s()[largest_row], residual_rad_per_s: residual[largest_row] },
+        ljung_box: LjungBox::new(&autocorrelation, rows),
+        autocorrelation_band: autocorrelation_band_99(rows),
+        autocorrelation,
+        correlations: states.correlations(&residual, record, &prediction),
+        regimes: cut.regimes(&residual, &scaled),
+        temperature_bands: cut.temperature_bands(&residual, &scaled),
+        rate_bands: cut.rate_bands(&residual, &scaled),
+        findings: Vec::new(),
+        verdict: Verdict::Adequate,
+        residual_rad_per_s: residual,
+        film_w_per_m2_k: boundary.air().film_w_per_m2_k,
+        kinks_s: boundary.air().kinks.iter().map(|k| k.time_s).collect(),
+        prediction,
+    };
+    (found.verdict, found.findings) = verdict::judge(&found, cut.transient_s);
+    Ok(found)
+}
+
+/// rᵀ C⁻¹ r/(n − 1), the offset fitted in the same metric.
+fn whitened_chi_square(boundary: &Boundary, noise: f64, residual: &[f64]) -> Result<f64, BoundaryError> {
+    let whitener = boundary.rate_whitener(noise)?;
+    let r = whitener.whiten(residual);
+    let one = whitener.whiten(&vec![noise; residual.len()]);
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let on_offset = dot(&r, &one).powi(2) / dot(&one, &one).max(f64::MIN_POSITIVE);
+    Ok((dot(&r, &r) - on_offset) / (residual.len() - 1) as f64)
+}
+
+/// The columns that the residual is correlated with.
+struct States {
+    temperature_k: Vec<f64>,
+    rate_k_per_s: Vec<f64>,
+    gradient_k: Vec<f64>,
+    gradient_rate_k_per_s: Vec<f64>,
+}
+
+impl States {
+    fn new(model: &CoilModel, pattern: &Pattern, record: &Record, prediction: &Prediction) -> Result<Self, RateError> {
+        let names: Vec<String> = record.channels().iter().map(|c| c.name.clone()).collect();
+        let rate = RateModel::new(model, pattern, &names)?;
+        let channels = vec![0.0; names.len()];
+        let history = &prediction.history;
+        let mut states = Self {
+            temperature_k: Vec::with_capacity(history.len()),
+            rate_k_per_s: Vec::with_capacity(history.len()),
+            gradient_k: Vec::with_capacity(history.len()),
+            gradient_rate_k_per_s: Vec::with_capacity(history.len()),
+        };
+        for row in 0..history.len() {
+            let state = rate.state(history, row, &channels);
+            states.temperature_k.push(state.mean_temperature_k);
+            states.rate_k_per_s.push(state.mean_rate_k_per_s);
+            states.gradient_k.push(state.temperatures_k[history.layers - 1] - state.temperatures_k[0]);
+            states.gradient_rate_k_per_s.push(state.gradient_rate_k_per_s());
+        }
+        Ok(states)
+    }
+
+    fn correlations(&self, residual: &[f64], record: &Record, prediction: &Prediction) -> Vec<Correlation> {
+        let coil: Vec<f64> = prediction.rate_rad_per_s.iter().map(|r| r - prediction.offset_rad_per_s).collect();
+        let directed: Vec<f64> = coil.iter().zip(&self.rate_k_per_s).map(|(c, r)| c * r.signum()).collect();
+        let own = [
+            (Quantity::Temperature, &self.temperature_k),
+            (Quantity::TemperatureRate, &self.rate_k_per_s),
+            (Quantity::Gradient, &self.gradient_k),
+            (Quantity::GradientRate, &self.gradient_rate_k_per_s),
+            (Quantity::Prediction, &coil),
+            (Quantity::PredictionByDirection, &directed),
+        ];
+        let channels = record.channels().iter().map(|c| (Quantity::Channel(c.name.clone()), &c.values));
+        own.into_iter()
+            .chain(channels)
+            .map(|(with, values)| Correlation { with, value: correlation(residual, values) })
+            .collect()
+    }
+}

@@ -1,0 +1,190 @@
+//! Whether a model is adequate for a record, and where it fails, in words.
+//!
+//! A part of the record stands out where its χ² per row exceeds what chance and a little allow; the residual follows a
+//! quantity where taking that quantity out would lower χ² by more than chance and a little allow.
+
+use super::regimes::{Part, Regime};
+use super::{Comparison, Quantity};
+use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    Adequate,
+    Missing,
+}
+
+/// One statement about where the error lies.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Finding {
+    /// The whole χ² is too large.
+    Excess {
+        whitened_chi_square: f64,
+    },
+    Regime {
+        regime: Regime,
+        share: f64,
+        share_of_rows: f64,
+        transient_s: f64,
+    },
+    TemperatureBand {
+        band: String,
+        share: f64,
+        share_of_rows: f64,
+    },
+    RateBand {
+        band: String,
+        share: f64,
+        share_of_rows: f64,
+    },
+    Follows {
+        quantity: Quantity,
+        correlation: f64,
+    },
+    Coloured {
+        lag_one: f64,
+        band: f64,
+    },
+    NothingStandsOut {
+        reduced_chi_square: f64,
+    },
+    Boundary {
+        reduced_chi_square: f64,
+        boundary_chi_square: f64,
+    },
+    Largest {
+        residual_rad_per_s: f64,
+        time_s: f64,
+    },
+}
+
+impl std::fmt::Display for Finding {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let percent = |share: &f64| format!("{:.0} %", percent_from_fraction(*share));
+        match self {
+            Finding::Excess { whitened_chi_square } => write!(
+                f,
+                "the residual is {:.2} times what the record's noise and the boundary's uncertainty explain (reduced chi-square {whitened_chi_square:.3})",
+                whitened_chi_square.max(0.0).sqrt()
+            ),
+            Finding::Regime { regime, share, share_of_rows, transient_s } => {
+                let place = match regime {
+                    Regime::WarmUp => "in the warm-up at the start".to_owned(),
+                    Regime::Transient => format!("in the {transient_s:.0} s after each change of ramp"),
+                    Regime::HeatingRamp => "in the heating ramps".to_owned(),
+                    Regime::CoolingRamp => "in the cooling ramps".to_owned(),
+                    Regime::Soak => "in the soaks".to_owned(),
+                };
+                write!(
+                    f,
+                    "{} of the squared error lies {place}, in {} of the rows",
+                    percent(share),
+                    percent(share_of_rows)
+                )
+            }
+            Finding::TemperatureBand { band, share, share_of_rows } => write!(
+                f,
+                "{} of the squared error lies at {band}, in {} of the rows",
+                percent(share),
+                percent(share_of_rows)
+            ),
+            Finding::RateBand { band, share, share_of_rows } => write!(
+                f,
+                "{} of the squared error lies where dT/dt is {band}, in {} of the rows",
+                percent(share),
+                percent(share_of_rows)
+            ),
+            Finding::Follows { quantity, correlation } => {
+                write!(f, "the residual follows {quantity} (correlation {correlation:.2})")
+            }
+            Finding::Coloured { lag_one, band } => write!(
+                f,
+                "neighbouring residuals hang together (autocorrelation {lag_one:.2} at lag 1, white within {band:.2})"
+            ),
+            Finding::NothingStandsOut { reduced_chi_square } => write!(
+                f,
+                "nothing stands out: the residual is the record's noise (reduced chi-square {reduced_chi_square:.3})"
+            ),
+            Finding::Boundary { reduced_chi_square, boundary_chi_square } => write!(
+                f,
+                "of the reduced chi-square of {reduced_chi_square:.3}, {boundary_chi_square:.3} is expected from the uncertainty of the estimated boundary"
+            ),
+            Finding::Largest { residual_rad_per_s, time_s } => write!(
+                f,
+                "the largest error is {:.4} °/h at {time_s:.1} s",
+                deg_per_h_from_rad_per_s(*residual_rad_per_s)
+            ),
+        }
+    }
+}
+
+/// The whole χ² may exceed 1 by this, besides chance: what an estimated boundary and a discretised pack leave.
+const TOLERATED_EXCESS: f64 = 0.15;
+/// A part's χ² a row may exceed 1 by this, besides chance.
+const TOLERATED_PART_EXCESS: f64 = 0.35;
+/// Standard errors that count as chance.
+const CHANCE: f64 = 5.0;
+/// A correlation whose square is below this share explains nothing worth telling, however certain it is.
+const TOLD_SHARE: f64 = 0.03;
+/// A part is named where it holds this many times its share of the rows.
+const CONCENTRATION: f64 = 1.25;
+/// Dependences that are named at most: the rest follows from the strongest.
+const MOST_DEPENDENCES: usize = 3;
+
+fn stands_out(part: &Part) -> bool {
+    let chance = CHANCE * (2.0 / part.rows as f64).sqrt();
+    part.chi_square_per_row > 1.0 + TOLERATED_PART_EXCESS + chance
+}
+
+/// The parts that stand out and hold more than their rows, the largest share first.
+fn concentrated(parts: &[Part]) -> Vec<&Part> {
+    let holds_more = |p: &Part| p.share_of_squared_error > CONCENTRATION * p.share_of_rows;
+    let mut found: Vec<&Part> = parts.iter().filter(|p| stands_out(p) && holds_more(p)).collect();
+    found.sort_by(|a, b| b.share_of_squared_error.total_cmp(&a.share_of_squared_error));
+    found
+}
+
+pub(super) fn judge(found: &Comparison, transient_s: f64) -> (Verdict, Vec<Finding>) {
+    let mut findings = Vec::new();
+    let rows = found.rows as f64;
+    if found.whitened_chi_square > 1.0 + TOLERATED_EXCESS + 3.0 * (2.0 / rows).sqrt() {
+        findings.push(Finding::Excess { whitened_chi_square: found.whitened_chi_square });
+    }
+    for part in concentrated(&found.regimes) {
+        if let Some(regime) = Regime::ALL.into_iter().find(|r| r.key() == part.name) {
+            let (share, share_of_rows) = (part.share_of_squared_error, part.share_of_rows);
+            findings.push(Finding::Regime { regime, share, share_of_rows, transient_s });
+        }
+    }
+    let follows = |value: f64| {
+        let explained = value * value;
+        explained > TOLD_SHARE && explained * rows * found.reduced_chi_square > CHANCE * CHANCE
+    };
+    let mut followed: Vec<(&Quantity, f64)> =
+        found.correlations.iter().filter_map(|c| Some((&c.with, c.value?))).filter(|(_, v)| follows(*v)).collect();
+    followed.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+    for (quantity, correlation) in followed.into_iter().take(MOST_DEPENDENCES) {
+        findings.push(Finding::Follows { quantity: quantity.clone(), correlation });
+    }
+    if let Some(part) = concentrated(&found.temperature_bands).first() {
+        let (band, share, share_of_rows) = (part.name.clone(), part.share_of_squared_error, part.share_of_rows);
+        findings.push(Finding::TemperatureBand { band, share, share_of_rows });
+    }
+    if let Some(part) = concentrated(&found.rate_bands).first() {
+        let (band, share, share_of_rows) = (part.name.clone(), part.share_of_squared_error, part.share_of_rows);
+        findings.push(Finding::RateBand { band, share, share_of_rows });
+    }
+    let verdict = if findings.is_empty() { Verdict::Adequate } else { Verdict::Missing };
+    let lag_one = found.autocorrelation.get(1).copied().unwrap_or(0.0);
+    if verdict == Verdict::Adequate {
+        findings.push(Finding::NothingStandsOut { reduced_chi_square: found.reduced_chi_square });
+    } else if lag_one.abs() > found.autocorrelation_band {
+        findings.push(Finding::Coloured { lag_one, band: found.autocorrelation_band });
+    }
+    findings.push(Finding::Boundary {
+        reduced_chi_square: found.reduced_chi_square,
+        boundary_chi_square: found.boundary_chi_square,
+    });
+    let largest = found.largest;
+    findings.push(Finding::Largest { residual_rad_per_s: largest.residual_rad_per_s, time_s: largest.time_s });
+    (verdict, findings)
+}
