@@ -13,6 +13,7 @@ mod optimise;
 mod patterns;
 pub mod progress;
 mod records;
+mod report;
 mod reproduce;
 mod schedule;
 mod schema;
@@ -96,6 +97,7 @@ enum Command {
     Completions(completions::Arguments),
     Man(man::Arguments),
     Verify(verify::Arguments),
+    Report(report::Arguments),
 }
 
 /// How a command ended; errors aside.
@@ -138,6 +140,8 @@ pub enum CliError {
     Exists { path: String },
     #[error("error: {file}: the model's effects read {}, which the record lacks: add the columns or leave the effects out", .columns.join(", "))]
     ColumnsMissing { file: String, columns: Vec<String> },
+    #[error("error: {0}")]
+    Report(#[from] crate::report::search_run::ReportError),
     #[error("error: no pattern is stated: give --pattern, or winding.pattern in the model file")]
     PatternMissing,
     #[error("error: {0}")]
@@ -170,6 +174,7 @@ pub fn run() -> ExitCode {
         Command::Completions(arguments) => completions::run(arguments, &screen),
         Command::Man(arguments) => man::run(arguments, &screen),
         Command::Verify(arguments) => verify::run(arguments, &screen),
+        Command::Report(arguments) => report::run(arguments, &screen),
     };
     match ending {
         Ok(Ending::Done) => ExitCode::SUCCESS,

@@ -135,3 +135,9 @@ pub struct VerifyJson {
     pub independent_worst_rate_deg_per_h: Option<f64>,
     pub violations: Vec<ViolationJson>,
 }
+
+#[derive(Debug, Serialize)]
+pub struct ReportJson {
+    pub report: String,
+    pub bytes: usize,
+}

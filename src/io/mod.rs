@@ -16,6 +16,7 @@ mod production_table;
 mod profile_tables;
 pub mod record_file;
 pub mod run_directory;
+pub mod run_reader;
 pub mod schedule_file;
 pub mod schedule_reader;
 pub mod schema;
