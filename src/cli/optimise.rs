@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use super::budget::parse_duration;
 use super::progress::StopFlag;
 use super::screen::{Screen, table};
-use super::{CliError, Ending, schedule};
+use super::{CliError, Ending, report, schedule};
 use crate::io::checkpoint::{CHECKPOINT_FILE, read_checkpoint, write_checkpoint};
 use crate::io::fault::Faults;
 use crate::io::files::write_atomically;
@@ -346,6 +346,7 @@ fn write_folder(
     write_atomically(&folder.join("schedule.csv"), csv.as_bytes())?;
     write_atomically(&folder.join("schedule.json"), json.as_bytes())?;
     write_results(folder, answer, best, search.state())?;
+    report::write_report(folder, &folder.join("report.html"))?;
     screen.note(&format!("wrote {}", folder.display()));
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! `report`: the page of a search.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::screen::Screen;
 use super::{CliError, Ending};
@@ -21,11 +21,16 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
-    let run = read_run(&arguments.folder)?;
-    let page = search_page(&run)?;
     let path = arguments.output.clone().unwrap_or_else(|| arguments.folder.join("report.html"));
-    write_atomically(&path, page.as_bytes())?;
+    let bytes = write_report(&arguments.folder, &path)?;
     let report = path.display().to_string();
-    screen.answer(ReportJson { report, bytes: page.len() }, |body| format!("{}\n", body.report))?;
+    screen.answer(ReportJson { report, bytes }, |body| format!("{}\n", body.report))?;
     Ok(Ending::Done)
+}
+
+/// Makes the page of a search's folder; its size in bytes.
+pub(super) fn write_report(folder: &Path, path: &Path) -> Result<usize, CliError> {
+    let page = search_page(&read_run(folder)?)?;
+    write_atomically(path, page.as_bytes())?;
+    Ok(page.len())
 }

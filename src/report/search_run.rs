@@ -1,6 +1,8 @@
 //! The report of a search: one page that opens offline.
 
 use maud::{Markup, html};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
 use super::cross_section::cross_section;
@@ -47,6 +49,8 @@ pub fn search_page(run: &Run) -> Result<String, ReportError> {
         }
         h2 { "Rate error over time" }
         @for (svg, caption) in over_time(run)? { (figure(&svg, &caption)) }
+        h2 { "Tolerance" }
+        (figure(&tolerance(run, &best)?, &format!("{TOLERANCE_COILS} coils, the turns of each layer off by up to half a turn (uniform, independent; seed {}), under the best pattern's worst profile.", summary.seed)))
         h2 { "What it costs the winding shop" }
         (figure(&trade_off(run), "Every step to the left is an easier crossover, every step down a smaller error."))
         h2 { "How the search went" }
@@ -163,8 +167,9 @@ fn over_time(run: &Run) -> Result<Vec<(String, String)>, ReportError> {
         let mut chart = Chart::new(format!("Rate error under {}", profile.name()))
             .x(Axis::linear("time [min]"))
             .y(Axis::linear("rate error [°/h]"));
-        let mut patterns: Vec<&RunPattern> = vec![&run.summary.best];
-        patterns.extend(run.summary.baselines.iter().filter(|p| p.name != run.summary.best.name));
+        // The best one last, on top of the others.
+        let baselines = run.summary.baselines.iter().filter(|p| p.name != run.summary.best.name);
+        let patterns: Vec<&RunPattern> = baselines.chain(std::iter::once(&run.summary.best)).collect();
         for found in patterns {
             let pattern = Pattern::new(found.segments.clone())?;
             let model = RateModel::new(&run.file.model, &pattern, &[]).map_err(SearchError::from)?;
@@ -181,6 +186,45 @@ fn over_time(run: &Run) -> Result<Vec<(String, String)>, ReportError> {
         figures.push((profile_chart(profile), format!("What drives it: {}, from a steady state.", profile.name())));
     }
     Ok(figures)
+}
+
+const TOLERANCE_COILS: usize = 300;
+const TOLERANCE_BINS: usize = 24;
+/// Largest error of a layer's turn count [turns].
+const TURN_ERROR: f64 = 0.5;
+
+/// How the best pattern's worst rate error spreads when turns are miscounted.
+fn tolerance(run: &Run, best: &Pattern) -> Result<String, ReportError> {
+    let profiles = run.file.profiles.profiles();
+    let worst = profiles.iter().find(|p| p.name() == run.summary.best.worst_profile).or(profiles.first());
+    let Some(profile) = worst else {
+        return Err(ReportError::Profile { name: run.summary.best.worst_profile.clone() });
+    };
+    let solved = SolvedProfiles::new(&run.file.model, std::slice::from_ref(profile))?;
+    let history = &solved.profiles()[0].history;
+    let mut random = ChaCha8Rng::seed_from_u64(run.summary.seed);
+    let mut found = Vec::with_capacity(TOLERANCE_COILS);
+    for _ in 0..TOLERANCE_COILS {
+        let mut model = run.file.model.clone();
+        let turns = model.coil.turns().iter().map(|t| t + TURN_ERROR * (2.0 * random.random::<f64>() - 1.0));
+        model.coil = model.coil.with_turns(turns.collect()).map_err(SearchError::from)?;
+        let rates = RateModel::new(&model, best, &[]).map_err(SearchError::from)?.series_rad_per_s(history);
+        found.push(deg_per_h_from_rad_per_s(rates.iter().fold(0.0, |most: f64, r| most.max(r.abs()))));
+    }
+    let (low, high) = found.iter().fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
+    let width = ((high - low) / TOLERANCE_BINS as f64).max(f64::MIN_POSITIVE);
+    let edges: Vec<f64> = (0..=TOLERANCE_BINS).map(|i| low + i as f64 * width).collect();
+    let mut counts = vec![0.0; TOLERANCE_BINS];
+    for value in &found {
+        counts[(((value - low) / width) as usize).min(TOLERANCE_BINS - 1)] += 1.0;
+    }
+    Ok(Chart::new("Worst rate error of coils as wound")
+        .size(720, 280)
+        .x(Axis::linear("worst |rate error| [°/h]"))
+        .y(Axis::linear("coils [1]"))
+        .with(Series::histogram("", &edges, &counts))
+        .mark(Mark::vertical("as designed", run.summary.best.worst_rate_deg_per_h))
+        .svg())
 }
 
 fn profile_chart(profile: &Profile) -> String {
@@ -228,7 +272,7 @@ fn certificate(run: &Run) -> Markup {
     let words = match proof.status.as_str() {
         "optimal" => "The best pattern is proved optimal in its class.",
         "gap" => "The class has been searched up to the gap between best value and lower bound.",
-        _ => "Nothing is proved about better patterns; `coilwright exact` searches for a proof.",
+        _ => "Nothing is proved about better patterns; coilwright exact searches for a proof.",
     };
     html! {
         h2 { "Certificate" }
