@@ -6,6 +6,7 @@ mod compare;
 mod completions;
 mod effects;
 mod evaluate;
+mod exact;
 mod man;
 mod metrics;
 mod new;
@@ -83,6 +84,7 @@ pub enum Format {
 #[derive(Debug, Subcommand)]
 enum Command {
     Evaluate(evaluate::Arguments),
+    Exact(exact::Arguments),
     Effects(effects::Arguments),
     Tolerance(tolerance::Arguments),
     Patterns(patterns::Arguments),
@@ -160,6 +162,7 @@ pub fn run() -> ExitCode {
     let screen = Screen::new(&cli.output);
     let ending = match &cli.command {
         Command::Evaluate(arguments) => evaluate::run(arguments, &screen),
+        Command::Exact(arguments) => exact::run(arguments, &screen),
         Command::Effects(arguments) => effects::run(arguments, &screen),
         Command::Tolerance(arguments) => tolerance::run(arguments, &screen),
         Command::Patterns(arguments) => patterns::run(arguments, &screen),

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindingGraph;
+use crate::search::exact::{Certificate, Status};
 use crate::search::worst_case::WorstCase;
 use crate::units::deg_per_h_from_rad_per_s;
 
@@ -84,6 +85,45 @@ impl PatternJson {
 pub struct EvaluateJson {
     pub model: String,
     pub patterns: Vec<PatternJson>,
+}
+
+/// What was proved about the best pattern.
+#[derive(Debug, Clone, Serialize)]
+pub struct ProofJson {
+    /// "optimal", "gap" or "none".
+    pub status: String,
+    /// No pattern of the class has a smaller worst rate; null where nothing was proved.
+    pub lower_bound_deg_per_h: Option<f64>,
+}
+
+impl ProofJson {
+    pub fn none() -> Self {
+        Self { status: Status::None.to_string(), lower_bound_deg_per_h: None }
+    }
+
+    pub fn of(certificate: &Certificate) -> Self {
+        let bound = deg_per_h_from_rad_per_s(certificate.lower_bound_rad_per_s);
+        Self {
+            status: certificate.status.to_string(),
+            lower_bound_deg_per_h: (certificate.status != Status::None).then_some(bound),
+        }
+    }
+}
+
+/// The answer of `exact`.
+#[derive(Debug, Serialize)]
+pub struct ExactJson {
+    pub model: String,
+    pub windability: String,
+    pub best: PatternJson,
+    pub proof: ProofJson,
+    /// Nodes whose bound was computed; the same on every machine unless the clock ended the proof.
+    pub nodes: u64,
+    /// Patterns judged on all samples.
+    pub judged: u64,
+    /// Samples that the last pass refuted by.
+    pub rows: usize,
+    pub seconds: f64,
 }
 
 #[derive(Debug, Serialize)]

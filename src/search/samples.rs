@@ -124,6 +124,26 @@ impl SampleMatrix {
         Self { layout: self.layout, columns: self.columns.select(samples), lengths_m: self.lengths_m.clone() }
     }
 
+    /// The same matrix with further samples behind the others.
+    pub fn extended(&self, responses: &[WeightResponse]) -> Self {
+        let layout = self.layout;
+        let longer = |column: &[f64], of: &dyn Fn(&WeightResponse) -> f64| {
+            column.iter().copied().chain(responses.iter().map(of)).collect::<Vec<f64>>()
+        };
+        let columns: Vec<Vec<f64>> = (0..layout.columns())
+            .map(|k| {
+                let layer = k % layout.layers;
+                longer(self.columns.column(k), &|r| match k / layout.layers {
+                    0 => r.half_a_rad_per_s_m2[layer],
+                    1 if !layout.halves_alike => r.half_b_rad_per_s_m2[layer],
+                    _ => r.axial_rad_per_s_m2[layer],
+                })
+            })
+            .collect();
+        let constant = longer(self.columns.constant(), &|r| r.constant_rad_per_s);
+        Self { layout, columns: Columns::new(&constant, &columns), lengths_m: self.lengths_m.clone() }
+    }
+
     /// The same matrix with every sample multiplied by its own factor.
     pub fn scaled(&self, factors: &[f64]) -> Self {
         let scale = |column: &[f64]| column.iter().zip(factors).map(|(v, f)| v * f).collect::<Vec<f64>>();

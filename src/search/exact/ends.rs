@@ -6,11 +6,9 @@
 //! that stays under the limit. What signs are left over are tried one choice after the other. Where a pattern's mirror
 //! image has the opposite error, the outermost sign is fixed.
 
-use std::ops::ControlFlow;
-
 use rayon::prelude::*;
 
-use super::judge::{Finding, Judge};
+use super::judge::Judge;
 use super::pairs::{Matching, Step, Target, Tree};
 use super::rows::{Range, Row};
 use super::{Outcome, Watch};
@@ -24,9 +22,6 @@ const ROUNDING: f64 = 1e-6;
 
 /// Pieces of work that are shared out: more than threads, and always the same.
 const SHARES: usize = 256;
-
-/// Patterns that one share may judge in full before it asks for more samples to refute them by.
-const MOST_JUDGED: u64 = 4096;
 
 /// A choice of samples, made ready.
 #[derive(Debug)]
@@ -113,12 +108,7 @@ impl Ends {
                     Step::Pause => watch.pause(),
                     Step::Match { left, right } => {
                         let segments = segments_of_signs(&self.high(choice, left, right));
-                        mine.judge(judge, &segments, limit_rad_per_s);
-                        if mine.judged > MOST_JUDGED {
-                            mine.overflowed = true;
-                            return ControlFlow::Break(());
-                        }
-                        watch.pause()
+                        mine.judge(judge, &segments, limit_rad_per_s, watch)
                     }
                 });
                 mine.complete = end.is_continue();
@@ -155,26 +145,3 @@ fn sign_columns(row: &Row, lengths_m: &[f64]) -> Vec<f64> {
     columns.remove(0);
     columns
 }
-
-impl Outcome {
-    /// Judges one pattern and keeps what comes of it.
-    pub(super) fn judge(&mut self, judge: &Judge, segments: &[usize], limit_rad_per_s: f64) {
-        self.judged += 1;
-        let limit = self.best.as_ref().map_or(limit_rad_per_s, |b| b.rate_rad_per_s);
-        match judge.judge(segments, limit) {
-            Finding::Better(candidate) => {
-                self.best = Some(match self.best.take() {
-                    Some(best) => best.better(candidate),
-                    None => candidate,
-                });
-            }
-            Finding::Refuted { sample: Some(sample) } if self.refuting.len() < MOST_REFUTING => {
-                self.refuting.push(sample);
-            }
-            Finding::Refuted { .. } => {}
-        }
-    }
-}
-
-/// Refuting samples that one share remembers.
-const MOST_REFUTING: usize = 64;

@@ -1,13 +1,17 @@
 //! Full judgement of the few patterns that a search cannot refute on its own samples.
 
+use std::ops::ControlFlow;
+
 use rayon::prelude::*;
 
+use super::{Outcome, Watch};
 use crate::coil::Coil;
 use crate::pattern::Pattern;
 use crate::rate::{CoilModel, LayerWeights, RateError};
 use crate::search::columns::BLOCK;
-use crate::search::samples::SampleMatrix;
+use crate::search::samples::{SampleMatrix, any_rate_model};
 use crate::search::worst_case::{SearchError, SolvedProfiles};
+use crate::thermal::Instant;
 
 /// A pattern and its worst rate by the reference, refined in time.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,15 +28,27 @@ impl Candidate {
     }
 }
 
+/// A time of a profile.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Peak {
+    pub profile: usize,
+    pub time_s: f64,
+}
+
 /// What was found out about a pattern.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Finding {
-    /// Its worst rate is not below the limit; the sample that shows it, if one does.
+    /// Its worst rate is not below the limit, as a sample shows.
     Refuted {
-        sample: Option<usize>,
+        sample: usize,
     },
+    /// It is not below the limit, but only between samples.
+    RefutedBetween(Peak),
     Better(Candidate),
 }
+
+/// Instants of one profile closer than this share of its duration are one sample.
+const SAME_INSTANT: f64 = 1e-7;
 
 /// Every sample of the solved profiles, and the reference behind them.
 #[derive(Debug)]
@@ -40,6 +56,8 @@ pub struct Judge<'a> {
     model: &'a CoilModel,
     solved: &'a SolvedProfiles,
     coil: Coil,
+    /// Instants between the profiles' own samples, in the order of the samples that they became.
+    peaks: Vec<Peak>,
     matrix: SampleMatrix,
     /// Samples in the order in which they are tried, and the same matrix in that order.
     order: Vec<usize>,
@@ -52,10 +70,10 @@ impl<'a> Judge<'a> {
     pub fn new(model: &'a CoilModel, solved: &'a SolvedProfiles) -> Result<Self, SearchError> {
         let (matrix, _) = SampleMatrix::of_profiles(model, solved)?;
         let order = (0..matrix.samples()).collect();
-        Ok(Self { model, solved, coil: model.wound_coil()?, ordered: matrix.clone(), matrix, order })
+        Ok(Self { model, solved, coil: model.wound_coil()?, peaks: Vec::new(), ordered: matrix.clone(), matrix, order })
     }
 
-    /// All samples, in their own order.
+    /// Every sample of the profiles in order, then those that were added.
     pub fn matrix(&self) -> &SampleMatrix {
         &self.matrix
     }
@@ -75,8 +93,45 @@ impl<'a> Judge<'a> {
     /// # Errors
     /// A pattern of another layer count.
     pub fn candidate(&self, pattern: &Pattern) -> Result<Candidate, SearchError> {
+        Ok(self.candidate_and_peak(pattern)?.0)
+    }
+
+    fn candidate_and_peak(&self, pattern: &Pattern) -> Result<(Candidate, Peak), SearchError> {
         let worst = self.solved.worst_case(self.model, pattern)?;
-        Ok(Candidate { rate_rad_per_s: worst.rate_rad_per_s.abs(), segments: pattern.segments().to_vec() })
+        let candidate = Candidate { rate_rad_per_s: worst.rate_rad_per_s.abs(), segments: pattern.segments().to_vec() };
+        Ok((candidate, Peak { profile: worst.profile_index, time_s: worst.time_s }))
+    }
+
+    /// The times at which given patterns are worst.
+    ///
+    /// # Errors
+    /// A pattern of another layer count.
+    pub fn peaks_of(&self, patterns: &[Pattern]) -> Result<Vec<Peak>, SearchError> {
+        patterns.iter().map(|pattern| Ok(self.candidate_and_peak(pattern)?.1)).collect()
+    }
+
+    /// Makes samples of instants; false if none of them is new.
+    pub fn add_peaks(&mut self, peaks: &[Peak]) -> bool {
+        let any = any_rate_model(self.model).expect("the model was compiled before");
+        let mut responses = Vec::new();
+        for peak in peaks {
+            let solved = &self.solved.profiles()[peak.profile];
+            let same_s = SAME_INSTANT * solved.profile.duration_s();
+            let is_known = |known: &Peak| known.profile == peak.profile && (known.time_s - peak.time_s).abs() <= same_s;
+            if !self.peaks.iter().any(is_known) {
+                self.peaks.push(*peak);
+                let history = solved.field.at(&[Instant::after(peak.time_s)]);
+                responses.push(any.weight_response(&any.state(&history, 0, &[])));
+            }
+        }
+        if responses.is_empty() {
+            return false;
+        }
+        let from = self.matrix.samples();
+        self.matrix = self.matrix.extended(&responses);
+        let added: Vec<usize> = (from..self.matrix.samples()).collect();
+        self.try_first(&added);
+        true
     }
 
     /// Whether a pattern's worst rate is below a limit: first by the samples, then by the reference.
@@ -101,12 +156,15 @@ impl<'a> Judge<'a> {
                 }
             }
             if worst >= limit_rad_per_s {
-                return Finding::Refuted { sample: Some(self.order[from + at]) };
+                return Finding::Refuted { sample: self.order[from + at] };
             }
         }
-        match self.candidate(&pattern) {
-            Ok(candidate) if candidate.rate_rad_per_s < limit_rad_per_s => Finding::Better(candidate),
-            _ => Finding::Refuted { sample: None },
+        let (candidate, peak) =
+            self.candidate_and_peak(&pattern).expect("a search makes patterns of the coil's layers");
+        if candidate.rate_rad_per_s < limit_rad_per_s {
+            Finding::Better(candidate)
+        } else {
+            Finding::RefutedBetween(peak)
         }
     }
 
@@ -146,14 +204,55 @@ impl<'a> Judge<'a> {
         chosen
     }
 
-    /// Tries these samples first from now on.
+    /// Tries these samples first from now on, and the others in the order that they have.
     pub fn try_first(&mut self, samples: &[usize]) {
         let mut is_first = vec![false; self.matrix.samples()];
         for &s in samples {
             is_first[s] = true;
         }
-        let rest = (0..is_first.len()).filter(|&s| !is_first[s]);
+        let rest: Vec<usize> = self.order.iter().copied().filter(|&s| !is_first[s]).collect();
         self.order = samples.iter().copied().chain(rest).collect();
         self.ordered = self.matrix.select(&self.order);
     }
 }
+
+impl Outcome {
+    /// Judges one pattern and keeps what comes of it; breaks off where the samples refute too little.
+    pub(super) fn judge(
+        &mut self,
+        judge: &Judge,
+        segments: &[usize],
+        limit_rad_per_s: f64,
+        watch: &Watch,
+    ) -> ControlFlow<()> {
+        self.judged += 1;
+        let limit = self.best.as_ref().map_or(limit_rad_per_s, |b| b.rate_rad_per_s);
+        match judge.judge(segments, limit) {
+            Finding::Better(candidate) => {
+                self.best = Some(match self.best.take() {
+                    Some(best) => best.better(candidate),
+                    None => candidate,
+                });
+            }
+            Finding::Refuted { sample } if self.refuting.len() < MOST_REFUTING => self.refuting.push(sample),
+            Finding::Refuted { .. } => {}
+            Finding::RefutedBetween(peak) => self.between.push(peak),
+        }
+        let too_much = self.judged > MOST_JUDGED || self.between.len() > MOST_BETWEEN;
+        if watch.may_overflow && too_much {
+            self.overflowed = true;
+            return ControlFlow::Break(());
+        }
+        watch.pause()
+    }
+}
+
+/// Refuting samples that one share remembers.
+const MOST_REFUTING: usize = 64;
+
+/// Patterns that one share may judge on all samples before it asks for more samples to refute them by.
+const MOST_JUDGED: u64 = 4096;
+
+/// Patterns that one share may judge by the reference in vain, which takes a thousand times longer, before it asks for
+/// samples at the instants that refuted them.
+const MOST_BETWEEN: usize = 3;

@@ -39,7 +39,7 @@ pub use starts::starting_patterns;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use judge::{Candidate, Judge};
+use judge::{Candidate, Judge, Peak};
 use sampling::Proof;
 
 use super::worst_case::{SearchError, SolvedProfiles};
@@ -180,12 +180,14 @@ pub fn prove(task: &Task, starts: &[Pattern], watcher: Watcher) -> Result<Certif
     let mut best: Option<Candidate> = None;
     for start in starts.iter().filter(|p| task.class.admits(p)) {
         let candidate = judge.candidate(start)?;
-        best = Some(match best {
-            Some(best) => best.better(candidate),
-            None => candidate,
-        });
+        // Of starts that are equally good, the first: it may be one that has a name.
+        let is_better = |b: &Candidate| candidate.rate_rad_per_s < b.rate_rad_per_s * (1.0 - RELATIVE_TOLERANCE);
+        if best.as_ref().is_none_or(is_better) {
+            best = Some(candidate);
+        }
     }
     let mut best = best.ok_or(SearchError::NoStart { class: task.class })?;
+    judge.add_peaks(&judge.peaks_of(starts)?);
     let mut proof = Proof::new(task.class, &mut judge, starts, best.rate_rad_per_s);
     let mut lower_bound_rad_per_s = 0.0;
     let mut closed = best.rate_rad_per_s == 0.0;
@@ -196,9 +198,9 @@ pub fn prove(task: &Task, starts: &[Pattern], watcher: Watcher) -> Result<Certif
         let Pass { over_best, most_nodes } = passes.next();
         let at =
             Progress { best_rad_per_s: best.rate_rad_per_s, lower_bound_rad_per_s, pass: over_best, share_done: 0.0 };
-        let watch = Watch { stop: &stop, watcher, at, most_nodes };
+        let mut watch = Watch { stop: &stop, watcher, at, most_nodes, may_overflow: true };
         let limit = best.rate_rad_per_s * over_best * (1.0 - RELATIVE_TOLERANCE);
-        let outcome = proof.pass(&mut judge, limit, &watch);
+        let outcome = proof.pass(&mut judge, limit, &mut watch);
         nodes += outcome.nodes;
         judged += outcome.judged;
         if let Some(candidate) = outcome.best {
@@ -245,11 +247,21 @@ pub struct Outcome {
     pub best: Option<Candidate>,
     /// Samples that refuted what was judged.
     pub refuting: Vec<usize>,
+    /// Instants between samples that refuted what no sample did.
+    pub between: Vec<Peak>,
 }
 
 impl Default for Outcome {
     fn default() -> Self {
-        Self { complete: true, overflowed: false, nodes: 0, judged: 0, best: None, refuting: Vec::new() }
+        Self {
+            complete: true,
+            overflowed: false,
+            nodes: 0,
+            judged: 0,
+            best: None,
+            refuting: Vec::new(),
+            between: Vec::new(),
+        }
     }
 }
 
@@ -261,6 +273,7 @@ impl Outcome {
         self.nodes += other.nodes;
         self.judged += other.judged;
         self.refuting.extend(other.refuting);
+        self.between.extend(other.between);
         self.best = match (self.best.take(), other.best) {
             (Some(a), Some(b)) => Some(a.better(b)),
             (a, b) => a.or(b),
@@ -275,6 +288,8 @@ pub struct Watch<'a> {
     at: Progress,
     /// The pass ends incomplete beyond so many.
     pub most_nodes: u64,
+    /// A piece of work gives up where too much is left to be judged in full, so that samples can be added.
+    pub may_overflow: bool,
 }
 
 impl Watch<'_> {

@@ -298,9 +298,6 @@ const UNEVENNESS: u64 = 8;
 
 const NODES_PER_PAUSE: u64 = 1 << 12;
 
-/// Patterns that one share may judge in full before it asks for more samples to refute them by.
-const MOST_JUDGED: u64 = 4096;
-
 impl Orders {
     /// Every pattern that may stay under the limit is judged.
     pub fn search(&self, judge: &Judge, limit_rad_per_s: f64, mirrored: bool, watch: &Watch) -> Outcome {
@@ -352,12 +349,7 @@ struct Dive<'a, 'w> {
 impl Dive<'_, '_> {
     fn descend(&mut self, node: &Node) -> ControlFlow<()> {
         if node.open == 0 {
-            self.found.judge(self.judge, &Orders::segments(node), self.limit_rad_per_s);
-            if self.found.judged > MOST_JUDGED {
-                self.found.overflowed = true;
-                return ControlFlow::Break(());
-            }
-            return self.watch.pause();
+            return self.found.judge(self.judge, &Orders::segments(node), self.limit_rad_per_s, self.watch);
         }
         for child in self.orders.children(node, self.mirrored) {
             self.found.nodes += 1;

@@ -85,8 +85,8 @@ impl Proof {
     }
 
     /// Judges every pattern whose worst rate may be below the limit.
-    pub fn pass(&mut self, judge: &mut Judge, limit_rad_per_s: f64, watch: &Watch) -> Outcome {
-        let mut earlier = Outcome::default();
+    pub fn pass(&mut self, judge: &mut Judge, limit_rad_per_s: f64, watch: &mut Watch) -> Outcome {
+        let mut whole = Outcome::default();
         loop {
             let outcome = match &self.engine {
                 Engine::Ends(ends) => ends.search(judge, limit_rad_per_s, watch),
@@ -98,38 +98,46 @@ impl Proof {
                     outcome
                 }
             };
-            let repeat = outcome.overflowed && !watch.is_stopped() && self.add(judge, &outcome.refuting);
-            let last = Outcome { complete: outcome.complete, ..outcome };
-            if !repeat {
-                let complete = last.complete;
-                earlier.absorb(last);
-                earlier.complete = complete;
-                return earlier;
+            let complete = outcome.complete;
+            let repeat = outcome.overflowed && !watch.is_stopped();
+            if repeat && !self.add(judge, &outcome) {
+                watch.may_overflow = false;
             }
-            earlier.absorb(last);
+            whole.absorb(outcome);
+            if !repeat {
+                whole.complete = complete;
+                return whole;
+            }
         }
     }
 
-    /// Takes in the samples that refuted most; false if there is no room or nothing new.
-    fn add(&mut self, judge: &mut Judge, refuting: &[usize]) -> bool {
-        let most = if self.class == WindabilityClass::Standard { MOST_ENDS_ROWS } else { MOST_ORDERS_ROWS };
-        let mut sorted = refuting.to_vec();
+    /// Takes in the samples that refuted most, and the instants at which only the reference could; false if there is
+    /// no room or nothing new.
+    fn add(&mut self, judge: &mut Judge, outcome: &Outcome) -> bool {
+        let first_new = judge.matrix().samples();
+        let mut joining: Vec<usize> = Vec::new();
+        if judge.add_peaks(&outcome.between) {
+            joining.extend(first_new..judge.matrix().samples());
+        }
+        let has_new_instants = !joining.is_empty();
+        let mut sorted = outcome.refuting.clone();
         sorted.sort_unstable();
         let mut counted: Vec<(usize, usize)> = sorted.chunk_by(|a, b| a == b).map(|c| (c.len(), c[0])).collect();
         counted.sort_by_key(|&(count, sample)| (std::cmp::Reverse(count), sample));
+        joining.extend(counted.into_iter().map(|(_, sample)| sample));
+        let most = if self.class == WindabilityClass::Standard { MOST_ENDS_ROWS } else { MOST_ORDERS_ROWS };
         let room = most.min(2 * self.samples.len());
         let before = self.samples.len();
-        for (_, sample) in counted {
+        for sample in joining {
             if self.samples.len() < room && !self.samples.contains(&sample) {
                 self.samples.push(sample);
             }
         }
-        if self.samples.len() == before {
-            return false;
+        if self.samples.len() > before {
+            self.engine = Self::engine(self.class, judge, &self.samples, self.mirrored);
+            judge.try_first(&self.samples);
         }
-        self.engine = Self::engine(self.class, judge, &self.samples, self.mirrored);
-        judge.try_first(&self.samples);
-        true
+        has_new_instants || self.samples.len() > before
     }
 }
 

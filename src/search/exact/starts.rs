@@ -17,7 +17,7 @@ const SHORTENED: u64 = 8;
 /// Patterns of the search that are kept.
 const MOST_FOUND: usize = 6;
 
-/// The classics of the class and the best patterns of a short search; the same seed gives the same patterns.
+/// The classics of the class, then the best patterns of a short search; the same seed gives the same patterns.
 ///
 /// # Errors
 /// Effects that leave a layer no turns; rates that are not finite.
@@ -41,5 +41,5 @@ pub fn starting_patterns(task: &Task, seed: u64) -> Result<Vec<Pattern>, SearchE
     while search.advance() {}
     let found = search.state().found.iter().take(MOST_FOUND);
     let found = found.map(|f| Pattern::new(f.segments.clone()).expect("a walk visits permutations only"));
-    Ok(found.chain(classics).collect())
+    Ok(classics.into_iter().chain(found).collect())
 }
