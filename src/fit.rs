@@ -53,6 +53,8 @@ pub struct Effort {
     /// Evaluations of the residuals that the optimiser may spend, per parameter (derivatives not counted).
     pub evaluations_per_parameter: usize,
     pub differences: Differences,
+    /// Whether the covariance is wanted too; it costs two evaluations a parameter.
+    pub standard_errors: bool,
 }
 
 /// How derivatives are taken while searching; those of the covariance are always central.
@@ -64,10 +66,19 @@ pub enum Differences {
 
 impl Effort {
     /// As exact as double precision allows.
-    pub const EXACT: Self =
-        Self { tolerance: 1e-14, evaluations_per_parameter: 2000, differences: Differences::Central };
+    pub const EXACT: Self = Self {
+        tolerance: 1e-14,
+        evaluations_per_parameter: 2000,
+        differences: Differences::Central,
+        standard_errors: true,
+    };
     /// Enough to see a standard error's tenth.
-    pub const QUICK: Self = Self { tolerance: 1e-5, evaluations_per_parameter: 15, differences: Differences::Forward };
+    pub const QUICK: Self = Self {
+        tolerance: 1e-5,
+        evaluations_per_parameter: 15,
+        differences: Differences::Forward,
+        standard_errors: false,
+    };
 }
 
 /// Why a fit ended.
@@ -84,7 +95,7 @@ pub enum Ending {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
     pub parameters: Vec<f64>,
-    /// None where a parameter is at a bound or the residuals do not depend on it.
+    /// None where a parameter is at a bound, where the residuals do not depend on it, or where none were asked for.
     pub standard_errors: Vec<Option<f64>>,
     pub at_bound: Vec<bool>,
     /// Row-major; zero in rows and columns of parameters without a standard error.
@@ -168,7 +179,11 @@ pub fn least_squares(
     }
     let at_minimum = counted(&found).ok_or(FitError::NotFinite)?;
     let at_bound: Vec<bool> = found.iter().zip(parameters).map(|(v, p)| is_at_bound(*v, p)).collect();
-    let (covariance, standard_errors) = covariance(&found, parameters, &at_bound, &at_minimum, &counted);
+    let (covariance, standard_errors) = if effort.standard_errors {
+        covariance(&found, parameters, &at_bound, &at_minimum, &counted)
+    } else {
+        (vec![0.0; found.len() * found.len()], vec![None; found.len()])
+    };
     let sum_of_squares = at_minimum.iter().map(|r| r * r).sum();
     let degrees_of_freedom = at_minimum.len().saturating_sub(parameters.len()).max(1);
     Ok(Fit {

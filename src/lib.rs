@@ -20,6 +20,7 @@ pub mod rate;
 // Floor 4: what is done with it.
 pub mod boundary;
 pub mod compare;
+pub mod diagnose;
 pub mod fit;
 pub mod metrics;
 pub mod predict;

@@ -145,7 +145,7 @@ pub fn layer_gains_rad_per_k(model: &CoilModel, pattern: &Pattern) -> Result<Vec
 }
 
 /// The measured ambient as a drive, if the record has a complete one.
-fn measured_ambient(record: &Record) -> Option<PiecewiseLinear> {
+pub(crate) fn measured_ambient(record: &Record) -> Option<PiecewiseLinear> {
     let values = record.ambient_k()?;
     PiecewiseLinear::new(record.times_s().to_vec(), values.to_vec()).ok()
 }

@@ -179,6 +179,23 @@ impl Boundary {
         Drive { boundary_k, ambient_k: Some(self.air_k.clone()) }
     }
 
+    /// The drive if the sensor lagged by `further_lag_s` more than was taken into account: T + Δτ dT/dt.
+    pub fn delayed_drive(&self, location: Location, further_lag_s: f64) -> Drive {
+        let drive = self.drive(location);
+        if further_lag_s == 0.0 {
+            return drive;
+        }
+        let knots = drive.boundary_k.knots();
+        let values = (0..knots.len())
+            .map(|i| {
+                let slope = 0.5 * (drive.boundary_k.slope_before(knots[i]) + drive.boundary_k.slope_after(knots[i]));
+                drive.boundary_k.values()[i] + further_lag_s * slope
+            })
+            .collect();
+        let boundary_k = PiecewiseLinear::new(knots.to_vec(), values).expect("the knots are those of the boundary");
+        Drive { boundary_k, ..drive }
+    }
+
     /// The whitening of rate residuals whose covariance is that of white noise plus that of the boundary's error.
     ///
     /// # Errors

@@ -1,6 +1,7 @@
 //! Mathematics without domain words; what a well-kept library has is called, not written again.
 
 pub mod allan;
+pub mod despike;
 pub mod expression;
 pub mod maximise;
 pub mod piecewise;

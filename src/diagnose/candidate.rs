@@ -1,0 +1,157 @@
+//! What may be missing: the effects that a model lacks, as things to fit.
+
+use crate::effect::{Acts, CATALOGUE, DeclaredEffect, EffectSpec};
+use crate::rate::CoilModel;
+use crate::record::Record;
+use crate::units::Unit;
+
+/// An effect to try, with the parameters to fit and the points to start from.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    pub effect: DeclaredEffect,
+    /// Indices of the fitted parameters; the others keep their values.
+    pub free: Vec<usize>,
+    /// All parameters in SI, one vector a start.
+    pub starts: Vec<Vec<f64>>,
+}
+
+/// Effects that say what a rate follows, not why.
+const EMPIRICAL: [&str; 4] =
+    ["bias_temperature", "bias_temperature_rate", "bias_gradient_rate", "heating_cooling_asymmetry"];
+/// Effects that are no physics of their own but a wrong number in the model file.
+const DECLARED: [&str; 2] = ["diffusivity", "thermo_optic"];
+/// Starts a candidate has at most.
+const MAX_STARTS: usize = 6;
+
+impl Candidate {
+    pub fn kind(&self) -> String {
+        self.effect.kind()
+    }
+
+    pub fn is_empirical(&self) -> bool {
+        is_empirical(&self.effect)
+    }
+
+    /// Whether the boundary's estimate depends on it.
+    pub fn moves_sensor(&self) -> bool {
+        self.effect.spec().acts == Acts::Sensor
+    }
+
+    pub fn moves_heat(&self) -> bool {
+        self.effect.spec().acts == Acts::HeatPath
+    }
+}
+
+pub fn is_empirical(effect: &DeclaredEffect) -> bool {
+    EMPIRICAL.contains(&effect.spec().kind) || effect.spec().kind == crate::effect::CHANNEL.kind
+}
+
+/// Whether an effect is a factor on a declared number.
+pub fn is_declared_number(effect: &DeclaredEffect) -> bool {
+    DECLARED.contains(&effect.spec().kind)
+}
+
+/// Everything of the catalogue that the model does not have, and every further column that all records share.
+pub(super) fn candidates(model: &CoilModel, records: &[&Record]) -> Vec<Candidate> {
+    let present: Vec<String> = model.effects.iter().map(DeclaredEffect::kind).collect();
+    let temperatures = temperature_quartiles_k(records);
+    let mut all = Vec::new();
+    for spec in CATALOGUE.iter().filter(|s| !present.iter().any(|p| p == s.kind)) {
+        let count: usize = spec.choices.iter().map(|c| c.options.len()).product();
+        for index in 0..count.max(1) {
+            all.extend(of_spec(spec, choices_of(spec, index), &temperatures));
+        }
+    }
+    if let Some((first, others)) = records.split_first() {
+        for channel in first.channels() {
+            let varies = channel.values.iter().all(|v| v.is_finite())
+                && channel.values.iter().any(|v| (v - channel.values[0]).abs() > 1e-9 * channel.values[0].abs());
+            let shared = others
+                .iter()
+                .all(|r| r.channels().iter().any(|c| c.name == channel.name && c.values.iter().all(|v| v.is_finite())));
+            let declared = present.contains(&format!("channel:{}", channel.name));
+            if varies && shared && !declared {
+                let start = crate::effect::CHANNEL.parameters[0];
+                let effect = DeclaredEffect::channel(channel.name.clone(), start.unit.to_si(start.start));
+                let starts = vec![effect.values().to_vec()];
+                all.push(Candidate { effect, free: vec![0], starts });
+            }
+        }
+    }
+    all
+}
+
+/// The `index`-th combination of choices.
+fn choices_of(spec: &EffectSpec, mut index: usize) -> Vec<usize> {
+    spec.choices
+        .iter()
+        .map(|choice| {
+            let chosen = index % choice.options.len();
+            index /= choice.options.len();
+            chosen
+        })
+        .collect()
+}
+
+/// The effect with its needed parameters alone, and with the optional ones too.
+fn of_spec(spec: &'static EffectSpec, choices: Vec<usize>, temperatures_k: &[f64]) -> Vec<Candidate> {
+    let all: Vec<usize> = (0..spec.parameters.len()).collect();
+    let mut needed: Vec<usize> = all.iter().copied().filter(|&i| spec.parameters[i].default.is_none()).collect();
+    if needed.is_empty() && !all.is_empty() {
+        needed.push(0);
+    }
+    let mut frees = vec![needed];
+    if frees[0] != all {
+        frees.push(all);
+    }
+    frees
+        .into_iter()
+        .filter_map(|free| {
+            let values: Vec<f64> = spec
+                .parameters
+                .iter()
+                .enumerate()
+                .map(|(i, p)| p.unit.to_si(if free.contains(&i) { p.start } else { p.default.unwrap_or(p.start) }))
+                .collect();
+            let effect = DeclaredEffect::new(spec, values.clone(), choices.clone()).ok()?;
+            let mut starts = vec![values];
+            for &parameter in &free {
+                let options = starts_of(spec, parameter, temperatures_k);
+                starts = starts
+                    .iter()
+                    .flat_map(|start| {
+                        options.iter().map(move |&option| {
+                            let mut moved = start.clone();
+                            moved[parameter] = option;
+                            moved
+                        })
+                    })
+                    .collect();
+            }
+            starts.truncate(MAX_STARTS);
+            Some(Candidate { effect, free, starts })
+        })
+        .collect()
+}
+
+/// Where to start a parameter: once if the response is linear in it, else at several points.
+fn starts_of(spec: &EffectSpec, parameter: usize, temperatures_k: &[f64]) -> Vec<f64> {
+    let p = spec.parameters[parameter];
+    let stated: Vec<f64> = match p.unit {
+        Unit::Celsius => return temperatures_k.to_vec(),
+        _ if p.lower > 0.0 && p.upper / p.lower >= 100.0 => vec![p.start, 0.2 * p.start, 5.0 * p.start],
+        Unit::Second => vec![p.start, 4.0 * p.start],
+        _ => vec![p.start],
+    };
+    stated.into_iter().map(|v| p.unit.to_si(v.clamp(p.lower, p.upper))).collect()
+}
+
+fn temperature_quartiles_k(records: &[&Record]) -> Vec<f64> {
+    let mut all: Vec<f64> = records.iter().flat_map(|r| r.temperature_k().iter().copied()).collect();
+    all.sort_by(f64::total_cmp);
+    let (low, high) = match (all.first(), all.last()) {
+        (Some(low), Some(high)) => (*low, *high),
+        _ => return Vec::new(),
+    };
+    [0.5, 0.25, 0.75].iter().map(|share| low + share * (high - low)).collect()
+}

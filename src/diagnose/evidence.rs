@@ -1,0 +1,260 @@
+//! Records made ready for many models: their boundaries, the whitening of their residuals, their noise.
+
+use std::sync::{Arc, Mutex};
+
+use rayon::prelude::*;
+
+use super::DiagnoseError;
+use crate::boundary::{Boundary, RateWhitener};
+use crate::numeric::despike::despike;
+use crate::pattern::Pattern;
+use crate::predict::{estimate_boundary, noise_floor_rad_per_s, rates_rad_per_s};
+use crate::rate::CoilModel;
+use crate::record::Record;
+use crate::thermal::{self, HeatPath, Location, ThermalHistory};
+
+/// What a record is used for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Role {
+    Fit,
+    Holdout,
+}
+
+/// All records, and how a model's residuals over them are weighed.
+pub(super) struct Evidence<'a> {
+    pub pattern: &'a Pattern,
+    pub cases: Vec<Case>,
+}
+
+/// One record.
+pub(super) struct Case {
+    pub record: Record,
+    pub role: Role,
+    pub noise_rad_per_s: f64,
+    /// Rows whose rate was a gross outlier.
+    pub outliers: usize,
+    anchors: Vec<Anchor>,
+    recent: Mutex<Vec<Arc<Solved>>>,
+}
+
+/// A boundary estimated for one way in which the sensor may be connected to the pack.
+struct Anchor {
+    location: Location,
+    lag_s: f64,
+    boundary: Boundary,
+    whitener: RateWhitener,
+    /// The measured rates and a constant of one noise, whitened; the latter of unit length.
+    measured: Vec<f64>,
+    one: Vec<f64>,
+}
+
+/// A field that was solved lately.
+struct Solved {
+    path: HeatPath,
+    anchor: usize,
+    lag_s: f64,
+    history: ThermalHistory,
+}
+
+/// Fields kept for models that differ only in what is done with them.
+const KEPT_FIELDS: usize = 4;
+/// Outliers are further from their neighbours than this many noise floors.
+const OUTLIER_NOISES: f64 = 12.0;
+
+impl<'a> Evidence<'a> {
+    /// Cleans the records and estimates their boundaries under the declared model.
+    ///
+    /// # Errors
+    /// Records that say nothing about the model, models that cannot be solved.
+    pub fn new(
+        model: &CoilModel,
+        pattern: &'a Pattern,
+        records: &[Record],
+        holdout: &[Record],
+    ) -> Result<Self, DiagnoseError> {
+        let with_role = |records: &[Record], role| records.iter().map(|r| Case::new(r, role)).collect::<Vec<_>>();
+        let mut cases = with_role(records, Role::Fit);
+        cases.extend(with_role(holdout, Role::Holdout));
+        let mut evidence = Self { pattern, cases };
+        evidence.anchor(model)?;
+        for case in &evidence.cases {
+            case.check()?;
+        }
+        Ok(evidence)
+    }
+
+    /// Estimates every record's boundary under a model; replaces an estimate for the same sensor.
+    ///
+    /// # Errors
+    /// As [`Evidence::new`].
+    pub fn anchor(&mut self, model: &CoilModel) -> Result<(), DiagnoseError> {
+        let pattern = self.pattern;
+        let anchors = self
+            .cases
+            .par_iter()
+            .map(|case| case.estimate(model, pattern))
+            .collect::<Result<Vec<_>, DiagnoseError>>()?;
+        for (case, anchor) in self.cases.iter_mut().zip(anchors) {
+            case.anchors.retain(|a| a.location != anchor.location || a.lag_s != anchor.lag_s);
+            case.anchors.push(anchor);
+            case.recent = Mutex::default();
+        }
+        Ok(())
+    }
+
+    /// Number of rows in the records of a role.
+    pub fn rows(&self, role: Role) -> usize {
+        self.cases.iter().filter(|c| c.role == role).map(|c| c.record.rows()).sum()
+    }
+
+    pub fn of(&self, role: Role) -> impl Iterator<Item = &Case> {
+        self.cases.iter().filter(move |c| c.role == role)
+    }
+
+    /// Whitened residuals of a model, each record's offset taken out; None where the model cannot be solved.
+    pub fn residuals(&self, model: &CoilModel, role: Role) -> Option<Vec<f64>> {
+        let mut all = Vec::new();
+        for case in self.of(role) {
+            all.extend(case.residuals(model, self.pattern)?);
+        }
+        Some(all)
+    }
+}
+
+pub(super) fn sum_of_squares(values: &[f64]) -> f64 {
+    values.iter().map(|v| v * v).sum()
+}
+
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+impl Case {
+    fn new(record: &Record, role: Role) -> Self {
+        let noise_rad_per_s = noise_floor_rad_per_s(record);
+        let mut rates = record.rate_rad_per_s().to_vec();
+        let outliers = despike(&mut rates, OUTLIER_NOISES * noise_rad_per_s).len();
+        let record = record.clone().with_rates(rates).unwrap_or_else(|_| record.clone());
+        Self { record, role, noise_rad_per_s, outliers, anchors: Vec::new(), recent: Mutex::default() }
+    }
+
+    /// Whether anything can be learnt from the record.
+    fn check(&self) -> Result<(), DiagnoseError> {
+        let name = || self.record.name().to_owned();
+        if self.noise_rad_per_s <= 0.0 {
+            return Err(DiagnoseError::NoNoise { record: name() });
+        }
+        let temperatures = self.record.temperature_k();
+        let low = temperatures.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = temperatures.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let noise_k = self.anchors.last().map_or(0.0, |a| a.boundary.air().noise_k);
+        let needed_k = LEAST_RANGE_NOISES * noise_k;
+        if high - low < needed_k {
+            return Err(DiagnoseError::TemperatureConstant { record: name(), range_k: high - low, needed_k });
+        }
+        Ok(())
+    }
+
+    fn estimate(&self, model: &CoilModel, pattern: &Pattern) -> Result<Anchor, DiagnoseError> {
+        let boundary = estimate_boundary(model, pattern, &self.record)
+            .map_err(|source| DiagnoseError::Record { record: self.record.name().to_owned(), source })?;
+        if self.noise_rad_per_s <= 0.0 {
+            return Err(DiagnoseError::NoNoise { record: self.record.name().to_owned() });
+        }
+        let whitener = boundary
+            .rate_whitener(self.noise_rad_per_s)
+            .map_err(|e| DiagnoseError::Record { record: self.record.name().to_owned(), source: e.into() })?;
+        let measured = whitener.whiten(self.record.rate_rad_per_s());
+        let mut one = whitener.whiten(&vec![self.noise_rad_per_s; self.record.rows()]);
+        let length = sum_of_squares(&one).sqrt();
+        one.iter_mut().for_each(|v| *v /= length);
+        let location = model.heat_path()?.location;
+        Ok(Anchor { location, lag_s: model.sensor_lag_s(), boundary, whitener, measured, one })
+    }
+
+    /// The anchor for a sensor: that of its place whose lag is nearest.
+    fn anchor_for(&self, location: Location, lag_s: f64) -> Option<usize> {
+        (0..self.anchors.len())
+            .filter(|&i| self.anchors[i].location == location)
+            .min_by(|&a, &b| (self.anchors[a].lag_s - lag_s).abs().total_cmp(&(self.anchors[b].lag_s - lag_s).abs()))
+    }
+
+    /// The pack over each averaging interval under a model.
+    fn solved(&self, model: &CoilModel) -> Option<Arc<Solved>> {
+        let path = model.heat_path().ok()?;
+        let lag_s = model.sensor_lag_s();
+        let anchor = self.anchor_for(path.location, lag_s)?;
+        if let Ok(recent) = self.recent.lock()
+            && let Some(known) = recent.iter().find(|s| s.anchor == anchor && s.lag_s == lag_s && s.path == path)
+        {
+            return Some(known.clone());
+        }
+        let from = &self.anchors[anchor];
+        let mut drive = from.boundary.delayed_drive(path.location, lag_s - from.lag_s);
+        if let Some(measured) = crate::predict::measured_ambient(&self.record) {
+            drive.ambient_k = Some(measured);
+        }
+        let history = thermal::solve(&path, &drive).ok()?.means(self.record.times_s(), model.rate_mean_s);
+        let solved = Arc::new(Solved { path, anchor, lag_s, history });
+        if let Ok(mut recent) = self.recent.lock() {
+            if recent.len() >= KEPT_FIELDS {
+                // The first is that of the declared model, which is asked for most.
+                recent.remove(1);
+            }
+            recent.push(solved.clone());
+        }
+        Some(solved)
+    }
+
+    fn residuals(&self, model: &CoilModel, pattern: &Pattern) -> Option<Vec<f64>> {
+        let solved = self.solved(model)?;
+        let predicted = rates_rad_per_s(model, pattern, &self.record, &solved.history).ok()?;
+        let anchor = &self.anchors[solved.anchor];
+        let mut residuals = anchor.whitener.whiten(&predicted);
+        for (r, m) in residuals.iter_mut().zip(&anchor.measured) {
+            *r = m - *r;
+        }
+        let offset = dot(&residuals, &anchor.one);
+        for (r, one) in residuals.iter_mut().zip(&anchor.one) {
+            *r -= offset * one;
+        }
+        Some(residuals)
+    }
+
+    /// Columns over the rows, whitened under the boundary for a model and with the offset taken out.
+    pub fn whiten_columns(&self, model: &CoilModel, columns: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
+        let anchor = &self.anchors[self.anchor_for(model.heat_path().ok()?.location, model.sensor_lag_s())?];
+        Some(
+            columns
+                .iter()
+                .map(|column| {
+                    let mut whitened = anchor.whitener.whiten(column);
+                    let offset = dot(&whitened, &anchor.one);
+                    whitened.iter_mut().zip(&anchor.one).for_each(|(w, one)| *w -= offset * one);
+                    whitened
+                })
+                .collect(),
+        )
+    }
+
+    /// Σ (Ω_model − mean)²/σ²: how much of the noise the coil's own error is.
+    pub fn signal_square(&self, model: &CoilModel, pattern: &Pattern) -> f64 {
+        let Some(solved) = self.solved(model) else { return 0.0 };
+        let Ok(rates) = rates_rad_per_s(model, pattern, &self.record, &solved.history) else { return 0.0 };
+        let mean = rates.iter().sum::<f64>() / rates.len() as f64;
+        rates.iter().map(|r| ((r - mean) / self.noise_rad_per_s).powi(2)).sum()
+    }
+
+    /// Plain residuals, their mean taken out [rad/s], and the pack under the model.
+    pub fn plain_residuals(&self, model: &CoilModel, pattern: &Pattern) -> Option<(Vec<f64>, ThermalHistory)> {
+        let solved = self.solved(model)?;
+        let predicted = rates_rad_per_s(model, pattern, &self.record, &solved.history).ok()?;
+        let mut residuals: Vec<f64> = self.record.rate_rad_per_s().iter().zip(&predicted).map(|(m, p)| m - p).collect();
+        let mean = residuals.iter().sum::<f64>() / residuals.len() as f64;
+        residuals.iter_mut().for_each(|r| *r -= mean);
+        Some((residuals, solved.history.clone()))
+    }
+}
+
+/// A record whose temperature moves less than this many noises of its sensor says nothing about heat.
+const LEAST_RANGE_NOISES: f64 = 50.0;

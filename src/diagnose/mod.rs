@@ -1,0 +1,218 @@
+//! Which piece of physics a model lacks, judged by records.
+//!
+//! Every effect of the catalogue that the model lacks is fitted to the records as an addition: alone, in pairs, as a
+//! further step and in exchange. Residuals are whitened with the covariance of noise and boundary, so that sums of
+//! squares are χ². An effect stays if the information criterion pays for it and for the search, if it explains data
+//! that it was not fitted to, and if its size is practical. Plain functions of time compete, so that something outside
+//! the catalogue is recognised.
+//!
+//! ```text
+//! χ² = Σ_records (Ω − Ω̂ − Ω_0)ᵀ (σ² 1 + J C Jᵀ)⁻¹ (Ω − Ω̂ − Ω_0)
+//! merit = χ²/s² + p ln n + 6 m,   s² = max(1, χ²_best/n)        p parameters, m effects
+//! ```
+//!
+//! # Source
+//! Schwarz, Ann. Stat. 6 (1978) 461 (the criterion); Golub and Pereyra, Inverse Problems 19 (2003) R1 (linear parameters
+//! projected out); Bartlett, J. R. Stat. Soc. Suppl. 8 (1946) 27 (standard errors under autocorrelation).
+
+mod candidate;
+mod confirm;
+mod evidence;
+mod hypothesis;
+pub mod plain;
+mod search;
+mod verdict;
+
+use thiserror::Error;
+
+use crate::coil::CoilError;
+use crate::effect::DeclaredEffect;
+use crate::pattern::Pattern;
+use crate::predict::PredictError;
+use crate::rate::CoilModel;
+use crate::record::Record;
+use crate::units::Unit;
+
+pub use candidate::{is_declared_number, is_empirical};
+pub use plain::{Plain, Shape};
+
+/// What is asked.
+#[derive(Debug, Clone, Copy)]
+pub struct Request<'a> {
+    pub model: &'a CoilModel,
+    pub pattern: &'a Pattern,
+    /// Fitted to.
+    pub records: &'a [Record],
+    /// Only judged by.
+    pub holdout: &'a [Record],
+}
+
+/// The answer in one word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// Nothing is missing that these records could show.
+    Adequate,
+    /// These effects are missing.
+    Missing,
+    /// Several effects explain the records equally well.
+    Indistinguishable,
+    /// Something is there that no combination of known effects explains.
+    Unexplained,
+}
+
+/// A fitted parameter; value and error in SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedParameter {
+    pub key: String,
+    pub unit: Unit,
+    pub value: f64,
+    /// With the residuals' autocorrelation; None at a bound or where the records do not determine it.
+    pub standard_error: Option<f64>,
+    pub at_bound: bool,
+    /// Whether it was fitted at all.
+    pub fitted: bool,
+}
+
+/// Another effect that would do in the place of an accepted one.
+#[derive(Debug, Clone)]
+pub struct Equivalent {
+    pub effect: DeclaredEffect,
+    /// By how much χ² is larger with it, over all records, hold-out included.
+    pub chi_square_more: f64,
+    /// Cosine of the angle between the two responses in these records.
+    pub correlation: f64,
+}
+
+/// An accepted effect.
+#[derive(Debug, Clone)]
+pub struct Finding {
+    pub effect: DeclaredEffect,
+    pub parameters: Vec<FittedParameter>,
+    pub equivalents: Vec<Equivalent>,
+    /// By how much χ² rises without it.
+    pub chi_square_less: f64,
+    /// By how much χ² of data that it was not fitted to rises without it.
+    pub confirmed_by: f64,
+}
+
+/// One step of the ladder.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rung {
+    pub effects: Vec<String>,
+    pub rmse_rad_per_s: f64,
+    pub holdout_rmse_rad_per_s: Option<f64>,
+    pub reduced_chi_square: f64,
+    pub bic: f64,
+}
+
+/// One candidate by itself.
+#[derive(Debug, Clone)]
+pub struct Contender {
+    pub effect: DeclaredEffect,
+    pub reduced_chi_square: f64,
+    pub bic: f64,
+    /// By how much χ² falls with it alone.
+    pub chi_square_less: f64,
+}
+
+/// What is left over.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unexplained {
+    /// Root mean square beyond the noise [rad/s].
+    pub excess_rad_per_s: f64,
+    /// Share of the declared model's excess that is left.
+    pub share_of_excess: f64,
+    /// Correlations with t, T, dT/dt, d(T_out − T_in)/dt and further columns; strongest first.
+    pub correlations: Vec<(String, f64)>,
+    /// Plain functions of time that fit it best.
+    pub plain: Vec<Plain>,
+}
+
+/// Something that a reader of the answer should know.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum Caution {
+    #[error("{record}: {rows} rates were gross outliers and were replaced by their neighbours' median")]
+    Outliers { record: String, rows: usize },
+    #[error("{record}: column {channel} lacks values and was not considered")]
+    ChannelIncomplete { record: String, channel: String },
+    #[error("no hold-out record: effects were confirmed on blocks in time that they were not fitted to")]
+    NoHoldout,
+    #[error("{kind} was not accepted: {reason}")]
+    Refused { kind: String, reason: Refusal },
+}
+
+/// Why an effect that fits was refused.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+pub enum Refusal {
+    #[error("it does not explain data that it was not fitted to")]
+    Unconfirmed,
+    #[error("it is too small to matter beside the model's own accuracy")]
+    Small,
+    #[error("the factor is within 2 % of one")]
+    FactorNearOne,
+}
+
+/// The whole answer.
+#[derive(Debug, Clone)]
+pub struct Diagnosis {
+    pub verdict: Verdict,
+    pub effects: Vec<Finding>,
+    pub ladder: Vec<Rung>,
+    pub candidates: Vec<Contender>,
+    /// Over all records that were fitted.
+    pub noise_floor_rad_per_s: f64,
+    pub unexplained: Option<Unexplained>,
+    pub suggested_experiment: Option<String>,
+    pub cautions: Vec<Caution>,
+    /// The declared model with the accepted effects.
+    pub extended: CoilModel,
+}
+
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum DiagnoseError {
+    #[error("a diagnosis needs at least one record")]
+    NoRecord,
+    #[error("{record}: {source}")]
+    Record { record: String, source: PredictError },
+    #[error(transparent)]
+    Coil(#[from] CoilError),
+    #[error("{record}: the rate has no noise at all: is this a measurement?")]
+    NoNoise { record: String },
+    #[error(
+        "{record}: the temperature moves by {range_k:.3} K only, less than the {needed_k:.3} K that its sensor's noise asks for: no verdict can be drawn from it"
+    )]
+    TemperatureConstant { record: String, range_k: f64, needed_k: f64 },
+    #[error("{record} has {found} rows: a diagnosis needs at least {needed}")]
+    TooShort { record: String, found: usize, needed: usize },
+    #[error("the declared model cannot be solved for these records")]
+    Unsolvable,
+}
+
+/// Fewer rows than this determine no effect.
+const LEAST_ROWS: usize = 100;
+
+/// Finds what a model lacks; `progress` is told the share that is done.
+///
+/// # Errors
+/// No records, records that say nothing, a model that cannot be solved.
+pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Diagnosis, DiagnoseError> {
+    if request.records.is_empty() {
+        return Err(DiagnoseError::NoRecord);
+    }
+    for record in request.records.iter().chain(request.holdout) {
+        if record.rows() < LEAST_ROWS {
+            let (record, found) = (record.name().to_owned(), record.rows());
+            return Err(DiagnoseError::TooShort { record, found, needed: LEAST_ROWS });
+        }
+    }
+    progress(0.0);
+    let mut evidence = evidence::Evidence::new(request.model, request.pattern, request.records, request.holdout)?;
+    progress(0.15);
+    let records: Vec<&Record> = request.records.iter().chain(request.holdout).collect();
+    let candidates = candidate::candidates(request.model, &records);
+    let found = search::search(&mut evidence, request.model, &candidates, progress)?;
+    progress(0.9);
+    let diagnosis = verdict::judge(&mut evidence, request.model, &candidates, found)?;
+    progress(1.0);
+    Ok(diagnosis)
+}

@@ -1,0 +1,228 @@
+//! The search over sets of effects: singles, pairs, forward steps, swaps and a backward step.
+
+use rayon::prelude::*;
+
+use super::DiagnoseError;
+use super::candidate::Candidate;
+use super::evidence::{Evidence, Role};
+use super::hypothesis::{Hypothesis, Member, Trial, pairs};
+use crate::fit::Effort;
+use crate::rate::CoilModel;
+
+/// What the search found.
+pub(super) struct Found {
+    pub base: Hypothesis,
+    /// The best fit of each candidate alone, best first.
+    pub singles: Vec<Hypothesis>,
+    pub best: Hypothesis,
+    /// What χ² is counted in: 1, or the mean square of what the best set leaves, whichever is more.
+    pub variance: f64,
+}
+
+/// A set must be this much better than a smaller one.
+const MARGIN: f64 = 10.0;
+const MAX_EFFECTS: usize = 4;
+/// Sets that are fitted in earnest after a linear look at all of them.
+const PAIRS_TRIED: usize = 10;
+const FORWARD_TRIED: usize = 6;
+/// Starts from which a candidate is fitted alone.
+const STARTS_TRIED: usize = 2;
+/// Times that a boundary is estimated again with the sensor that was found.
+const SENSOR_ROUNDS: usize = 2;
+
+/// Searches; boundaries for other sensors are added to the evidence on the way.
+pub(super) fn search(
+    evidence: &mut Evidence,
+    model: &CoilModel,
+    candidates: &[Candidate],
+    progress: &(dyn Fn(f64) + Sync),
+) -> Result<Found, DiagnoseError> {
+    let rows = evidence.rows(Role::Fit);
+    let base = {
+        let trial = Trial { evidence, model, candidates };
+        trial.fit(&[], Effort::QUICK).ok_or(DiagnoseError::Unsolvable)?
+    };
+    // A sensor in the air needs a boundary of its own.
+    for candidate in candidates.iter().filter(|c| c.moves_heat()) {
+        let moved = model.with_effect(candidate.effect.clone());
+        if let (Ok(there), Ok(here)) = (moved.heat_path(), model.heat_path())
+            && there.location != here.location
+        {
+            evidence.anchor(&moved)?;
+        }
+    }
+    progress(0.3);
+    let mut singles = {
+        let trial = Trial { evidence, model, candidates };
+        fit_singles(&trial, &base)
+    };
+    for single in &mut singles {
+        let member = &single.members[0];
+        if candidates[member.candidate].moves_sensor() && base.chi_square - single.chi_square > MARGIN {
+            *single = settle_sensor(evidence, model, candidates, single.clone())?;
+        }
+    }
+    progress(0.6);
+    let trial = Trial { evidence, model, candidates };
+    let least = |list: &[Hypothesis], variance: f64| {
+        list.iter().min_by(|a, b| a.merit(rows, variance).total_cmp(&b.merit(rows, variance))).cloned()
+    };
+    let mut proposals = singles.clone();
+    let mut variance = noise_variance(&base, &proposals, rows);
+    let singles_leave = variance;
+    if singles_leave > 1.0 || base.chi_square > rows as f64 {
+        proposals.extend(fit_pairs(&trial, &base));
+        variance = noise_variance(&base, &proposals, rows);
+    }
+    let mut best = base.clone();
+    if let Some(first) = least(&proposals, variance)
+        && first.merit(rows, variance) < best.merit(rows, variance) - MARGIN
+    {
+        best = first;
+    }
+    progress(0.8);
+    while !best.members.is_empty() && best.members.len() < MAX_EFFECTS {
+        let mut further = fit_forward(&trial, &best);
+        further.extend(fit_swaps(&trial, &best, FORWARD_TRIED));
+        variance = noise_variance(&best, &further, rows).min(variance);
+        match least(&further, variance) {
+            Some(next) => {
+                let margin = if next.members.len() > best.members.len() { MARGIN } else { 0.5 };
+                if next.merit(rows, variance) >= best.merit(rows, variance) - margin {
+                    break;
+                }
+                best = next;
+            }
+            None => break,
+        }
+    }
+    best = step_back(&trial, best, rows, variance);
+    singles.sort_by(|a, b| a.merit(rows, variance).total_cmp(&b.merit(rows, variance)));
+    Ok(Found { base, singles, best, variance })
+}
+
+fn noise_variance(base: &Hypothesis, others: &[Hypothesis], rows: usize) -> f64 {
+    let least = others.iter().map(|h| h.chi_square).fold(base.chi_square, f64::min);
+    (least / rows as f64).max(1.0)
+}
+
+/// Each candidate alone, from its most promising starts.
+fn fit_singles(trial: &Trial, base: &Hypothesis) -> Vec<Hypothesis> {
+    let responses = trial.responses(base);
+    (0..trial.candidates.len())
+        .into_par_iter()
+        .filter_map(|candidate| {
+            let mut own: Vec<_> = responses.iter().filter(|r| r.member.candidate == candidate).collect();
+            own.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
+            own.iter()
+                .take(STARTS_TRIED)
+                .filter_map(|r| trial.fit(&[trial.scaled(&r.member, r.amplitude())], Effort::QUICK))
+                .min_by(|a, b| a.chi_square.total_cmp(&b.chi_square))
+        })
+        .collect()
+}
+
+fn fit_pairs(trial: &Trial, base: &Hypothesis) -> Vec<Hypothesis> {
+    let responses = trial.responses(base);
+    pairs(trial, &responses, PAIRS_TRIED)
+        .into_par_iter()
+        .filter_map(|pair| {
+            let first = trial.scaled(&responses[pair.first].member, pair.amplitudes.0);
+            let second = trial.scaled(&responses[pair.second].member, pair.amplitudes.1);
+            trial.fit(&[first, second], Effort::QUICK)
+        })
+        .collect()
+}
+
+/// One effect more.
+fn fit_forward(trial: &Trial, from: &Hypothesis) -> Vec<Hypothesis> {
+    let mut responses = trial.responses(from);
+    responses.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
+    let mut seen = Vec::new();
+    responses.retain(|r| {
+        let new = seen.len() < FORWARD_TRIED && !seen.contains(&r.member.candidate);
+        if new {
+            seen.push(r.member.candidate);
+        }
+        new
+    });
+    responses
+        .into_par_iter()
+        .filter_map(|response| {
+            let mut members = from.members.clone();
+            members.push(trial.scaled(&response.member, response.amplitude()));
+            trial.fit(&members, Effort::QUICK)
+        })
+        .collect()
+}
+
+/// Each member in turn exchanged for each of the `count` most promising others.
+pub(super) fn fit_swaps(trial: &Trial, from: &Hypothesis, count: usize) -> Vec<Hypothesis> {
+    (0..from.members.len()).flat_map(|out| fit_swap(trial, from, out, count)).collect()
+}
+
+/// One member exchanged for others; the new one stands at its place.
+pub(super) fn fit_swap(trial: &Trial, from: &Hypothesis, out: usize, count: usize) -> Vec<Hypothesis> {
+    let kind = trial.candidates[from.members[out].candidate].kind();
+    let mut rest: Vec<Member> = from.members.clone();
+    rest.remove(out);
+    let Some(without) = trial.fit(&rest, Effort::QUICK) else { return Vec::new() };
+    let mut responses = trial.responses(&without);
+    responses.retain(|r| trial.candidates[r.member.candidate].kind() != kind);
+    responses.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
+    let mut seen = Vec::new();
+    responses.retain(|r| {
+        let new = seen.len() < count && !seen.contains(&r.member.candidate);
+        if new {
+            seen.push(r.member.candidate);
+        }
+        new
+    });
+    responses
+        .into_par_iter()
+        .filter_map(|response| {
+            let mut members = without.members.clone();
+            members.insert(out, trial.scaled(&response.member, response.amplitude()));
+            trial.fit(&members, Effort::QUICK)
+        })
+        .collect()
+}
+
+/// Leaves out what the rest does not need.
+fn step_back(trial: &Trial, mut best: Hypothesis, rows: usize, variance: f64) -> Hypothesis {
+    loop {
+        let smaller = (0..best.members.len())
+            .filter_map(|out| without(trial, &best, out))
+            .min_by(|a, b| a.merit(rows, variance).total_cmp(&b.merit(rows, variance)));
+        match smaller {
+            Some(smaller) if smaller.merit(rows, variance) < best.merit(rows, variance) + MARGIN => best = smaller,
+            _ => return best,
+        }
+    }
+}
+
+/// The rest of a set, fitted again without one member.
+pub(super) fn without(trial: &Trial, from: &Hypothesis, out: usize) -> Option<Hypothesis> {
+    let mut rest = from.members.clone();
+    rest.remove(out);
+    trial.fit(&rest, Effort::QUICK)
+}
+
+/// Estimates the boundary anew with the sensor that a hypothesis found, and fits again.
+pub(super) fn settle_sensor(
+    evidence: &mut Evidence,
+    model: &CoilModel,
+    candidates: &[Candidate],
+    mut hypothesis: Hypothesis,
+) -> Result<Hypothesis, DiagnoseError> {
+    for _ in 0..SENSOR_ROUNDS {
+        let members = hypothesis.members.clone();
+        let Some(with) = (Trial { evidence, model, candidates }).model_of(&members) else { break };
+        evidence.anchor(&with)?;
+        match (Trial { evidence, model, candidates }).fit(&members, Effort::QUICK) {
+            Some(settled) => hypothesis = settled,
+            None => break,
+        }
+    }
+    Ok(hypothesis)
+}

@@ -1,0 +1,397 @@
+//! From fitted sets of effects to an answer that can be defended.
+
+use super::candidate::{Candidate, is_declared_number};
+use super::confirm::{confirmation, holdout};
+use super::evidence::{Evidence, Role, dot, sum_of_squares};
+use super::hypothesis::{Hypothesis, Trial};
+use super::plain::{Plain, compete};
+use super::search::{Found, fit_swap, settle_sensor, without};
+use super::{
+    Caution, Contender, DiagnoseError, Diagnosis, Equivalent, Finding, FittedParameter, Refusal, Rung, Unexplained,
+    Verdict,
+};
+use crate::fit::Effort;
+use crate::rate::CoilModel;
+
+/// An effect must lower χ² by this share of the rows: a root mean square of a tenth of the noise.
+const LEAST_SHARE_OF_ROWS: f64 = 0.01;
+/// … and have this share of the coil's own signal: no model is more accurate than that.
+const LEAST_SHARE_OF_SIGNAL: f64 = 0.01;
+/// A factor this close to one is the model's accuracy, not physics.
+const LEAST_FACTOR: f64 = 0.02;
+/// χ² of unseen data must fall by this.
+const CONFIRMED: f64 = 4.0;
+/// Sets whose χ² differ by less explain the records equally well (odds of 400 at best).
+const EQUAL: f64 = 12.0;
+const MAX_EQUIVALENTS: usize = 2;
+const SWAPS_TRIED: usize = 8;
+/// Reduced χ² beyond 1 that noise floor and boundary may make, besides chance.
+const TOLERATED_EXCESS: f64 = 0.12;
+/// A plain function of time is there if it lowers χ² by this much, and by this share of the rows.
+const PLAIN_GAIN: f64 = 40.0;
+const PLAIN_SHARE_OF_ROWS: f64 = 0.02;
+/// Share of the declared model's excess that accepted effects may leave.
+const TOLERATED_REST: f64 = 0.05;
+
+/// Judges what the search found.
+pub(super) fn judge(
+    evidence: &mut Evidence,
+    model: &CoilModel,
+    candidates: &[Candidate],
+    found: Found,
+) -> Result<Diagnosis, DiagnoseError> {
+    let Found { base, singles, mut best, variance } = found;
+    let rows = evidence.rows(Role::Fit);
+    let mut cautions = cautions_of(evidence);
+    if best.members.iter().any(|m| candidates[m.candidate].moves_heat() || candidates[m.candidate].moves_sensor()) {
+        best = settle_sensor(evidence, model, candidates, best)?;
+    }
+    let trial = Trial { evidence, model, candidates };
+    let signal = trial.evidence.of(Role::Fit).map(|c| c.signal_square(model, trial.evidence.pattern)).sum::<f64>();
+    let mut reasons = Vec::new();
+    // What is not needed, not confirmed or not of a practical size goes, the least significant first.
+    while let Some((out, kind, reason)) = refusal(&trial, &best, rows, variance, signal) {
+        cautions.push(Caution::Refused { kind, reason });
+        match without(&trial, &best, out) {
+            Some(smaller) => best = smaller,
+            None => break,
+        }
+    }
+    let mut effects = Vec::new();
+    for place in 0..best.members.len() {
+        let (main, equivalents) = settle_equivalents(&trial, best, place, rows, variance);
+        best = main;
+        reasons.push(equivalents);
+    }
+    let errors = trial.fit(&best.members, Effort { standard_errors: true, ..Effort::QUICK });
+    if let Some(with_errors) = errors {
+        best = with_errors;
+    }
+    let extended = trial.model_of(&best.members).ok_or(DiagnoseError::Unsolvable)?;
+    let inflation = inflation(&trial, &extended, &best, rows);
+    for (place, equivalents) in reasons.into_iter().enumerate() {
+        effects.push(finding(&trial, &best, place, equivalents, inflation));
+    }
+    let freedom = |h: &Hypothesis| (rows as f64 - h.parameters as f64 - 1.0).max(1.0);
+    let excess = |h: &Hypothesis| h.chi_square - freedom(h);
+    let plain = compete(trial.evidence, &extended, &best.residuals);
+    let tolerated = TOLERATED_EXCESS + 3.0 * (2.0 / rows as f64).sqrt();
+    let is_plain = |p: &Plain, least: f64| p.gain > least.max(PLAIN_GAIN).max(PLAIN_SHARE_OF_ROWS * rows as f64);
+    let left = excess(&best) / excess(&base).max(1.0);
+    let verdict = if best.members.is_empty() {
+        let quiet = base.chi_square / freedom(&base) < 1.0 + tolerated && !plain.iter().any(|p| is_plain(p, 0.0));
+        if quiet { Verdict::Adequate } else { Verdict::Unexplained }
+    } else {
+        let gained = base.chi_square - best.chi_square;
+        let rival = compete(trial.evidence, model, &base.residuals);
+        let outdone = rival.iter().any(|p| p.gain > gained - EQUAL);
+        let rest = best.chi_square / freedom(&best) > 1.0 + tolerated && left > TOLERATED_REST;
+        let plain_rest = plain.iter().any(|p| is_plain(p, TOLERATED_REST * gained));
+        if outdone || rest || plain_rest {
+            Verdict::Unexplained
+        } else if effects.iter().any(|e| !e.equivalents.is_empty()) {
+            Verdict::Indistinguishable
+        } else {
+            Verdict::Missing
+        }
+    };
+    let unexplained = (verdict == Verdict::Unexplained).then(|| describe(&trial, &extended, plain, left));
+    let ladder = ladder(&trial, &base, &best, rows);
+    let suggested_experiment = experiment(verdict, &effects);
+    let mut contenders: Vec<Contender> = Vec::new();
+    for single in &singles {
+        let Some(with) = trial.model_of(&single.members) else { continue };
+        let Some(effect) = with.effects.last().cloned() else { continue };
+        if contenders.iter().any(|c| c.effect.kind() == effect.kind()) {
+            continue;
+        }
+        contenders.push(Contender {
+            effect,
+            reduced_chi_square: single.chi_square / freedom(single),
+            bic: bic(single, rows),
+            chi_square_less: base.chi_square - single.chi_square,
+        });
+    }
+    let squares: f64 = trial.evidence.of(Role::Fit).map(|c| c.noise_rad_per_s.powi(2) * c.record.rows() as f64).sum();
+    Ok(Diagnosis {
+        verdict,
+        effects,
+        ladder,
+        candidates: contenders,
+        noise_floor_rad_per_s: (squares / rows as f64).sqrt(),
+        unexplained,
+        suggested_experiment,
+        cautions,
+        extended,
+    })
+}
+
+fn bic(hypothesis: &Hypothesis, rows: usize) -> f64 {
+    hypothesis.chi_square + hypothesis.parameters as f64 * (rows as f64).ln()
+}
+
+fn cautions_of(evidence: &Evidence) -> Vec<Caution> {
+    let mut cautions = Vec::new();
+    for case in &evidence.cases {
+        let record = case.record.name().to_owned();
+        if case.outliers > 0 {
+            cautions.push(Caution::Outliers { record: record.clone(), rows: case.outliers });
+        }
+        for channel in case.record.channels().iter().filter(|c| c.values.iter().any(|v| !v.is_finite())) {
+            cautions.push(Caution::ChannelIncomplete { record: record.clone(), channel: channel.name.clone() });
+        }
+    }
+    if evidence.rows(Role::Holdout) == 0 {
+        cautions.push(Caution::NoHoldout);
+    }
+    cautions
+}
+
+/// The first member that cannot stay, and why; the least significant first.
+fn refusal(
+    trial: &Trial,
+    best: &Hypothesis,
+    rows: usize,
+    variance: f64,
+    signal: f64,
+) -> Option<(usize, String, Refusal)> {
+    let mut order: Vec<(usize, Hypothesis)> =
+        (0..best.members.len()).filter_map(|out| Some((out, without(trial, best, out)?))).collect();
+    order.sort_by(|a, b| a.1.chi_square.total_cmp(&b.1.chi_square));
+    let least = (LEAST_SHARE_OF_ROWS * rows as f64).max(LEAST_SHARE_OF_SIGNAL.powi(2) * signal);
+    order.into_iter().find_map(|(out, rest)| {
+        let member = &best.members[out];
+        let candidate = &trial.candidates[member.candidate];
+        let reason = if is_declared_number(&candidate.effect) && (member.values[0] - 1.0).abs() < LEAST_FACTOR {
+            Refusal::FactorNearOne
+        } else if rest.chi_square - best.chi_square < least * variance {
+            Refusal::Small
+        } else if confirmation(trial, best, &rest).is_none_or(|less| less < CONFIRMED * variance) {
+            Refusal::Unconfirmed
+        } else {
+            return None;
+        };
+        Some((out, candidate.kind(), reason))
+    })
+}
+
+/// What else would do in one member's place; a physical effect is preferred to an empirical one that does as well.
+fn settle_equivalents(
+    trial: &Trial,
+    best: Hypothesis,
+    place: usize,
+    rows: usize,
+    variance: f64,
+) -> (Hypothesis, Vec<Equivalent>) {
+    let Some(rest) = without(trial, &best, place) else { return (best, Vec::new()) };
+    let total = |h: &Hypothesis| {
+        h.chi_square + holdout(trial, &h.members).unwrap_or(0.0) + h.parameters as f64 * (rows as f64).ln() * variance
+    };
+    let mut rivals = vec![(total(&best), best)];
+    for rival in fit_swap(trial, &rivals[0].1, place, SWAPS_TRIED) {
+        rivals.push((total(&rival), rival));
+    }
+    let least = rivals.iter().map(|r| r.0).fold(f64::INFINITY, f64::min);
+    rivals.retain(|(value, _)| *value < least + EQUAL * variance);
+    let empirical = |h: &Hypothesis| trial.candidates[h.members[place].candidate].is_empirical();
+    rivals.sort_by(|a, b| empirical(&a.1).cmp(&empirical(&b.1)).then(a.0.total_cmp(&b.0)));
+    let mut rivals = rivals.into_iter();
+    let Some((value, main)) = rivals.next() else { return (rest, Vec::new()) };
+    let response =
+        |h: &Hypothesis| -> Vec<f64> { rest.residuals.iter().zip(&h.residuals).map(|(a, b)| a - b).collect() };
+    let own = response(&main);
+    let mut kinds = vec![trial.candidates[main.members[place].candidate].kind()];
+    let mut equivalents = Vec::new();
+    for (other, rival) in rivals {
+        let member = &rival.members[place];
+        let candidate = &trial.candidates[member.candidate];
+        if kinds.contains(&candidate.kind()) || equivalents.len() == MAX_EQUIVALENTS {
+            continue;
+        }
+        let Ok(effect) = candidate.effect.with_values(member.values.clone()) else { continue };
+        kinds.push(candidate.kind());
+        let theirs = response(&rival);
+        let correlation =
+            dot(&own, &theirs) / (sum_of_squares(&own) * sum_of_squares(&theirs)).sqrt().max(f64::MIN_POSITIVE);
+        equivalents.push(Equivalent { effect, chi_square_more: other - value, correlation });
+    }
+    (main, equivalents)
+}
+
+/// By how much standard errors grow: residuals beyond the noise, and their autocorrelation.
+fn inflation(trial: &Trial, model: &CoilModel, best: &Hypothesis, rows: usize) -> f64 {
+    let Some(fit) = &best.fit else { return 1.0 };
+    let mut correlated = 0.0;
+    for case in trial.evidence.of(Role::Fit) {
+        if let Some((residuals, _)) = case.plain_residuals(model, trial.evidence.pattern) {
+            correlated += variance_inflation(&residuals) * case.record.rows() as f64 / rows as f64;
+        }
+    }
+    let reduced = (best.chi_square / (rows as f64 - best.parameters as f64 - 1.0).max(1.0)).max(1.0);
+    // The fit divided by the number of whitened values, which is larger than that of rows.
+    let counted = fit.sum_of_squares / fit.degrees_of_freedom as f64;
+    (correlated.max(1.0) * reduced / counted.max(f64::MIN_POSITIVE)).sqrt()
+}
+
+/// 1 + 2 Σ (1 − k/n) ρ_k up to the first lag that does not differ from zero.
+fn variance_inflation(residuals: &[f64]) -> f64 {
+    let n = residuals.len();
+    let total = sum_of_squares(residuals);
+    if total <= 0.0 {
+        return 1.0;
+    }
+    let mut sum = 1.0;
+    for lag in 1..n / 4 {
+        let rho = dot(&residuals[lag..], &residuals[..n - lag]) / total;
+        if rho < 2.0 / (n as f64).sqrt() {
+            break;
+        }
+        sum += 2.0 * (1.0 - lag as f64 / n as f64) * rho;
+    }
+    sum
+}
+
+fn finding(trial: &Trial, best: &Hypothesis, place: usize, equivalents: Vec<Equivalent>, inflation: f64) -> Finding {
+    let member = &best.members[place];
+    let candidate = &trial.candidates[member.candidate];
+    let before: usize = best.members[..place].iter().map(|m| trial.candidates[m.candidate].free.len()).sum();
+    let parameters = candidate
+        .effect
+        .parameters()
+        .into_iter()
+        .enumerate()
+        .map(|(i, declared)| {
+            let fitted = candidate.free.iter().position(|&f| f == i).map(|k| before + k);
+            let fit = best.fit.as_ref().zip(fitted);
+            FittedParameter {
+                key: declared.key,
+                unit: declared.unit,
+                value: member.values[i],
+                standard_error: fit.and_then(|(f, k)| f.standard_errors[k]).map(|e| e * inflation),
+                at_bound: fit.is_some_and(|(f, k)| f.at_bound[k]),
+                fitted: fitted.is_some(),
+            }
+        })
+        .collect();
+    let effect = candidate.effect.with_values(member.values.clone()).unwrap_or_else(|_| candidate.effect.clone());
+    let rest = without(trial, best, place);
+    Finding {
+        effect,
+        parameters,
+        equivalents,
+        chi_square_less: rest.as_ref().map_or(0.0, |r| r.chi_square - best.chi_square),
+        confirmed_by: rest.and_then(|r| confirmation(trial, best, &r)).unwrap_or(0.0),
+    }
+}
+
+/// The errors after each accepted effect, the most effective first.
+fn ladder(trial: &Trial, base: &Hypothesis, best: &Hypothesis, rows: usize) -> Vec<Rung> {
+    let rung = |h: &Hypothesis| -> Option<Rung> {
+        let model = trial.model_of(&h.members)?;
+        let rmse = |role: Role| -> Option<f64> {
+            let (mut squares, mut count) = (0.0, 0);
+            for case in trial.evidence.of(role) {
+                let (residuals, _) = case.plain_residuals(&model, trial.evidence.pattern)?;
+                squares += sum_of_squares(&residuals);
+                count += residuals.len();
+            }
+            (count > 0).then(|| (squares / count as f64).sqrt())
+        };
+        Some(Rung {
+            effects: h.members.iter().map(|m| trial.candidates[m.candidate].kind()).collect(),
+            rmse_rad_per_s: rmse(Role::Fit)?,
+            holdout_rmse_rad_per_s: rmse(Role::Holdout),
+            reduced_chi_square: h.chi_square / (rows as f64 - h.parameters as f64 - 1.0).max(1.0),
+            bic: bic(h, rows),
+        })
+    };
+    let mut rungs: Vec<Rung> = rung(base).into_iter().collect();
+    let mut so_far: Vec<usize> = Vec::new();
+    while so_far.len() + 1 < best.members.len() {
+        let next = (0..best.members.len())
+            .filter(|place| !so_far.contains(place))
+            .filter_map(|place| {
+                let chosen: Vec<_> = so_far.iter().chain([&place]).map(|&i| best.members[i].clone()).collect();
+                Some((place, trial.fit(&chosen, Effort::QUICK)?))
+            })
+            .min_by(|a, b| a.1.chi_square.total_cmp(&b.1.chi_square));
+        let Some((place, hypothesis)) = next else { break };
+        so_far.push(place);
+        rungs.extend(rung(&hypothesis));
+    }
+    if !best.members.is_empty() {
+        rungs.extend(rung(best));
+    }
+    rungs
+}
+
+/// What is left over: how much, and what it goes with.
+fn describe(trial: &Trial, model: &CoilModel, plain: Vec<Plain>, share_of_excess: f64) -> Unexplained {
+    let (mut squares, mut noise, mut count) = (0.0, 0.0, 0);
+    let mut sums: Vec<(String, f64, f64, f64)> = Vec::new();
+    for case in trial.evidence.of(Role::Fit) {
+        let Some((residuals, history)) = case.plain_residuals(model, trial.evidence.pattern) else { continue };
+        squares += sum_of_squares(&residuals);
+        noise += case.noise_rad_per_s.powi(2) * residuals.len() as f64;
+        count += residuals.len();
+        let layers = history.layers;
+        let row = |f: &dyn Fn(usize) -> f64| (0..residuals.len()).map(f).collect::<Vec<f64>>();
+        let mut columns = vec![
+            ("time".to_owned(), case.record.times_s().to_vec()),
+            ("temperature".to_owned(), row(&|i| history.temperatures_k(i)[layers - 1])),
+            ("temperature rate".to_owned(), row(&|i| history.rates_k_per_s(i)[layers - 1])),
+            (
+                "rate of outer less inner temperature".to_owned(),
+                row(&|i| history.rates_k_per_s(i)[layers - 1] - history.rates_k_per_s(i)[0]),
+            ),
+        ];
+        columns.extend(
+            case.record
+                .channels()
+                .iter()
+                .filter(|c| c.values.iter().all(|v| v.is_finite()))
+                .map(|c| (format!("channel:{}", c.name), c.values.clone())),
+        );
+        for (name, mut column) in columns {
+            let mean = column.iter().sum::<f64>() / column.len() as f64;
+            column.iter_mut().for_each(|v| *v -= mean);
+            let found = sums.iter().position(|s| s.0 == name).unwrap_or_else(|| {
+                sums.push((name, 0.0, 0.0, 0.0));
+                sums.len() - 1
+            });
+            let entry = &mut sums[found];
+            entry.1 += dot(&column, &residuals);
+            entry.2 += sum_of_squares(&column);
+            entry.3 += sum_of_squares(&residuals);
+        }
+    }
+    let mut correlations: Vec<(String, f64)> = sums
+        .into_iter()
+        .filter(|(_, _, column, rest)| *column > 0.0 && *rest > 0.0)
+        .map(|(name, cross, column, rest)| (name, cross / (column * rest).sqrt()))
+        .collect();
+    correlations.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+    Unexplained {
+        excess_rad_per_s: ((squares - noise) / count.max(1) as f64).max(0.0).sqrt(),
+        share_of_excess,
+        correlations,
+        plain,
+    }
+}
+
+/// What to measure next.
+fn experiment(verdict: Verdict, effects: &[Finding]) -> Option<String> {
+    match verdict {
+        Verdict::Adequate => None,
+        Verdict::Unexplained => Some(
+            "repeat the record with the disturbance that its period or time constant suggests switched off, and log what correlates with it"
+                .to_owned(),
+        ),
+        Verdict::Missing => effects.first().map(|e| format!("to confirm {}: {}", e.effect.kind(), e.effect.spec().experiment)),
+        Verdict::Indistinguishable => effects.iter().find(|e| !e.equivalents.is_empty()).map(|e| {
+            let others = e.equivalents.iter().map(|o| format!("for {}: {}", o.effect.kind(), o.effect.spec().experiment));
+            let own = format!("for {}: {}", e.effect.kind(), e.effect.spec().experiment);
+            std::iter::once(own).chain(others).collect::<Vec<_>>().join("; ")
+        }),
+    }
+}
