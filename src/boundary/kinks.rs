@@ -28,7 +28,7 @@ const CLOSE_INTERVALS: f64 = 8.0;
 /// … also if that costs this much likelihood: it is gained back when the film is fitted again.
 const MERGE_SLACK: f64 = 6.0;
 /// Searches that begin anew with the film that the last one found.
-const MAX_PASSES: usize = 5;
+const MAX_PASSES: usize = 4;
 /// Newton steps for the kinks' times at most; they stop by themselves when nothing moves.
 const NEWTON_STEPS: usize = 6;
 /// No thermocouple is better [K].

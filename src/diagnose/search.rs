@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::DiagnoseError;
 use super::candidate::Candidate;
 use super::evidence::{Evidence, Role};
-use super::hypothesis::{Hypothesis, Member, Trial, pairs};
+use super::hypothesis::{Hypothesis, Response, Trial, pairs};
 use crate::fit::Effort;
 use crate::rate::CoilModel;
 
@@ -23,8 +23,12 @@ pub(super) struct Found {
 const MARGIN: f64 = 10.0;
 const MAX_EFFECTS: usize = 4;
 /// Sets that are fitted in earnest after a linear look at all of them.
-const PAIRS_TRIED: usize = 10;
-const FORWARD_TRIED: usize = 6;
+const PAIRS_TRIED: usize = 8;
+const FORWARD_TRIED: usize = 5;
+/// A start whose response cannot lower χ² by this much, at any amplitude, is not worth a fit.
+const WORTH_A_FIT: f64 = 6.0;
+/// Nor is one that promises less than this share of what the best start of its candidate, or a removed effect, does.
+const WORTH_BESIDE: f64 = 0.5;
 /// Starts from which a candidate is fitted alone.
 const STARTS_TRIED: usize = 2;
 /// Times that a boundary is estimated again with the sensor that was found.
@@ -68,10 +72,10 @@ pub(super) fn search(
         list.iter().min_by(|a, b| a.merit(rows, variance).total_cmp(&b.merit(rows, variance))).cloned()
     };
     let mut proposals = singles.clone();
-    let mut variance = noise_variance(&base, &proposals, rows);
-    let singles_leave = variance;
-    if singles_leave > 1.0 || base.chi_square > rows as f64 {
-        proposals.extend(fit_pairs(&trial, &base));
+    let mut variance;
+    {
+        let best_single = singles.iter().map(|h| h.chi_square).fold(base.chi_square, f64::min);
+        proposals.extend(fit_pairs(&trial, &base, best_single));
         variance = noise_variance(&base, &proposals, rows);
     }
     let mut best = base.clone();
@@ -83,7 +87,7 @@ pub(super) fn search(
     progress(0.8);
     while !best.members.is_empty() && best.members.len() < MAX_EFFECTS {
         let mut further = fit_forward(&trial, &best);
-        further.extend(fit_swaps(&trial, &best, FORWARD_TRIED));
+        further.extend(fit_swaps(&trial, &best));
         variance = noise_variance(&best, &further, rows).min(variance);
         match least(&further, variance) {
             Some(next) => {
@@ -106,7 +110,7 @@ fn noise_variance(base: &Hypothesis, others: &[Hypothesis], rows: usize) -> f64 
     (least / rows as f64).max(1.0)
 }
 
-/// Each candidate alone, from its most promising starts.
+/// Each candidate alone, from its most promising starts; one that promises nothing keeps its linear estimate.
 fn fit_singles(trial: &Trial, base: &Hypothesis) -> Vec<Hypothesis> {
     let responses = trial.responses(base);
     (0..trial.candidates.len())
@@ -114,18 +118,32 @@ fn fit_singles(trial: &Trial, base: &Hypothesis) -> Vec<Hypothesis> {
         .filter_map(|candidate| {
             let mut own: Vec<_> = responses.iter().filter(|r| r.member.candidate == candidate).collect();
             own.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
+            let best = own.first()?;
+            if best.gain() < WORTH_A_FIT {
+                return Some(Hypothesis {
+                    members: vec![trial.scaled(&best.member, best.amplitude())],
+                    chi_square: base.chi_square - best.gain(),
+                    parameters: trial.candidates[candidate].free.len(),
+                    residuals: base.residuals.clone(),
+                    fit: None,
+                });
+            }
             own.iter()
                 .take(STARTS_TRIED)
+                .filter(|r| r.gain() > WORTH_BESIDE * best.gain())
                 .filter_map(|r| trial.fit(&[trial.scaled(&r.member, r.amplitude())], Effort::QUICK))
                 .min_by(|a, b| a.chi_square.total_cmp(&b.chi_square))
         })
         .collect()
 }
 
-fn fit_pairs(trial: &Trial, base: &Hypothesis) -> Vec<Hypothesis> {
+/// Pairs that promise more than the best of the singles does.
+fn fit_pairs(trial: &Trial, base: &Hypothesis, best_single: f64) -> Vec<Hypothesis> {
     let responses = trial.responses(base);
+    let needed = base.chi_square - best_single + MARGIN;
     pairs(trial, &responses, PAIRS_TRIED)
         .into_par_iter()
+        .filter(|pair| pair.gain > needed)
         .filter_map(|pair| {
             let first = trial.scaled(&responses[pair.first].member, pair.amplitudes.0);
             let second = trial.scaled(&responses[pair.second].member, pair.amplitudes.1);
@@ -134,41 +152,9 @@ fn fit_pairs(trial: &Trial, base: &Hypothesis) -> Vec<Hypothesis> {
         .collect()
 }
 
-/// One effect more.
-fn fit_forward(trial: &Trial, from: &Hypothesis) -> Vec<Hypothesis> {
-    let mut responses = trial.responses(from);
-    responses.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
-    let mut seen = Vec::new();
-    responses.retain(|r| {
-        let new = seen.len() < FORWARD_TRIED && !seen.contains(&r.member.candidate);
-        if new {
-            seen.push(r.member.candidate);
-        }
-        new
-    });
-    responses
-        .into_par_iter()
-        .filter_map(|response| {
-            let mut members = from.members.clone();
-            members.push(trial.scaled(&response.member, response.amplitude()));
-            trial.fit(&members, Effort::QUICK)
-        })
-        .collect()
-}
-
-/// Each member in turn exchanged for each of the `count` most promising others.
-pub(super) fn fit_swaps(trial: &Trial, from: &Hypothesis, count: usize) -> Vec<Hypothesis> {
-    (0..from.members.len()).flat_map(|out| fit_swap(trial, from, out, count)).collect()
-}
-
-/// One member exchanged for others; the new one stands at its place.
-pub(super) fn fit_swap(trial: &Trial, from: &Hypothesis, out: usize, count: usize) -> Vec<Hypothesis> {
-    let kind = trial.candidates[from.members[out].candidate].kind();
-    let mut rest: Vec<Member> = from.members.clone();
-    rest.remove(out);
-    let Some(without) = trial.fit(&rest, Effort::QUICK) else { return Vec::new() };
-    let mut responses = trial.responses(&without);
-    responses.retain(|r| trial.candidates[r.member.candidate].kind() != kind);
+/// The most promising response of each of the `count` most promising candidates.
+fn foremost(mut responses: Vec<Response>, count: usize, least_gain: f64) -> Vec<Response> {
+    responses.retain(|r| r.gain() > least_gain);
     responses.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
     let mut seen = Vec::new();
     responses.retain(|r| {
@@ -179,9 +165,37 @@ pub(super) fn fit_swap(trial: &Trial, from: &Hypothesis, out: usize, count: usiz
         new
     });
     responses
+}
+
+/// One effect more.
+fn fit_forward(trial: &Trial, from: &Hypothesis) -> Vec<Hypothesis> {
+    foremost(trial.responses(from), FORWARD_TRIED, WORTH_A_FIT)
         .into_par_iter()
         .filter_map(|response| {
-            let mut members = without.members.clone();
+            let mut members = from.members.clone();
+            members.push(trial.scaled(&response.member, response.amplitude()));
+            trial.fit(&members, Effort::QUICK)
+        })
+        .collect()
+}
+
+/// Each member in turn exchanged for each of the most promising others.
+fn fit_swaps(trial: &Trial, from: &Hypothesis) -> Vec<Hypothesis> {
+    (0..from.members.len())
+        .filter_map(|out| Some((out, without(trial, from, out)?)))
+        .flat_map(|(out, rest)| fit_swap(trial, from, &rest, out))
+        .collect()
+}
+
+/// One member exchanged for others, `rest` being the fit without it; the new one stands at its place.
+pub(super) fn fit_swap(trial: &Trial, from: &Hypothesis, rest: &Hypothesis, out: usize) -> Vec<Hypothesis> {
+    let kind = trial.candidates[from.members[out].candidate].kind();
+    let mut responses = trial.responses(rest);
+    responses.retain(|r| trial.candidates[r.member.candidate].kind() != kind);
+    foremost(responses, FORWARD_TRIED, WORTH_BESIDE * (rest.chi_square - from.chi_square))
+        .into_par_iter()
+        .filter_map(|response| {
+            let mut members = rest.members.clone();
             members.insert(out, trial.scaled(&response.member, response.amplitude()));
             trial.fit(&members, Effort::QUICK)
         })

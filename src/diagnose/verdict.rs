@@ -24,7 +24,6 @@ const CONFIRMED: f64 = 4.0;
 /// Sets whose χ² differ by less explain the records equally well (odds of 400 at best).
 const EQUAL: f64 = 12.0;
 const MAX_EQUIVALENTS: usize = 2;
-const SWAPS_TRIED: usize = 8;
 /// Reduced χ² beyond 1 that noise floor and boundary may make, besides chance.
 const TOLERATED_EXCESS: f64 = 0.12;
 /// A plain function of time is there if it lowers χ² by this much, and by this share of the rows.
@@ -188,7 +187,7 @@ fn settle_equivalents(
         h.chi_square + holdout(trial, &h.members).unwrap_or(0.0) + h.parameters as f64 * (rows as f64).ln() * variance
     };
     let mut rivals = vec![(total(&best), best)];
-    for rival in fit_swap(trial, &rivals[0].1, place, SWAPS_TRIED) {
+    for rival in fit_swap(trial, &rivals[0].1, &rest, place) {
         rivals.push((total(&rival), rival));
     }
     let least = rivals.iter().map(|r| r.0).fold(f64::INFINITY, f64::min);

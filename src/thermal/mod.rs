@@ -5,6 +5,7 @@
 
 mod course;
 pub mod half_space;
+mod half_space_memory;
 mod modal;
 mod network;
 pub mod pack;
@@ -435,8 +436,9 @@ impl Field {
             return self.at(&ends_s.iter().map(|&t| Instant::after(t)).collect::<Vec<_>>());
         }
         let ends = self.sample(&ends_s.iter().map(|&t| Instant::before(t)).collect::<Vec<_>>(), Wanted::Temperatures);
+        // Temperatures are continuous; just before a knot the fast modes are over.
         let starts = self
-            .sample(&ends_s.iter().map(|&t| Instant::after(t - window_s)).collect::<Vec<_>>(), Wanted::Temperatures);
+            .sample(&ends_s.iter().map(|&t| Instant::before(t - window_s)).collect::<Vec<_>>(), Wanted::Temperatures);
         let middle = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| 0.5 * (a + b)).collect::<Vec<f64>>();
         let change = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (b - a) / window_s).collect::<Vec<f64>>();
         ThermalHistory {

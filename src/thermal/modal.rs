@@ -55,11 +55,13 @@ struct Decay<'a> {
     decay_per_s: &'a [f64],
     elapsed_s: f64,
     left: Vec<f64>,
+    /// Modes from here on have nothing left.
+    remembered: usize,
 }
 
 impl<'a> Decay<'a> {
     fn new(decay_per_s: &'a [f64]) -> Self {
-        Self { decay_per_s, elapsed_s: 0.0, left: vec![1.0; decay_per_s.len()] }
+        Self { decay_per_s, elapsed_s: 0.0, left: vec![1.0; decay_per_s.len()], remembered: decay_per_s.len() }
     }
 
     fn after(&mut self, elapsed_s: f64) -> &[f64] {
@@ -71,6 +73,7 @@ impl<'a> Decay<'a> {
                 *left = (-l * elapsed_s).exp();
             }
             self.left[remembered..].fill(0.0);
+            self.remembered = remembered;
         }
         &self.left
     }
@@ -176,21 +179,24 @@ impl PackField {
         let mut decay = Decay::new(&self.decay_per_s);
         let mut inputs = vec![(0.0, 0.0); batch.len()];
         for track in &self.tracks {
+            let mut remembered = 0;
             for ((&instant, column), input) in
                 batch.iter().zip(state.as_mut_slice().chunks_exact_mut(modes)).zip(&mut inputs)
             {
                 *input = track.at(instant, &mut decay, column);
+                remembered = remembered.max(decay.remembered);
             }
             let response = &track.response;
+            let contents = state.rows(0, remembered);
             if let Some(temperature) = &mut temperature {
-                temperature.gemm(1.0, &response.lag, &state, 1.0);
+                temperature.gemm(1.0, &response.lag.columns(0, remembered), &contents, 1.0);
                 for (mut column, &(value, slope)) in temperature.column_iter_mut().zip(&inputs) {
                     column.axpy(value, &response.steady, 1.0);
                     column.axpy(-slope, &response.lag_sum, 1.0);
                 }
             }
             if let Some(rate) = &mut rate {
-                rate.gemm(-1.0, &response.amplitude, &state, 1.0);
+                rate.gemm(-1.0, &response.amplitude.columns(0, remembered), &contents, 1.0);
                 for (mut column, &(_, slope)) in rate.column_iter_mut().zip(&inputs) {
                     column.axpy(slope, &response.steady, 1.0);
                 }
