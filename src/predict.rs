@@ -19,6 +19,7 @@ use crate::pattern::Pattern;
 use crate::rate::{CoilModel, RateError, RateModel};
 use crate::record::Record;
 use crate::thermal::{self, ThermalError, ThermalHistory};
+use crate::units::percent_from_fraction;
 
 /// A model's prediction of one record.
 ///
@@ -35,6 +36,36 @@ pub struct Prediction {
     pub noise_rad_per_s: f64,
     /// The pack over each averaging interval.
     pub history: ThermalHistory,
+}
+
+/// How well a prediction agrees with its record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Agreement {
+    pub rmse_rad_per_s: f64,
+    /// 100 (1 − ‖y − ŷ‖/‖y − ȳ‖).
+    pub nrmse_fit_percent: f64,
+    /// Against noise and boundary, one degree of freedom for the offset.
+    pub reduced_chi_square: f64,
+}
+
+impl Prediction {
+    /// Compares with the record that was predicted.
+    pub fn agreement(&self, record: &Record) -> Agreement {
+        let measured = record.rate_rad_per_s();
+        let count = measured.len() as f64;
+        let mean = measured.iter().sum::<f64>() / count;
+        let (mut squares, mut spread, mut chi_square) = (0.0, 0.0, 0.0);
+        for ((m, p), variance) in measured.iter().zip(&self.rate_rad_per_s).zip(&self.boundary_variance_rad2_per_s2) {
+            squares += (m - p).powi(2);
+            spread += (m - mean).powi(2);
+            chi_square += (m - p).powi(2) / (self.noise_rad_per_s.powi(2) + variance);
+        }
+        Agreement {
+            rmse_rad_per_s: (squares / count).sqrt(),
+            nrmse_fit_percent: percent_from_fraction(1.0 - (squares / spread).sqrt()),
+            reduced_chi_square: chi_square / (count - 1.0),
+        }
+    }
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]

@@ -117,16 +117,6 @@ impl Record {
         Ok(self)
     }
 
-    /// The same record with other rates, such as outliers replaced.
-    ///
-    /// # Errors
-    /// A column of another length.
-    pub fn with_rates(mut self, rate_rad_per_s: Vec<f64>) -> Result<Self, RecordError> {
-        self.check_length("rate_deg_per_h", rate_rad_per_s.len())?;
-        self.rate_rad_per_s = rate_rad_per_s;
-        Ok(self)
-    }
-
     /// Adds a further channel.
     ///
     /// # Errors

@@ -18,17 +18,25 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let known = || CATALOGUE.iter().copied().chain([CHANNEL, CUSTOM]);
     for stated in &arguments.kinds {
         if !known().any(|spec| spec.kind == stated) {
-            let nearest = known()
-                .map(|spec| (strsim::jaro_winkler(spec.kind, stated), spec.kind))
-                .max_by(|a, b| a.0.total_cmp(&b.0))
-                .map_or("", |(_, kind)| kind);
-            return Err(CliError::UnknownEffect { stated: stated.clone(), nearest });
+            return Err(unknown(stated));
         }
     }
     let chosen = known().filter(|spec| arguments.kinds.is_empty() || arguments.kinds.iter().any(|k| k == spec.kind));
     let body = EffectsJson { effects: chosen.map(EffectJson::of).collect() };
     screen.answer(body, |body| body.effects.iter().map(describe).collect::<Vec<_>>().join("\n"))?;
     Ok(Ending::Done)
+}
+
+/// The complaint about an effect that does not exist, with the nearest that does.
+pub(super) fn unknown(stated: &str) -> CliError {
+    let nearest = CATALOGUE
+        .iter()
+        .copied()
+        .chain([CHANNEL, CUSTOM])
+        .map(|spec| (strsim::jaro_winkler(spec.kind, stated), spec.kind))
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map_or("", |(_, kind)| kind);
+    CliError::UnknownEffect { stated: stated.to_owned(), nearest }
 }
 
 fn describe(effect: &EffectJson) -> String {

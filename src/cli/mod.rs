@@ -4,9 +4,11 @@ mod budget;
 mod check;
 mod compare;
 mod completions;
+mod diagnose;
 mod effects;
 mod evaluate;
 mod exact;
+mod extend;
 mod man;
 mod metrics;
 mod new;
@@ -27,6 +29,9 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand, ValueEnum};
 use thiserror::Error;
 
+use crate::diagnose::DiagnoseError;
+use crate::effect::EffectError;
+use crate::effect::custom::FormulaError;
 use crate::io::fault::Faults;
 use crate::io::files::WriteError;
 use crate::io::pattern_file::ResolveError;
@@ -95,6 +100,8 @@ enum Command {
     Schedule(schedule::Arguments),
     Compare(compare::Arguments),
     Metrics(metrics::Arguments),
+    Diagnose(diagnose::Arguments),
+    Extend(extend::Arguments),
     Schema(schema::Arguments),
     Completions(completions::Arguments),
     Man(man::Arguments),
@@ -138,6 +145,18 @@ pub enum CliError {
     Metrics(#[from] MetricsError),
     #[error("error: {0}")]
     Record(#[from] RecordError),
+    #[error("error: {0}")]
+    Diagnose(#[from] DiagnoseError),
+    #[error("error: {0}")]
+    Predict(#[from] PredictError),
+    #[error("error: {0}")]
+    Formula(#[from] FormulaError),
+    #[error("error: {0}")]
+    Effect(#[from] EffectError),
+    #[error(
+        "error: --effect custom needs --formula: give a formula in t, T, dT_dt, T_inner, mean rate or further columns"
+    )]
+    FormulaMissing,
     #[error("error: {path} exists already: choose another name or remove it first")]
     Exists { path: String },
     #[error("error: {file}: the model's effects read {}, which the record lacks: add the columns or leave the effects out", .columns.join(", "))]
@@ -173,6 +192,8 @@ pub fn run() -> ExitCode {
         Command::Schedule(arguments) => schedule::run(arguments, &screen),
         Command::Compare(arguments) => compare::run(arguments, &screen),
         Command::Metrics(arguments) => metrics::run(arguments, &screen),
+        Command::Diagnose(arguments) => diagnose::run(arguments, &screen),
+        Command::Extend(arguments) => extend::run(arguments, &screen),
         Command::Schema(arguments) => schema::run(arguments, &screen),
         Command::Completions(arguments) => completions::run(arguments, &screen),
         Command::Man(arguments) => man::run(arguments, &screen),

@@ -1,6 +1,6 @@
 //! What may be missing: the effects that a model lacks, as things to fit.
 
-use crate::effect::{Acts, CATALOGUE, DeclaredEffect, EffectSpec};
+use crate::effect::{Acts, CATALOGUE, DeclaredEffect, EffectSpec, Subject};
 use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::units::Unit;
@@ -79,6 +79,15 @@ pub(super) fn candidates(model: &CoilModel, records: &[&Record]) -> Vec<Candidat
         }
     }
     all
+}
+
+/// The candidates of one kind; of a custom effect, itself.
+pub(super) fn of_kind(model: &CoilModel, records: &[&Record], effect: &DeclaredEffect) -> Vec<Candidate> {
+    if let Subject::Formula(_) = effect.subject() {
+        let free = (0..effect.values().len()).collect();
+        return vec![Candidate { effect: effect.clone(), free, starts: vec![effect.values().to_vec()] }];
+    }
+    candidates(model, records).into_iter().filter(|c| c.kind() == effect.kind()).collect()
 }
 
 /// The `index`-th combination of choices.

@@ -6,7 +6,6 @@ use rayon::prelude::*;
 
 use super::DiagnoseError;
 use crate::boundary::{Boundary, RateWhitener};
-use crate::numeric::despike::despike;
 use crate::pattern::Pattern;
 use crate::predict::{estimate_boundary, noise_floor_rad_per_s, rates_rad_per_s};
 use crate::rate::CoilModel;
@@ -31,7 +30,7 @@ pub(super) struct Case {
     pub record: Record,
     pub role: Role,
     pub noise_rad_per_s: f64,
-    /// Rows whose rate was a gross outlier.
+    /// Rows left out because of a gross error.
     pub outliers: usize,
     anchors: Vec<Anchor>,
     recent: Mutex<Vec<Arc<Solved>>>,
@@ -58,8 +57,6 @@ struct Solved {
 
 /// Fields kept for models that differ only in what is done with them.
 const KEPT_FIELDS: usize = 4;
-/// Outliers are further from their neighbours than this many noise floors.
-const OUTLIER_NOISES: f64 = 12.0;
 
 impl<'a> Evidence<'a> {
     /// Cleans the records and estimates their boundaries under the declared model.
@@ -131,10 +128,11 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 impl Case {
     fn new(record: &Record, role: Role) -> Self {
-        let noise_rad_per_s = noise_floor_rad_per_s(record);
-        let mut rates = record.rate_rad_per_s().to_vec();
-        let outliers = despike(&mut rates, OUTLIER_NOISES * noise_rad_per_s).len();
-        let record = record.clone().with_rates(rates).unwrap_or_else(|_| record.clone());
+        let mut rows: Vec<usize> = record.gross_errors().iter().map(|e| e.row).collect();
+        rows.dedup();
+        let record = record.without_rows(&rows).unwrap_or_else(|_| record.clone());
+        let outliers = rows.len();
+        let noise_rad_per_s = noise_floor_rad_per_s(&record);
         Self { record, role, noise_rad_per_s, outliers, anchors: Vec::new(), recent: Mutex::default() }
     }
 

@@ -95,6 +95,26 @@ pub struct Finding {
     pub confirmed_by: f64,
 }
 
+impl Finding {
+    /// An effect at values that no record was asked about.
+    pub fn unfitted(effect: DeclaredEffect) -> Self {
+        let parameters = effect
+            .parameters()
+            .into_iter()
+            .zip(effect.values())
+            .map(|(declared, &value)| FittedParameter {
+                key: declared.key,
+                unit: declared.unit,
+                value,
+                standard_error: None,
+                at_bound: false,
+                fitted: false,
+            })
+            .collect();
+        Self { effect, parameters, equivalents: Vec::new(), chi_square_less: 0.0, confirmed_by: 0.0 }
+    }
+}
+
 /// One step of the ladder.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rung {
@@ -131,7 +151,7 @@ pub struct Unexplained {
 /// Something that a reader of the answer should know.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum Caution {
-    #[error("{record}: {rows} rates were gross outliers and were replaced by their neighbours' median")]
+    #[error("{record}: {rows} rows were left out because of gross errors")]
     Outliers { record: String, rows: usize },
     #[error("{record}: column {channel} lacks values and was not considered")]
     ChannelIncomplete { record: String, channel: String },
@@ -184,6 +204,10 @@ pub enum DiagnoseError {
     TemperatureConstant { record: String, range_k: f64, needed_k: f64 },
     #[error("{record} has {found} rows: a diagnosis needs at least {needed}")]
     TooShort { record: String, found: usize, needed: usize },
+    #[error(
+        "{kind} cannot be fitted to these records: it changes nothing in them, or the model cannot be solved with it"
+    )]
+    NoFit { kind: String },
     #[error("the declared model cannot be solved for these records")]
     Unsolvable,
 }
@@ -191,11 +215,32 @@ pub enum DiagnoseError {
 /// Fewer rows than this determine no effect.
 const LEAST_ROWS: usize = 100;
 
-/// Finds what a model lacks; `progress` is told the share that is done.
+/// An effect that was asked for, fitted to records.
+#[derive(Debug, Clone)]
+pub struct Extension {
+    pub finding: Finding,
+    /// The declared model with the effect; an effect of the same kind that it had is replaced.
+    pub extended: CoilModel,
+    pub reduced_chi_square_before: f64,
+    pub reduced_chi_square_after: f64,
+}
+
+/// Fits one kind of effect, whatever the evidence says about it; a custom effect starts from the values given.
 ///
 /// # Errors
-/// No records, records that say nothing, a model that cannot be solved.
-pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Diagnosis, DiagnoseError> {
+/// As [`diagnose`]; an effect that cannot be fitted to these records.
+pub fn extend(request: &Request, effect: &DeclaredEffect) -> Result<Extension, DiagnoseError> {
+    let mut without = request.model.clone();
+    without.effects.retain(|e| e.kind() != effect.kind());
+    check_lengths(request)?;
+    let mut evidence = evidence::Evidence::new(&without, request.pattern, request.records, request.holdout)?;
+    let records: Vec<&Record> = request.records.iter().chain(request.holdout).collect();
+    let candidates = candidate::of_kind(&without, &records, effect);
+    verdict::settle_one(&mut evidence, &without, &candidates)?
+        .ok_or_else(|| DiagnoseError::NoFit { kind: effect.kind() })
+}
+
+fn check_lengths(request: &Request) -> Result<(), DiagnoseError> {
     if request.records.is_empty() {
         return Err(DiagnoseError::NoRecord);
     }
@@ -205,6 +250,15 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
             return Err(DiagnoseError::TooShort { record, found, needed: LEAST_ROWS });
         }
     }
+    Ok(())
+}
+
+/// Finds what a model lacks; `progress` is told the share that is done.
+///
+/// # Errors
+/// No records, records that say nothing, a model that cannot be solved.
+pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Diagnosis, DiagnoseError> {
+    check_lengths(request)?;
     progress(0.0);
     let mut evidence = evidence::Evidence::new(request.model, request.pattern, request.records, request.holdout)?;
     progress(0.15);

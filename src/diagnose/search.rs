@@ -46,26 +46,7 @@ pub(super) fn search(
         let trial = Trial { evidence, model, candidates };
         trial.fit(&[], Effort::QUICK).ok_or(DiagnoseError::Unsolvable)?
     };
-    // A sensor in the air needs a boundary of its own.
-    for candidate in candidates.iter().filter(|c| c.moves_heat()) {
-        let moved = model.with_effect(candidate.effect.clone());
-        if let (Ok(there), Ok(here)) = (moved.heat_path(), model.heat_path())
-            && there.location != here.location
-        {
-            evidence.anchor(&moved)?;
-        }
-    }
-    progress(0.3);
-    let mut singles = {
-        let trial = Trial { evidence, model, candidates };
-        fit_singles(&trial, &base)
-    };
-    for single in &mut singles {
-        let member = &single.members[0];
-        if candidates[member.candidate].moves_sensor() && base.chi_square - single.chi_square > MARGIN {
-            *single = settle_sensor(evidence, model, candidates, single.clone())?;
-        }
-    }
+    let mut singles = all_singles(evidence, model, candidates, &base)?;
     progress(0.6);
     let trial = Trial { evidence, model, candidates };
     let least = |list: &[Hypothesis], variance: f64| {
@@ -103,6 +84,32 @@ pub(super) fn search(
     best = step_back(&trial, best, rows, variance);
     singles.sort_by(|a, b| a.merit(rows, variance).total_cmp(&b.merit(rows, variance)));
     Ok(Found { base, singles, best, variance })
+}
+
+/// Each candidate alone; boundaries for other sensors are added to the evidence.
+pub(super) fn all_singles(
+    evidence: &mut Evidence,
+    model: &CoilModel,
+    candidates: &[Candidate],
+    base: &Hypothesis,
+) -> Result<Vec<Hypothesis>, DiagnoseError> {
+    // A sensor in the air needs a boundary of its own.
+    for candidate in candidates.iter().filter(|c| c.moves_heat()) {
+        let moved = model.with_effect(candidate.effect.clone());
+        if let (Ok(there), Ok(here)) = (moved.heat_path(), model.heat_path())
+            && there.location != here.location
+        {
+            evidence.anchor(&moved)?;
+        }
+    }
+    let mut singles = fit_singles(&Trial { evidence, model, candidates }, base);
+    for single in &mut singles {
+        let member = &single.members[0];
+        if candidates[member.candidate].moves_sensor() && base.chi_square - single.chi_square > MARGIN {
+            *single = settle_sensor(evidence, model, candidates, single.clone())?;
+        }
+    }
+    Ok(singles)
 }
 
 fn noise_variance(base: &Hypothesis, others: &[Hypothesis], rows: usize) -> f64 {

@@ -5,10 +5,10 @@ use super::confirm::{confirmation, holdout};
 use super::evidence::{Evidence, Role, dot, sum_of_squares};
 use super::hypothesis::{Hypothesis, Trial};
 use super::plain::{Plain, compete};
-use super::search::{Found, fit_swap, settle_sensor, without};
+use super::search::{Found, all_singles, fit_swap, settle_sensor, without};
 use super::{
-    Caution, Contender, DiagnoseError, Diagnosis, Equivalent, Finding, FittedParameter, Refusal, Rung, Unexplained,
-    Verdict,
+    Caution, Contender, DiagnoseError, Diagnosis, Equivalent, Extension, Finding, FittedParameter, Refusal, Rung,
+    Unexplained, Verdict,
 };
 use crate::fit::Effort;
 use crate::rate::CoilModel;
@@ -123,6 +123,36 @@ pub(super) fn judge(
         cautions,
         extended,
     })
+}
+
+/// The best fit of one kind of effect, with its errors; None where none can be fitted.
+pub(super) fn settle_one(
+    evidence: &mut Evidence,
+    model: &CoilModel,
+    candidates: &[Candidate],
+) -> Result<Option<Extension>, DiagnoseError> {
+    let rows = evidence.rows(Role::Fit);
+    let base = (Trial { evidence, model, candidates }).fit(&[], Effort::QUICK).ok_or(DiagnoseError::Unsolvable)?;
+    let singles = all_singles(evidence, model, candidates, &base)?;
+    let least = singles.into_iter().min_by(|a, b| bic(a, rows).total_cmp(&bic(b, rows)));
+    let Some(mut best) = least else { return Ok(None) };
+    let candidate = &candidates[best.members[0].candidate];
+    if candidate.moves_heat() || candidate.moves_sensor() {
+        best = settle_sensor(evidence, model, candidates, best)?;
+    }
+    let trial = Trial { evidence, model, candidates };
+    let Some(best) = trial.fit(&best.members, Effort { standard_errors: true, ..Effort::QUICK }) else {
+        return Ok(None);
+    };
+    let Some(extended) = trial.model_of(&best.members) else { return Ok(None) };
+    let inflation = inflation(&trial, &extended, &best, rows);
+    let freedom = |h: &Hypothesis| (rows as f64 - h.parameters as f64 - 1.0).max(1.0);
+    Ok(Some(Extension {
+        finding: finding(&trial, &best, 0, Vec::new(), inflation),
+        extended,
+        reduced_chi_square_before: base.chi_square / freedom(&base),
+        reduced_chi_square_after: best.chi_square / freedom(&best),
+    }))
 }
 
 fn bic(hypothesis: &Hypothesis, rows: usize) -> f64 {

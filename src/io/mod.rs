@@ -2,6 +2,7 @@
 
 pub mod checkpoint;
 pub mod comparison_json;
+pub mod diagnosis_json;
 mod effect_tables;
 pub mod effects_json;
 pub mod fault;

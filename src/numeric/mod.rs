@@ -1,7 +1,6 @@
 //! Mathematics without domain words; what a well-kept library has is called, not written again.
 
 pub mod allan;
-pub mod despike;
 pub mod expression;
 pub mod maximise;
 pub mod piecewise;
