@@ -148,8 +148,6 @@ pub enum CliError {
     #[error("error: {0}")]
     Diagnose(#[from] DiagnoseError),
     #[error("error: {0}")]
-    Predict(#[from] PredictError),
-    #[error("error: {0}")]
     Formula(#[from] FormulaError),
     #[error("error: {0}")]
     Effect(#[from] EffectError),
