@@ -15,6 +15,7 @@ mod new;
 mod optimise;
 mod patterns;
 pub mod progress;
+mod prove;
 mod records;
 mod report;
 mod reproduce;

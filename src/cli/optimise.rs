@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::budget::parse_duration;
 use super::progress::StopFlag;
+use super::prove::{prove_best, words};
 use super::screen::{Screen, table};
 use super::{CliError, Ending, report, schedule};
 use crate::io::checkpoint::{CHECKPOINT_FILE, read_checkpoint, write_checkpoint};
@@ -48,6 +49,9 @@ pub struct Arguments {
     /// Begins again although the output folder holds an unfinished run
     #[arg(long, requires = "output")]
     fresh: bool,
+    /// Tries for so long to prove that the best pattern is the best of its class
+    #[arg(long, value_name = "TIME", value_parser = parse_duration)]
+    prove: Option<Duration>,
     /// Writes a checkpoint when the last one is older than this
     #[arg(long, value_name = "TIME", default_value = "1s", value_parser = parse_duration)]
     checkpoint_every: Duration,
@@ -172,6 +176,10 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let budget = options.budget()?;
     let plan = options.plan(&file)?;
     let request = Request { file: &file, class, objective, plan: &plan, budget: options.budget.as_deref() };
+    if arguments.prove.is_some() && !matches!(objective, Objective::WorstRate | Objective::WorstPhase) {
+        let message = format!("proofs are of the worst rate and the worst phase, not of {}", objective.key());
+        return Err(CliError::Option { option: "--prove", message });
+    }
     let folder = arguments.output.as_deref();
     let saved = match folder {
         Some(folder) => saved_state(arguments, folder, &request, screen)?,
@@ -207,6 +215,14 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         screen.note("interrupted before anything was found");
         return Ok(Ending::Interrupted);
     };
+    let nothing_proved = (ProofJson::none(), false);
+    let (best, (proof, proof_cut_short)) = match arguments.prove.filter(|_| ended != Ended::Signal) {
+        None => (best, nothing_proved),
+        Some(time) => {
+            let (best, proof, cut) = prove_best(&bench, class, best, &baselines, time, &stop, screen)?;
+            (best, (proof, cut))
+        }
+    };
     let judged_now = (search.evaluations() - evaluated_before) as f64;
     let answer = OptimiseJson {
         model: file.model.name.clone(),
@@ -216,13 +232,13 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         best: PatternJson::of(&best),
         baselines: baselines.iter().map(PatternJson::of).collect(),
         improvement_over_qua: improvement_over_qua(&best, &baselines),
-        statement: bench.statement(&best, &baselines, class),
-        proof: ProofJson::none(),
+        statement: bench.statement(&best, &baselines, class) + &words(&proof),
+        proof,
         evaluations: search.evaluations(),
         evaluations_per_s: Some(judged_now / seconds),
         rounds: search.state().round,
         stopped_by: ended.words(&search).to_owned(),
-        reproducible: ended == Ended::Rule,
+        reproducible: ended == Ended::Rule && !proof_cut_short,
     };
     if let Some(folder) = folder {
         write_folder(folder, &file, &answer, &best, &search, screen)?;
