@@ -1,0 +1,240 @@
+//! Moves a second of the annealer against argmin's, on the same objective, samples, temperatures and machine.
+//!
+//! `cargo bench --bench annealers -- [--export FILE] [--moves N]`. The instance is the paper's coil with 24 layers and
+//! 8192 samples of 85 profiles; `--export` writes it for `benches/peers/annealer_simanneal.py`. Every annealer makes swaps of two
+//! layers and cools geometrically between the same temperatures; the cost is the largest |Ω| over all samples.
+
+use std::cell::RefCell;
+use std::io::Write;
+use std::time::Instant;
+
+use argmin::core::{CostFunction, Error, Executor};
+use argmin::solver::simulatedannealing::{Anneal, SATempFunc, SimulatedAnnealing};
+use coilwright::coil::{Coil, CoilSpec, Fibre, LayerLength};
+use coilwright::pattern::windability::WindabilityClass;
+use coilwright::profile::ProfileSpec;
+use coilwright::rate::CoilModel;
+use coilwright::search::anneal::{Restart, cooling_for, generator};
+use coilwright::search::columns::{Norm, Work};
+use coilwright::search::optimise::{Optimisation, Plan, Rules};
+use coilwright::search::samples::SampleMatrix;
+use coilwright::search::walk::Space;
+use coilwright::search::worst_case::SolvedProfiles;
+use coilwright::thermal::{Extent, Location, Material};
+use coilwright::units::{deg_per_h_from_rad_per_s, k_per_s_from_c_per_h, percent_from_fraction};
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+
+const LAYERS: usize = 24;
+const SAMPLES: usize = 8192;
+const PROFILES: usize = 85;
+const SEED: u64 = 1;
+
+fn instance() -> SampleMatrix {
+    let fibre = Fibre {
+        refractive_index: 1.447,
+        thermo_optic_per_k: 1.35e-5,
+        thermal_expansion_per_k: 0.0,
+        wavelength_m: 1300e-9,
+        outer_diameter_m: 250e-6,
+    };
+    let spec = CoilSpec {
+        fibre,
+        layers: LAYERS,
+        turns_per_layer: None,
+        bore_radius_m: 0.036,
+        radial_pitch_m: 250e-6,
+        axial_pitch_m: 250e-6,
+        layer_length: LayerLength::Equal,
+        length_m: Some(400.0),
+    };
+    let model = CoilModel {
+        name: "paper, 24 layers".into(),
+        coil: Coil::new(spec).expect("the coil is sound"),
+        extent: Extent::HalfSpace,
+        material: Material::Diffusivity { m2_per_s: 2.7e-7 },
+        location: Location::OuterLayer,
+        rate_mean_s: 0.0,
+        effects: vec![],
+    };
+    let profiles = ProfileSpec {
+        max_rate_k_per_s: k_per_s_from_c_per_h(10.0),
+        count: PROFILES,
+        segments: 4,
+        duration_s: 6000.0,
+        seed: SEED,
+        listed: vec![],
+    };
+    let solved = SolvedProfiles::new(&model, &profiles.profiles()).expect("a half space can be solved");
+    let (matrix, _) = SampleMatrix::of_profiles(&model, &solved).expect("the samples are finite");
+    // Evenly spread over the whole grid.
+    let kept: Vec<usize> = (0..SAMPLES).map(|i| i * matrix.samples() / SAMPLES).collect();
+    matrix.select(&kept)
+}
+
+/// The response of each layer to a weight of one half-segment, so that weights are the odd numbers 2P − 1 − N.
+fn responses(matrix: &SampleMatrix) -> Vec<Vec<f64>> {
+    let square_m2 = matrix.lengths_m()[0].powi(2);
+    (0..LAYERS).map(|j| matrix.columns.column(j).iter().map(|a| a * square_m2).collect()).collect()
+}
+
+fn weight(segment: usize) -> f64 {
+    (2 * segment) as f64 - 1.0 - LAYERS as f64
+}
+
+/// The cost from nothing, in the form that a user of a general annealer would write.
+fn full_cost(responses: &[Vec<f64>], segments: &[usize], values: &mut Vec<f64>) -> f64 {
+    values.clear();
+    values.resize(SAMPLES, 0.0);
+    for (column, &segment) in responses.iter().zip(segments) {
+        let weight = weight(segment);
+        for (v, a) in values.iter_mut().zip(column) {
+            *v += weight * a;
+        }
+    }
+    let mut lanes = [0.0_f64; 8];
+    for chunk in values.chunks_exact(8) {
+        for (lane, v) in lanes.iter_mut().zip(chunk) {
+            *lane = lane.max(v.abs());
+        }
+    }
+    lanes.into_iter().fold(0.0, f64::max)
+}
+
+fn swap(segments: &mut [usize], random: &mut ChaCha8Rng) {
+    let mut pick = |count: usize| (random.next_u32() as usize * count) >> 32;
+    let (from, other) = (pick(LAYERS), pick(LAYERS - 1));
+    segments.swap(from, if other >= from { other + 1 } else { other });
+}
+
+struct Argmin {
+    responses: Vec<Vec<f64>>,
+    values: RefCell<Vec<f64>>,
+    random: RefCell<ChaCha8Rng>,
+}
+
+impl CostFunction for Argmin {
+    type Param = Vec<usize>;
+    type Output = f64;
+
+    fn cost(&self, segments: &Vec<usize>) -> Result<f64, Error> {
+        Ok(full_cost(&self.responses, segments, &mut self.values.borrow_mut()))
+    }
+}
+
+impl Anneal for Argmin {
+    type Param = Vec<usize>;
+    type Output = Vec<usize>;
+    type Float = f64;
+
+    fn anneal(&self, segments: &Vec<usize>, _temperature: f64) -> Result<Vec<usize>, Error> {
+        let mut next = segments.clone();
+        swap(&mut next, &mut self.random.borrow_mut());
+        Ok(next)
+    }
+}
+
+fn say(name: &str, moves: u64, seconds: f64, best_rad_per_s: f64) {
+    println!(
+        "{name:<34} {moves:>10} moves {seconds:>8.3} s {:>12.0} moves/s  best {:.5} deg/h",
+        moves as f64 / seconds,
+        deg_per_h_from_rad_per_s(best_rad_per_s)
+    );
+}
+
+fn main() {
+    // One thread, as the peers have.
+    rayon::ThreadPoolBuilder::new().num_threads(1).build_global().expect("no pool has been used yet");
+    let arguments: Vec<String> = std::env::args().collect();
+    let after = |flag: &str| arguments.iter().position(|a| a == flag).and_then(|i| arguments.get(i + 1));
+    let moves: u64 = after("--moves").and_then(|m| m.parse().ok()).unwrap_or(2_000_000);
+    let matrix = instance();
+    let responses = responses(&matrix);
+    let space = Space::new(matrix, WindabilityClass::Any);
+    let cooling = cooling_for(&space, Norm::Largest, SEED, moves);
+    println!("{LAYERS} layers, {} samples, class any, seed {SEED}", space.matrix().samples());
+    if let Some(path) = after("--export") {
+        let mut bytes = Vec::new();
+        for number in [LAYERS as f64, SAMPLES as f64, cooling.hot, cooling.cold] {
+            bytes.extend(number.to_le_bytes());
+        }
+        bytes.extend(responses.iter().flatten().flat_map(|v| v.to_le_bytes()));
+        std::fs::File::create(path).and_then(|mut f| f.write_all(&bytes)).expect("the export can be written");
+    }
+
+    let (rate_as_shipped, best) = as_shipped(&space, moves);
+    say("coilwright as shipped, one thread", moves, moves as f64 / rate_as_shipped, best);
+
+    let mut restart = Restart::new(&space, SEED, 0, None);
+    let started = Instant::now();
+    while !restart.is_done(&cooling) {
+        restart.advance(&space, Norm::Largest, &cooling);
+    }
+    let seconds = started.elapsed().as_secs_f64();
+    say("coilwright, every sample judged", moves, seconds, restart.best_cost);
+    say_work(restart.work, seconds);
+
+    let recomputed_moves = moves / 100;
+    let mut random = generator(SEED, 77);
+    let mut segments = space.draw(&mut random);
+    let mut values = Vec::new();
+    let mut smallest = f64::INFINITY;
+    let started = Instant::now();
+    for _ in 0..recomputed_moves {
+        swap(&mut segments, &mut random);
+        smallest = smallest.min(full_cost(&responses, &segments, &mut values));
+    }
+    say("coilwright, every sample recomputed", recomputed_moves, started.elapsed().as_secs_f64(), smallest);
+
+    let argmin_moves = moves / 100;
+    let start = space.draw(&mut generator(SEED, 1));
+    let factor = (cooling.cold / cooling.hot).powf(1.0 / argmin_moves as f64);
+    let problem = Argmin { responses, values: RefCell::new(Vec::new()), random: RefCell::new(generator(SEED, 78)) };
+    let solver = SimulatedAnnealing::new(cooling.hot)
+        .expect("the temperature is positive")
+        .with_temp_func(SATempFunc::Exponential(factor));
+    let started = Instant::now();
+    let result = Executor::new(problem, solver)
+        .configure(|state| state.param(start).max_iters(argmin_moves))
+        .run()
+        .expect("the cost is always defined");
+    say("argmin 0.11", argmin_moves, started.elapsed().as_secs_f64(), result.state.best_cost);
+
+    // The same time for both: what is found in it.
+    let equal_moves = (rate_as_shipped * started.elapsed().as_secs_f64()) as u64;
+    let (rate, best) = as_shipped(&space, equal_moves);
+    say("coilwright, in argmin's time", equal_moves, equal_moves as f64 / rate, best);
+}
+
+/// Rounds of restarts on a working set of samples, what they find judged on all samples; moves a second and the best.
+fn as_shipped(space: &Space, moves: u64) -> (f64, f64) {
+    const ROUNDS: u64 = 4;
+    const RESTARTS: usize = 4;
+    let plan = Plan {
+        seed: SEED,
+        norm: Norm::Largest,
+        restarts_per_round: RESTARTS,
+        moves_per_restart: moves / ROUNDS / RESTARTS as u64,
+        rules: Rules { rounds: ROUNDS, patience: ROUNDS, moves: None, target: None },
+        starts: vec![],
+    };
+    let started = Instant::now();
+    let mut search = Optimisation::new(space.matrix().clone(), space.class(), plan);
+    while search.advance() {}
+    let seconds = started.elapsed().as_secs_f64();
+    say_work(search.state().work, seconds);
+    let best = search.best().expect("rounds have ended").cost;
+    (search.evaluations() as f64 / seconds, best)
+}
+
+fn say_work(work: Work, seconds: f64) {
+    let (count, samples) = (work.moves as f64, work.samples as f64);
+    println!(
+        "  accepted {:.1} %, samples a move {:.0}, {:.2} GB/s read and written, {:.2} Gflop/s",
+        percent_from_fraction(work.accepted as f64 / count),
+        samples / count,
+        // Values in and out and two columns; two multiplications, two additions, one comparison.
+        samples * 4.0 * 8.0 / seconds / 1e9,
+        samples * 5.0 / seconds / 1e9
+    );
+}
