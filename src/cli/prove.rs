@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 use super::CliError;
 use super::progress::StopFlag;
 use super::screen::Screen;
-use crate::io::run_directory::ProofJson;
+use crate::io::json::ProofJson;
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
-use crate::search::exact::{Certificate, Progress, Status, Task, prove};
+use crate::search::exact::{Progress, Status, Task, prove};
 use crate::search::verdict::{Bench, Judged};
 use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
 
@@ -45,13 +45,13 @@ pub fn prove_best(
         if stop.is_set() || started.elapsed() >= time { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let task = Task { model: bench.model, solved: bench.solved, class };
-    let Certificate { pattern, best_rad_per_s, lower_bound_rad_per_s, status, .. } = prove(&task, &starts, &watcher)?;
-    let best = if best_rad_per_s < best.worst.rate_rad_per_s.abs() { bench.judge(&best.name, &pattern)? } else { best };
-    let proof = ProofJson {
-        status: status.to_string(),
-        lower_bound_deg_per_h: (status != Status::None).then(|| deg_per_h_from_rad_per_s(lower_bound_rad_per_s)),
+    let certificate = prove(&task, &starts, &watcher)?;
+    let best = if certificate.best_rad_per_s < best.worst.rate_rad_per_s.abs() {
+        bench.judge(&best.name, &certificate.pattern)?
+    } else {
+        best
     };
-    Ok((best, proof, status != Status::Optimal))
+    Ok((best, ProofJson::of(&certificate), certificate.status != Status::Optimal))
 }
 
 /// What was proved, to be said after how good the best pattern is.

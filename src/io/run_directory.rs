@@ -8,7 +8,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::files::{WriteError, write_atomically};
-use super::json::{Document, PatternJson};
+use super::json::{Document, PatternJson, ProofJson};
 use super::model_file::{ModelFile, NamedPattern};
 use super::pattern_file::print_pattern;
 use super::schedule_file::sha256_hex;
@@ -22,21 +22,6 @@ impl PatternJson {
     /// Of a pattern that was judged by the reference.
     pub fn of(judged: &Judged) -> Self {
         Self::new(&judged.name, &judged.pattern, &judged.worst, judged.phase_rad, judged.guaranteed_rad_per_s)
-    }
-}
-
-/// What was proved about the best pattern.
-#[derive(Debug, Clone, Serialize)]
-pub struct ProofJson {
-    /// "optimal", "gap" or "none".
-    pub status: String,
-    /// Null where nothing was proved.
-    pub lower_bound_deg_per_h: Option<f64>,
-}
-
-impl ProofJson {
-    pub fn none() -> Self {
-        Self { status: "none".to_owned(), lower_bound_deg_per_h: None }
     }
 }
 
