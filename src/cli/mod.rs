@@ -22,6 +22,7 @@ mod reproduce;
 mod schedule;
 mod schema;
 pub mod screen;
+mod temperatures;
 mod tolerance;
 mod verify;
 
@@ -92,6 +93,7 @@ enum Command {
     Evaluate(evaluate::Arguments),
     Exact(exact::Arguments),
     Effects(effects::Arguments),
+    Temperatures(temperatures::Arguments),
     Tolerance(tolerance::Arguments),
     Patterns(patterns::Arguments),
     Check(check::Arguments),
@@ -135,9 +137,13 @@ pub enum CliError {
     #[error("error: {0}")]
     Rate(#[from] RateError),
     #[error("error: {0}")]
+    Predict(#[from] PredictError),
+    #[error("error: {0}")]
     Tolerance(#[from] ToleranceError),
     #[error("error: {path} has no [tolerance]: state at least one spread there, such as turns_per_layer_sd = 0.3")]
     NoTolerance { path: String },
+    #[error("error: the model has no profile called \"{stated}\": its profiles are {known}")]
+    UnknownProfile { stated: String, known: String },
     #[error("error: there is no effect {stated}: did you mean {nearest}? `coilwright effects` lists all")]
     UnknownEffect { stated: String, nearest: &'static str },
     #[error("error: {0}")]
@@ -182,6 +188,7 @@ pub fn run() -> ExitCode {
         Command::Evaluate(arguments) => evaluate::run(arguments, &screen),
         Command::Exact(arguments) => exact::run(arguments, &screen),
         Command::Effects(arguments) => effects::run(arguments, &screen),
+        Command::Temperatures(arguments) => temperatures::run(arguments, &screen),
         Command::Tolerance(arguments) => tolerance::run(arguments, &screen),
         Command::Patterns(arguments) => patterns::run(arguments, &screen),
         Command::Check(arguments) => check::run(arguments, &screen),

@@ -21,6 +21,7 @@ pub mod run_reader;
 pub mod schedule_file;
 pub mod schedule_reader;
 pub mod schema;
+pub mod temperature_file;
 pub mod tolerance_json;
 mod tolerance_table;
 pub mod toml_reader;

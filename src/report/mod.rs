@@ -4,5 +4,6 @@ pub mod cross_section;
 mod page;
 pub mod plot;
 pub mod search_run;
+pub mod temperatures;
 pub mod traveller;
 pub mod yan1998;
