@@ -147,8 +147,6 @@ pub enum CliError {
     #[error("error: there is no effect {stated}: did you mean {nearest}? `coilwright effects` lists all")]
     UnknownEffect { stated: String, nearest: &'static str },
     #[error("error: {0}")]
-    Predict(#[from] PredictError),
-    #[error("error: {0}")]
     Metrics(#[from] MetricsError),
     #[error("error: {0}")]
     Record(#[from] RecordError),
