@@ -1,16 +1,17 @@
 //! Records made ready for many models: their boundaries, the whitening of their residuals, their noise.
 
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use rayon::prelude::*;
 
 use super::DiagnoseError;
+use super::conductivity::SlopeResponse;
 use crate::boundary::{Boundary, RateWhitener};
 use crate::pattern::Pattern;
 use crate::predict::{estimate_boundary, noise_floor_rad_per_s, rates_rad_per_s};
 use crate::rate::CoilModel;
 use crate::record::Record;
-use crate::thermal::{self, HeatPath, Location, ThermalHistory};
+use crate::thermal::{self, Drive, HeatPath, Location, ThermalHistory};
 
 /// What a record is used for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,6 +42,10 @@ struct Anchor {
     location: Location,
     lag_s: f64,
     boundary: Boundary,
+    /// Under which it was estimated.
+    path: HeatPath,
+    /// Solved when it is first asked for; none where it cannot be.
+    slope_response: OnceLock<Option<SlopeResponse>>,
     whitener: RateWhitener,
     /// The measured rates and a constant of one noise, whitened; the latter of unit length.
     measured: Vec<f64>,
@@ -91,7 +96,11 @@ impl<'a> Evidence<'a> {
             .par_iter()
             .map(|case| case.estimate(model, pattern))
             .collect::<Result<Vec<_>, DiagnoseError>>()?;
-        for (case, anchor) in self.cases.iter_mut().zip(anchors) {
+        for (case, mut anchor) in self.cases.iter_mut().zip(anchors) {
+            // The slope's effect hardly depends on the sensor: what was solved is kept.
+            if let Some(known) = case.anchors.iter_mut().find(|a| a.location == anchor.location) {
+                anchor.slope_response = std::mem::take(&mut known.slope_response);
+            }
             case.anchors.retain(|a| a.location != anchor.location || a.lag_s != anchor.lag_s);
             case.anchors.push(anchor);
             case.recent = Mutex::default();
@@ -166,8 +175,9 @@ impl Case {
         let mut one = whitener.whiten(&vec![self.noise_rad_per_s; self.record.rows()]);
         let length = sum_of_squares(&one).sqrt();
         one.iter_mut().for_each(|v| *v /= length);
-        let location = model.heat_path()?.location;
-        Ok(Anchor { location, lag_s: model.sensor_lag_s(), boundary, whitener, measured, one })
+        let path = model.heat_path()?;
+        let (location, lag_s, slope_response) = (path.location, model.sensor_lag_s(), OnceLock::new());
+        Ok(Anchor { location, lag_s, boundary, path, slope_response, whitener, measured, one })
     }
 
     /// The anchor for a sensor: that of its place whose lag is nearest.
@@ -192,7 +202,7 @@ impl Case {
         if let Some(measured) = crate::predict::measured_ambient(&self.record) {
             drive.ambient_k = Some(measured);
         }
-        let history = thermal::solve(&path, &drive).ok()?.means(self.record.times_s(), model.rate_mean_s);
+        let history = self.history(&path, &drive, from, model.rate_mean_s)?;
         let solved = Arc::new(Solved { path, anchor, lag_s, history });
         if let Ok(mut recent) = self.recent.lock() {
             if recent.len() >= KEPT_FIELDS {
@@ -202,6 +212,23 @@ impl Case {
             recent.push(solved.clone());
         }
         Some(solved)
+    }
+
+    /// The pack under a drive; the effect of a conductivity's slope is taken from two solutions made before.
+    fn history(&self, path: &HeatPath, drive: &Drive, anchor: &Anchor, rate_mean_s: f64) -> Option<ThermalHistory> {
+        let times_s = self.record.times_s();
+        let slope_per_k = path.conductivity_slope_per_k;
+        let linear = HeatPath { conductivity_slope_per_k: 0.0, ..path.clone() };
+        let mut history = thermal::solve(&linear, drive).ok()?.means(times_s, rate_mean_s);
+        if slope_per_k != 0.0 {
+            thermal::check(path).ok()?;
+            let own_drive = || anchor.boundary.drive(anchor.location);
+            let response = anchor
+                .slope_response
+                .get_or_init(|| SlopeResponse::new(&anchor.path, &own_drive(), times_s, rate_mean_s));
+            response.as_ref()?.add_to(&mut history, slope_per_k);
+        }
+        Some(history)
     }
 
     fn residuals(&self, model: &CoilModel, pattern: &Pattern) -> Option<Vec<f64>> {

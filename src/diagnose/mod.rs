@@ -16,6 +16,7 @@
 //! projected out); Bartlett, J. R. Stat. Soc. Suppl. 8 (1946) 27 (standard errors under autocorrelation).
 
 mod candidate;
+mod conductivity;
 mod confirm;
 mod evidence;
 mod hypothesis;
