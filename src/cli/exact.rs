@@ -13,10 +13,11 @@ use crate::io::files::write_atomically;
 use crate::io::json::{ExactJson, PatternJson, ProofJson};
 use crate::io::model_file::{NamedPattern, read_model};
 use crate::io::pattern_file::{print_pattern, resolve_pattern};
+use crate::io::sample_table::print_samples;
 use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
 use crate::pattern::windability::WindabilityClass;
-use crate::rate::RateModel;
+use crate::rate::{RateError, RateModel};
 use crate::search::exact::{Progress, Status, Task, prove, starting_patterns};
 use crate::search::guaranteed::UnitStep;
 use crate::search::worst_case::SolvedProfiles;
@@ -46,6 +47,10 @@ pub struct Arguments {
     /// Seed of the short search; without it, the model's own
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// Writes the samples that the proof ran on as a table, for other solvers: constant and one coefficient a layer in
+    /// °/h, so that the rate error is constant + Σ a_j (2 P(j) − 1 − N). Needs equal lengths and halves that respond alike
+    #[arg(long, value_name = "FILE")]
+    samples: Option<PathBuf>,
     /// Writes the best winding as a pattern file
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -99,7 +104,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         proof: ProofJson::of(&certificate),
         nodes: certificate.nodes,
         judged: certificate.judged,
-        rows: certificate.rows,
+        rows: certificate.rows.len(),
         seconds: started.elapsed().as_secs_f64(),
     };
     if let Some(path) = &arguments.output {
@@ -110,6 +115,17 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         ];
         write_atomically(path, print_pattern(&named, &comments).as_bytes())?;
         screen.note(&format!("wrote {}", path.display()));
+    }
+    if let Some(path) = &arguments.samples {
+        let lengths_m = model.wound_coil().map_err(RateError::from)?.layer_lengths_m().to_vec();
+        match print_samples(&certificate.rows, &lengths_m) {
+            Some(table) => write_atomically(path, table.as_bytes())?,
+            None => screen.note(&format!(
+                "note: {} was not written: the samples are linear in the segments only with equal lengths and halves that \
+                 respond alike",
+                path.display()
+            )),
+        }
     }
     let interrupted = stop.is_set() && certificate.status != Status::Optimal;
     screen.answer(body, text)?;

@@ -18,6 +18,7 @@ mod profile_tables;
 pub mod record_file;
 pub mod run_directory;
 pub mod run_reader;
+pub mod sample_table;
 pub mod schedule_file;
 pub mod schedule_reader;
 pub mod schema;

@@ -251,7 +251,7 @@ impl Outcome {
 const MOST_REFUTING: usize = 64;
 
 /// Patterns that one share may judge on all samples before it asks for more samples to refute them by.
-const MOST_JUDGED: u64 = 4096;
+const MOST_JUDGED: u64 = 512;
 
 /// Patterns that one share may judge by the reference in vain, which takes a thousand times longer, before it asks for
 /// samples at the instants that refuted them.

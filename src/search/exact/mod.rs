@@ -17,14 +17,16 @@
 //! | class | space | method |
 //! |---|---|---|
 //! | `standard` | 2^(N−1) choices of ends | [`ends`]: two sets of sums and pairs of boxes |
-//! | `captive:K`, `any` | permutations | [`orders`]: outermost layer first, bounds by rearrangement |
+//! | `captive:K`, `any` | permutations | [`descent`]: outermost layer first, bounds by rearrangement, the innermost from a tree |
 //!
 //! Where nothing tells the halves of the fibre apart and nothing is added outside the coil, a pattern and its mirror
 //! image s → N+1−s have opposite errors and one of the two is searched.
 //!
 //! Holds for the worst rate (and so the worst phase, a fixed multiple of it). Leaves out the rms objective.
 
+pub mod descent;
 pub mod ends;
+pub mod inner;
 pub mod judge;
 pub mod orders;
 pub mod pairs;
@@ -40,6 +42,7 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use judge::{Candidate, Judge, Peak};
+use rows::Row;
 use sampling::Proof;
 
 use super::worst_case::{SearchError, SolvedProfiles};
@@ -103,7 +106,7 @@ pub struct Certificate {
     /// Patterns judged on all samples.
     pub judged: u64,
     /// Samples that the last pass refuted by.
-    pub rows: usize,
+    pub rows: Vec<Row>,
 }
 
 /// Told from time to time; answers whether to go on.
@@ -231,7 +234,7 @@ pub fn prove(task: &Task, starts: &[Pattern], watcher: Watcher) -> Result<Certif
         status,
         nodes,
         judged,
-        rows: proof.rows(),
+        rows: proof.rows(&judge),
     })
 }
 

@@ -25,14 +25,7 @@
 //! # Source
 //! Hardy, Littlewood, Pólya, Inequalities, theorem 368 (rearrangement).
 
-use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicUsize, Ordering};
-
-use rayon::prelude::*;
-
-use super::judge::Judge;
 use super::rows::{Row, curved_slack, deviations_m};
-use super::{Outcome, Watch};
 use crate::pattern::windability::WindabilityClass;
 
 /// Rows judged at once.
@@ -68,6 +61,7 @@ pub struct Orders {
     /// Rows with an axial term are searched twice, for either direction of the first layer.
     axial_sign: Option<f32>,
     blocks: Vec<RowBlock>,
+    whole_m: f32,
     /// For each number of open layers: l̄, and half of Σ |δ_i|.
     mean_m: Vec<f32>,
     half_deviation_m: Vec<f32>,
@@ -82,9 +76,9 @@ pub struct Node {
     pub open: u64,
 }
 
-/// Places of a node as a bound needs them, shared by all rows.
-#[derive(Debug)]
-struct Places {
+/// Places of a node as a bound needs them, shared by all rows; kept between nodes for its room.
+#[derive(Debug, Default)]
+pub struct Places {
     /// W at the places of F, outermost layer first, then the open places' in ascending order.
     placed: Vec<f32>,
     open: Vec<f32>,
@@ -95,6 +89,19 @@ struct Places {
     open_first: bool,
     signs: Vec<f32>,
     open_signs: Vec<f32>,
+}
+
+impl Node {
+    pub fn open_count(&self) -> usize {
+        self.open.count_ones() as usize
+    }
+
+    /// Takes back the layer placed last.
+    pub fn take_back(&mut self) {
+        if let Some(place) = self.places.pop() {
+            self.open |= 1 << place;
+        }
+    }
 }
 
 impl Orders {
@@ -118,6 +125,7 @@ impl Orders {
                 .chunks(LANES)
                 .map(|rows| RowBlock::new(rows, lengths_m, &deviations, has_difference, axial_sign.is_some()))
                 .collect(),
+            whole_m: lengths_m.iter().sum::<f64>() as f32,
             mean_m: (0..=layers)
                 .map(|open| (lengths_m[..open].iter().sum::<f64>() / open.max(1) as f64) as f32)
                 .collect(),
@@ -129,8 +137,18 @@ impl Orders {
         Node { places: Vec::new(), open: if self.layers == 64 { u64::MAX } else { (1 << self.layers) - 1 } }
     }
 
-    pub fn is_leaf(&self, node: &Node) -> bool {
-        node.open == 0
+    pub fn layers(&self) -> usize {
+        self.layers
+    }
+
+    /// Whether all layers have the same length.
+    pub fn equal(&self) -> bool {
+        self.equal
+    }
+
+    /// Rows, padded.
+    pub fn width(&self) -> usize {
+        self.blocks.len() * LANES
     }
 
     /// Whether layers wound at these places, and no others, leave few enough captive runs.
@@ -143,49 +161,57 @@ impl Orders {
         node.places.iter().rev().map(|&p| usize::from(p) + 1).collect()
     }
 
-    fn places(&self, node: &Node) -> Places {
+    /// W of a place of which all that lies before it is known.
+    fn w(&self, from_m: f32, length_m: f32) -> f32 {
+        2.0 * from_m + length_m - self.whole_m
+    }
+
+    fn sign(&self, place: usize) -> f32 {
+        let sign = self.axial_sign.unwrap_or(0.0);
+        if place.is_multiple_of(2) { -sign } else { sign }
+    }
+
+    fn set_places(&self, node: &Node, found: &mut Places) {
         let placed_count = node.places.len();
         let open_count = self.layers - placed_count;
         let mean_m = self.mean_m[open_count];
-        let mut layer_at = [usize::MAX; MOST_LAYERS];
+        let mut layer_at = [u8::MAX; MOST_LAYERS];
         for (k, &p) in node.places.iter().enumerate() {
-            layer_at[usize::from(p)] = k;
+            layer_at[usize::from(p)] = k as u8;
         }
-        let whole_m: f32 = self.lengths_m.iter().sum();
-        let mut found = Places {
-            placed: vec![0.0; placed_count],
-            open: Vec::with_capacity(open_count),
-            open_difference: Vec::new(),
-            along: Vec::with_capacity(placed_count),
-            open_first: false,
-            signs: vec![0.0; placed_count],
-            open_signs: Vec::new(),
-        };
+        found.placed.resize(placed_count, 0.0);
+        found.signs.resize(placed_count, 0.0);
+        found.open.clear();
+        found.open_signs.clear();
+        found.along.clear();
+        found.open_first = false;
         let mut from_m = 0.0;
         for (p, &k) in layer_at[..self.layers].iter().enumerate() {
-            let sign = if p % 2 == 0 { -1.0 } else { 1.0 } * self.axial_sign.unwrap_or(0.0);
-            if k == usize::MAX {
-                found.open.push(2.0 * from_m + mean_m - whole_m);
-                found.open_signs.push(sign);
+            if k == u8::MAX {
+                found.open.push(self.w(from_m, mean_m));
+                found.open_signs.push(self.sign(p));
                 from_m += mean_m;
                 match found.along.last_mut() {
                     Some((_, open_behind)) => *open_behind = true,
                     None => found.open_first = true,
                 }
             } else {
+                let k = usize::from(k);
                 let layer = self.layers - 1 - k;
-                found.placed[k] = 2.0 * from_m + self.lengths_m[layer] - whole_m;
-                found.signs[k] = sign;
+                found.placed[k] = self.w(from_m, self.lengths_m[layer]);
+                found.signs[k] = self.sign(p);
                 from_m += self.lengths_m[layer];
                 found.along.push((layer, false));
             }
         }
         if self.has_difference {
-            found.open_difference = found.open.iter().map(|w| -w.abs()).collect();
+            found.open_difference.clear();
+            found.open_difference.extend(found.open.iter().map(|w| -w.abs()));
             found.open_difference.sort_by(f32::total_cmp);
         }
-        found.open_signs.sort_by(f32::total_cmp);
-        found
+        if self.axial_sign.is_some() {
+            found.open_signs.sort_by(f32::total_cmp);
+        }
     }
 
     /// By how much each row of a block exceeds the limit at best below a node.
@@ -256,17 +282,17 @@ impl Orders {
     }
 
     /// Whether a pattern below the node may stay under the limit in every row. What is not a number refutes nothing.
-    pub fn may_stay_under(&self, node: &Node, limit: f32) -> bool {
-        let places = self.places(node);
-        self.blocks.iter().all(|block| self.excess(block, &places, limit).iter().all(|e| !(*e >= 0.0)))
+    pub fn may_stay_under(&self, node: &Node, limit: f32, places: &mut Places) -> bool {
+        self.set_places(node, places);
+        self.blocks.iter().all(|block| self.excess(block, places, limit).iter().all(|e| !(*e >= 0.0)))
     }
 
     /// The row that exceeds the limit most below a node, if any does.
-    pub fn refuting_row(&self, node: &Node, limit: f32) -> Option<usize> {
-        let places = self.places(node);
+    pub fn refuting_row(&self, node: &Node, limit: f32, places: &mut Places) -> Option<usize> {
+        self.set_places(node, places);
         let mut worst = (0.0, None);
         for (b, block) in self.blocks.iter().enumerate() {
-            for (i, e) in self.excess(block, &places, limit).into_iter().enumerate() {
+            for (i, e) in self.excess(block, places, limit).into_iter().enumerate() {
                 if e >= worst.0 && e.is_finite() {
                     worst = (e, Some(b * LANES + i));
                 }
@@ -275,95 +301,47 @@ impl Orders {
         worst.1
     }
 
-    /// The nodes below one, by the place of the next layer. A mirror image is left out where `mirrored` holds.
-    pub fn children<'a>(&'a self, node: &'a Node, mirrored: bool) -> impl Iterator<Item = Node> + 'a {
-        let last = if mirrored && node.places.is_empty() { self.layers / 2 } else { self.layers };
-        (0..last).filter(move |p| node.open >> p & 1 == 1).filter_map(move |p| {
-            let open = node.open & !(1 << p);
-            self.admits(open).then(|| {
-                let mut places = Vec::with_capacity(self.layers);
-                places.extend_from_slice(&node.places);
-                places.push(p as u8);
-                Node { places, open }
-            })
-        })
+    /// Puts the next layer on a place if that is open, the class admits it, and no mirror image stands for it.
+    pub fn place(&self, node: &mut Node, place: usize, mirrored: bool) -> bool {
+        let is_mirror_image = mirrored && node.places.is_empty() && place >= self.layers / 2;
+        if is_mirror_image || node.open >> place & 1 == 0 || !self.admits(node.open & !(1 << place)) {
+            return false;
+        }
+        node.open &= !(1 << place);
+        node.places.push(place as u8);
+        true
     }
-}
 
-/// Pieces of work that are shared out: more than threads, and always the same.
-const SHARES: usize = 256;
-
-/// One piece may take so many times its even share of the nodes allowed.
-const UNEVENNESS: u64 = 8;
-
-const NODES_PER_PAUSE: u64 = 1 << 12;
-
-impl Orders {
-    /// Every pattern that may stay under the limit is judged.
-    pub fn search(&self, judge: &Judge, limit_rad_per_s: f64, mirrored: bool, watch: &Watch) -> Outcome {
-        let limit = limit_rad_per_s as f32;
-        let mut outcome = Outcome::default();
-        let mut shares = vec![self.root()];
-        while shares.len() < SHARES && shares.iter().any(|n| n.open != 0) {
-            let next: Vec<Node> = shares.iter().flat_map(|n| self.children(n, mirrored)).collect();
-            outcome.nodes += next.len() as u64;
-            shares = next.into_iter().filter(|n| self.may_stay_under(n, limit)).collect();
+    /// Adds what a layer contributes on a place to all rows; for equal lengths.
+    pub fn add_placed(&self, layer: usize, place: usize, sum: &mut [f32]) {
+        let length_m = self.lengths_m[0];
+        let w = self.w(place as f32 * length_m, length_m);
+        let axial_term = usize::from(self.has_difference);
+        for (block, sum) in self.blocks.iter().zip(sum.chunks_exact_mut(LANES)) {
+            add(sum, &block.mean[layer], w);
+            if self.has_difference {
+                add(sum, &block.terms[0][layer], -w.abs());
+            }
+            if self.axial_sign.is_some() {
+                add(sum, &block.terms[axial_term][layer], self.sign(place));
+            }
         }
-        let most_nodes = watch.most_nodes / shares.len().max(1) as u64;
-        let most_nodes = most_nodes.saturating_mul(UNEVENNESS);
-        let done = AtomicUsize::new(0);
-        let found: Vec<Outcome> = shares
-            .par_iter()
-            .map(|share| {
-                let mut dive = Dive {
-                    orders: self,
-                    judge,
-                    limit_rad_per_s,
-                    mirrored,
-                    most_nodes,
-                    watch,
-                    found: Outcome::default(),
-                };
-                dive.found.complete = dive.descend(share).is_continue();
-                let count = done.fetch_add(1, Ordering::Relaxed) + 1;
-                let _ = watch.report(count as f64 / shares.len() as f64);
-                dive.found
-            })
-            .collect();
-        found.into_iter().for_each(|o| outcome.absorb(o));
-        outcome
     }
-}
 
-/// The depth-first search of one share.
-struct Dive<'a, 'w> {
-    orders: &'a Orders,
-    judge: &'a Judge<'a>,
-    limit_rad_per_s: f64,
-    mirrored: bool,
-    most_nodes: u64,
-    watch: &'a Watch<'w>,
-    found: Outcome,
-}
-
-impl Dive<'_, '_> {
-    fn descend(&mut self, node: &Node) -> ControlFlow<()> {
-        if node.open == 0 {
-            return self.found.judge(self.judge, &Orders::segments(node), self.limit_rad_per_s, self.watch);
+    /// Between what bounds the sum of the layers without a place must lie; for equal lengths.
+    pub fn room(&self, node: &Node, limit: f32, low: &mut Vec<f32>, high: &mut Vec<f32>) {
+        low.clear();
+        low.extend(self.blocks.iter().flat_map(|b| b.constant));
+        for (k, &place) in node.places.iter().enumerate() {
+            self.add_placed(self.layers - 1 - k, usize::from(place), low);
         }
-        for child in self.orders.children(node, self.mirrored) {
-            self.found.nodes += 1;
-            if self.found.nodes > self.most_nodes {
-                return ControlFlow::Break(());
-            }
-            if self.found.nodes.is_multiple_of(NODES_PER_PAUSE) {
-                self.watch.pause()?;
-            }
-            if self.orders.may_stay_under(&child, self.limit_rad_per_s as f32) {
-                self.descend(&child)?;
-            }
+        high.clear();
+        let slack = self.blocks.iter().flat_map(|b| &b.slack[node.open_count()]);
+        for (known, slack) in low.iter_mut().zip(slack) {
+            let reach = limit + slack;
+            high.push(reach - *known);
+            *known = -reach - *known;
         }
-        ControlFlow::Continue(())
     }
 }
 
@@ -445,9 +423,9 @@ fn pairs_slack(row: &Row, lengths_m: &[f64], deviations_m: &[f64]) -> f64 {
 }
 
 #[inline]
-fn add(sum: &mut [f32; LANES], factors: &[f32; LANES], by: f32) {
-    for i in 0..LANES {
-        sum[i] += factors[i] * by;
+fn add(sum: &mut [f32], factors: &[f32; LANES], by: f32) {
+    for (s, factor) in sum.iter_mut().zip(factors) {
+        *s += factor * by;
     }
 }
 

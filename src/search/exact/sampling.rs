@@ -7,9 +7,10 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
+use super::descent::search;
 use super::ends::Ends;
 use super::judge::Judge;
-use super::orders::{Node, Orders};
+use super::orders::{Node, Orders, Places};
 use super::rows::Row;
 use super::{Outcome, Watch};
 use crate::pattern::Pattern;
@@ -80,8 +81,8 @@ impl Proof {
     }
 
     /// Samples in use.
-    pub fn rows(&self) -> usize {
-        self.samples.len()
+    pub fn rows(&self, judge: &Judge) -> Vec<Row> {
+        self.samples.iter().map(|&s| Row::of(judge.matrix(), s)).collect()
     }
 
     /// Judges every pattern whose worst rate may be below the limit.
@@ -93,7 +94,7 @@ impl Proof {
                 Engine::Orders(directions) => {
                     let mut outcome = Outcome::default();
                     for orders in directions {
-                        outcome.absorb(orders.search(judge, limit_rad_per_s, self.mirrored, watch));
+                        outcome.absorb(search(orders, judge, limit_rad_per_s, self.mirrored, watch));
                     }
                     outcome
                 }
@@ -185,15 +186,19 @@ fn most_refuting(
     let directions = both_directions(&rows, judge, class);
     let mut random = ChaCha8Rng::seed_from_u64(DESCENT_SEED);
     let mut counts = vec![0usize; candidates.len()];
+    let mut places = Places::default();
     for descent in 0..DESCENTS {
         let orders = &directions[descent % directions.len()];
         let mut node = orders.root();
         while node.open != 0 {
             let mut alive: Vec<Node> = Vec::new();
-            for child in orders.children(&node, mirrored) {
-                match orders.refuting_row(&child, limit_rad_per_s as f32) {
-                    Some(row) => counts[row] += 1,
-                    None => alive.push(child),
+            for place in 0..orders.layers() {
+                if orders.place(&mut node, place, mirrored) {
+                    match orders.refuting_row(&node, limit_rad_per_s as f32, &mut places) {
+                        Some(row) => counts[row] += 1,
+                        None => alive.push(node.clone()),
+                    }
+                    node.take_back();
                 }
             }
             if alive.is_empty() {
