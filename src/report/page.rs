@@ -62,7 +62,7 @@ figure svg{max-width:100%;height:auto;display:block}
 .fill{min-width:5rem}.long{min-width:10.5rem}.keep{white-space:nowrap}
 .a{color:var(--a)}.b{color:var(--b)}
 code,pre{font-family:ui-monospace,'DejaVu Sans Mono',monospace;font-size:.86em;overflow-wrap:anywhere;white-space:pre-wrap}
-@media(max-width:40rem){body{font-size:15px}dl.facts{grid-template-columns:1fr}dl.facts dt{margin-top:.3rem}}
+@media screen and (max-width:40rem){figure .zoom:not(.open){overflow-x:auto}figure .zoom:not(.open) svg{max-width:none;width:560px}body{font-size:15px}dl.facts{grid-template-columns:1fr}dl.facts dt{margin-top:.3rem}}
 @page{margin:14mm 12mm 16mm;@bottom-right{content:'page ' counter(page) ' of ' counter(pages);font:9pt sans-serif}}
 @media print{
 :root{--ink:#000;--paper:#fff;--soft:#eee;--line:#888}

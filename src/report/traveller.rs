@@ -81,9 +81,9 @@ fn reels(document: &ScheduleJson) -> Markup {
             thead { tr { th.word { "Reel" } th { "Load" } th { "To be wound" } th { "Fibre from" } th { "Fibre to" } th.word { "Prepare" } th { "Loaded, measured" } } }
             tbody { @for reel in &document.reels { tr {
                 td.word { b { (reel.name) } @if reel.captive { " (captive)" } }
-                td { b { (metres(reel.load_m.unwrap_or(reel.to_m - reel.from_m))) } }
-                td { (metres(reel.to_m - reel.from_m)) }
-                td { (metres(reel.from_m)) } td { (metres(reel.to_m)) }
+                td.keep { b { (metres(reel.load_m.unwrap_or(reel.to_m - reel.from_m))) } }
+                td.keep { (metres(reel.to_m - reel.from_m)) }
+                td.keep { (metres(reel.from_m)) } td.keep { (metres(reel.to_m)) }
                 td.word {
                     @if let Some(source) = &reel.taken_from { "spool over from reel " (source) " before step " (reel.prepared_before_step) }
                     @else { "before step " (reel.prepared_before_step) }

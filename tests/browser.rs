@@ -1,0 +1,86 @@
+//! The pages in a real browser: no script error, no request to the network, nothing wider than a phone.
+//!
+//! Skips with a clear line where no Chromium is installed.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const MODEL: &str = "examples/paper-200m.toml";
+const BROWSERS: &[&str] = &["chromium", "chromium-browser", "google-chrome", "chrome"];
+
+fn browser() -> Option<&'static str> {
+    let found = BROWSERS
+        .iter()
+        .copied()
+        .find(|name| Command::new(name).arg("--version").output().is_ok_and(|out| out.status.success()));
+    if found.is_none() {
+        println!("skipped: none of {} is installed", BROWSERS.join(", "));
+    }
+    found
+}
+
+fn coilwright(arguments: &[&str]) {
+    let out = Command::new(env!("CARGO_BIN_EXE_coilwright")).args(arguments).output().unwrap();
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+}
+
+/// A traveller and a search's report.
+fn pages(folder: &Path) -> Vec<PathBuf> {
+    let (schedule, run) = (folder.join("schedule"), folder.join("run"));
+    coilwright(&["schedule", MODEL, "--pattern", "qua", "-q", "-o", schedule.to_str().unwrap()]);
+    coilwright(&["optimise", MODEL, "--rounds", "1", "--moves-per-restart", "500", "-q", "-o", run.to_str().unwrap()]);
+    vec![schedule.join("traveller.html"), run.join("report.html")]
+}
+
+fn run(browser: &str, profile: &Path, arguments: &[&str]) -> (String, String) {
+    let out = Command::new(browser)
+        .args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--enable-logging=stderr",
+            "--allow-file-access-from-files",
+        ])
+        .args(["--host-resolver-rules=MAP * ~NOTFOUND", "--virtual-time-budget=3000"])
+        .arg(format!("--user-data-dir={}", profile.display()))
+        .args(arguments)
+        .output()
+        .unwrap();
+    (String::from_utf8_lossy(&out.stdout).into_owned(), String::from_utf8_lossy(&out.stderr).into_owned())
+}
+
+#[test]
+fn pages_hold_everything_themselves_and_open_without_a_script_error_on_desktop_phone_and_paper() {
+    let folder = tempfile::tempdir().unwrap();
+    let pages = pages(folder.path());
+    for page in &pages {
+        let text = std::fs::read_to_string(page).unwrap();
+        for outside in ["src=\"http", "href=\"http", "url(http", "@import", "<img", "<link rel=\"stylesheet\""] {
+            assert!(!text.contains(outside), "{} asks for {outside}", page.display());
+        }
+    }
+    let Some(browser) = browser() else { return };
+    for page in &pages {
+        let address = format!("file://{}", page.display());
+        let (dom, log) = run(browser, folder.path(), &["--dump-dom", &address]);
+        assert!(dom.contains("</svg>") && dom.contains("<h1>"), "{log}");
+        assert!(!log.contains("CONSOLE"), "{log}");
+        // In a frame as wide as a phone's screen nothing may stick out but what scrolls by itself.
+        let frame = folder.path().join("phone.html");
+        let script = "onload=()=>{const d=document.querySelector('iframe').contentDocument.documentElement;\
+                      document.title=d.clientWidth>300&&d.scrollWidth<=d.clientWidth?'fits':`${d.scrollWidth} of ${d.clientWidth}`}";
+        let html = format!(
+            "<iframe src=\"{address}\" style=\"width:390px;height:900px;border:0\"></iframe><script>{script}</script>"
+        );
+        std::fs::write(&frame, html).unwrap();
+        let (dom, log) = run(browser, folder.path(), &["--dump-dom", &format!("file://{}", frame.display())]);
+        assert!(dom.contains("<title>fits</title>"), "{dom}\n{log}");
+        let pdf = folder.path().join("page.pdf");
+        let (_, log) = run(
+            browser,
+            folder.path(),
+            &["--no-pdf-header-footer", &format!("--print-to-pdf={}", pdf.display()), &address],
+        );
+        assert!(std::fs::metadata(&pdf).is_ok_and(|found| found.len() > 10_000), "{log}");
+    }
+}
