@@ -1,6 +1,6 @@
 //! Reading whole text files, and writing them so that nothing is ever half there.
 
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
@@ -40,7 +40,14 @@ pub fn read_text_up_to(path: &Path, largest_bytes: u64) -> Result<String, Faults
     if found.len() > largest_bytes {
         return Err(fault(format!("expected a text file of at most {largest_bytes} bytes, found {}", found.len())));
     }
-    let bytes = std::fs::read(path).map_err(|e| fault(format!("cannot be read: {e}")))?;
+    // A pipe or device has no length to check beforehand.
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)
+        .and_then(|file| file.take(LARGEST_TEXT_BYTES + 1).read_to_end(&mut bytes))
+        .map_err(|e| fault(format!("cannot be read: {e}")))?;
+    if bytes.len() as u64 > LARGEST_TEXT_BYTES {
+        return Err(fault(format!("expected a text file of at most {LARGEST_TEXT_BYTES} bytes, found more")));
+    }
     let text = String::from_utf8(bytes).map_err(|e| {
         fault(format!(
             "expected text in UTF-8, found other bytes at offset {}: is it the right file?",

@@ -1,0 +1,9 @@
+#![no_main]
+//! Any text: an answer or faults that can be drawn, never a panic.
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    if let Err(faults) = coilwright::io::schedule_reader::parse_claim("schedule", text) {
+        let _ = faults.to_string();
+    }
+});
