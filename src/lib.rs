@@ -21,6 +21,7 @@ pub mod rate;
 pub mod boundary;
 pub mod compare;
 pub mod diagnose;
+pub mod compensate;
 pub mod fit;
 pub mod metrics;
 pub mod predict;

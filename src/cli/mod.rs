@@ -3,6 +3,7 @@
 mod budget;
 mod check;
 mod compare;
+mod compensate;
 mod completions;
 mod diagnose;
 mod effects;
@@ -34,6 +35,8 @@ use thiserror::Error;
 use crate::diagnose::DiagnoseError;
 use crate::effect::EffectError;
 use crate::effect::custom::FormulaError;
+use crate::compensate::CompensateError;
+use crate::io::compensation_file::StreamError;
 use crate::io::fault::Faults;
 use crate::io::files::WriteError;
 use crate::io::pattern_file::ResolveError;
@@ -102,6 +105,7 @@ enum Command {
     Optimise(optimise::Arguments),
     Schedule(schedule::Arguments),
     Compare(compare::Arguments),
+    Compensate(compensate::Arguments),
     Metrics(metrics::Arguments),
     Diagnose(diagnose::Arguments),
     Extend(extend::Arguments),
@@ -147,6 +151,18 @@ pub enum CliError {
     #[error("error: there is no effect {stated}: did you mean {nearest}? `coilwright effects` lists all")]
     UnknownEffect { stated: String, nearest: &'static str },
     #[error("error: {0}")]
+    Predict(#[from] PredictError),
+    #[error("error: {0}")]
+    Compensate(#[from] CompensateError),
+    #[error(transparent)]
+    Stream(StreamError),
+    #[error(
+        "error: only the physical compensator of a model without a bias over temperature can be exported, and it needs an interval: give --interval or --fit"
+    )]
+    NoExport,
+    #[error("error: --all-methods needs a record to try them on")]
+    NoHoldout,
+    #[error("error: {0}")]
     Metrics(#[from] MetricsError),
     #[error("error: {0}")]
     Record(#[from] RecordError),
@@ -178,6 +194,16 @@ pub enum CliError {
     Stdout(std::io::Error),
 }
 
+impl From<StreamError> for CliError {
+    fn from(error: StreamError) -> Self {
+        match error {
+            // A reader that has seen enough is told apart from a failure by its kind.
+            StreamError::Write(source) => CliError::Stdout(source),
+            other => CliError::Stream(other),
+        }
+    }
+}
+
 /// Parses the arguments, runs the command, and turns its ending into an exit code.
 pub fn run() -> ExitCode {
     let cli = Cli::parse();
@@ -195,6 +221,7 @@ pub fn run() -> ExitCode {
         Command::Optimise(arguments) => optimise::run(arguments, &screen),
         Command::Schedule(arguments) => schedule::run(arguments, &screen),
         Command::Compare(arguments) => compare::run(arguments, &screen),
+        Command::Compensate(arguments) => compensate::run(arguments, &screen),
         Command::Metrics(arguments) => metrics::run(arguments, &screen),
         Command::Diagnose(arguments) => diagnose::run(arguments, &screen),
         Command::Extend(arguments) => extend::run(arguments, &screen),

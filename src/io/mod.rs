@@ -3,6 +3,7 @@
 pub mod checkpoint;
 pub mod comparison_json;
 pub mod diagnosis_json;
+pub mod compensation_file;
 mod effect_tables;
 pub mod effects_json;
 pub mod fault;

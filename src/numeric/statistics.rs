@@ -23,6 +23,31 @@ pub fn standard_deviation(values: &[f64]) -> f64 {
     (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (values.len() - 1) as f64).sqrt()
 }
 
+/// A standard deviation in constant memory.
+///
+/// # Source
+/// Welford, Technometrics 4 (1962) 419.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RunningDeviation {
+    count: f64,
+    mean: f64,
+    square: f64,
+}
+
+impl RunningDeviation {
+    pub fn push(&mut self, value: f64) {
+        self.count += 1.0;
+        let from_mean = value - self.mean;
+        self.mean += from_mean / self.count;
+        self.square += from_mean * (value - self.mean);
+    }
+
+    /// With n − 1; None for fewer than two values.
+    pub fn deviation(&self) -> Option<f64> {
+        (self.count > 1.5).then(|| (self.square / (self.count - 1.0)).sqrt())
+    }
+}
+
 /// The mean of the middle two where their number is even; NaN of nothing.
 pub fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();

@@ -1,0 +1,231 @@
+//! `compensate`: temperature and rate in, compensated rate out, as a file or as a stream.
+
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+
+use super::records::{GrossErrors, read_noticed};
+use super::schedule::pattern_of;
+use super::screen::{Screen, table};
+use super::{CliError, Ending};
+use crate::compensate::{Compensator, Method};
+use crate::io::compensation_file::{
+    BiasLineJson, CompensateJson, DifferenceEquation, MethodJson, StreamSummary, compensate_lines,
+};
+use crate::io::fault::Faults;
+use crate::io::files::write_atomically;
+use crate::io::json::Document;
+use crate::io::model_file::{ModelFile, NamedPattern, read_model};
+use crate::numeric::statistics::rms;
+use crate::predict::noise_floor_rad_per_s;
+use crate::record::Record;
+use crate::units::deg_per_h_from_rad_per_s;
+
+/// Temperature and rate in, compensated rate out, as a file or as a stream
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  coilwright compensate coil.toml day-2.csv --fit day-1.csv > compensated.csv\n  logger | coilwright compensate coil.toml - --fit day-1.csv\n  coilwright compensate coil.toml day-2.csv --fit day-1.csv --all-methods\n  coilwright compensate coil.toml --fit day-1.csv --export embedded/compensation\n\nEvery line comes out, in order, with rate_compensated_deg_per_h and flags behind it: malformed, clock_back, gap,\ntemperature_held, rate_held, rate_rejected."
+)]
+pub struct Arguments {
+    /// The model file
+    model: PathBuf,
+    /// A record (CSV), or - for standard input
+    record: Option<PathBuf>,
+    /// The record to fit film, noise, delay and offset (or the lines, or the regression) to
+    #[arg(long, value_name = "RECORD")]
+    fit: Option<PathBuf>,
+    /// How to compensate
+    #[arg(long, value_enum, default_value_t = Way::Physical)]
+    method: Way,
+    /// Fits every method and shows how well each does on the record
+    #[arg(long, requires = "fit")]
+    all_methods: bool,
+    /// A winding's name or a pattern file; without it, the model's own
+    #[arg(long, short, value_name = "PATTERN")]
+    pattern: Option<String>,
+    /// Writes the lines here instead of to stdout
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Writes the physical compensator as FILE.json and FILE.h
+    #[arg(long, value_name = "FILE")]
+    export: Option<PathBuf>,
+    /// Interval of the exported difference equation [s]; without it, that of the fitted record
+    #[arg(long, value_name = "SECONDS")]
+    interval: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Way {
+    /// The model's own physics
+    Physical,
+    /// Straight lines over temperature
+    Piecewise,
+    /// Linear in T, dT/dt and d(T_out - T_in)/dt
+    Regression,
+}
+
+impl From<Way> for Method {
+    fn from(way: Way) -> Self {
+        match way {
+            Way::Physical => Method::Physical,
+            Way::Piecewise => Method::Piecewise,
+            Way::Regression => Method::Regression,
+        }
+    }
+}
+
+pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+    let file = read_model(&arguments.model)?;
+    let named = pattern_of(&file, arguments.pattern.as_deref())?;
+    let fitted = match &arguments.fit {
+        Some(path) => Some(read_noticed(path, GrossErrors::Drop, screen)?.record),
+        None => None,
+    };
+    let method: Method = arguments.method.into();
+    if arguments.all_methods {
+        return all_methods(arguments, &file, &named, fitted.as_ref(), screen);
+    }
+    let compensator = match &fitted {
+        Some(record) => Compensator::fit(method, &file.model, &named.pattern, record)?,
+        None => Compensator::declared(method, &file.model, &named.pattern)?,
+    };
+    if let Some(prefix) = &arguments.export {
+        export(&compensator, &file, fitted.as_ref(), arguments.interval, prefix, screen)?;
+        if arguments.record.is_none() {
+            return Ok(Ending::Done);
+        }
+    }
+    let summary = stream(arguments, &compensator, screen)?;
+    screen.note(&format!(
+        "compensated {} rows ({}), {} rows behind; standard deviation {} -> {} °/h; malformed {}, clock back {}, gaps {}, temperature held {}, rate held {}, rate rejected {}",
+        summary.rows,
+        method.key(),
+        summary.delay_rows,
+        shown(summary.rate_deviation_deg_per_h),
+        shown(summary.compensated_deviation_deg_per_h),
+        summary.malformed,
+        summary.clock_back,
+        summary.gap,
+        summary.temperature_held,
+        summary.rate_held,
+        summary.rate_rejected
+    ));
+    if screen.is_json() {
+        let body = CompensateJson {
+            model: file.model.name.clone(),
+            method: method.key(),
+            summary: Some(summary),
+            noise_floor_deg_per_h: None,
+            methods: Vec::new(),
+            lines: BiasLineJson::all(&compensator),
+        };
+        screen.answer(body, |_| String::new())?;
+    }
+    Ok(Ending::Done)
+}
+
+fn shown(value: Option<f64>) -> String {
+    value.map_or_else(|| "-".to_owned(), |v| format!("{v:.5}"))
+}
+
+fn stream(arguments: &Arguments, compensator: &Compensator, screen: &Screen) -> Result<StreamSummary, CliError> {
+    let path = arguments.record.as_deref().unwrap_or(Path::new("-"));
+    let name = path.display().to_string();
+    // With a JSON document on stdout the lines have no place there.
+    let to_stdout = arguments.output.is_none() && !screen.is_json();
+    let mut kept = Vec::new();
+    let mut stdout = std::io::stdout().lock();
+    let output: &mut dyn Write = if to_stdout {
+        &mut stdout
+    } else if arguments.output.is_some() {
+        &mut kept
+    } else {
+        &mut std::io::sink()
+    };
+    let summary = if name == "-" {
+        compensate_lines(compensator, "standard input", std::io::stdin().lock(), output)?
+    } else {
+        let file = File::open(path).map_err(|e| Faults::of_file(&name, format!("cannot be read: {e}")))?;
+        compensate_lines(compensator, &name, file, output)?
+    };
+    if let Some(path) = &arguments.output {
+        write_atomically(path, &kept)?;
+    }
+    Ok(summary)
+}
+
+fn export(
+    compensator: &Compensator,
+    file: &ModelFile,
+    fitted: Option<&Record>,
+    interval_s: Option<f64>,
+    prefix: &Path,
+    screen: &Screen,
+) -> Result<(), CliError> {
+    let interval_s = interval_s.or(fitted.map(Record::interval_s)).filter(|i| *i > 0.0 && i.is_finite());
+    let (Compensator::Physical(physical), Some(interval_s)) = (compensator, interval_s) else {
+        return Err(CliError::NoExport);
+    };
+    let delay = compensator.delay_rows(interval_s);
+    let equation = DifferenceEquation::new(&file.model.name, physical, interval_s, delay).ok_or(CliError::NoExport)?;
+    let header = equation.c_header();
+    let json = serde_json::to_string_pretty(&Document::new(equation)).map_err(|e| CliError::Stdout(e.into()))? + "\n";
+    for (extension, text) in [("json", json), ("h", header)] {
+        let path = prefix.with_extension(extension);
+        write_atomically(&path, text.as_bytes())?;
+        screen.note(&format!("wrote {}", path.display()));
+    }
+    Ok(())
+}
+
+fn all_methods(
+    arguments: &Arguments,
+    file: &ModelFile,
+    named: &NamedPattern,
+    fitted: Option<&Record>,
+    screen: &Screen,
+) -> Result<Ending, CliError> {
+    let (Some(fitted), Some(path)) = (fitted, &arguments.record) else { return Err(CliError::NoHoldout) };
+    let record = read_noticed(path, GrossErrors::Keep, screen)?.record;
+    let rate = |values: &[f64]| deg_per_h_from_rad_per_s(rms(values));
+    let mut methods = Vec::new();
+    for method in Method::ALL {
+        methods.push(match Compensator::fit(method, &file.model, &named.pattern, fitted) {
+            Ok(compensator) => MethodJson {
+                method: method.key(),
+                rms_deg_per_h: Some(rate(&compensator.batch(&record))),
+                delay_rows: Some(compensator.delay_rows(record.interval_s())),
+                reason: None,
+            },
+            Err(error) => MethodJson {
+                method: method.key(),
+                rms_deg_per_h: None,
+                delay_rows: None,
+                reason: Some(error.to_string()),
+            },
+        });
+    }
+    let body = CompensateJson {
+        model: file.model.name.clone(),
+        method: "all",
+        summary: None,
+        noise_floor_deg_per_h: Some(deg_per_h_from_rad_per_s(noise_floor_rad_per_s(&record))),
+        methods,
+        lines: Vec::new(),
+    };
+    screen.answer(body, |body| {
+        let rows = body.methods.iter().map(|m| {
+            vec![
+                m.method.to_owned(),
+                shown(m.rms_deg_per_h),
+                m.delay_rows.map_or_else(|| "-".to_owned(), |d| d.to_string()),
+                m.reason.clone().unwrap_or_default(),
+            ]
+        });
+        let noise = shown(body.noise_floor_deg_per_h);
+        table(&["method", "rms °/h", "delay rows", ""], rows) + &format!("noise floor of the record: {noise} °/h\n")
+    })?;
+    Ok(Ending::Done)
+}

@@ -1,0 +1,141 @@
+//! Takes the predictable part out of a gyro's rate, from one thermometer, row by row.
+//!
+//! Three compensators: the physical model ([`physical`]), straight lines over temperature, and a regression on temperature
+//! and its rates ([`empirical`]). All run as a [`stream::Stream`], in batch too, so that both agree to the last digit.
+//!
+//! What remains is the inertial rate, the noise, and what the compensator does not know. An offset that a record was
+//! fitted with is taken out too.
+
+pub mod empirical;
+pub mod physical;
+pub mod stream;
+
+use thiserror::Error;
+
+use crate::boundary::BoundaryError;
+use crate::coil::CoilError;
+use crate::pattern::Pattern;
+use crate::predict::{self, PredictError};
+use crate::rate::{CoilModel, RateError};
+use crate::record::Record;
+use crate::thermal::ThermalError;
+use empirical::{PiecewiseBias, Regression};
+use physical::{MOST_DELAY_ROWS, Physical};
+use stream::{Compensated, Reading, Stream};
+
+/// Ways to compensate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    Physical,
+    Piecewise,
+    Regression,
+}
+
+impl Method {
+    pub const ALL: [Method; 3] = [Method::Physical, Method::Piecewise, Method::Regression];
+
+    pub fn key(self) -> &'static str {
+        match self {
+            Method::Physical => "physical",
+            Method::Piecewise => "piecewise",
+            Method::Regression => "regression",
+        }
+    }
+}
+
+/// A compensator, ready for any record of the same gyro.
+#[derive(Debug, Clone)]
+pub enum Compensator {
+    Physical(Physical),
+    Piecewise(PiecewiseBias),
+    Regression(Regression),
+}
+
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum CompensateError {
+    #[error(
+        "the model is not linear in the temperatures' rates: compensate with piecewise or regression, or leave out effects such as conductivity_temperature, self_heating, axial_gradient or channels"
+    )]
+    NotLinear,
+    #[error("a fit needs at least {needed} rows, found {found}")]
+    TooFew { needed: usize, found: usize },
+    #[error("{method} needs a record to be fitted to: give one with --fit", method = .method.key())]
+    NeedsRecord { method: Method },
+    #[error(transparent)]
+    Predict(#[from] PredictError),
+    #[error(transparent)]
+    Boundary(#[from] BoundaryError),
+    #[error(transparent)]
+    Thermal(#[from] ThermalError),
+    #[error(transparent)]
+    Rate(#[from] RateError),
+    #[error(transparent)]
+    Coil(#[from] CoilError),
+}
+
+impl Compensator {
+    /// Fitted to a record; the physical one's physics stays as declared: film, noise, delay and offset are fitted.
+    ///
+    /// # Errors
+    /// A model that is not linear, a record that is too short or whose temperature says nothing.
+    pub fn fit(method: Method, model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<Self, CompensateError> {
+        Ok(match method {
+            Method::Physical => {
+                let boundary = predict::estimate_boundary(model, pattern, record)?;
+                let mut physical = Physical::with_boundary(model, pattern, &boundary)?;
+                physical.tune(record);
+                Compensator::Physical(physical)
+            }
+            Method::Piecewise => Compensator::Piecewise(PiecewiseBias::fit(record)?),
+            Method::Regression => Compensator::Regression(Regression::fit(record)?),
+        })
+    }
+
+    /// Without a record: the physical one, with usual values for film, noise and delay and without an offset.
+    ///
+    /// # Errors
+    /// A model that is not linear; a method that needs a record.
+    pub fn declared(method: Method, model: &CoilModel, pattern: &Pattern) -> Result<Self, CompensateError> {
+        match method {
+            Method::Physical => Ok(Compensator::Physical(Physical::new(model, pattern)?)),
+            Method::Piecewise | Method::Regression => Err(CompensateError::NeedsRecord { method }),
+        }
+    }
+
+    pub fn method(&self) -> Method {
+        match self {
+            Compensator::Physical(_) => Method::Physical,
+            Compensator::Piecewise(_) => Method::Piecewise,
+            Compensator::Regression(_) => Method::Regression,
+        }
+    }
+
+    /// By how many rows of this interval the output follows the input; at least 1.
+    pub fn delay_rows(&self, interval_s: f64) -> usize {
+        let delay_s = match self {
+            Compensator::Physical(physical) => physical.delay_s,
+            Compensator::Piecewise(_) => 0.0,
+            Compensator::Regression(regression) => regression.window_s,
+        };
+        ((delay_s / interval_s).round() as usize).clamp(1, MOST_DELAY_ROWS)
+    }
+
+    /// The compensated rate of every row of a record [rad/s].
+    pub fn batch(&self, record: &Record) -> Vec<f64> {
+        let mut found = Vec::with_capacity(record.rows());
+        let mut stream = Stream::new(self);
+        let keep = |row: Compensated<f64>| row.rate_rad_per_s.unwrap_or(row.tag);
+        for row in 0..record.rows() {
+            let rate = record.rate_rad_per_s()[row];
+            let reading = Reading {
+                time_s: record.times_s()[row],
+                temperature_k: Some(record.temperature_k()[row]),
+                inner_k: record.inner_k().map(|k| k[row]),
+                rate_rad_per_s: Some(rate),
+            };
+            stream.push(rate, Some(reading), |row| found.push(keep(row)));
+        }
+        stream.finish(|row| found.push(keep(row)));
+        found
+    }
+}
