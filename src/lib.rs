@@ -20,8 +20,8 @@ pub mod rate;
 // Floor 4: what is done with it.
 pub mod boundary;
 pub mod compare;
-pub mod diagnose;
 pub mod compensate;
+pub mod diagnose;
 pub mod fit;
 pub mod metrics;
 pub mod predict;

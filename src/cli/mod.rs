@@ -32,10 +32,10 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand, ValueEnum};
 use thiserror::Error;
 
+use crate::compensate::CompensateError;
 use crate::diagnose::DiagnoseError;
 use crate::effect::EffectError;
 use crate::effect::custom::FormulaError;
-use crate::compensate::CompensateError;
 use crate::io::compensation_file::StreamError;
 use crate::io::fault::Faults;
 use crate::io::files::WriteError;

@@ -102,10 +102,8 @@ pub fn compensate_lines(
     sink.flush();
     sink.check()?;
     let mut summary = sink.summary;
-    let deviation =
-        |values: &[f64]| Some(deg_per_h_from_rad_per_s(standard_deviation(values))).filter(|d| d.is_finite());
-    summary.rate_deviation_deg_per_h = deviation(&sink.before);
-    summary.compensated_deviation_deg_per_h = deviation(&sink.after);
+    summary.rate_deviation_deg_per_h = sink.before.deviation().map(deg_per_h_from_rad_per_s);
+    summary.compensated_deviation_deg_per_h = sink.after.deviation().map(deg_per_h_from_rad_per_s);
     Ok(summary)
 }
 

@@ -2,8 +2,8 @@
 
 pub mod checkpoint;
 pub mod comparison_json;
-pub mod diagnosis_json;
 pub mod compensation_file;
+pub mod diagnosis_json;
 mod effect_tables;
 pub mod effects_json;
 pub mod fault;
