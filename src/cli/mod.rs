@@ -151,8 +151,6 @@ pub enum CliError {
     #[error("error: there is no effect {stated}: did you mean {nearest}? `coilwright effects` lists all")]
     UnknownEffect { stated: String, nearest: &'static str },
     #[error("error: {0}")]
-    Predict(#[from] PredictError),
-    #[error("error: {0}")]
     Compensate(#[from] CompensateError),
     #[error(transparent)]
     Stream(StreamError),
