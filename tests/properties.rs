@@ -9,6 +9,7 @@ use coilwright::pattern::Pattern;
 use coilwright::pattern::windability::{WindabilityClass, WindingGraph};
 use coilwright::profile::{Piece, Profile, ProfileSpec};
 use coilwright::rate::{CoilModel, RateModel};
+use coilwright::search::guaranteed::UnitStep;
 use coilwright::search::worst_case::SolvedProfiles;
 use coilwright::thermal::{Extent, Location, Material, ThermalHistory};
 use proptest::prelude::*;
@@ -188,6 +189,19 @@ proptest! {
         let series = rate_model.series_rad_per_s(&solved.profiles()[0].field.at(&instants));
         let sampled = series.iter().map(|r| r.abs()).fold(0.0, f64::max);
         prop_assert!(sampled <= worst.rate_rad_per_s.abs() * (1.0 + 1e-9), "{sampled} and {worst:?}");
+    }
+
+    #[test]
+    fn no_sampled_worst_case_exceeds_the_guaranteed_one(case in cases(1..=8), pack in any::<bool>(), seed in any::<u64>()) {
+        let extent = if pack { Extent::Pack } else { Extent::HalfSpace };
+        let model = CoilModel { extent, ..case.model.clone() };
+        let spec = ProfileSpec {
+            max_rate_k_per_s: 0.01, count: 6, segments: 4, duration_s: 600.0, seed, listed: vec![],
+        };
+        let sampled = SolvedProfiles::new(&model, &spec.profiles()).unwrap().worst_case(&model, &case.pattern).unwrap();
+        let bound = UnitStep::new(&model, 0.01).unwrap().guaranteed(&model, &case.pattern).unwrap();
+        let (sampled, guaranteed) = (sampled.rate_rad_per_s.abs(), bound.rate_rad_per_s);
+        prop_assert!(sampled <= guaranteed * (1.0 + 1e-9), "{sampled} and {guaranteed}");
     }
 
     #[test]
