@@ -1,6 +1,7 @@
 //! The command line: one file a subcommand — parse, call, print. Documents go to stdout, words and progress to stderr.
 
 mod budget;
+mod campaign;
 mod check;
 mod compare;
 mod compensate;
@@ -14,6 +15,7 @@ mod man;
 mod metrics;
 mod new;
 mod optimise;
+mod pareto;
 mod patterns;
 pub mod progress;
 mod prove;
@@ -103,6 +105,8 @@ enum Command {
     New(new::Arguments),
     Reproduce(reproduce::Arguments),
     Optimise(optimise::Arguments),
+    Campaign(campaign::Arguments),
+    Pareto(pareto::Arguments),
     Schedule(schedule::Arguments),
     Compare(compare::Arguments),
     Compensate(compensate::Arguments),
@@ -217,6 +221,8 @@ pub fn run() -> ExitCode {
         Command::New(arguments) => new::run(arguments, &screen),
         Command::Reproduce(arguments) => reproduce::run(arguments, &screen),
         Command::Optimise(arguments) => optimise::run(arguments, &screen),
+        Command::Campaign(arguments) => campaign::run(arguments, &screen),
+        Command::Pareto(arguments) => pareto::run(arguments, &screen),
         Command::Schedule(arguments) => schedule::run(arguments, &screen),
         Command::Compare(arguments) => compare::run(arguments, &screen),
         Command::Compensate(arguments) => compensate::run(arguments, &screen),

@@ -1,5 +1,6 @@
 //! Files in, files out: the only place (with `report`) that knows serde, paths, TOML, CSV and JSON.
 
+pub mod campaign_file;
 pub mod checkpoint;
 pub mod comparison_json;
 pub mod compensation_file;
@@ -13,6 +14,7 @@ pub mod machine_program;
 pub mod metrics_json;
 pub mod model_edit;
 pub mod model_file;
+pub mod pareto_json;
 pub mod pattern_file;
 mod production_table;
 mod profile_tables;

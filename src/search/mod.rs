@@ -6,6 +6,7 @@ pub mod exact;
 pub mod guaranteed;
 pub mod objective;
 pub mod optimise;
+pub mod pareto;
 pub mod samples;
 pub mod signs;
 pub mod tolerance;

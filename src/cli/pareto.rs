@@ -1,0 +1,185 @@
+//! `pareto`: how much error each step of winding effort buys.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use super::progress::StopFlag;
+use super::screen::{Screen, table};
+use super::{CliError, Ending};
+use crate::io::files::write_atomically;
+use crate::io::model_file::{ModelFile, NamedPattern, read_model};
+use crate::io::pareto_json::{ParetoJson, PointJson, front_csv};
+use crate::io::pattern_file::print_pattern;
+use crate::pattern::Pattern;
+use crate::pattern::windability::WindabilityClass;
+use crate::report::plot::{Axis, Chart, Series};
+use crate::search::objective::Objective;
+use crate::search::optimise::{DEFAULT_RESTARTS_PER_ROUND, Optimisation, Plan, Rules, default_moves_per_restart};
+use crate::search::pareto::{Point, front};
+use crate::search::tolerance::study;
+use crate::search::verdict::{Bench, Judged};
+use crate::search::worst_case::SolvedProfiles;
+
+/// The front of worst-case error against windability and robustness
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Weighed are the worst rate, captive reels, largest climb, crossovers over other layers and, where the model has a\n\
+    [tolerance] table, the 95 % quantile over built coils. Every point is a pattern file that schedule takes.\n\n\
+    Example:\n  coilwright pareto examples/paper-200m.toml -o results/paper-200m-front"
+)]
+pub struct Arguments {
+    /// The model file
+    model: PathBuf,
+    /// Writes pareto.csv, pareto.svg and one pattern file a point into this folder
+    #[arg(long, short, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Seed of the searches; without it, the model's own
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// The most captive reels that are tried one by one; any number is tried besides
+    #[arg(long, value_name = "K", default_value_t = 2, value_parser = clap::value_parser!(u8).range(0..=16))]
+    most_captive: u8,
+    /// Rounds of restarts a class
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..))]
+    rounds: u64,
+}
+
+pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+    let stop = StopFlag::listen();
+    let file = read_model(&arguments.model)?;
+    let seed = arguments.seed.unwrap_or(file.search.seed);
+    let solved = SolvedProfiles::new(&file.model, &file.profiles.profiles())?;
+    let unit_step = crate::search::guaranteed::UnitStep::new(&file.model, file.profiles.max_rate_k_per_s).ok();
+    let bench =
+        Bench { model: &file.model, solved: &solved, objective: Objective::WorstRate, unit_step: unit_step.as_ref() };
+    let mut judged = bench.baselines()?;
+    let captive = (1..=usize::from(arguments.most_captive)).map(WindabilityClass::Captive);
+    let classes: Vec<WindabilityClass> =
+        std::iter::once(WindabilityClass::Standard).chain(captive).chain([WindabilityClass::Any]).collect();
+    let progress = screen.progress("pareto", Some(classes.len() as u64));
+    for (done, &class) in classes.iter().enumerate() {
+        match candidates(&bench, &file, class, seed, arguments.rounds, &stop)? {
+            Some(found) => judged.extend(found),
+            None => return Ok(Ending::Interrupted),
+        }
+        progress.at(done as u64 + 1, &class.to_string());
+    }
+    progress.finish();
+    let points = front(&with_spreads(&file, judged)?);
+    let names = named(points.iter().map(|p| p.judged.name.as_str()));
+    let mut shown = Vec::new();
+    for (point, name) in points.iter().zip(names) {
+        let mut point = point.clone();
+        point.judged.name.clone_from(&name);
+        let written = match &arguments.output {
+            None => None,
+            Some(folder) => {
+                let path = folder.join(format!("{name}.toml"));
+                let comment = format!("coil: {}; a point of the front of error against windability", file.model.name);
+                let pattern = NamedPattern { name, pattern: point.judged.pattern.clone() };
+                write_atomically(&path, print_pattern(&pattern, &[comment]).as_bytes())?;
+                path.file_name().map(|n| n.to_string_lossy().into_owned())
+            }
+        };
+        shown.push(PointJson::of(&point, written));
+    }
+    if let Some(folder) = &arguments.output {
+        let csv = front_csv(&shown).map_err(|e| CliError::Stdout(e.into()))?;
+        write_atomically(&folder.join("pareto.csv"), &csv)?;
+        write_atomically(&folder.join("pareto.svg"), chart(&file, &shown).as_bytes())?;
+        screen.note(&format!("wrote {}", folder.display()));
+    }
+    screen.answer(ParetoJson { model: file.model.name.clone(), seed, points: shown }, text)?;
+    Ok(Ending::Done)
+}
+
+/// What a search of a class found, judged by the reference; none if a signal came first.
+fn candidates(
+    bench: &Bench,
+    file: &ModelFile,
+    class: WindabilityClass,
+    seed: u64,
+    rounds: u64,
+    stop: &StopFlag,
+) -> Result<Option<Vec<Judged>>, CliError> {
+    let layers = file.model.coil.layers();
+    let plan = Plan {
+        seed,
+        norm: bench.objective.norm(),
+        restarts_per_round: DEFAULT_RESTARTS_PER_ROUND,
+        moves_per_restart: default_moves_per_restart(layers),
+        rules: Rules { rounds, patience: rounds, moves: None, target: None },
+        starts: Vec::new(),
+    };
+    let matrix = bench.objective.compile(bench.model, bench.solved, file.profiles.max_rate_k_per_s)?;
+    let mut search = Optimisation::new(matrix, class, plan);
+    while search.advance() {
+        if stop.is_set() {
+            return Ok(None);
+        }
+    }
+    let judge = |found: &crate::search::optimise::Found| {
+        let pattern = Pattern::new(found.segments.clone()).expect("a walk visits permutations only");
+        bench.judge(&class.to_string().replace(':', "-"), &pattern)
+    };
+    Ok(Some(search.state().found.iter().map(judge).collect::<Result<_, _>>()?))
+}
+
+/// The points with their 95 % quantiles, where the model states tolerances.
+fn with_spreads(file: &ModelFile, judged: Vec<Judged>) -> Result<Vec<Point>, CliError> {
+    let spreads = match &file.tolerance {
+        None => vec![None; judged.len()],
+        Some(spec) => {
+            let patterns: Vec<Pattern> = judged.iter().map(|j| j.pattern.clone()).collect();
+            let studied = study(&file.model, &file.profiles, spec, &patterns)?;
+            studied.iter().map(|d| Some(d.p95_rad_per_s())).collect()
+        }
+    };
+    Ok(judged.into_iter().zip(spreads).map(|(judged, p95)| Point::new(judged, p95)).collect())
+}
+
+/// Names made distinct by a number where several points have the same.
+fn named<'n>(names: impl Iterator<Item = &'n str>) -> Vec<String> {
+    let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
+    names
+        .map(|name| {
+            let count = seen.entry(name).or_insert(0);
+            *count += 1;
+            if *count == 1 { name.to_owned() } else { format!("{name}-{count}") }
+        })
+        .collect()
+}
+
+fn chart(file: &ModelFile, points: &[PointJson]) -> String {
+    let mut chart = Chart::new(format!("{}: error against largest climb", file.model.name))
+        .x(Axis::linear("largest climb [layers]"))
+        .y(Axis::log("worst rate error [°/h]"));
+    let mut captive: Vec<usize> = points.iter().map(|p| p.pattern.windability.captive).collect();
+    captive.sort_unstable();
+    captive.dedup();
+    for count in captive {
+        let of_count = points.iter().filter(|p| p.pattern.windability.captive == count);
+        let places =
+            of_count.map(|p| (p.pattern.windability.max_climb as f64, p.pattern.worst_rate_deg_per_h)).collect();
+        chart = chart.with(Series::points(format!("{count} captive"), places));
+    }
+    chart.svg()
+}
+
+fn text(answer: &ParetoJson) -> String {
+    let rows = answer.points.iter().map(|p| {
+        vec![
+            p.pattern.name.clone(),
+            format!("{:.4}", p.pattern.worst_rate_deg_per_h),
+            p.p95_rate_deg_per_h.map_or_else(|| "–".to_owned(), |q| format!("{q:.4}")),
+            p.pattern.windability.captive.to_string(),
+            p.pattern.windability.max_climb.to_string(),
+            p.long_crossovers.to_string(),
+        ]
+    });
+    format!(
+        "{}: what no other pattern beats in every respect\n\n{}",
+        answer.model,
+        table(&["pattern", "worst °/h", "P95 °/h", "captive", "climb", "crossovers > 1"], rows)
+    )
+}

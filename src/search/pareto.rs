@@ -1,0 +1,88 @@
+//! The trade-off between a small error and an easy winding: what nothing else beats in every respect.
+
+use super::verdict::Judged;
+use crate::pattern::windability::{Windability, WindingGraph};
+
+/// A pattern with everything that it is weighed by; less is better throughout.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Point {
+    pub judged: Judged,
+    pub windability: Windability,
+    /// The 95 % quantile of the worst rate over built coils, where tolerances are stated.
+    pub p95_rad_per_s: Option<f64>,
+}
+
+/// Errors this close count as equal, so that rounding makes no trade-off.
+const SAME_ERROR: f64 = 1e-6;
+
+impl Point {
+    pub fn new(judged: Judged, p95_rad_per_s: Option<f64>) -> Self {
+        let windability = WindingGraph::new(&judged.pattern).windability();
+        Self { judged, windability, p95_rad_per_s }
+    }
+
+    /// Nowhere worse and somewhere better.
+    fn beats(&self, other: &Self) -> bool {
+        let no_worse = |a: f64, b: f64| a <= b * (1.0 + SAME_ERROR);
+        let better = |a: f64, b: f64| a < b * (1.0 - SAME_ERROR);
+        let (a, b) = (&self.windability, &other.windability);
+        let (error, other_error) = (self.judged.objective_rad_per_s, other.judged.objective_rad_per_s);
+        let spreads = self.p95_rad_per_s.zip(other.p95_rad_per_s);
+        let effort = |w: &Windability| [w.captive, w.max_climb, w.long_crossovers];
+        no_worse(error, other_error)
+            && spreads.is_none_or(|(p, q)| no_worse(p, q))
+            && effort(a).iter().zip(effort(b)).all(|(x, y)| *x <= y)
+            && (better(error, other_error)
+                || spreads.is_some_and(|(p, q)| better(p, q))
+                || effort(a).iter().zip(effort(b)).any(|(x, y)| *x < y))
+    }
+}
+
+/// The points that no other beats, smallest error first; of several that are equal in every respect the first.
+pub fn front(points: &[Point]) -> Vec<Point> {
+    let mut kept: Vec<Point> = Vec::new();
+    for (index, point) in points.iter().enumerate() {
+        let beaten = points.iter().any(|other| other.beats(point));
+        let same_before = points[..index].iter().any(|other| {
+            other.windability == point.windability
+                && (other.judged.objective_rad_per_s - point.judged.objective_rad_per_s).abs()
+                    <= SAME_ERROR * point.judged.objective_rad_per_s
+        });
+        if !beaten && !same_before {
+            kept.push(point.clone());
+        }
+    }
+    kept.sort_by(|a, b| a.judged.objective_rad_per_s.total_cmp(&b.judged.objective_rad_per_s));
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pattern::Pattern;
+    use crate::search::worst_case::WorstCase;
+
+    fn point(segments: &[usize], objective_rad_per_s: f64) -> Point {
+        let worst =
+            WorstCase { rate_rad_per_s: objective_rad_per_s, profile: "p".into(), profile_index: 0, time_s: 0.0 };
+        let judged = Judged {
+            name: "test".into(),
+            pattern: Pattern::new(segments.to_vec()).unwrap(),
+            worst,
+            phase_rad: 0.0,
+            guaranteed_rad_per_s: None,
+            objective_rad_per_s,
+        };
+        Point::new(judged, None)
+    }
+
+    #[test]
+    fn the_front_keeps_what_is_smaller_or_easier_and_drops_the_rest() {
+        let cylindrical = point(&[1, 2, 3, 4], 3.0);
+        let dipole = point(&[2, 3, 1, 4], 2.0);
+        let worse_dipole = point(&[3, 2, 4, 1], 2.5);
+        let captive = point(&[2, 4, 1, 3], 1.0);
+        let found = front(&[cylindrical.clone(), dipole.clone(), worse_dipole, captive.clone()]);
+        assert_eq!(found, [captive, dipole, cylindrical]);
+    }
+}
