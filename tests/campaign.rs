@@ -1,0 +1,92 @@
+//! Campaigns: shards together equal the whole, and what is done is not done again. The front's points are patterns
+//! that `schedule` takes.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn coilwright(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_coilwright")).args(arguments).output().unwrap()
+}
+
+fn example() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("examples/paper-200m.toml")
+}
+
+fn campaign_file(folder: &Path) -> String {
+    std::fs::copy(example(), folder.join("paper.toml")).unwrap();
+    let path = folder.join("grid.toml");
+    let text = "name = \"grid\"\nmodels = \"paper.toml\"\nlayers = [8, 12]\nclasses = \"standard any\"\nseeds = [1, 2]\n\
+                rounds = 1\nmoves_per_restart = 2000\n";
+    std::fs::write(&path, text).unwrap();
+    path.display().to_string()
+}
+
+fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
+        if entry.path().is_dir() {
+            found.extend(files(&entry.path()).into_iter().map(|(p, b)| (PathBuf::from(entry.file_name()).join(p), b)));
+        } else {
+            found.insert(PathBuf::from(entry.file_name()), std::fs::read(entry.path()).unwrap());
+        }
+    }
+    found
+}
+
+#[test]
+fn shards_together_are_the_whole_and_what_is_done_is_skipped() {
+    let root = tempfile::tempdir().unwrap();
+    let campaign = campaign_file(root.path());
+    let (whole, shards) = (root.path().join("whole"), root.path().join("shards"));
+    let run = |folder: &Path, more: &[&str]| {
+        let folder = folder.display().to_string();
+        let output = coilwright(&[&["campaign", &campaign, "-o", &folder, "--format", "json"], more].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()
+    };
+    let first = run(&whole, &[]);
+    assert_eq!((&first["cells"], &first["searched"], &first["missing"]), (&8.into(), &8.into(), &0.into()));
+    assert_eq!(run(&whole, &[])["searched"], 0);
+    assert_eq!(run(&shards, &["--shard", "2/3"])["missing"], 5);
+    assert_eq!(run(&shards, &["--shard", "1/3"])["missing"], 2);
+    assert_eq!(run(&shards, &["--shard", "3/3"])["missing"], 0);
+    let found = files(&whole);
+    assert!(found.contains_key(Path::new("summary.csv")) && found.contains_key(Path::new("summary.svg")));
+    assert_eq!(found, files(&shards));
+}
+
+#[test]
+fn a_campaign_file_with_faults_names_them_all() {
+    let root = tempfile::tempdir().unwrap();
+    let path = root.path().join("grid.toml");
+    std::fs::write(
+        &path,
+        "name = \"x\"\nmodels = \"m.toml\"\nclasses = \"easy\"\nobjectives = \"speed\"\nseed = [1]\n",
+    )
+    .unwrap();
+    let output = coilwright(&["campaign", &path.display().to_string(), "-o", &root.path().display().to_string()]);
+    assert_eq!(output.status.code(), Some(2));
+    let words = String::from_utf8_lossy(&output.stderr);
+    for part in ["easy", "speed", "seed"] {
+        assert!(words.contains(part), "{part}: {words}");
+    }
+}
+
+#[test]
+fn every_point_of_the_front_is_a_pattern_that_schedule_takes() {
+    let root = tempfile::tempdir().unwrap();
+    let folder = root.path().join("front");
+    let (model, shown) = (example().display().to_string(), folder.display().to_string());
+    let output =
+        coilwright(&["pareto", &model, "-o", &shown, "--rounds", "1", "--most-captive", "1", "--format", "json"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let answer: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let points = answer["points"].as_array().unwrap();
+    assert!(points.len() >= 3, "{points:?}");
+    for point in points {
+        let file = folder.join(point["file"].as_str().unwrap()).display().to_string();
+        assert!(coilwright(&["schedule", &model, "--pattern", &file]).status.success(), "{file}");
+    }
+    assert!(folder.join("pareto.csv").exists() && folder.join("pareto.svg").exists());
+}
