@@ -18,7 +18,7 @@ use super::{Outcome, Watch};
 const SHARES: usize = 256;
 
 /// Pieces whose nodes are completed together.
-const SHARES_TOGETHER: usize = 32;
+const SHARES_TOGETHER: usize = 128;
 
 /// One piece may take so many times its even share of the nodes allowed.
 const UNEVENNESS: u64 = 8;
@@ -26,7 +26,7 @@ const UNEVENNESS: u64 = 8;
 const NODES_PER_PAUSE: u64 = 1 << 12;
 
 /// Nodes that one piece gathers before it completes them on its own.
-const MOST_GATHERED: usize = 1 << 16;
+const MOST_GATHERED: usize = 1 << 15;
 
 /// What all pieces of a search share.
 #[derive(Clone, Copy)]
