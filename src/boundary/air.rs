@@ -120,6 +120,10 @@ impl Scene {
         })
     }
 
+    pub fn lag_s(&self) -> f64 {
+        self.lag_s
+    }
+
     /// Only temperatures are measured.
     pub fn space(&self, air: &Air) -> Result<AirSpace, BoundaryError> {
         self.build(air, Rates::None)

@@ -179,17 +179,27 @@ impl Boundary {
         Drive { boundary_k, ambient_k: Some(self.air_k.clone()) }
     }
 
-    /// The drive if the sensor lagged by `further_lag_s` more than was taken into account: T + Δτ dT/dt.
+    /// The drive if the sensor lagged by `further_lag_s` more than was taken into account: T + Δτ dT_s/dt, T_s being what
+    /// the sensor shows.
     pub fn delayed_drive(&self, location: Location, further_lag_s: f64) -> Drive {
         let drive = self.drive(location);
         if further_lag_s == 0.0 {
             return drive;
         }
+        let lag_s = self.scene.lag_s();
         let knots = drive.boundary_k.knots();
+        let mut sensor_slope = 0.0;
         let values = (0..knots.len())
             .map(|i| {
-                let slope = 0.5 * (drive.boundary_k.slope_before(knots[i]) + drive.boundary_k.slope_after(knots[i]));
-                drive.boundary_k.values()[i] + further_lag_s * slope
+                if lag_s > 0.0 && i > 0 {
+                    // The sensor's slope follows the boundary's through the lag.
+                    let left = (-(knots[i] - knots[i - 1]) / lag_s).exp();
+                    sensor_slope = sensor_slope * left + drive.boundary_k.slope_of(i - 1) * (1.0 - left);
+                } else if lag_s == 0.0 {
+                    sensor_slope =
+                        0.5 * (drive.boundary_k.slope_before(knots[i]) + drive.boundary_k.slope_after(knots[i]));
+                }
+                drive.boundary_k.values()[i] + further_lag_s * sensor_slope
             })
             .collect();
         let boundary_k = PiecewiseLinear::new(knots.to_vec(), values).expect("the knots are those of the boundary");

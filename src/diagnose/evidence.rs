@@ -61,7 +61,7 @@ struct Solved {
 }
 
 /// Fields kept for models that differ only in what is done with them.
-const KEPT_FIELDS: usize = 4;
+const KEPT_FIELDS: usize = 8;
 
 impl<'a> Evidence<'a> {
     /// Cleans the records and estimates their boundaries under the declared model.
@@ -190,6 +190,23 @@ impl Case {
     /// The pack over each averaging interval under a model.
     fn solved(&self, model: &CoilModel) -> Option<Arc<Solved>> {
         let path = model.heat_path().ok()?;
+        let slope_per_k = path.conductivity_slope_per_k;
+        if slope_per_k == 0.0 {
+            return self.solved_path(path, model);
+        }
+        // A nonlinear field costs a hundred linear ones, but it is nearly linear in the slope: it is solved at slopes of
+        // 0.002/K times powers of two and scaled from the nearest.
+        let octave = (slope_per_k.abs() / REFERENCE_SLOPE_PER_K).log2().round().clamp(LEAST_OCTAVE, MOST_OCTAVE);
+        let reference_per_k = slope_per_k.signum() * REFERENCE_SLOPE_PER_K * octave.exp2();
+        let linear = self.solved_path(HeatPath { conductivity_slope_per_k: 0.0, ..path.clone() }, model)?;
+        let reference =
+            self.solved_path(HeatPath { conductivity_slope_per_k: reference_per_k, ..path.clone() }, model)?;
+        let history = between(&linear.history, &reference.history, slope_per_k / reference_per_k);
+        Some(Arc::new(Solved { path, anchor: linear.anchor, lag_s: linear.lag_s, history }))
+    }
+
+    /// The pack under a model whose heat path is `path`, remembered if it was asked for lately.
+    fn solved_path(&self, path: HeatPath, model: &CoilModel) -> Option<Arc<Solved>> {
         let lag_s = model.sensor_lag_s();
         let anchor = self.anchor_for(path.location, lag_s)?;
         if let Ok(recent) = self.recent.lock()
@@ -278,6 +295,23 @@ impl Case {
         let mean = residuals.iter().sum::<f64>() / residuals.len() as f64;
         residuals.iter_mut().for_each(|r| *r -= mean);
         Some((residuals, solved.history.clone()))
+    }
+}
+
+/// Slope at which a conductivity that depends on temperature is solved, and the octaves above and below it.
+const REFERENCE_SLOPE_PER_K: f64 = 0.002;
+const LEAST_OCTAVE: f64 = -2.0;
+const MOST_OCTAVE: f64 = 2.0;
+
+/// from + share · (to − from), field by field.
+fn between(from: &ThermalHistory, to: &ThermalHistory, share: f64) -> ThermalHistory {
+    let mix = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect::<Vec<f64>>();
+    ThermalHistory {
+        temperature_k: mix(&from.temperature_k, &to.temperature_k),
+        rate_k_per_s: mix(&from.rate_k_per_s, &to.rate_k_per_s),
+        axial_moment_k: mix(&from.axial_moment_k, &to.axial_moment_k),
+        axial_moment_k_per_s: mix(&from.axial_moment_k_per_s, &to.axial_moment_k_per_s),
+        ..from.clone()
     }
 }
 

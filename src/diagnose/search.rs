@@ -23,16 +23,22 @@ pub(super) struct Found {
 const MARGIN: f64 = 10.0;
 const MAX_EFFECTS: usize = 4;
 /// Sets that are fitted in earnest after a linear look at all of them.
-const PAIRS_TRIED: usize = 8;
-const FORWARD_TRIED: usize = 5;
+const PAIRS_TRIED: usize = 6;
+const FORWARD_TRIED: usize = 4;
 /// A start whose response cannot lower χ² by this much, at any amplitude, is not worth a fit.
 const WORTH_A_FIT: f64 = 6.0;
-/// Nor is one that promises less than this share of what the best start of its candidate, or a removed effect, does.
+/// One effect more must promise this much: what it costs is more.
+const WORTH_A_STEP: f64 = 14.0;
+/// Another sensor is worth estimating boundaries for if it alone does this share of what the best effect does.
+const WORTH_A_BOUNDARY: f64 = 0.3;
+/// Standard deviations of χ² within which the best single effect leaves nothing for a pair.
+const NOTHING_LEFT: f64 = 3.0;
+/// A start is not worth a fit either that promises less than this share of what the best start of its candidate, or a removed effect, does.
 const WORTH_BESIDE: f64 = 0.5;
 /// Starts from which a candidate is fitted alone.
 const STARTS_TRIED: usize = 2;
 /// Times that a boundary is estimated again with the sensor that was found.
-const SENSOR_ROUNDS: usize = 2;
+const SENSOR_ROUNDS: usize = 3;
 
 /// Searches; boundaries for other sensors are added to the evidence on the way.
 pub(super) fn search(
@@ -53,12 +59,11 @@ pub(super) fn search(
         list.iter().min_by(|a, b| a.merit(rows, variance).total_cmp(&b.merit(rows, variance))).cloned()
     };
     let mut proposals = singles.clone();
-    let mut variance;
-    {
-        let best_single = singles.iter().map(|h| h.chi_square).fold(base.chi_square, f64::min);
+    let best_single = singles.iter().map(|h| h.chi_square).fold(base.chi_square, f64::min);
+    if best_single > rows as f64 + NOTHING_LEFT * (2.0 * rows as f64).sqrt() {
         proposals.extend(fit_pairs(&trial, &base, best_single));
-        variance = noise_variance(&base, &proposals, rows);
     }
+    let mut variance = noise_variance(&base, &proposals, rows);
     let mut best = base.clone();
     if let Some(first) = least(&proposals, variance)
         && first.merit(rows, variance) < best.merit(rows, variance) - MARGIN
@@ -103,10 +108,12 @@ pub(super) fn all_singles(
         }
     }
     let mut singles = fit_singles(&Trial { evidence, model, candidates }, base);
+    let best = singles.iter().map(|h| base.chi_square - h.chi_square).fold(0.0, f64::max);
     for single in &mut singles {
-        let member = &single.members[0];
-        if candidates[member.candidate].moves_sensor() && base.chi_square - single.chi_square > MARGIN {
-            *single = settle_sensor(evidence, model, candidates, single.clone())?;
+        let gain = base.chi_square - single.chi_square;
+        let moves_sensor = candidates[single.members[0].candidate].moves_sensor();
+        if moves_sensor && gain > MARGIN.max(WORTH_A_BOUNDARY * best) {
+            *single = settle_sensor(evidence, model, candidates, single.clone(), SENSOR_ROUNDS)?;
         }
     }
     Ok(singles)
@@ -176,7 +183,7 @@ fn foremost(mut responses: Vec<Response>, count: usize, least_gain: f64) -> Vec<
 
 /// One effect more.
 fn fit_forward(trial: &Trial, from: &Hypothesis) -> Vec<Hypothesis> {
-    foremost(trial.responses(from), FORWARD_TRIED, WORTH_A_FIT)
+    foremost(trial.responses(from), FORWARD_TRIED, WORTH_A_STEP)
         .into_par_iter()
         .filter_map(|response| {
             let mut members = from.members.clone();
@@ -235,8 +242,9 @@ pub(super) fn settle_sensor(
     model: &CoilModel,
     candidates: &[Candidate],
     mut hypothesis: Hypothesis,
+    rounds: usize,
 ) -> Result<Hypothesis, DiagnoseError> {
-    for _ in 0..SENSOR_ROUNDS {
+    for _ in 0..rounds {
         let members = hypothesis.members.clone();
         let Some(with) = (Trial { evidence, model, candidates }).model_of(&members) else { break };
         evidence.anchor(&with)?;
