@@ -283,9 +283,11 @@ fn self_heating_ends_in_the_steady_flow_of_a_hollow_cylinder() {
     assert!(early.temperatures_k(0).iter().all(|t| (t - 300.0).abs() < 1e-9));
     let settled = field.at(&[Instant::after(5e4)]);
     let drive_m = model.coil.layer_radius_m(LAYERS - 1);
+    // A layer's mean over its two cells differs from the value at its middle by (pitch/4r)²/2 of the profile's slope,
+    // which weighs most where the rise is least: 1.2e-4 beside the outermost layer.
     for j in 0..LAYERS - 1 {
         let expected_k = 80.0 * 0.04 / CONDUCTIVITY * (drive_m / model.coil.layer_radius_m(j)).ln();
-        compare("self_heating, rise in K", settled.temperatures_k(0)[j] - 300.0, expected_k, 1e-4);
+        compare("self_heating, rise in K", settled.temperatures_k(0)[j] - 300.0, expected_k, 2e-4);
     }
     // While the pack follows the heat at once, its rate is that of q∞/τ e^{−t/τ}.
     let late_s = 1800.0;
