@@ -1,6 +1,7 @@
 //! Numbers checked against something outside the program; each file's head names its reference.
 
 mod allan;
+mod compensation;
 mod effects;
 mod exact_integers;
 mod exhaustive;
@@ -8,3 +9,4 @@ mod fog_v7;
 mod nist_strd;
 mod pack;
 mod paper;
+mod records;

@@ -1,0 +1,193 @@
+//! References: the seven records of [`crate::records`], fitted on calibration and applied to validation; the thesis
+//! chapter's piecewise-linear compensation (Eqs. 3-4, 3-8 to 3-11) on a synthetic record with its coefficients; and a C
+//! compiler for the exported header.
+//! Tolerance: physical compensation best where the model is complete; break points within 0.15 K in a
+//! twentieth of the chapter's noise band, within 2 K in all of it;
+//! the chapter's rounded figures to their printed digits or within 10 %; exported and own output equal to 1e-8 °/h.
+
+use std::fmt::Write as _;
+use std::process::Command;
+
+use coilwright::compensate::{Compensator, Method};
+use coilwright::io::compensation_file::{DifferenceEquation, compensate_lines};
+use coilwright::numeric::statistics::rms;
+use coilwright::record::Record;
+use coilwright::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s, kelvin_from_celsius, rad_per_s_from_deg_per_s};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::records::{folder, model, record};
+
+fn fitted(name: &str, method: Method) -> Compensator {
+    let file = model(name);
+    Compensator::fit(method, &file.model, &file.pattern.unwrap().pattern, &record(name, "calibration.csv")).unwrap()
+}
+
+#[test]
+fn the_physical_compensator_is_best_where_its_model_is_complete() {
+    for name in ["a-control", "g-control-zyl"] {
+        let holdout = record(name, "validation.csv");
+        let rms_of = |method| deg_per_h_from_rad_per_s(rms(&fitted(name, method).batch(&holdout)));
+        let [physical, piecewise, regression] = Method::ALL.map(rms_of);
+        println!("{name}: physical {physical:.4}, piecewise {piecewise:.4}, regression {regression:.4} °/h rms");
+        assert!(physical < 0.5 * piecewise && physical < 0.5 * regression, "{name}");
+    }
+}
+
+#[test]
+fn stream_and_batch_agree_to_the_last_digit_and_no_line_is_lost() {
+    let compensator = fitted("a-control", Method::Physical);
+    let text = std::fs::read_to_string(folder("a-control").join("validation.csv")).unwrap();
+    let mut output = Vec::new();
+    let summary = compensate_lines(&compensator, "validation", text.as_bytes(), &mut output).unwrap();
+    let output = String::from_utf8(output).unwrap();
+    assert_eq!(output.lines().count(), text.lines().count());
+    let batch = compensator.batch(&record("a-control", "validation.csv"));
+    assert_eq!(summary.rows, batch.len());
+    for (line, rate) in output.lines().skip(1).zip(&batch) {
+        let fields: Vec<&str> = line.split(',').collect();
+        assert_eq!(fields[fields.len() - 2], format!("{:.8}", deg_per_h_from_rad_per_s(*rate)));
+    }
+}
+
+#[test]
+fn faults_in_a_stream_are_flagged_in_order_and_the_stream_goes_on() {
+    let compensator = fitted("a-control", Method::Physical);
+    let mut input = "time_s,temperature_c,rate_deg_per_h\n".to_owned();
+    for i in 0..200 {
+        let time_s = if i >= 150 { 10 * i - 30 } else { 10 * i };
+        let rate = 0.01 * f64::from(i % 5);
+        match i {
+            60 => input += "600,20\n",
+            70 => writeln!(input, "{time_s},nan,{rate}").unwrap(),
+            80 => writeln!(input, "{time_s},20.0,").unwrap(),
+            90 => writeln!(input, "{time_s},20.0,500").unwrap(),
+            100 => writeln!(input, "{time_s},-180,{rate}").unwrap(),
+            110..=114 => {}
+            120 => input += "\u{1}\u{2}garbage\n",
+            _ => writeln!(input, "{time_s},20.0,{rate}").unwrap(),
+        }
+    }
+    let mut output = Vec::new();
+    let summary = compensate_lines(&compensator, "x", input.as_bytes(), &mut output).unwrap();
+    let output = String::from_utf8(output).unwrap();
+    assert_eq!(output.lines().count(), input.lines().count());
+    let flagged: Vec<(usize, &str)> = output
+        .lines()
+        .enumerate()
+        .skip(1)
+        .filter_map(|(i, l)| Some((i - 1, l.rsplit(',').next()?)).filter(|(_, f)| !f.is_empty()))
+        .collect();
+    println!("{flagged:?}");
+    assert_eq!(
+        flagged,
+        [
+            (60, "malformed"),
+            (70, "temperature_held"),
+            (80, "rate_held"),
+            (90, "rate_rejected"),
+            (100, "temperature_held"),
+            (110, "gap"),
+            (115, "malformed"),
+            (145, "clock_back"),
+        ]
+        .iter()
+        .flat_map(|f| if f.0 == 60 { vec![(60, "malformed"), (61, "gap")] } else { vec![*f] })
+        .flat_map(|f| if f.0 == 115 { vec![(115, "malformed"), (116, "gap")] } else { vec![f] })
+        .collect::<Vec<_>>()
+    );
+    assert_eq!((summary.malformed, summary.clock_back, summary.rate_rejected), (2, 1, 1));
+}
+
+#[test]
+fn the_exported_c_header_gives_the_programs_own_output() {
+    let Ok(version) = Command::new("cc").arg("--version").output() else {
+        println!("no C compiler here: the header is not tried");
+        return;
+    };
+    assert!(version.status.success());
+    let compensator = fitted("g-control-zyl", Method::Physical);
+    let Compensator::Physical(physical) = &compensator else { panic!("fitted the physical one") };
+    let holdout = record("g-control-zyl", "validation.csv");
+    let delay = compensator.delay_rows(holdout.interval_s());
+    let equation = DifferenceEquation::new("g-control-zyl", physical, holdout.interval_s(), delay).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("compensation.h"), equation.c_header()).unwrap();
+    let program = "#include <stdio.h>\n#include \"compensation.h\"\nint main(void) { coilwright_state s; double t;\ncoilwright_start(&s); while (scanf(\"%lf\", &t) == 1) printf(\"%.17g\\n\", coilwright_step(&s, t, 1)); return 0; }\n";
+    std::fs::write(dir.path().join("main.c"), program).unwrap();
+    let built = Command::new("cc")
+        .args(["-std=c99", "-Wall", "-Wextra", "-Werror", "-O1", "-o", "try", "main.c"])
+        .current_dir(dir.path())
+        .status()
+        .unwrap();
+    assert!(built.success());
+    let readings: String =
+        holdout.temperature_k().iter().map(|t| format!("{:.17}\n", celsius_from_kelvin(*t))).collect();
+    std::fs::write(dir.path().join("in.txt"), readings).unwrap();
+    let output = Command::new(dir.path().join("try"))
+        .stdin(std::fs::File::open(dir.path().join("in.txt")).unwrap())
+        .output()
+        .unwrap();
+    let exported: Vec<f64> = String::from_utf8(output.stdout).unwrap().lines().map(|l| l.parse().unwrap()).collect();
+    assert_eq!(exported.len(), holdout.rows());
+    let own: Vec<f64> = compensator
+        .batch(&holdout)
+        .iter()
+        .zip(holdout.rate_rad_per_s())
+        .map(|(left, rate)| deg_per_h_from_rad_per_s(rate - left))
+        .collect();
+    let worst = exported[2 * delay..].iter().zip(&own[delay..]).map(|(e, o)| (e - o).abs()).fold(0.0, f64::max);
+    println!("largest difference between the C header and the program: {worst:.1e} °/h");
+    assert!(worst < 1e-8);
+}
+
+/// The chapter's record, from its coefficients: sums of 100 outputs a second, one unit being 3.04e-5 °/s (±2.5 of a
+/// hundred units are ±0.0076 °/s), between 14 and 42 °C, with the noise band of its Fig. 3-4.
+fn chapter_record(noise_band_units: f64) -> Record {
+    const UNIT_DEG_PER_S: f64 = 0.0076 / 250.0;
+    let mut random = ChaCha8Rng::seed_from_u64(33);
+    let rows = 18_000;
+    let (mut temperature_k, mut rate) = (Vec::new(), Vec::new());
+    for i in 0..rows {
+        let celsius = 14.0 + 28.0 * f64::from(i) / f64::from(rows - 1);
+        let units = match celsius {
+            t if t >= 30.0 => 40.82 * t - 1149.2,
+            t if t > 23.6 => 10.45 * t - 200.33,
+            t => 33.86 * t - 732.29,
+        };
+        let noise = noise_band_units * (random.random::<f64>() - 0.5);
+        temperature_k.push(kelvin_from_celsius(celsius));
+        rate.push(rad_per_s_from_deg_per_s((units + noise) * UNIT_DEG_PER_S));
+    }
+    Record::new("chapter", (0..rows).map(f64::from).collect(), temperature_k, rate).unwrap()
+}
+
+#[test]
+fn the_chapters_lines_give_back_break_points_peak_to_peak_and_sensitivity() {
+    let record = chapter_record(500.0);
+    let piecewise = coilwright::compensate::empirical::PiecewiseBias::fit(&record).unwrap();
+    let breaks: Vec<f64> = piecewise.lines[..2].iter().map(|l| celsius_from_kelvin(l.until_k)).collect();
+    let left = Compensator::Piecewise(piecewise).batch(&record);
+    let spread = |values: &[f64]| {
+        let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+        coilwright::units::deg_per_s_from_rad_per_s(high - low)
+    };
+    let means = |values: &[f64]| values.chunks_exact(600).map(|c| c.iter().sum::<f64>() / 600.0).collect::<Vec<f64>>();
+    let before = spread(record.rate_rad_per_s());
+    let after = spread(&means(&left));
+    // Eq. (3-4) with its first point as the reference, over the whole range: what the chapter's 0.00089 is.
+    let drift = means(record.rate_rad_per_s());
+    let sensitivity =
+        coilwright::units::deg_per_s_from_rad_per_s(drift[drift.len() - 1] - drift[0]).abs() / (28.0 * 29.0 / 30.0);
+    println!("breaks {breaks:.2?} °C; peak to peak {before:.4} -> {after:.5} °/s; sensitivity {sensitivity:.5} °/s/°C");
+    // The jumps of the printed lines at the breaks are 20 and 38 units: a noise band of 500 hides them.
+    assert!((breaks[0] - 23.6).abs() < 2.0 && (breaks[1] - 30.0).abs() < 2.0);
+    let quiet = coilwright::compensate::empirical::PiecewiseBias::fit(&chapter_record(25.0)).unwrap();
+    let breaks: Vec<f64> = quiet.lines[..2].iter().map(|l| celsius_from_kelvin(l.until_k)).collect();
+    println!("with a twentieth of the noise: breaks {breaks:.2?} °C");
+    assert!((breaks[0] - 23.6).abs() < 0.15 && (breaks[1] - 30.0).abs() < 0.15);
+    assert!((before - 0.04).abs() < 0.002);
+    assert!(after < 0.00163 && after / before < 0.04);
+    assert!((sensitivity / 0.00089 - 1.0).abs() < 0.05);
+}
