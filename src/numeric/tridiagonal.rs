@@ -5,7 +5,7 @@
 //! ```
 //!
 //! A general symmetric solver first reduces a full matrix and then rotates all n rows of V. Here the matrix is
-//! tridiagonal already and the rotations act on the wanted rows only, which is several times faster (see
+//! tridiagonal already and the rotations act on the wanted rows only, which takes a little more than half the time (see
 //! `benches/thermal.rs`); a test compares the result with the general solver of nalgebra.
 //!
 //! # Source
