@@ -78,7 +78,7 @@ impl CoilModel {
         Ok(path)
     }
 
-    /// The sensor's lag behind what it is attached to [s]; several lags add.
+    /// The sensor's lag behind what it is attached to \[s\]; several lags add.
     pub fn sensor_lag_s(&self) -> f64 {
         self.bind_all(&self.coil, &[]).iter().map(|e| e.sensor_lag_s()).sum()
     }
@@ -109,11 +109,11 @@ impl CoilModel {
 /// One entry a layer, innermost first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayerWeights {
-    /// The part of w_j with z < L/2 [m²].
+    /// The part of w_j with z < L/2 \[m²\].
     pub half_a_m2: Vec<f64>,
-    /// The part with z > L/2 [m²].
+    /// The part with z > L/2 \[m²\].
     pub half_b_m2: Vec<f64>,
-    /// 2 d_j l_j², the weight of the axial moment [m²].
+    /// 2 d_j l_j², the weight of the axial moment \[m²\].
     pub axial_m2: Vec<f64>,
 }
 
@@ -143,7 +143,7 @@ impl LayerWeights {
         Ok(weights)
     }
 
-    /// w_j, both halves together [m²].
+    /// w_j, both halves together \[m²\].
     pub fn total_m2(&self) -> Vec<f64> {
         self.half_a_m2.iter().zip(&self.half_b_m2).map(|(a, b)| a + b).collect()
     }
@@ -269,7 +269,7 @@ impl RateModel {
         self.scale_per_m2() * 2.0 * surplus.offset_m * (moved - lead)
     }
 
-    /// Δφ for a rate error: Δφ = Ω 2πLD/(λ c0) [rad].
+    /// Δφ for a rate error: Δφ = Ω 2πLD/(λ c0) \[rad\].
     pub fn phase_rad(&self, rate_rad_per_s: f64) -> f64 {
         rate_rad_per_s * std::f64::consts::TAU * self.coil.length_m() * self.coil.mean_diameter_m()
             / (self.coil.fibre().wavelength_m * LIGHT_SPEED_M_PER_S)

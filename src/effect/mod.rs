@@ -71,7 +71,7 @@ pub trait Effect: std::fmt::Debug + Send + Sync {
     /// Edits the turn counts, innermost layer first.
     fn change_turns(&self, _turns: &mut [f64]) {}
 
-    /// Time constant with which the sensor follows what it is attached to [s].
+    /// Time constant with which the sensor follows what it is attached to \[s\].
     fn sensor_lag_s(&self) -> f64 {
         0.0
     }

@@ -8,7 +8,7 @@
 //! | `T1 M6` | supply reel into the feed: 1 is A, 2 is B, 11 is C1, 12 is C2, … |
 //! | `G0 X` | carriage to the flange at which the layer starts; X = 0 is the first flange |
 //! | `G92 C0` | the spool's counter to zero |
-//! | `G1 X C F` | wind: carriage to X [mm] while the spool turns by C [turns, clockwise seen from the first flange]; F [turns/min] |
+//! | `G1 X C F` | wind: carriage to X \[mm\] while the spool turns by C [turns, clockwise seen from the first flange]; F [turns/min] |
 //! | `M0` | stop for adhesive |
 //! | `M30` | end |
 

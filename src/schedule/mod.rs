@@ -41,7 +41,7 @@ pub struct Step {
     pub fibre_to_m: f64,
     pub length_m: f64,
     pub radius_m: f64,
-    /// Largest climb of the crossovers that this step completes [layers].
+    /// Largest climb of the crossovers that this step completes \[layers\].
     pub climb: usize,
     /// The crossovers that this step completes, the one at its start first.
     pub crossovers: Vec<Crossing>,

@@ -17,7 +17,7 @@ pub struct Judged {
     pub name: String,
     pub pattern: Pattern,
     pub worst: WorstCase,
-    /// Δφ at the worst rate [rad].
+    /// Δφ at the worst rate \[rad\].
     pub phase_rad: f64,
     /// None for models that have no guaranteed worst case.
     pub guaranteed_rad_per_s: Option<f64>,

@@ -163,9 +163,9 @@ impl HeatPath {
 /// What drives the field: temperatures against time, the pack being in a steady state before the first knot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drive {
-    /// The temperature at the heat path's [`Location`] [K].
+    /// The temperature at the heat path's [`Location`] \[K\].
     pub boundary_k: PiecewiseLinear,
-    /// The ambient's, where it is known apart from the boundary [K].
+    /// The ambient's, where it is known apart from the boundary \[K\].
     pub ambient_k: Option<PiecewiseLinear>,
 }
 

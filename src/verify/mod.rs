@@ -5,7 +5,7 @@
 //!
 //! What is compared how closely: lengths, radii and turns to the last printed digit; words and counts exactly; the
 //! worst rate error to its last printed digit against the reference model at the stated profile and time, and against
-//! [`rate`]'s own solution of the heat equation where the model declares nothing that this solution leaves out.
+//! `rate`'s own solution of the heat equation where the model declares nothing that this solution leaves out.
 
 mod expected;
 mod rate;
