@@ -47,10 +47,6 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
 struct SelfHeating(BoreHeat);
 
 impl Effect for SelfHeating {
-    fn is_linear(&self) -> bool {
-        false
-    }
-
     fn change_heat_path(&self, path: &mut HeatPath) {
         path.bore_heat = Some(self.0);
     }

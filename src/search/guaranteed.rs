@@ -14,8 +14,17 @@
 //! refined on the exact field. The profile that attains the bound is bang-bang, ±k_max with the sign of G' reversed in
 //! time, and ends on the sign of G(0+).
 //!
+//! Electronics that heat the bore from power-on add a known error g(t) that no profile changes. A profile that begins at
+//! power-on has had the time t to act, and may have either sign, so that
+//!
+//! ```text
+//! max |Ω| = sup_t { k_max ( |G(0+)| + ∫_0^t |G'(τ)| dτ ) + |g(t)| }          over all |k| ≤ k_max from power-on
+//! ```
+//!
+//! which a bang-bang profile of the length t with the sign of g(t) attains.
+//!
 //! Holds for models in which Ω is linear in the rates of temperature. Effects that make it depend on the temperature
-//! itself, on a sign, or on heat from elsewhere have no such bound; [`GuaranteedError::Effect`] names them.
+//! itself or on a sign have no such bound; [`GuaranteedError::Effect`] names them.
 //!
 //! # Source
 //! The L1 norm of an impulse response is the gain between bounded signals: Boyd and Barratt, Linear Controller Design
@@ -51,6 +60,24 @@ pub struct UnitStep {
     /// Just after each of `times_s`, and last the limit at infinity.
     history: ThermalHistory,
     times_s: Vec<f64>,
+    heat: Option<HeatAlone>,
+}
+
+/// The field of the bore's heat while the drive stands still.
+#[derive(Debug)]
+struct HeatAlone {
+    field: Field,
+    /// At each of the unit step's times.
+    history: ThermalHistory,
+}
+
+/// What a guaranteed worst case is made of, for any pattern.
+#[derive(Debug, Clone)]
+pub struct BoundParts {
+    /// G(0+), and then what it changes by from one time of the grid to the next.
+    pub changes: Vec<WeightResponse>,
+    /// g at the same times; empty where nothing heats the bore.
+    pub heat: Vec<WeightResponse>,
 }
 
 /// The guaranteed worst case of one pattern.
@@ -61,6 +88,8 @@ pub struct Guaranteed {
     /// Times and values at which G turns, from (0, G(0+)) to where the rest no longer matters.
     turns: Vec<(f64, f64)>,
     limit: f64,
+    /// Of the heat's error when the worst case occurs; 1 without heat.
+    sign: f64,
 }
 
 /// Ratio of successive times of the grid on which extremes of G are looked for.
@@ -71,6 +100,9 @@ const SETTLED_SHARE: f64 = 1e-10;
 
 /// The share of the bound that the bang-bang profile may miss because it is finite.
 const MISSED_SHARE: f64 = 1e-3;
+
+/// The bore's heat is settled after so many of its time constants.
+const HEAT_SETTLED: f64 = 20.0;
 
 /// One endless ramp: only its rate counts, so its end may lie anywhere behind the grid's last time.
 const BEHIND_THE_GRID: f64 = 1000.0;
@@ -83,9 +115,11 @@ impl UnitStep {
         if let Some(effect) = model.effects.iter().find(|e| !e.bind(&coil, &[]).is_linear()) {
             return Err(GuaranteedError::Effect { kind: effect.kind() });
         }
-        let path = model.heat_path().map_err(SearchError::from)?;
+        let mut path = model.heat_path().map_err(SearchError::from)?;
+        let heated_path = path.bore_heat.map(|_| path.clone());
+        let heat_settled_s = path.bore_heat.take().map_or(0.0, |heat| HEAT_SETTLED * heat.time_constant_s);
         let response = StepResponse::of(&path).map_err(SearchError::from)?;
-        let (first_s, last_s) = (1e-2 * response.shortest_s(), response.settling_s());
+        let (first_s, last_s) = (1e-2 * response.shortest_s(), response.settling_s().max(heat_settled_s));
         let count = ((last_s / first_s).ln() / GRID_RATIO.ln()).ceil() as usize;
         let times_s: Vec<f64> = std::iter::once(0.0)
             .chain((0..=count).map(|i| first_s * (last_s / first_s).powf(i as f64 / count as f64)))
@@ -96,7 +130,21 @@ impl UnitStep {
         let field = solve(&path, &Drive::boundary(ramp)).map_err(SearchError::from)?;
         let mut history = rates_at(&field, &times_s);
         append_limit(&mut history, max_rate_k_per_s);
-        Ok(Self { max_rate_k_per_s, field, history, times_s })
+        let heat = match heated_path {
+            None => None,
+            Some(path) => {
+                let still = Drive::boundary(PiecewiseLinear::constant(REFERENCE_TEMPERATURE_K));
+                let field = solve(&path, &still).map_err(SearchError::from)?;
+                let history = rates_at(&field, &times_s);
+                Some(HeatAlone { field, history })
+            }
+        };
+        Ok(Self { max_rate_k_per_s, field, history, times_s, heat })
+    }
+
+    /// Whether something besides the drive heats the pack.
+    pub fn is_heated(&self) -> bool {
+        self.heat.is_some()
     }
 
     /// # Errors
@@ -105,10 +153,11 @@ impl UnitStep {
         let rate_model = RateModel::new(model, pattern, &[]).map_err(SearchError::from)?;
         let mut series = rate_model.series_rad_per_s(&self.history);
         let limit = series.pop().expect("the limit was appended");
-        let error_at = |time_s: f64| {
-            let history = rates_at(&self.field, &[time_s]);
+        let error_of = |field: &Field, time_s: f64| {
+            let history = rates_at(field, &[time_s]);
             rate_model.rate_error_rad_per_s(&rate_model.state(&history, 0, &[]))
         };
+        let error_at = |time_s: f64| error_of(&self.field, time_s);
         let last = series.len() - 1;
         let largest = series.iter().map(|g| g.abs()).fold(limit.abs(), f64::max);
         let mut turns = vec![(0.0, series[0])];
@@ -125,28 +174,72 @@ impl UnitStep {
         turns.push((self.times_s[last], series[last]));
         let variation: f64 = turns.windows(2).map(|w| (w[1].1 - w[0].1).abs()).sum();
         let rate_rad_per_s = series[0].abs() + variation + (limit - series[last]).abs();
-        let mut found = Guaranteed { rate_rad_per_s, max_rate_k_per_s: self.max_rate_k_per_s, turns, limit };
+        let mut found = Guaranteed { rate_rad_per_s, max_rate_k_per_s: self.max_rate_k_per_s, turns, limit, sign: 1.0 };
+        let heat_at = |time_s: f64| self.heat.as_ref().map_or(0.0, |heat| error_of(&heat.field, time_s));
+        if let Some(heat) = &self.heat {
+            let with_heat = |time_s: f64, error: f64, heat: f64| found.variation_until(time_s, error) + heat.abs();
+            let heats = rate_model.series_rad_per_s(&heat.history);
+            let worst = (1..last)
+                .map(|i| (i, with_heat(self.times_s[i], series[i], heats[i])))
+                .fold((0, 0.0), |best, here| if here.1 > best.1 { here } else { best });
+            if worst.1 > rate_rad_per_s {
+                let (from_s, to_s) = (self.times_s[worst.0 - 1], self.times_s[worst.0 + 1]);
+                let peak = golden_section(|t| with_heat(t, error_at(t), heat_at(t)), from_s, to_s);
+                let peak_s = if peak.value > worst.1 { peak.at } else { self.times_s[worst.0] };
+                let rate_rad_per_s = peak.value.max(worst.1);
+                found.turns.retain(|turn| turn.0 < peak_s);
+                found.turns.push((peak_s, error_at(peak_s)));
+                return Ok(Guaranteed { rate_rad_per_s, sign: heat_at(peak_s).signum(), ..found });
+            }
+        }
         found.shorten(&self.times_s, &series);
+        if self.heat.is_some() {
+            found.sign = heat_at(found.turns[found.turns.len() - 1].0).signum();
+        }
         Ok(found)
     }
 
     /// The bound as a sum of sizes over samples, for any pattern: minimise it with [`super::columns::Norm::Sum`]. It falls
-    /// short of the bound only by what the grid's extremes miss.
+    /// short of the bound only by what the grid's extremes miss, and by the bore's heat where there is any.
     ///
     /// # Errors
     /// Effects that leave a layer no turns.
     pub fn samples(&self, model: &CoilModel) -> Result<SampleMatrix, GuaranteedError> {
+        Ok(SampleMatrix::new(model, &self.parts(model, 1)?.changes).map_err(SearchError::from)?)
+    }
+
+    /// What the bound is made of, at every `stride`-th time of the grid, the first and the limit included.
+    ///
+    /// # Errors
+    /// Effects that leave a layer no turns.
+    pub fn parts(&self, model: &CoilModel, stride: usize) -> Result<BoundParts, GuaranteedError> {
         let rate_model = any_rate_model(model)?;
-        let steps: Vec<WeightResponse> = (0..self.history.len())
-            .map(|row| rate_model.weight_response(&rate_model.state(&self.history, row, &[])))
-            .collect();
-        let mut responses = vec![steps[0].clone()];
-        responses.extend(steps.windows(2).map(|pair| difference(&pair[1], &pair[0])));
-        Ok(SampleMatrix::new(model, &responses).map_err(SearchError::from)?)
+        let limit = self.times_s.len();
+        let rows: Vec<usize> = (0..limit).step_by(stride).chain([limit]).collect();
+        let of = |history: &ThermalHistory, rows: &[usize]| -> Vec<WeightResponse> {
+            rows.iter().map(|&row| rate_model.weight_response(&rate_model.state(history, row, &[]))).collect()
+        };
+        let steps = of(&self.history, &rows);
+        let mut changes = vec![steps[0].clone()];
+        changes.extend(steps.windows(2).map(|pair| difference(&pair[1], &pair[0])));
+        let heat = self.heat.as_ref().map_or_else(Vec::new, |heat| {
+            let mut errors = of(&heat.history, &rows[..rows.len() - 1]);
+            // Nothing is left of the heat's error in the limit.
+            errors.push(difference(&errors[0], &errors[0]));
+            errors
+        });
+        Ok(BoundParts { changes, heat })
     }
 }
 
 impl Guaranteed {
+    /// |G(0+)| + ∫_0^t |G'| dτ, G(t) being `error`.
+    fn variation_until(&self, time_s: f64, error: f64) -> f64 {
+        let before = self.turns.partition_point(|turn| turn.0 < time_s).max(1);
+        let full: f64 = self.turns[..before].windows(2).map(|w| (w[1].1 - w[0].1).abs()).sum();
+        self.turns[0].1.abs() + full + (error - self.turns[before - 1].1).abs()
+    }
+
     /// Ends the last stretch where what is left of G's way to its limit no longer matters.
     fn shorten(&mut self, times_s: &[f64], series: &[f64]) {
         let allowed = MISSED_SHARE * self.rate_rad_per_s;
@@ -167,7 +260,7 @@ impl Guaranteed {
 
     /// The bang-bang profile that attains the bound just after its last switch.
     pub fn profile(&self, name: &str) -> Profile {
-        let toward = |sign_of: f64| self.max_rate_k_per_s.copysign(sign_of);
+        let toward = |sign_of: f64| self.sign * self.max_rate_k_per_s.copysign(sign_of);
         let mut pieces: Vec<Piece> = self
             .turns
             .windows(2)
@@ -215,7 +308,9 @@ fn difference(later: &WeightResponse, earlier: &WeightResponse) -> WeightRespons
 mod tests {
     use super::*;
     use crate::coil::LayerLength;
+    use crate::effect::{self, DeclaredEffect};
     use crate::pattern::classic::Classic;
+    use crate::profile::ProfileSpec;
     use crate::search::columns::Norm;
     use crate::search::samples::tests::model;
     use crate::search::worst_case::SolvedProfiles;
@@ -256,6 +351,52 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn with_a_heated_bore_the_bang_bang_profile_attains_the_bound_and_no_sampled_profile_exceeds_it() {
+        let parameters = |power: f64, time_constant_s: f64| {
+            let mut model = model(8, LayerLength::Actual, &["surface_film", "spool_mass"]);
+            let spec = effect::find("self_heating").unwrap();
+            model.effects.push(DeclaredEffect::new(spec, vec![power, time_constant_s], vec![]).unwrap());
+            model
+        };
+        for (power, time_constant_s) in [(50.0, 600.0), (-50.0, 30.0), (1500.0, 5.0), (2.0, 20000.0)] {
+            let model = parameters(power, time_constant_s);
+            let step = UnitStep::new(&model, RATE_K_PER_S).unwrap();
+            for classic in [Classic::Zyl, Classic::Dip, Classic::Qua] {
+                let pattern = classic.pattern(8).unwrap();
+                let bound = step.guaranteed(&model, &pattern).unwrap();
+                let worst = |profiles: &[Profile]| {
+                    let solved = SolvedProfiles::new(&model, profiles).unwrap();
+                    solved.worst_case(&model, &pattern).unwrap().rate_rad_per_s.abs() / bound.rate_rad_per_s
+                };
+                let attained = worst(&[bound.profile("bang-bang")]);
+                assert!((0.995..=1.0 + 1e-9).contains(&attained), "{power} {time_constant_s} {classic:?}: {attained}");
+                let spec = ProfileSpec {
+                    max_rate_k_per_s: RATE_K_PER_S,
+                    count: 20,
+                    segments: 4,
+                    duration_s: 3000.0,
+                    seed: 2,
+                    listed: vec![],
+                };
+                assert!(worst(&spec.profiles()) <= 1.0 + 1e-9, "{power} {time_constant_s} {classic:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn without_a_drive_that_matters_the_bound_is_the_largest_error_of_the_heat() {
+        let model = model(8, LayerLength::Actual, &["surface_film", "self_heating"]);
+        let pattern = Classic::Dip.pattern(8).unwrap();
+        let bound = UnitStep::new(&model, 1e-12).unwrap().guaranteed(&model, &pattern).unwrap().rate_rad_per_s;
+        let rate_model = RateModel::new(&model, &pattern, &[]).unwrap();
+        let still = Drive::boundary(PiecewiseLinear::constant(REFERENCE_TEMPERATURE_K));
+        let field = solve(&model.heat_path().unwrap(), &still).unwrap();
+        let times: Vec<Instant> = (0..20000).map(|i| Instant::after(0.2 * f64::from(i))).collect();
+        let alone = rate_model.series_rad_per_s(&field.at(&times)).iter().map(|g| g.abs()).fold(0.0, f64::max);
+        assert!((bound / alone - 1.0).abs() < 1e-6, "{bound} {alone}");
     }
 
     #[test]

@@ -360,8 +360,8 @@ fn what_an_effect_says_of_its_linearity_is_what_it_does() {
         let constant =
             [-60.0, 0.0, 45.0, 90.0].iter().all(|t| (of(1.0, *t) - reference).abs() < 1e-9 * reference.abs());
         let says = declared.bind(&model.coil, &[]).is_linear();
-        // Two effects act through the field: heat that no profile controls, and a conductivity that varies.
-        let by_field = ["self_heating", "conductivity_temperature"].contains(&spec.kind);
+        // This one acts through the field alone.
+        let by_field = spec.kind == "conductivity_temperature";
         assert_eq!(says, homogeneous && constant && !by_field, "{}", spec.kind);
     }
 }
