@@ -8,12 +8,13 @@
 //! floor and var_k the variance that the boundary's estimate gives the prediction.
 //!
 //! # Source
-//! The noise floor by second differences: Gasser, Sroka, Jennen-Steinmetz, Biometrika 73 (1986) 625.
+//! The noise floor as in [`crate::numeric::noise`].
 
 use thiserror::Error;
 
 use crate::boundary::{self, Boundary, BoundaryError, Observation};
 use crate::coil::CoilError;
+use crate::numeric::noise::{WhiteNoise, white_noise};
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::pattern::Pattern;
 use crate::rate::{CoilModel, RateError, RateModel};
@@ -181,21 +182,14 @@ pub(crate) fn measured_ambient(record: &Record) -> Option<PiecewiseLinear> {
     PiecewiseLinear::new(record.times_s().to_vec(), values.to_vec()).ok()
 }
 
-/// White noise of one rate, from the record alone: trimmed second differences, in which slow signals cancel.
-///
-/// Differences beyond three times the spread of the median are left out (kinks, gross outliers), and the mean square of
-/// what is left is corrected for that.
+/// White noise of one rate, from the record alone: what quadratics leave in short windows, steep and spoilt ones left out.
+pub fn noise_floor(record: &Record) -> WhiteNoise {
+    white_noise(record.times_s(), record.rate_rad_per_s())
+}
+
+/// As [`noise_floor`], the deviation alone.
 pub fn noise_floor_rad_per_s(record: &Record) -> f64 {
-    // Mean square of a unit Gaussian within ±3: 1 − 6 φ(3)/(2Φ(3) − 1).
-    const KEPT_SQUARE: f64 = 0.973_337_2;
-    let rates = record.rate_rad_per_s();
-    let mut differences: Vec<f64> = rates.windows(3).map(|w| (w[2] - 2.0 * w[1] + w[0]).abs()).collect();
-    differences.sort_by(f64::total_cmp);
-    let spread = differences[differences.len() / 2] / 0.674_489_75;
-    let kept: Vec<f64> = differences.iter().copied().filter(|d| *d <= 3.0 * spread).collect();
-    let mean_square = kept.iter().map(|d| d * d).sum::<f64>() / kept.len().max(1) as f64;
-    // var of a second difference of white noise: 1 + 4 + 1.
-    (mean_square / KEPT_SQUARE / 6.0).sqrt()
+    noise_floor(record).deviation
 }
 
 #[cfg(test)]

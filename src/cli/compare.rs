@@ -66,7 +66,11 @@ fn text(body: &CompareJson) -> String {
         let number = |value: Option<f64>, digits: usize| value.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
         let measures = [
             ("RMSE", format!("{:.5}", record.rmse_deg_per_h), "°/h"),
-            ("noise floor of the record", format!("{:.5}", record.noise_floor_deg_per_h), "°/h"),
+            (
+                "noise floor of the record",
+                format!("{:.5} ± {:.5}", record.noise_floor_deg_per_h, record.noise_floor_standard_error_deg_per_h),
+                "°/h",
+            ),
             ("offset", format!("{:.5}", record.offset_deg_per_h), "°/h"),
             ("NRMSE fit", number(record.nrmse_fit_percent, 2), "%"),
             ("R²", number(record.r_squared, 5), ""),

@@ -11,7 +11,7 @@
 //!
 //! | symbol | meaning | in code |
 //! |---|---|---|
-//! | σ | the record's white noise, from its own second differences: mean square within three robust spreads | `noise_rad_per_s` |
+//! | σ | the record's white noise, with its standard error: [`crate::numeric::noise`] | `noise_rad_per_s`, `noise_standard_error_rad_per_s` |
 //! | var_k, C_boundary | variance and covariance that the boundary's estimate gives the prediction | `boundary_chi_square`, `whitened_chi_square` |
 //!
 //! Holds for records with more than a few dozen rows. The white noise of a record whose signal jumps from row to row is
@@ -40,6 +40,7 @@ pub struct Comparison {
     pub rows: usize,
     pub offset_rad_per_s: f64,
     pub noise_rad_per_s: f64,
+    pub noise_standard_error_rad_per_s: f64,
     pub rmse_rad_per_s: f64,
     pub nrmse_fit_percent: f64,
     /// None where the record does not vary.
@@ -151,6 +152,7 @@ pub fn compare_with(
         rows,
         offset_rad_per_s: prediction.offset_rad_per_s,
         noise_rad_per_s: noise,
+        noise_standard_error_rad_per_s: predict::noise_floor(record).standard_error,
         rmse_rad_per_s: rms(&residual),
         nrmse_fit_percent: explained.map_or(f64::NEG_INFINITY, |e| percent_from_fraction(1.0 - e.sqrt())),
         r_squared: explained.map(|e| 1.0 - e),

@@ -3,6 +3,7 @@
 pub mod allan;
 pub mod expression;
 pub mod maximise;
+pub mod noise;
 pub mod piecewise;
 pub mod state_space;
 pub mod statistics;

@@ -11,7 +11,9 @@ use coilwright::compare::verdict::{Finding, Verdict};
 use coilwright::compare::{Comparison, Quantity, compare};
 use coilwright::io::model_file::{ModelFile, read_model};
 use coilwright::io::record_file::read_record;
+use coilwright::predict::noise_floor;
 use coilwright::record::Record;
+use coilwright::units::deg_per_h_from_rad_per_s;
 
 pub fn folder(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/records").join(name)
@@ -38,6 +40,38 @@ fn compared(name: &str) -> Comparison {
     let shares: f64 = found.regimes.iter().map(|r| r.share_of_squared_error).sum();
     assert!((shares - 1.0).abs() < 1e-9);
     found
+}
+
+/// The simulator's white noise of one rate [°/h].
+const NOISE_DEG_PER_H: [(&str, f64); 7] = [
+    ("a-control", 0.037947),
+    ("b-half-space", 0.189737),
+    ("c-spool", 0.037947),
+    ("d-mismatch", 0.037947),
+    ("e-sensor", 0.075895),
+    ("f-two", 0.037947),
+    ("g-control-zyl", 0.037947),
+];
+
+#[test]
+fn the_noise_floor_is_the_simulators_within_its_own_standard_error() {
+    let mut squares = 0.0;
+    let mut sum = 0.0;
+    for (name, expected) in NOISE_DEG_PER_H {
+        for part in ["calibration.csv", "validation.csv"] {
+            let found = noise_floor(&record(name, part));
+            let excess = deg_per_h_from_rad_per_s(found.deviation) / expected - 1.0;
+            let in_errors = excess * found.deviation / found.standard_error;
+            println!("{name}/{part}: {:+.2} %, {in_errors:+.2} standard errors", 100.0 * excess);
+            assert!(excess.abs() < 0.05, "{name}/{part}");
+            squares += in_errors * in_errors;
+            sum += excess;
+        }
+    }
+    println!("mean {:+.2} %, squares {squares:.1} of 14", 100.0 * sum / 14.0);
+    assert!((sum / 14.0).abs() < 0.015);
+    // The 99.9 % point of chi-square with 14 degrees of freedom.
+    assert!(squares < 36.1);
 }
 
 fn names_transients(found: &Comparison) -> bool {
