@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
-use super::records::{GrossErrors, read_noticed};
 use super::schedule::pattern_of;
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
 use crate::diagnose::{self, Request};
 use crate::io::diagnosis_json::{DiagnosisJson, FindingJson, ParameterJson};
 use crate::io::model_file::read_model;
+use crate::io::record_file::read_record;
 
 /// Which piece of physics a model lacks: fits every known effect to records and says what is missing, and how sure
 #[derive(Debug, clap::Args)]
@@ -39,9 +39,8 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
     let pattern = pattern_of(&file, arguments.pattern.as_deref())?.pattern;
     // Gross errors are left out by the diagnosis itself, which says so.
-    let read = |paths: &[PathBuf]| -> Result<Vec<_>, CliError> {
-        paths.iter().map(|path| Ok(read_noticed(path, GrossErrors::Drop, screen)?.record)).collect()
-    };
+    let read =
+        |paths: &[PathBuf]| -> Result<Vec<_>, CliError> { paths.iter().map(|path| Ok(read_record(path)?)).collect() };
     let (records, holdout) = (read(&arguments.records)?, read(&arguments.holdout)?);
     let progress = screen.progress("diagnose", Some(PARTS as u64));
     let request = Request { model: &file.model, pattern: &pattern, records: &records, holdout: &holdout };

@@ -155,7 +155,7 @@ impl Case {
         let low = temperatures.iter().copied().fold(f64::INFINITY, f64::min);
         let high = temperatures.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let noise_k = self.anchors.last().map_or(0.0, |a| a.boundary.air().noise_k);
-        let needed_k = LEAST_RANGE_NOISES * noise_k;
+        let needed_k = (LEAST_RANGE_NOISES * noise_k).max(LEAST_RANGE_K);
         if high - low < needed_k {
             return Err(DiagnoseError::TemperatureConstant { record: name(), range_k: high - low, needed_k });
         }
@@ -317,3 +317,5 @@ fn between(from: &ThermalHistory, to: &ThermalHistory, share: f64) -> ThermalHis
 
 /// A record whose temperature moves less than this many noises of its sensor says nothing about heat.
 const LEAST_RANGE_NOISES: f64 = 50.0;
+/// … and so does one that moves by less than this, however quiet the sensor [K].
+const LEAST_RANGE_K: f64 = 0.1;

@@ -123,6 +123,8 @@ pub struct Rung {
     pub rmse_rad_per_s: f64,
     pub holdout_rmse_rad_per_s: Option<f64>,
     pub reduced_chi_square: f64,
+    /// Of the records that were held out, nothing being fitted to them but their offsets.
+    pub holdout_reduced_chi_square: Option<f64>,
     pub bic: f64,
 }
 
@@ -171,6 +173,8 @@ pub enum Refusal {
     Small,
     #[error("the factor is within 2 % of one")]
     FactorNearOne,
+    #[error("what is left over, or a plain function of time, is larger than what it explains")]
+    Outdone,
 }
 
 /// The whole answer.
@@ -200,7 +204,7 @@ pub enum DiagnoseError {
     #[error("{record}: the rate has no noise at all: is this a measurement?")]
     NoNoise { record: String },
     #[error(
-        "{record}: the temperature moves by {range_k:.3} K only, less than the {needed_k:.3} K that its sensor's noise asks for: no verdict can be drawn from it"
+        "{record}: the temperature moves by {range_k:.3} K only, less than the {needed_k:.3} K that a diagnosis with this sensor needs: no verdict can be drawn from it"
     )]
     TemperatureConstant { record: String, range_k: f64, needed_k: f64 },
     #[error("{record} has {found} rows: a diagnosis needs at least {needed}")]

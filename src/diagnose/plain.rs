@@ -9,6 +9,7 @@
 use rayon::prelude::*;
 
 use super::evidence::{Case, Evidence, Role, dot, sum_of_squares};
+use super::hypothesis::Hypothesis;
 use crate::rate::CoilModel;
 
 /// A shape in time.
@@ -63,6 +64,11 @@ pub(super) fn compete(evidence: &Evidence, model: &CoilModel, residuals: &[f64])
         .collect();
     best.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     best
+}
+
+/// By how much χ² of a hypothesis falls with the best plain function of time.
+pub(super) fn best_gain(evidence: &Evidence, model: &CoilModel, hypothesis: &Hypothesis) -> f64 {
+    compete(evidence, model, &hypothesis.residuals).first().map_or(0.0, |plain| plain.gain)
 }
 
 fn duration_s(case: &Case) -> f64 {

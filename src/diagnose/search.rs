@@ -6,6 +6,7 @@ use super::DiagnoseError;
 use super::candidate::Candidate;
 use super::evidence::{Evidence, Role};
 use super::hypothesis::{Hypothesis, Response, Trial, pairs};
+use super::plain::best_gain;
 use crate::fit::Effort;
 use crate::rate::CoilModel;
 
@@ -58,33 +59,34 @@ pub(super) fn search(
     let least = |list: &[Hypothesis], variance: f64| {
         list.iter().min_by(|a, b| a.merit(rows, variance).total_cmp(&b.merit(rows, variance))).cloned()
     };
-    let mut proposals = singles.clone();
+    // What plain functions of time explain better than an effect does is no evidence for the effect.
+    let plain_gain = |from: &Hypothesis| trial.model_of(&from.members).map_or(0.0, |m| best_gain(evidence, &m, from));
     let best_single = singles.iter().map(|h| h.chi_square).fold(base.chi_square, f64::min);
+    let mut twos = Vec::new();
     if best_single > rows as f64 + NOTHING_LEFT * (2.0 * rows as f64).sqrt() {
-        proposals.extend(fit_pairs(&trial, &base, best_single));
+        twos = fit_pairs(&trial, &base, best_single);
     }
-    let mut variance = noise_variance(&base, &proposals, rows);
+    let mut variance = noise_variance(&base, singles.iter().chain(&twos), rows);
     let mut best = base.clone();
-    if let Some(first) = least(&proposals, variance)
-        && first.merit(rows, variance) < best.merit(rows, variance) - MARGIN
-    {
-        best = first;
+    for step in [least(&singles, variance), least(&twos, variance)].into_iter().flatten() {
+        let better = step.merit(rows, variance) < best.merit(rows, variance) - MARGIN;
+        if better && plain_gain(&best) < best.chi_square - step.chi_square {
+            best = step;
+        }
     }
     progress(0.8);
     while !best.members.is_empty() && best.members.len() < MAX_EFFECTS {
         let mut further = fit_forward(&trial, &best);
         further.extend(fit_swaps(&trial, &best));
         variance = noise_variance(&best, &further, rows).min(variance);
-        match least(&further, variance) {
-            Some(next) => {
-                let margin = if next.members.len() > best.members.len() { MARGIN } else { 0.5 };
-                if next.merit(rows, variance) >= best.merit(rows, variance) - margin {
-                    break;
-                }
-                best = next;
-            }
-            None => break,
+        let Some(next) = least(&further, variance) else { break };
+        let grows = next.members.len() > best.members.len();
+        let margin = if grows { MARGIN } else { 0.5 };
+        let better = next.merit(rows, variance) < best.merit(rows, variance) - margin;
+        if !better || (grows && plain_gain(&best) > best.chi_square - next.chi_square) {
+            break;
         }
+        best = next;
     }
     best = step_back(&trial, best, rows, variance);
     singles.sort_by(|a, b| a.merit(rows, variance).total_cmp(&b.merit(rows, variance)));
@@ -119,8 +121,8 @@ pub(super) fn all_singles(
     Ok(singles)
 }
 
-fn noise_variance(base: &Hypothesis, others: &[Hypothesis], rows: usize) -> f64 {
-    let least = others.iter().map(|h| h.chi_square).fold(base.chi_square, f64::min);
+fn noise_variance<'h>(base: &Hypothesis, others: impl IntoIterator<Item = &'h Hypothesis>, rows: usize) -> f64 {
+    let least = others.into_iter().map(|h| h.chi_square).fold(base.chi_square, f64::min);
     (least / rows as f64).max(1.0)
 }
 

@@ -4,7 +4,7 @@ use super::candidate::{Candidate, is_declared_number};
 use super::confirm::{confirmation, holdout};
 use super::evidence::{Evidence, Role, dot, sum_of_squares};
 use super::hypothesis::{Hypothesis, Trial};
-use super::plain::{Plain, compete};
+use super::plain::{Plain, best_gain, compete};
 use super::search::{Found, all_singles, fit_swap, settle_sensor, without};
 use super::{
     Caution, Contender, DiagnoseError, Diagnosis, Equivalent, Extension, Finding, FittedParameter, Refusal, Rung,
@@ -56,6 +56,27 @@ pub(super) fn judge(
             None => break,
         }
     }
+    let freedom = |h: &Hypothesis| (rows as f64 - h.parameters as f64 - 1.0).max(1.0);
+    let excess = |h: &Hypothesis| h.chi_square - freedom(h);
+    let tolerated = TOLERATED_EXCESS + 3.0 * (2.0 / rows as f64).sqrt();
+    // An effect that explains less than what is left over, or than a plain function of time does, may be that thing's shadow.
+    if !best.members.is_empty() && best_gain(trial.evidence, model, &base) > base.chi_square - best.chi_square - EQUAL {
+        let kinds = best.members.iter().map(|m| candidates[m.candidate].kind());
+        cautions.extend(kinds.map(|kind| Caution::Refused { kind, reason: Refusal::Outdone }));
+        best = base.clone();
+    }
+    while excess(&best) > tolerated * freedom(&best) {
+        let rests = (0..best.members.len()).filter_map(|out| Some((out, without(&trial, &best, out)?)));
+        let weakest = rests.min_by(|a, b| a.1.chi_square.total_cmp(&b.1.chi_square));
+        match weakest {
+            Some((out, rest)) if rest.chi_square - best.chi_square < excess(&best) => {
+                let kind = candidates[best.members[out].candidate].kind();
+                cautions.push(Caution::Refused { kind, reason: Refusal::Outdone });
+                best = rest;
+            }
+            _ => break,
+        }
+    }
     let mut effects = Vec::new();
     for place in 0..best.members.len() {
         let (main, equivalents) = settle_equivalents(&trial, best, place, rows, variance);
@@ -71,10 +92,7 @@ pub(super) fn judge(
     for (place, equivalents) in reasons.into_iter().enumerate() {
         effects.push(finding(&trial, &best, place, equivalents, inflation));
     }
-    let freedom = |h: &Hypothesis| (rows as f64 - h.parameters as f64 - 1.0).max(1.0);
-    let excess = |h: &Hypothesis| h.chi_square - freedom(h);
     let plain = compete(trial.evidence, &extended, &best.residuals);
-    let tolerated = TOLERATED_EXCESS + 3.0 * (2.0 / rows as f64).sqrt();
     let is_plain = |p: &Plain, least: f64| p.gain > least.max(PLAIN_GAIN).max(PLAIN_SHARE_OF_ROWS * rows as f64);
     let left = excess(&best) / excess(&base).max(1.0);
     let verdict = if best.members.is_empty() {
@@ -82,11 +100,9 @@ pub(super) fn judge(
         if quiet { Verdict::Adequate } else { Verdict::Unexplained }
     } else {
         let gained = base.chi_square - best.chi_square;
-        let rival = compete(trial.evidence, model, &base.residuals);
-        let outdone = rival.iter().any(|p| p.gain > gained - EQUAL);
         let rest = best.chi_square / freedom(&best) > 1.0 + tolerated && left > TOLERATED_REST;
         let plain_rest = plain.iter().any(|p| is_plain(p, TOLERATED_REST * gained));
-        if outdone || rest || plain_rest {
+        if rest || plain_rest {
             Verdict::Unexplained
         } else if effects.iter().any(|e| !e.equivalents.is_empty()) {
             Verdict::Indistinguishable
@@ -315,6 +331,8 @@ fn finding(trial: &Trial, best: &Hypothesis, place: usize, equivalents: Vec<Equi
 
 /// The errors after each accepted effect, the most effective first.
 fn ladder(trial: &Trial, base: &Hypothesis, best: &Hypothesis, rows: usize) -> Vec<Rung> {
+    let held_out = trial.evidence.rows(Role::Holdout);
+    let freedom = (held_out as f64 - trial.evidence.of(Role::Holdout).count() as f64).max(1.0);
     let rung = |h: &Hypothesis| -> Option<Rung> {
         let model = trial.model_of(&h.members)?;
         let rmse = |role: Role| -> Option<f64> {
@@ -331,6 +349,7 @@ fn ladder(trial: &Trial, base: &Hypothesis, best: &Hypothesis, rows: usize) -> V
             rmse_rad_per_s: rmse(Role::Fit)?,
             holdout_rmse_rad_per_s: rmse(Role::Holdout),
             reduced_chi_square: h.chi_square / (rows as f64 - h.parameters as f64 - 1.0).max(1.0),
+            holdout_reduced_chi_square: holdout(trial, &h.members).filter(|_| held_out > 0).map(|c| c / freedom),
             bic: bic(h, rows),
         })
     };

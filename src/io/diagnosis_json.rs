@@ -67,6 +67,7 @@ pub struct RungJson {
     pub rmse_deg_per_h: f64,
     pub holdout_rmse_deg_per_h: Option<f64>,
     pub reduced_chi_square: f64,
+    pub holdout_reduced_chi_square: Option<f64>,
     pub bic: f64,
 }
 
@@ -174,6 +175,7 @@ impl RungJson {
             rmse_deg_per_h: deg_per_h_from_rad_per_s(rung.rmse_rad_per_s),
             holdout_rmse_deg_per_h: rung.holdout_rmse_rad_per_s.map(deg_per_h_from_rad_per_s),
             reduced_chi_square: rung.reduced_chi_square,
+            holdout_reduced_chi_square: rung.holdout_reduced_chi_square,
             bic: rung.bic,
         }
     }

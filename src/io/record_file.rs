@@ -252,6 +252,7 @@ impl<'s> Reading<'s> {
             }
         }
         self.check_temperatures(&columns, &values, &header_span);
+        self.gather_empty_columns(&columns, &values, &header_span);
         let rows = values.first().map_or(0, Vec::len);
         if self.faults.is_empty() && rows < MIN_ROWS {
             self.fault(Fault::new(format!("expected at least {MIN_ROWS} rows of numbers, found {rows}"), None));
@@ -295,6 +296,26 @@ impl<'s> Reading<'s> {
                         .with_note("a name that ends in _c holds degrees Celsius, one that ends in _k kelvin"),
                 );
             }
+        }
+    }
+
+    /// A column that holds no number at all is one fault, not one a row.
+    fn gather_empty_columns(&mut self, columns: &[Column], values: &[Vec<f64>], header: &Range<usize>) {
+        for (column, values) in columns.iter().zip(values) {
+            if values.len() < MIN_ROWS || values.iter().any(|v| v.is_finite()) {
+                continue;
+            }
+            let own = format!(", column {}: expected a finite number", column.name);
+            let before = self.faults.len();
+            self.faults.retain(|f| !f.message.contains(&own));
+            let shown = before - self.faults.len();
+            self.uncounted = self.uncounted.saturating_sub(values.len() - shown);
+            let message = format!("column {} holds no finite number in any of its {} rows", column.name, values.len());
+            let note = match column.quantity {
+                Quantity::Time | Quantity::Temperature | Quantity::Rate => "the sensor failed: measure again",
+                _ => "leave the column out",
+            };
+            self.fault(Fault::new(message, Some(header.clone())).with_note(note));
         }
     }
 
