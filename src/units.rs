@@ -43,6 +43,11 @@ pub fn deg_per_h_per_sqrt_h_from_rad_per_s_per_sqrt_s(walk_rad_per_s_per_sqrt_s:
     deg_per_h_from_rad_per_s(walk_rad_per_s_per_sqrt_s) * SECONDS_PER_HOUR.sqrt()
 }
 
+/// Ramp of the rate: rad/s² to °/h/h.
+pub fn deg_per_h_per_h_from_rad_per_s2(ramp_rad_per_s2: f64) -> f64 {
+    deg_per_h_from_rad_per_s(ramp_rad_per_s2) * SECONDS_PER_HOUR
+}
+
 pub fn deg_from_rad(angle_rad: f64) -> f64 {
     angle_rad * DEGREES_PER_RADIAN
 }

@@ -24,12 +24,21 @@ fn coilwright(arguments: &[&str]) {
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
 }
 
-/// A traveller and a search's report.
+/// Every kind of page.
 fn pages(folder: &Path) -> Vec<PathBuf> {
     let (schedule, run) = (folder.join("schedule"), folder.join("run"));
     coilwright(&["schedule", MODEL, "--pattern", "qua", "-q", "-o", schedule.to_str().unwrap()]);
     coilwright(&["optimise", MODEL, "--rounds", "1", "--moves-per-restart", "500", "-q", "-o", run.to_str().unwrap()]);
-    vec![schedule.join("traveller.html"), run.join("report.html")]
+    let (compared, measured) = (folder.join("compared"), folder.join("measured"));
+    let [model, record] = ["coil.toml", "validation.csv"].map(|name| format!("tests/data/records/c-spool/{name}"));
+    coilwright(&["compare", &model, &record, "-q", "-o", compared.to_str().unwrap()]);
+    coilwright(&["metrics", &record, "-q", "-o", measured.to_str().unwrap()]);
+    vec![
+        schedule.join("traveller.html"),
+        run.join("report.html"),
+        compared.join("report.html"),
+        measured.join("report.html"),
+    ]
 }
 
 fn run(browser: &str, profile: &Path, arguments: &[&str]) -> (String, String) {

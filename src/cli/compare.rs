@@ -1,20 +1,25 @@
 //! `compare`: a model's prediction beside measured records, and where it fails.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::records::{GrossErrors, Noticed, read_noticed};
+use super::report::{REPORT_FILE, write_report};
 use super::schedule::pattern_of;
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
-use crate::compare::{Comparison, compare};
+use crate::compare::compare;
 use crate::io::comparison_json::{CompareJson, PartJson, RecordComparisonJson};
-use crate::io::model_file::read_model;
-use crate::record::Record;
+use crate::io::comparison_rows::{ComparisonRow, comparison_rows};
+use crate::io::files::write_atomically;
+use crate::io::inputs_json::{InputsJson, RecordInputJson};
+use crate::io::measurement_folder::{COMPARISON_FILE, MODEL_FILE, check_free, table_name, write_document, write_table};
+use crate::io::model_file::{ModelFile, read_model};
+use crate::report::comparison::pictures;
 
 /// A model's prediction beside measured records, and where it fails
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  coilwright compare coil.toml calibration.csv validation.csv\n  coilwright compare coil.toml day-1.csv --strict --format json"
+    after_help = "Examples:\n  coilwright compare coil.toml calibration.csv validation.csv\n  coilwright compare coil.toml day-1.csv --strict --format json\n  coilwright compare coil.toml day-1.csv -o results/day-1"
 )]
 pub struct Arguments {
     /// The model file
@@ -31,13 +36,20 @@ pub struct Arguments {
     /// Exit code 1 when the model is not adequate
     #[arg(long)]
     strict: bool,
+    /// Writes comparison.json, a table and pictures for each record, and report.html into this folder
+    #[arg(long, short, value_name = "DIR")]
+    output: Option<PathBuf>,
 }
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
+    if let Some(folder) = &arguments.output {
+        check_free(folder)?;
+    }
     let named = pattern_of(&file, arguments.pattern.as_deref())?;
-    let mut compared: Vec<(Record, Comparison)> = Vec::with_capacity(arguments.records.len());
+    let mut tables = Vec::with_capacity(arguments.records.len());
     let mut shown = Vec::with_capacity(arguments.records.len());
+    let mut inputs = Vec::with_capacity(arguments.records.len());
     for path in &arguments.records {
         let Noticed { record, gross_errors, gaps } = read_noticed(path, arguments.gross_errors, screen)?;
         let names: Vec<String> = record.channels().iter().map(|c| c.name.clone()).collect();
@@ -48,12 +60,36 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         }
         let found = compare(&file.model, &named.pattern, &record)?;
         shown.push(RecordComparisonJson::new(&name, &found, gross_errors, gaps));
-        compared.push((record, found));
+        inputs.push(RecordInputJson::new(path, "compared")?);
+        if arguments.output.is_some() {
+            tables.push(comparison_rows(&record, &found));
+        }
     }
-    let body = CompareJson::new(&file.model.name, &named.name, shown);
+    let body = CompareJson::new(&file.model.name, &named.name, shown, InputsJson::new(Some(&file), inputs));
     let adequate = body.is_adequate();
+    if let Some(folder) = &arguments.output {
+        write_folder(folder, &file, &body, &tables)?;
+        write_report(folder, &folder.join(REPORT_FILE))?;
+        screen.note(&format!("wrote {}", folder.join(REPORT_FILE).display()));
+    }
     screen.answer(body, text)?;
     Ok(if arguments.strict && !adequate { Ending::No } else { Ending::Done })
+}
+
+fn write_folder(
+    folder: &Path,
+    file: &ModelFile,
+    body: &CompareJson,
+    tables: &[Vec<ComparisonRow>],
+) -> Result<(), CliError> {
+    for (index, (record, rows)) in body.records.iter().zip(tables).enumerate() {
+        write_table(folder, &table_name(index + 1), rows)?;
+        for picture in pictures(index + 1, record, rows) {
+            write_atomically(&folder.join(&picture.file), picture.svg.as_bytes())?;
+        }
+    }
+    write_atomically(&folder.join(MODEL_FILE), file.source.as_bytes())?;
+    Ok(write_document(folder, COMPARISON_FILE, body)?)
 }
 
 fn text(body: &CompareJson) -> String {

@@ -3,14 +3,21 @@
 use std::path::PathBuf;
 
 use super::records::{GrossErrors, read_noticed};
+use super::report::{REPORT_FILE, write_report};
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
+use crate::io::files::write_atomically;
+use crate::io::inputs_json::{InputsJson, RecordInputJson};
+use crate::io::measurement_folder::{METRICS_FILE, check_free, write_document};
 use crate::io::metrics_json::{MetricsJson, RecordMetricsJson};
 use crate::metrics::{Metrics, repeatability_rad_per_s};
+use crate::report::allan::allan_chart;
 
 /// Bias, stability, Allan deviation and temperature sensitivity of records
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  coilwright metrics day-1.csv day-2.csv --average 100")]
+#[command(
+    after_help = "Examples:\n  coilwright metrics day-1.csv day-2.csv --average 100\n  coilwright metrics rest.csv -o results/rest"
+)]
 pub struct Arguments {
     /// Records (CSV)
     #[arg(required = true)]
@@ -21,19 +28,36 @@ pub struct Arguments {
     /// What to do with values that stand alone
     #[arg(long, value_enum, default_value_t = GrossErrors::Keep)]
     gross_errors: GrossErrors,
+    /// Writes metrics.json, the pictures of the Allan deviation and report.html into this folder
+    #[arg(long, short, value_name = "DIR")]
+    output: Option<PathBuf>,
 }
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+    if let Some(folder) = &arguments.output {
+        check_free(folder)?;
+    }
     let mut measured = Vec::with_capacity(arguments.records.len());
     let mut shown = Vec::with_capacity(arguments.records.len());
+    let mut inputs = Vec::with_capacity(arguments.records.len());
     for path in &arguments.records {
         let noticed = read_noticed(path, arguments.gross_errors, screen)?;
         let metrics = Metrics::of(&noticed.record, arguments.average)?;
         let file = path.display().to_string();
         shown.push(RecordMetricsJson::new(&file, &metrics, noticed.gross_errors, noticed.gaps));
+        inputs.push(RecordInputJson::new(path, "measured")?);
         measured.push(metrics);
     }
-    let body = MetricsJson::new(shown, repeatability_rad_per_s(&measured)?);
+    let body = MetricsJson::new(shown, repeatability_rad_per_s(&measured)?, InputsJson::new(None, inputs));
+    if let Some(folder) = &arguments.output {
+        for (index, record) in body.records.iter().enumerate() {
+            let name = format!("allan-{}.svg", index + 1);
+            write_atomically(&folder.join(name), allan_chart(record).svg().as_bytes())?;
+        }
+        write_document(folder, METRICS_FILE, &body)?;
+        write_report(folder, &folder.join(REPORT_FILE))?;
+        screen.note(&format!("wrote {}", folder.join(REPORT_FILE).display()));
+    }
     screen.answer(body, text)?;
     Ok(Ending::Done)
 }

@@ -31,7 +31,7 @@ use crate::predict::{self, PredictError, Prediction};
 use crate::rate::{CoilModel, RateError, RateModel};
 use crate::record::Record;
 use crate::units::percent_from_fraction;
-use regimes::{Part, Regimes};
+use regimes::{Part, Regime, Regimes};
 use verdict::{Finding, Verdict};
 
 /// Everything that was found out about one record and one model.
@@ -55,6 +55,8 @@ pub struct Comparison {
     pub ljung_box: LjungBox,
     pub correlations: Vec<Correlation>,
     pub regimes: Vec<Part>,
+    /// One entry a row.
+    pub regime_of_row: Vec<Regime>,
     pub temperature_bands: Vec<Part>,
     pub rate_bands: Vec<Part>,
     pub findings: Vec<Finding>,
@@ -165,6 +167,7 @@ pub fn compare_with(
         autocorrelation,
         correlations: states.correlations(&residual, record, &prediction),
         regimes: cut.regimes(&residual, &scaled),
+        regime_of_row: cut.regime_of_row(),
         temperature_bands: cut.temperature_bands(&residual, &scaled),
         rate_bands: cut.rate_bands(&residual, &scaled),
         findings: Vec::new(),

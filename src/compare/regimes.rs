@@ -112,6 +112,10 @@ impl Regimes {
         Ok(Self { of_row, transient_s, temperature_band, temperature_names, rate_band, rate_names })
     }
 
+    pub(super) fn regime_of_row(&self) -> Vec<Regime> {
+        self.of_row.iter().map(|&place| Regime::ALL[place]).collect()
+    }
+
     pub(super) fn regimes(&self, residual: &[f64], scaled: &[f64]) -> Vec<Part> {
         let names: Vec<String> = Regime::ALL.iter().map(|r| r.key().to_owned()).collect();
         parts(&names, &self.of_row, residual, scaled)

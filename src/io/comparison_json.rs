@@ -1,35 +1,37 @@
-//! The JSON document of `compare`.
+//! The JSON document of `compare`; also read back for reports.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
+use super::inputs_json::InputsJson;
 use super::metrics_json::GrossErrorJson;
 use crate::compare::Comparison;
 use crate::compare::regimes::Part;
 use crate::compare::verdict::Verdict;
 use crate::units::deg_per_h_from_rad_per_s;
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CompareJson {
     pub model: String,
     pub pattern: String,
     /// "adequate" or "missing": whether every record is the model's prediction and noise.
-    pub verdict: &'static str,
+    pub verdict: String,
     pub records: Vec<RecordComparisonJson>,
+    pub inputs: InputsJson,
 }
 
 /// One record beside its prediction.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RecordComparisonJson {
     pub file: String,
     pub rows: usize,
-    pub verdict: &'static str,
+    pub verdict: String,
     pub rmse_deg_per_h: f64,
     /// Null where the record does not vary.
     pub nrmse_fit_percent: Option<f64>,
     pub r_squared: Option<f64>,
     pub noise_floor_deg_per_h: f64,
     pub noise_floor_standard_error_deg_per_h: f64,
-    pub noise_floor_method: &'static str,
+    pub noise_floor_method: String,
     pub reduced_chi_square: f64,
     /// What the uncertainty of the estimated boundary is expected to add to it.
     pub boundary_chi_square: f64,
@@ -53,20 +55,20 @@ pub struct RecordComparisonJson {
     pub gaps: usize,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LjungBoxJson {
     pub statistic: f64,
     pub lags: usize,
     pub p_value: f64,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CorrelationJson {
     pub with: String,
     pub correlation: Option<f64>,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PartJson {
     pub name: String,
     pub share_of_squared_error: f64,
@@ -106,13 +108,13 @@ impl RecordComparisonJson {
         Self {
             file: file.to_owned(),
             rows: found.rows,
-            verdict: verdict_word(found.verdict),
+            verdict: verdict_word(found.verdict).to_owned(),
             rmse_deg_per_h: deg_per_h_from_rad_per_s(found.rmse_rad_per_s),
             nrmse_fit_percent: Some(found.nrmse_fit_percent).filter(|p| p.is_finite()),
             r_squared: found.r_squared,
             noise_floor_deg_per_h: deg_per_h_from_rad_per_s(found.noise_rad_per_s),
             noise_floor_standard_error_deg_per_h: deg_per_h_from_rad_per_s(found.noise_standard_error_rad_per_s),
-            noise_floor_method: NOISE_FLOOR_METHOD,
+            noise_floor_method: NOISE_FLOOR_METHOD.to_owned(),
             reduced_chi_square: found.reduced_chi_square,
             boundary_chi_square: found.boundary_chi_square,
             whitened_chi_square: found.whitened_chi_square,
@@ -144,10 +146,10 @@ impl RecordComparisonJson {
 }
 
 impl CompareJson {
-    pub fn new(model: &str, pattern: &str, records: Vec<RecordComparisonJson>) -> Self {
+    pub fn new(model: &str, pattern: &str, records: Vec<RecordComparisonJson>, inputs: InputsJson) -> Self {
         let all = records.iter().all(|r| r.verdict == verdict_word(Verdict::Adequate));
         let verdict = verdict_word(if all { Verdict::Adequate } else { Verdict::Missing });
-        Self { model: model.to_owned(), pattern: pattern.to_owned(), verdict, records }
+        Self { model: model.to_owned(), pattern: pattern.to_owned(), verdict: verdict.to_owned(), records, inputs }
     }
 
     pub fn is_adequate(&self) -> bool {

@@ -43,10 +43,10 @@ pub fn read_text_up_to(path: &Path, largest_bytes: u64) -> Result<String, Faults
     // A pipe or device has no length to check beforehand.
     let mut bytes = Vec::new();
     std::fs::File::open(path)
-        .and_then(|file| file.take(LARGEST_TEXT_BYTES + 1).read_to_end(&mut bytes))
+        .and_then(|file| file.take(largest_bytes + 1).read_to_end(&mut bytes))
         .map_err(|e| fault(format!("cannot be read: {e}")))?;
-    if bytes.len() as u64 > LARGEST_TEXT_BYTES {
-        return Err(fault(format!("expected a text file of at most {LARGEST_TEXT_BYTES} bytes, found more")));
+    if bytes.len() as u64 > largest_bytes {
+        return Err(fault(format!("expected a text file of at most {largest_bytes} bytes, found more")));
     }
     let text = String::from_utf8(bytes).map_err(|e| {
         fault(format!(

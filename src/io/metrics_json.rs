@@ -1,15 +1,17 @@
-//! The JSON document of `metrics`.
+//! The JSON document of `metrics`; also read back for reports.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
+use super::inputs_json::InputsJson;
 use crate::metrics::{Allan, Metrics};
+use crate::numeric::allan::NoiseModel;
 use crate::units::{
-    arcsec_from_rad, celsius_from_kelvin, deg_per_h_from_rad_per_s, deg_per_h_per_sqrt_h_from_rad_per_s_per_sqrt_s,
-    deg_per_sqrt_h_from_rad_per_sqrt_s,
+    arcsec_from_rad, celsius_from_kelvin, deg_per_h_from_rad_per_s, deg_per_h_per_h_from_rad_per_s2,
+    deg_per_h_per_sqrt_h_from_rad_per_s_per_sqrt_s, deg_per_sqrt_h_from_rad_per_sqrt_s,
 };
 
 /// The measures under the keys that scripts read. Over several records: the mean bias and the worst of the others.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MetricsJson {
     pub bias_deg_per_h: f64,
     pub bias_stability_deg_per_h: Option<f64>,
@@ -21,9 +23,10 @@ pub struct MetricsJson {
     pub angle_random_walk_deg_per_sqrt_h: Option<f64>,
     pub peak_to_peak_deg_per_h: f64,
     pub records: Vec<RecordMetricsJson>,
+    pub inputs: InputsJson,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RecordMetricsJson {
     pub file: String,
     pub rows: usize,
@@ -47,26 +50,39 @@ pub struct RecordMetricsJson {
     /// Rows of the stretch without a gap that the Allan deviation is of; 0: no stretch was long enough.
     pub allan_rows: usize,
     pub allan: Vec<AllanPointJson>,
+    /// The fitted noises that show, the steepest fall first.
+    pub allan_noises: Vec<AllanNoiseJson>,
     pub gross_errors: Vec<GrossErrorJson>,
     pub gaps: usize,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TemperaturePointJson {
     pub temperature_c: f64,
     pub bias_deg_per_h: f64,
     pub rows: usize,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AllanPointJson {
     pub tau_s: f64,
     pub deviation_deg_per_h: f64,
     pub standard_error_deg_per_h: f64,
 }
 
+/// One noise in the Allan deviation: a straight line in the picture of logarithms.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AllanNoiseJson {
+    /// "quantisation", "angle random walk", "bias instability", "rate random walk" or "rate ramp".
+    pub noise: String,
+    pub value: f64,
+    pub unit: String,
+    pub slope: f64,
+    pub deviation_at_1_s_deg_per_h: f64,
+}
+
 /// A value that stands alone.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GrossErrorJson {
     pub time_s: f64,
     pub column: String,
@@ -119,14 +135,63 @@ impl RecordMetricsJson {
                     })
                     .collect()
             }),
+            allan_noises: allan.map_or_else(Vec::new, noises),
             gross_errors,
             gaps,
         }
     }
 }
 
+/// The lines of the noises that were found; the angle random walk is the one read off the slope.
+fn noises(allan: &Allan) -> Vec<AllanNoiseJson> {
+    let found = &allan.noises;
+    let walk = if allan.has_white_slope { allan.white_rad_per_sqrt_s } else { 0.0 };
+    let line = |noise: &str, value: f64, unit: &str, slope: f64, at_1_s: f64| AllanNoiseJson {
+        noise: noise.to_owned(),
+        value,
+        unit: unit.to_owned(),
+        slope,
+        deviation_at_1_s_deg_per_h: deg_per_h_from_rad_per_s(at_1_s),
+    };
+    let at_1_s = |noise: NoiseModel| noise.deviation(1.0);
+    let none = NoiseModel::default();
+    let mut lines = vec![
+        line(
+            "quantisation",
+            arcsec_from_rad(found.quantisation),
+            "arcsec",
+            -1.0,
+            at_1_s(NoiseModel { quantisation: found.quantisation, ..none }),
+        ),
+        line("angle random walk", deg_per_sqrt_h_from_rad_per_sqrt_s(walk), "°/√h", -0.5, walk),
+        line(
+            "bias instability",
+            deg_per_h_from_rad_per_s(found.flicker),
+            "°/h",
+            0.0,
+            at_1_s(NoiseModel { flicker: found.flicker, ..none }),
+        ),
+        line(
+            "rate random walk",
+            deg_per_h_per_sqrt_h_from_rad_per_s_per_sqrt_s(found.random_walk),
+            "°/h/√h",
+            0.5,
+            at_1_s(NoiseModel { random_walk: found.random_walk, ..none }),
+        ),
+        line(
+            "rate ramp",
+            deg_per_h_per_h_from_rad_per_s2(found.ramp),
+            "°/h/h",
+            1.0,
+            at_1_s(NoiseModel { ramp: found.ramp, ..none }),
+        ),
+    ];
+    lines.retain(|l| l.value > 0.0);
+    lines
+}
+
 impl MetricsJson {
-    pub fn new(records: Vec<RecordMetricsJson>, repeatability_rad_per_s: Option<f64>) -> Self {
+    pub fn new(records: Vec<RecordMetricsJson>, repeatability_rad_per_s: Option<f64>, inputs: InputsJson) -> Self {
         let count = records.len().max(1) as f64;
         let worst =
             |show: fn(&RecordMetricsJson) -> Option<f64>| records.iter().filter_map(show).max_by(f64::total_cmp);
@@ -140,6 +205,7 @@ impl MetricsJson {
             angle_random_walk_deg_per_sqrt_h: worst(|r| r.angle_random_walk_deg_per_sqrt_h),
             peak_to_peak_deg_per_h: worst(|r| Some(r.peak_to_peak_deg_per_h)).unwrap_or(0.0),
             records,
+            inputs,
         }
     }
 }

@@ -3,14 +3,17 @@
 pub mod campaign_file;
 pub mod checkpoint;
 pub mod comparison_json;
+pub mod comparison_rows;
 pub mod compensation_file;
 pub mod diagnosis_json;
 mod effect_tables;
 pub mod effects_json;
 pub mod fault;
 pub mod files;
+pub mod inputs_json;
 pub mod json;
 pub mod machine_program;
+pub mod measurement_folder;
 pub mod metrics_json;
 pub mod model_edit;
 pub mod model_file;

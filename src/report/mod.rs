@@ -1,6 +1,9 @@
 //! What a reader sees: charts, drawings and pages.
 
+pub mod allan;
+pub mod comparison;
 pub mod cross_section;
+pub mod measurement;
 mod page;
 pub mod plot;
 pub mod search_run;

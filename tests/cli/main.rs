@@ -3,7 +3,9 @@
 mod bad_input;
 mod commands;
 mod diagnose;
+mod compare;
 mod examples;
+mod metrics;
 mod readme;
 mod reproduce;
 

@@ -157,7 +157,7 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
 }
 
 /// Three significant digits, for the end of a bar.
-pub(super) fn three_digits(value: f64) -> String {
+pub(in crate::report) fn three_digits(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }

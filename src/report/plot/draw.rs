@@ -33,6 +33,12 @@ fn colour(index: usize) -> RGBColor {
     PALETTE[index % PALETTE.len()]
 }
 
+/// Blue below zero, red above; −1 and 1 are the strongest.
+fn tint(share: f64) -> ShapeStyle {
+    let hue = if share < 0.0 { PALETTE[0] } else { PALETTE[4] };
+    hue.mix(0.06 + 0.9 * share.abs().min(1.0)).filled()
+}
+
 fn fine(px: f64) -> i32 {
     (px * f64::from(FINE)).round() as i32
 }
@@ -120,6 +126,12 @@ fn draw_words(chart: &Chart, layout: &Layout, root: &Area) -> Drawn {
                 }
             }
             LegendShape::Dot => root.draw(&Circle::new(at(left + 10.0, y), 4 * FINE, colour(entry.colour).filled()))?,
+            LegendShape::Scale => {
+                for step in -2..=2 {
+                    let x = left + 4.0 * f64::from(step) + 8.0;
+                    root.draw(&Rectangle::new([at(x, y - 5.0), at(x + 4.0, y + 5.0)], tint(0.5 * f64::from(step))))?;
+                }
+            }
             LegendShape::Block | LegendShape::Band => {
                 let opacity = if entry.shape == LegendShape::Band { 0.25 } else { 0.9 };
                 let fill = colour(entry.colour).mix(opacity).filled();
@@ -162,7 +174,6 @@ fn draw_frame(chart: &Chart, layout: &Layout, root: &Area) -> Drawn {
 }
 
 fn draw_band(chart: &Chart, layout: &Layout, root: &Area, band: &super::Band, lying: bool) -> Drawn {
-    let index = chart.bands.iter().position(|b| b == band).unwrap_or(0);
     let (from, to) = (band.from.min(band.to), band.from.max(band.to));
     let corners = match band.along {
         Along::X => {
@@ -174,7 +185,7 @@ fn draw_band(chart: &Chart, layout: &Layout, root: &Area, band: &super::Band, ly
             [at(f64::from(layout.left), y(to)), at(f64::from(layout.right), y(from))]
         }
     };
-    root.draw(&Rectangle::new(corners, colour(index + 7).mix(0.18).filled()))
+    root.draw(&Rectangle::new(corners, colour(chart.hue_of(band)).mix(0.18).filled()))
 }
 
 fn draw_marks(chart: &Chart, layout: &Layout, root: &Area, lying: bool) -> Drawn {
@@ -234,7 +245,27 @@ fn draw_series(
                 }
             }
         }
+        Shape::Cells => {
+            let most = series.largest_value().max(f64::MIN_POSITIVE);
+            let half = (0.5 * series.cell.0, 0.5 * series.cell.1);
+            for (&(x, y), value) in series.points.iter().zip(&series.values).filter(|(_, v)| v.is_finite()) {
+                let (Some(low), Some(high)) = (place(&(x - half.0, y - half.1)), place(&(x + half.0, y + half.1)))
+                else {
+                    continue;
+                };
+                any = true;
+                root.draw(&Rectangle::new([at(low.0, high.1), at(high.0, low.1)], tint(value / most)))?;
+            }
+        }
         Shape::Points => {
+            for (&(x, y), error) in series.points.iter().zip(&series.errors) {
+                // Down to the frame where the axis does not reach as far.
+                let (Some(high), Some(middle)) = (place(&(x, y + error)), place(&(x, y))) else { continue };
+                let low = place(&(x, y - error)).map_or(f64::from(layout.bottom), |p| p.1);
+                let clamp = |y: f64| y.clamp(f64::from(layout.top), f64::from(layout.bottom));
+                let bar = [at(middle.0, clamp(high.1)), at(middle.0, clamp(low))];
+                root.draw(&PathElement::new(bar, hue.stroke_width(FINE as u32)))?;
+            }
             let radius = if series.points.len() > 300 { 2 } else { 4 };
             for (i, (x, y)) in series.points.iter().enumerate().filter_map(|(i, p)| place(p).map(|p| (i, p))) {
                 any = true;

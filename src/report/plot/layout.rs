@@ -1,6 +1,6 @@
 //! Where the parts of a chart go, in pixels of its natural size.
 
-use super::axis::Ruler;
+use super::axis::{Ruler, three_digits};
 use super::{Along, Chart, Shape};
 
 pub(super) const TEXT_PX: i32 = 13;
@@ -47,6 +47,8 @@ pub(super) enum LegendShape {
     Dot,
     Block,
     Band,
+    /// From the palest to the strongest tint.
+    Scale,
 }
 
 impl Layout {
@@ -66,6 +68,18 @@ impl Layout {
         let x_margin = if lying || has(Shape::Points) { 0.04 } else { 0.0 };
         let mut x_axis = chart.x.clone();
         let mut y_axis = chart.y.clone();
+        for series in chart.series.iter().filter(|s| s.shape == Shape::Cells) {
+            for (x, y) in &series.points {
+                let (half_x, half_y) = (0.5 * series.cell.0, 0.5 * series.cell.1);
+                x_axis = x_axis.reaching(x - half_x).reaching(x + half_x);
+                y_axis = y_axis.reaching(y - half_y).reaching(y + half_y);
+            }
+        }
+        for series in &chart.series {
+            for ((_, y), error) in series.points.iter().zip(&series.errors) {
+                y_axis = y_axis.reaching(y + error);
+            }
+        }
         if lying {
             x_axis = x_axis.reaching(0.0);
         }
@@ -165,12 +179,21 @@ fn legend(chart: &Chart, width: i32) -> (Vec<LegendEntry>, i32) {
             Shape::Dashed => LegendShape::Dashed,
             Shape::Points => LegendShape::Dot,
             Shape::Histogram | Shape::Bars => LegendShape::Block,
+            Shape::Cells => LegendShape::Scale,
         };
-        (s.name.clone(), i, shape)
+        let text = match s.shape {
+            Shape::Cells => {
+                format!("{}: −{} … {}", s.name, three_digits(s.largest_value()), three_digits(s.largest_value()))
+            }
+            _ => s.name.clone(),
+        };
+        (text, i, shape)
     });
-    let bands = chart.bands.iter().enumerate().map(|(i, b)| (b.label.clone(), i + 7, LegendShape::Band));
+    let is_first = |i: usize| chart.bands[..i].iter().all(|b| b.label != chart.bands[i].label);
+    let bands = chart.bands.iter().enumerate().filter(|(i, _)| is_first(*i));
+    let bands = bands.map(|(_, b)| (b.label.clone(), chart.hue_of(b), LegendShape::Band));
     let entries: Vec<_> = series.chain(bands).filter(|e| !e.0.is_empty()).collect();
-    if entries.len() < 2 {
+    if entries.len() < 2 && entries.iter().all(|e| e.2 != LegendShape::Scale) {
         return (Vec::new(), 0);
     }
     let (mut row, mut left) = (0, 12);

@@ -23,6 +23,7 @@ mod axis;
 mod draw;
 mod layout;
 
+pub(super) use axis::three_digits;
 pub(super) use draw::STYLE;
 
 pub use axis::Axis;
@@ -39,6 +40,8 @@ enum Shape {
     Histogram,
     /// One value a category; the points are (value, index of the category).
     Bars,
+    /// Rectangles of one size, tinted by a value; the points are their middles.
+    Cells,
 }
 
 /// One set of numbers under one name.
@@ -49,6 +52,13 @@ pub struct Series {
     points: Vec<(f64, f64)>,
     /// Written next to the points; empty or one a point.
     labels: Vec<String>,
+    /// Half the length of a bar through each point; empty or one a point.
+    errors: Vec<f64>,
+    /// What a cell's tint says; one a point.
+    values: Vec<f64>,
+    /// Width and height of a cell.
+    cell: (f64, f64),
+    least: f64,
 }
 
 impl Series {
@@ -86,6 +96,30 @@ impl Series {
         Self::of(name, Shape::Bars, points)
     }
 
+    /// Rectangles of one size around their middles, (x, y, value): blue below zero, red above, the paler the smaller.
+    pub fn cells(name: impl Into<String>, size: (f64, f64), cells: &[(f64, f64, f64)]) -> Self {
+        let points = cells.iter().map(|c| (c.0, c.1)).collect();
+        let values = cells.iter().map(|c| c.2).collect();
+        Self { values, cell: size, ..Self::of(name, Shape::Cells, points) }
+    }
+
+    /// Draws a bar of one standard error up and down through each point.
+    pub fn with_errors(mut self, errors: Vec<f64>) -> Self {
+        self.errors = errors;
+        self
+    }
+
+    /// The strongest tint of cells stands for no less than this.
+    pub fn at_least(mut self, value: f64) -> Self {
+        self.least = value;
+        self
+    }
+
+    /// What the strongest tint of the cells stands for.
+    fn largest_value(&self) -> f64 {
+        self.values.iter().filter(|v| v.is_finite()).fold(self.least, |most: f64, v| most.max(v.abs()))
+    }
+
     /// Writes a word next to each point.
     pub fn labelled(mut self, labels: Vec<String>) -> Self {
         self.labels = labels;
@@ -93,7 +127,8 @@ impl Series {
     }
 
     fn of(name: impl Into<String>, shape: Shape, points: Vec<(f64, f64)>) -> Self {
-        Self { name: name.into(), shape, points, labels: Vec::new() }
+        let (labels, errors, values) = (Vec::new(), Vec::new(), Vec::new());
+        Self { name: name.into(), shape, points, labels, errors, values, cell: (0.0, 0.0), least: 0.0 }
     }
 }
 
@@ -131,17 +166,25 @@ pub struct Band {
     along: Along,
     from: f64,
     to: f64,
+    /// Place in the palette; without it, one for each label.
+    hue: Option<usize>,
 }
 
 impl Band {
     /// Between two x, over the whole height.
     pub fn vertical(label: impl Into<String>, from: f64, to: f64) -> Self {
-        Self { label: label.into(), along: Along::X, from, to }
+        Self { label: label.into(), along: Along::X, from, to, hue: None }
     }
 
     /// Between two y, over the whole width.
     pub fn horizontal(label: impl Into<String>, from: f64, to: f64) -> Self {
-        Self { label: label.into(), along: Along::Y, from, to }
+        Self { label: label.into(), along: Along::Y, from, to, hue: None }
+    }
+
+    /// With the palette's colour of this number instead of the next free one.
+    pub fn hue(mut self, index: usize) -> Self {
+        self.hue = Some(index);
+        self
     }
 }
 
@@ -211,6 +254,12 @@ impl Chart {
     pub fn categories(mut self, names: impl IntoIterator<Item = impl Into<String>>) -> Self {
         self.categories = names.into_iter().map(Into::into).collect();
         self
+    }
+
+    /// Where in the palette a band's colour is: bands of one label have one colour.
+    fn hue_of(&self, band: &Band) -> usize {
+        let first = self.bands.iter().position(|b| b.label == band.label).unwrap_or(0);
+        band.hue.unwrap_or(first + 7)
     }
 
     /// The picture: one `<svg>` element, as a file of its own or inside a page.

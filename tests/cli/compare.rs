@@ -1,0 +1,107 @@
+//! `compare`: what it says, writes and refuses.
+
+use super::{code, folder_with, json, root, run, run_in, stderr, stdout};
+
+const COIL: &str = "tests/data/records/c-spool/coil.toml";
+const RECORD: &str = "tests/data/records/c-spool/calibration.csv";
+
+#[test]
+fn the_words_name_the_regime_in_which_a_hidden_spool_acts() {
+    let output = run(&["compare", COIL, RECORD]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let text = stdout(&output);
+    assert!(text.starts_with("c-spool with dip: missing\n"), "{text}");
+    let words = "of the squared error lies in the 762 s after each change of ramp";
+    assert!(text.lines().any(|l| l.trim_start().starts_with("73 %") && l.contains(words)), "{text}");
+    assert_eq!(code(&run(&["compare", COIL, RECORD, "--strict", "-q"])), 1);
+}
+
+#[test]
+fn the_words_name_the_dependence_through_which_a_mismatch_of_the_halves_acts() {
+    let folder = "tests/data/records/d-mismatch";
+    let output = run(&["compare", &format!("{folder}/coil.toml"), &format!("{folder}/calibration.csv")]);
+    let first = stdout(&output).lines().find(|l| l.contains("the residual follows")).unwrap_or_default();
+    assert_eq!(first.trim(), "the residual follows dT/dt (correlation 0.99)");
+}
+
+#[test]
+fn the_document_has_the_keys_that_scripts_read() {
+    let answer = json(&["compare", COIL, RECORD]);
+    assert_eq!(answer["schema_version"], 1);
+    assert_eq!(answer["verdict"], "missing");
+    let record = &answer["records"][0];
+    assert_eq!(record["file"], RECORD);
+    assert_eq!(record["rows"], 2041);
+    for key in
+        ["rmse_deg_per_h", "nrmse_fit_percent", "noise_floor_deg_per_h", "reduced_chi_square", "offset_deg_per_h"]
+    {
+        assert!(record[key].as_f64().is_some_and(f64::is_finite), "{key}");
+    }
+    let regimes = record["regimes"].as_array().unwrap();
+    let sum = |key: &str| regimes.iter().map(|r| r[key].as_f64().unwrap()).sum::<f64>();
+    assert!((sum("share_of_squared_error") - 1.0).abs() < 1e-9);
+    assert_eq!(sum("rows"), 2041.0);
+    assert!(regimes.iter().all(|r| r["name"].is_string() && r["rmse_deg_per_h"].is_number()));
+    let inputs = &answer["inputs"];
+    assert_eq!(inputs["model_file"], COIL);
+    assert_eq!(inputs["records"][0]["sha256"].as_str().map(str::len), Some(64));
+}
+
+#[test]
+fn a_folder_gets_document_tables_pictures_and_a_page_that_report_makes_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("day").display().to_string();
+    let written = run(&["compare", COIL, RECORD, "-o", &out, "-q"]);
+    assert_eq!(code(&written), 0, "{}", stderr(&written));
+    let file = |name: &str| std::fs::read_to_string(folder.path().join("day").join(name)).unwrap();
+    for picture in ["prediction", "residual", "temperature", "shares", "states", "autocorrelation"] {
+        assert!(file(&format!("record-1-{picture}.svg")).starts_with("<svg"), "{picture}");
+    }
+    assert_eq!(file("record-1.csv").lines().count(), 2042);
+    let page = file("report.html");
+    for needed in ["73 % of the squared error", "°/h", "SHA-256", "coilwright 0.1.0", "Ljung", "</svg>", "heating ramp"]
+    {
+        assert!(page.contains(needed), "{needed}");
+    }
+    let again = run(&["report", &out]);
+    assert_eq!(code(&again), 0, "{}", stderr(&again));
+    assert_eq!(page, file("report.html"));
+}
+
+#[test]
+fn a_folder_of_a_search_and_damaged_documents_are_refused() {
+    let (folder, run_toml) = folder_with("run.toml", "command = \"optimise\"\n");
+    let shown = folder.path().display().to_string();
+    let output = run(&["compare", COIL, RECORD, "-o", &shown]);
+    assert_eq!(code(&output), 2);
+    assert!(stderr(&output).contains("holds a search"), "{}", stderr(&output));
+    std::fs::remove_file(run_toml).unwrap();
+    std::fs::write(folder.path().join("comparison.json"), "{ \"model\": 3 }").unwrap();
+    let output = run(&["report", &shown]);
+    assert_eq!((code(&output), stdout(&output)), (2, ""));
+    assert!(stderr(&output).contains("cannot be understood as a comparison"), "{}", stderr(&output));
+}
+
+#[test]
+fn records_that_are_none_are_refused_with_line_and_remedy() {
+    let header = "time_s,temperature_c,rate_deg_per_h\n";
+    let cases = [
+        ("", "the file is empty"),
+        (header, "at least 3 rows"),
+        ("time_s,temp,rate_deg_per_h\n0,20,1\n", "column temperature_c is missing"),
+        (&format!("{header}0,20,1\n0,20,1\n20,20,1\n"), "time"),
+        (&format!("{header}0,20,1\n10,nan,1\n20,20,1\n"), "NaN"),
+        ("time_s;temperature_c;rate_deg_per_h\n0;20;1\n", "expected commas"),
+    ];
+    for (text, expected) in cases {
+        let (folder, _) = folder_with("record.csv", text);
+        let coil = root().join(COIL).display().to_string();
+        let output = run_in(folder.path(), &["compare", &coil, "record.csv"]);
+        assert_eq!((code(&output), stdout(&output)), (2, ""), "{text}");
+        let found = stderr(&output).to_lowercase();
+        assert!(found.contains(&expected.to_lowercase()) && found.contains("record.csv"), "{expected}: {found}");
+    }
+    let output = run(&["compare", COIL, "absent.csv"]);
+    assert_eq!(code(&output), 2);
+    assert!(stderr(&output).contains("absent.csv"), "{}", stderr(&output));
+}
