@@ -55,7 +55,7 @@ fn slope(value: f64) -> &'static str {
     match value {
         v if v <= -1.0 => "−1",
         v if v < 0.0 => "−½",
-        v if v == 0.0 => "0",
+        0.0 => "0",
         v if v < 1.0 => "+½",
         _ => "+1",
     }

@@ -71,6 +71,7 @@ fn sources() -> Markup {
         ul {
             li { "Rate error: Shupe, Appl. Opt. 19, 654 (1980); Yan, Lan, Jian, Acta Optica Sinica (1998), Eq. (4), corrected." }
             li { "Boundary from noisy readings: Harvey, Forecasting, Structural Time Series Models and the Kalman Filter (1989); de Jong and Penzer, J. Am. Stat. Assoc. 93 (1998) 796." }
+            li { "Noise floor: Gasser, Sroka, Jennen-Steinmetz, Biometrika 73 (1986) 625; Croux, Haesbroeck, J. Multivar. Anal. 71 (1999) 161." }
             li { "NRMSE fit: Ljung, System Identification (1999), section 16.4. Whiteness: Ljung and Box, Biometrika 65 (1978) 297." }
             li { "Information criterion: Schwarz, Ann. Stat. 6 (1978) 461. Allan deviation: IEEE Std 952, annex C; Riley, NIST SP 1065 (2008)." }
         }
