@@ -2,8 +2,8 @@
 
 mod bad_input;
 mod commands;
-mod diagnose;
 mod compare;
+mod diagnose;
 mod examples;
 mod metrics;
 mod readme;
