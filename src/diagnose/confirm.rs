@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::evidence::{Role, sum_of_squares};
-use super::hypothesis::{Hypothesis, Member, Trial};
+use super::hypothesis::{Hypothesis, Trial};
 
 /// Blocks in time, over all fitted rows, where no record was held out.
 const BLOCKS: usize = 6;
@@ -13,16 +13,10 @@ const STEP: f64 = 1e-4;
 /// By how much χ² of unseen data is smaller with a hypothesis than without one of its members.
 pub(super) fn confirmation(trial: &Trial, with: &Hypothesis, without: &Hypothesis) -> Option<f64> {
     if trial.evidence.rows(Role::Holdout) > 0 {
-        Some(holdout(trial, &without.members)? - holdout(trial, &with.members)?)
+        Some(without.unseen - with.unseen)
     } else {
         Some(left_out(trial, without)? - left_out(trial, with)?)
     }
-}
-
-/// χ² of the records that were held out.
-pub(super) fn holdout(trial: &Trial, members: &[Member]) -> Option<f64> {
-    let model = trial.model_of(members)?;
-    Some(sum_of_squares(&trial.evidence.residuals(&model, Role::Holdout)?))
 }
 
 /// Σ over blocks of the χ² of a block under the fit to all others, linear about the fit to all.

@@ -22,6 +22,8 @@ pub(super) struct Hypothesis {
     pub members: Vec<Member>,
     /// Of the whitened residuals, in units of the noise.
     pub chi_square: f64,
+    /// χ² of the records that were held out, only their offsets being fitted; 0 without any.
+    pub unseen: f64,
     pub parameters: usize,
     pub residuals: Vec<f64>,
     pub fit: Option<Fit>,
@@ -47,11 +49,15 @@ pub(super) struct Trial<'a> {
 const EFFECT_COST: f64 = 6.0;
 
 impl Hypothesis {
-    /// Bayesian information criterion with a price for having searched; χ² in units of `variance`.
+    /// χ² of all records, whether they were fitted or not.
+    pub fn total(&self) -> f64 {
+        self.chi_square + self.unseen
+    }
+
+    /// Bayesian information criterion with a price for having searched; χ² in units of `variance`. What was held out counts
+    /// too: sets that the fitted records do not tell apart often predict others differently.
     pub fn merit(&self, rows: usize, variance: f64) -> f64 {
-        self.chi_square / variance
-            + self.parameters as f64 * (rows as f64).ln()
-            + EFFECT_COST * self.members.len() as f64
+        self.total() / variance + self.parameters as f64 * (rows as f64).ln() + EFFECT_COST * self.members.len() as f64
     }
 }
 
@@ -76,6 +82,25 @@ impl Trial<'_> {
         self.evidence.residuals(&self.model_of(members)?, Role::Fit)
     }
 
+    /// χ² of the records that were held out.
+    fn unseen(&self, members: &[Member]) -> Option<f64> {
+        Some(sum_of_squares(&self.evidence.residuals(&self.model_of(members)?, Role::Holdout)?))
+    }
+
+    /// A set at the values that its members have.
+    pub fn at(&self, members: &[Member]) -> Option<Hypothesis> {
+        let residuals = self.residuals(members)?;
+        let parameters = members.iter().map(|m| self.candidates[m.candidate].free.len()).sum();
+        Some(Hypothesis {
+            members: members.to_vec(),
+            chi_square: sum_of_squares(&residuals),
+            unseen: self.unseen(members)?,
+            parameters,
+            residuals,
+            fit: None,
+        })
+    }
+
     /// Fits the free parameters of all members together, from the values that they have.
     pub fn fit(&self, members: &[Member], effort: Effort) -> Option<Hypothesis> {
         let parameters: Vec<Parameter> = members
@@ -90,9 +115,7 @@ impl Trial<'_> {
             })
             .collect();
         if parameters.is_empty() {
-            let residuals = self.residuals(members)?;
-            let chi_square = sum_of_squares(&residuals);
-            return Some(Hypothesis { members: members.to_vec(), chi_square, parameters: 0, residuals, fit: None });
+            return self.at(members);
         }
         let with = |p: &[f64]| -> Vec<Member> {
             let mut values = p.iter();
@@ -111,8 +134,10 @@ impl Trial<'_> {
         };
         let mut fit = least_squares(&parameters, |p| self.residuals(&with(p)), effort).ok()?;
         let residuals = std::mem::take(&mut fit.residuals);
+        let members = with(&fit.parameters);
         Some(Hypothesis {
-            members: with(&fit.parameters),
+            unseen: self.unseen(&members)?,
+            members,
             chi_square: fit.sum_of_squares,
             parameters: parameters.len(),
             residuals,

@@ -25,7 +25,7 @@ const MARGIN: f64 = 10.0;
 const MAX_EFFECTS: usize = 4;
 /// Sets that are fitted in earnest after a linear look at all of them.
 const PAIRS_TRIED: usize = 6;
-const FORWARD_TRIED: usize = 4;
+const KINDS_TRIED: usize = 4;
 /// A start whose response cannot lower χ² by this much, at any amplitude, is not worth a fit.
 const WORTH_A_FIT: f64 = 6.0;
 /// One effect more must promise this much: what it costs is more.
@@ -139,6 +139,7 @@ fn fit_singles(trial: &Trial, base: &Hypothesis) -> Vec<Hypothesis> {
                 return Some(Hypothesis {
                     members: vec![trial.scaled(&best.member, best.amplitude())],
                     chi_square: base.chi_square - best.gain(),
+                    unseen: base.unseen,
                     parameters: trial.candidates[candidate].free.len(),
                     residuals: base.residuals.clone(),
                     fit: None,
@@ -168,13 +169,18 @@ fn fit_pairs(trial: &Trial, base: &Hypothesis, best_single: f64) -> Vec<Hypothes
         .collect()
 }
 
-/// The most promising response of each of the `count` most promising candidates.
-fn foremost(mut responses: Vec<Response>, count: usize, least_gain: f64) -> Vec<Response> {
+/// The most promising response of each candidate of the `count` most promising kinds.
+fn foremost(trial: &Trial, mut responses: Vec<Response>, count: usize, least_gain: f64) -> Vec<Response> {
     responses.retain(|r| r.gain() > least_gain);
     responses.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
-    let mut seen = Vec::new();
+    let (mut kinds, mut seen) = (Vec::new(), Vec::new());
     responses.retain(|r| {
-        let new = seen.len() < count && !seen.contains(&r.member.candidate);
+        let kind = trial.candidates[r.member.candidate].kind();
+        if !kinds.contains(&kind) {
+            kinds.push(kind.clone());
+        }
+        let new = kinds.iter().position(|k| *k == kind).is_some_and(|place| place < count)
+            && !seen.contains(&r.member.candidate);
         if new {
             seen.push(r.member.candidate);
         }
@@ -185,7 +191,7 @@ fn foremost(mut responses: Vec<Response>, count: usize, least_gain: f64) -> Vec<
 
 /// One effect more.
 fn fit_forward(trial: &Trial, from: &Hypothesis) -> Vec<Hypothesis> {
-    foremost(trial.responses(from), FORWARD_TRIED, WORTH_A_STEP)
+    foremost(trial, trial.responses(from), KINDS_TRIED, WORTH_A_STEP)
         .into_par_iter()
         .filter_map(|response| {
             let mut members = from.members.clone();
@@ -197,21 +203,22 @@ fn fit_forward(trial: &Trial, from: &Hypothesis) -> Vec<Hypothesis> {
 
 /// Each member in turn exchanged for each of the most promising others.
 fn fit_swaps(trial: &Trial, from: &Hypothesis) -> Vec<Hypothesis> {
-    (0..from.members.len())
-        .filter_map(|out| Some((out, without(trial, from, out)?)))
-        .flat_map(|(out, rest)| fit_swap(trial, from, &rest, out))
-        .collect()
+    (0..from.members.len()).flat_map(|out| fit_swap(trial, from, out, KINDS_TRIED)).collect()
 }
 
-/// One member exchanged for others, `rest` being the fit without it; the new one stands at its place.
-pub(super) fn fit_swap(trial: &Trial, from: &Hypothesis, rest: &Hypothesis, out: usize) -> Vec<Hypothesis> {
+/// One member exchanged for others of the `kinds` most promising kinds; the new one stands at its place. The rest keeps
+/// its values until the new set is fitted: without any such effect it would be drawn far away.
+pub(super) fn fit_swap(trial: &Trial, from: &Hypothesis, out: usize, kinds: usize) -> Vec<Hypothesis> {
     let kind = trial.candidates[from.members[out].candidate].kind();
-    let mut responses = trial.responses(rest);
+    let mut others = from.members.clone();
+    others.remove(out);
+    let Some(rest) = trial.at(&others) else { return Vec::new() };
+    let mut responses = trial.responses(&rest);
     responses.retain(|r| trial.candidates[r.member.candidate].kind() != kind);
-    foremost(responses, FORWARD_TRIED, WORTH_BESIDE * (rest.chi_square - from.chi_square))
+    foremost(trial, responses, kinds, WORTH_BESIDE * (rest.chi_square - from.chi_square))
         .into_par_iter()
         .filter_map(|response| {
-            let mut members = rest.members.clone();
+            let mut members = others.clone();
             members.insert(out, trial.scaled(&response.member, response.amplitude()));
             trial.fit(&members, Effort::QUICK)
         })

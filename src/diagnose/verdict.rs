@@ -1,7 +1,7 @@
 //! From fitted sets of effects to an answer that can be defended.
 
 use super::candidate::{Candidate, is_declared_number};
-use super::confirm::{confirmation, holdout};
+use super::confirm::confirmation;
 use super::evidence::{Evidence, Role, dot, sum_of_squares};
 use super::hypothesis::{Hypothesis, Trial};
 use super::plain::{Plain, best_gain, compete};
@@ -24,6 +24,8 @@ const CONFIRMED: f64 = 4.0;
 /// Sets whose χ² differ by less explain the records equally well (odds of 400 at best).
 const EQUAL: f64 = 12.0;
 const MAX_EQUIVALENTS: usize = 2;
+/// Kinds that are tried in the place of an accepted one.
+const RIVALS: usize = 6;
 /// Reduced χ² beyond 1 that noise floor and boundary may make, besides chance.
 const TOLERATED_EXCESS: f64 = 0.12;
 /// A plain function of time is there if it lowers χ² by this much, and by this share of the rows.
@@ -229,11 +231,9 @@ fn settle_equivalents(
     variance: f64,
 ) -> (Hypothesis, Vec<Equivalent>) {
     let Some(rest) = without(trial, &best, place) else { return (best, Vec::new()) };
-    let total = |h: &Hypothesis| {
-        h.chi_square + holdout(trial, &h.members).unwrap_or(0.0) + h.parameters as f64 * (rows as f64).ln() * variance
-    };
+    let total = |h: &Hypothesis| h.total() + h.parameters as f64 * (rows as f64).ln() * variance;
     let mut rivals = vec![(total(&best), best)];
-    for rival in fit_swap(trial, &rivals[0].1, &rest, place) {
+    for rival in fit_swap(trial, &rivals[0].1, place, RIVALS) {
         rivals.push((total(&rival), rival));
     }
     let least = rivals.iter().map(|r| r.0).fold(f64::INFINITY, f64::min);
@@ -349,7 +349,7 @@ fn ladder(trial: &Trial, base: &Hypothesis, best: &Hypothesis, rows: usize) -> V
             rmse_rad_per_s: rmse(Role::Fit)?,
             holdout_rmse_rad_per_s: rmse(Role::Holdout),
             reduced_chi_square: h.chi_square / (rows as f64 - h.parameters as f64 - 1.0).max(1.0),
-            holdout_reduced_chi_square: holdout(trial, &h.members).filter(|_| held_out > 0).map(|c| c / freedom),
+            holdout_reduced_chi_square: (held_out > 0).then_some(h.unseen / freedom),
             bic: bic(h, rows),
         })
     };

@@ -21,7 +21,7 @@ SAME = {
 
 def run(binary, folder):
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.time()
-    command = ["nice", "-n", "3", binary, "diagnose", f"{folder}/coil.toml", f"{folder}/calibration.csv", "--holdout", f"{folder}/validation.csv", "--format", "json", "--quiet"]
+    command = ["nice", "-n", "10", binary, "diagnose", f"{folder}/coil.toml", f"{folder}/calibration.csv", "--holdout", f"{folder}/validation.csv", "--format", "json", "--quiet"]
     done = subprocess.run(command, capture_output=True, text=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     try:
