@@ -137,7 +137,7 @@ impl SolvedProfiles {
 
 impl SolvedProfile {
     /// The rate error with its sign and the time at which its size is largest.
-    fn worst(&self, rate_model: &RateModel) -> (f64, f64) {
+    pub(super) fn worst(&self, rate_model: &RateModel) -> (f64, f64) {
         let series = rate_model.series_rad_per_s(&self.history);
         let largest = series.iter().map(|r| r.abs()).fold(0.0, f64::max);
         let (mut best_rate, mut best_time_s) = (0.0_f64, 0.0);

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::{Outcome, Watch};
 use crate::coil::Coil;
 use crate::pattern::Pattern;
-use crate::rate::{CoilModel, LayerWeights, RateError};
+use crate::rate::{CoilModel, LayerWeights, RateError, RateModel};
 use crate::search::columns::BLOCK;
 use crate::search::samples::{SampleMatrix, any_rate_model};
 use crate::search::worst_case::{SearchError, SolvedProfiles};
@@ -59,6 +59,8 @@ pub struct Judge<'a> {
     /// Instants between the profiles' own samples, in the order of the samples that they became.
     peaks: Vec<Peak>,
     matrix: SampleMatrix,
+    /// The profile of each of the profiles' own samples.
+    profile_of: Vec<usize>,
     /// Samples in the order in which they are tried, and the same matrix in that order.
     order: Vec<usize>,
     ordered: SampleMatrix,
@@ -68,9 +70,17 @@ impl<'a> Judge<'a> {
     /// # Errors
     /// Effects that leave a layer no turns; rates that are not finite.
     pub fn new(model: &'a CoilModel, solved: &'a SolvedProfiles) -> Result<Self, SearchError> {
-        let (matrix, _) = SampleMatrix::of_profiles(model, solved)?;
-        let order = (0..matrix.samples()).collect();
-        Ok(Self { model, solved, coil: model.wound_coil()?, peaks: Vec::new(), ordered: matrix.clone(), matrix, order })
+        let (matrix, origins) = SampleMatrix::of_profiles(model, solved)?;
+        Ok(Self {
+            model,
+            solved,
+            coil: model.wound_coil()?,
+            peaks: Vec::new(),
+            profile_of: origins.iter().map(|origin| origin.profile).collect(),
+            order: (0..matrix.samples()).collect(),
+            ordered: matrix.clone(),
+            matrix,
+        })
     }
 
     /// Every sample of the profiles in order, then those that were added.
@@ -159,13 +169,27 @@ impl<'a> Judge<'a> {
                 return Finding::Refuted { sample: self.order[from + at] };
             }
         }
-        let (candidate, peak) =
-            self.candidate_and_peak(&pattern).expect("a search makes patterns of the coil's layers");
-        if candidate.rate_rad_per_s < limit_rad_per_s {
-            Finding::Better(candidate)
-        } else {
-            Finding::RefutedBetween(peak)
+        if let Some(peak) = self.peak_above(&pattern, limit_rad_per_s) {
+            return Finding::RefutedBetween(peak);
         }
+        Finding::Better(self.candidate(&pattern).expect("a search makes patterns of the coil's layers"))
+    }
+
+    /// A time at which a pattern is not below the limit; profiles are looked at in the order of their worst samples.
+    fn peak_above(&self, pattern: &Pattern, limit_rad_per_s: f64) -> Option<Peak> {
+        let rate_model =
+            RateModel::new(self.model, pattern, &[]).expect("a search makes patterns of the coil's layers");
+        let values = self.matrix.columns.values(&self.coefficients(pattern));
+        let mut largest = vec![0.0_f64; self.solved.profiles().len()];
+        for (&profile, v) in self.profile_of.iter().zip(&values) {
+            largest[profile] = largest[profile].max(v.abs());
+        }
+        let mut profiles: Vec<usize> = (0..largest.len()).collect();
+        profiles.sort_by(|&a, &b| largest[b].total_cmp(&largest[a]).then(a.cmp(&b)));
+        profiles.into_iter().find_map(|profile| {
+            let (rate_rad_per_s, time_s) = self.solved.profiles()[profile].worst(&rate_model);
+            (rate_rad_per_s.abs() >= limit_rad_per_s).then_some(Peak { profile, time_s })
+        })
     }
 
     fn coefficients(&self, pattern: &Pattern) -> Vec<f64> {
@@ -217,14 +241,8 @@ impl<'a> Judge<'a> {
 }
 
 impl Outcome {
-    /// Judges one pattern and keeps what comes of it; breaks off where the samples refute too little.
-    pub(super) fn judge(
-        &mut self,
-        judge: &Judge,
-        segments: &[usize],
-        limit_rad_per_s: f64,
-        watch: &Watch,
-    ) -> ControlFlow<()> {
+    /// Judges one pattern and keeps what comes of it.
+    pub(super) fn consider(&mut self, judge: &Judge, segments: &[usize], limit_rad_per_s: f64) {
         self.judged += 1;
         let limit = self.best.as_ref().map_or(limit_rad_per_s, |b| b.rate_rad_per_s);
         match judge.judge(segments, limit) {
@@ -238,6 +256,17 @@ impl Outcome {
             Finding::Refuted { .. } => {}
             Finding::RefutedBetween(peak) => self.between.push(peak),
         }
+    }
+
+    /// Considers a pattern; breaks off where the samples refute too little.
+    pub(super) fn judge(
+        &mut self,
+        judge: &Judge,
+        segments: &[usize],
+        limit_rad_per_s: f64,
+        watch: &Watch,
+    ) -> ControlFlow<()> {
+        self.consider(judge, segments, limit_rad_per_s);
         let too_much = self.judged > MOST_JUDGED || self.between.len() > MOST_BETWEEN;
         if watch.may_overflow && too_much {
             self.overflowed = true;

@@ -17,17 +17,19 @@
 //! | class | space | method |
 //! |---|---|---|
 //! | `standard` | 2^(N−1) choices of ends | [`ends`]: two sets of sums and pairs of boxes |
-//! | `captive:K`, `any` | permutations | [`descent`]: outermost layer first, bounds by rearrangement, the innermost from a tree |
+//! | `captive:K`, `any` | permutations | [`descent`]: outermost layer first, bounded by blends of samples ([`blends`]) |
 //!
 //! Where nothing tells the halves of the fibre apart and nothing is added outside the coil, a pattern and its mirror
 //! image s → N+1−s have opposite errors and one of the two is searched.
 //!
 //! Holds for the worst rate (and so the worst phase, a fixed multiple of it). Leaves out the rms objective.
 
+pub mod blends;
 pub mod descent;
 pub mod ends;
-pub mod inner;
+pub mod game;
 pub mod judge;
+pub mod lanes;
 pub mod orders;
 pub mod pairs;
 pub mod rows;
@@ -113,7 +115,7 @@ pub struct Certificate {
 pub type Watcher<'a> = &'a (dyn Fn(Progress) -> ControlFlow<()> + Sync);
 
 /// Limits of the passes over the best known rate.
-const LIMITS: [f64; 9] = [0.25, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 1.0];
+const LIMITS: [f64; 11] = [0.25, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.998, 1.0];
 
 /// What a pass may cost that only raises the lower bound, while the last one has not been tried.
 const CHEAP_NODES: u64 = 1 << 18;
@@ -191,7 +193,7 @@ pub fn prove(task: &Task, starts: &[Pattern], watcher: Watcher) -> Result<Certif
     }
     let mut best = best.ok_or(SearchError::NoStart { class: task.class })?;
     judge.add_peaks(&judge.peaks_of(starts)?);
-    let mut proof = Proof::new(task.class, &mut judge, starts, best.rate_rad_per_s);
+    let mut proof = Proof::new(task.class, &mut judge, starts, &mut best);
     let mut lower_bound_rad_per_s = 0.0;
     let mut closed = best.rate_rad_per_s == 0.0;
     let (mut nodes, mut judged) = (0, 0);
@@ -203,13 +205,16 @@ pub fn prove(task: &Task, starts: &[Pattern], watcher: Watcher) -> Result<Certif
             Progress { best_rad_per_s: best.rate_rad_per_s, lower_bound_rad_per_s, pass: over_best, share_done: 0.0 };
         let mut watch = Watch { stop: &stop, watcher, at, most_nodes, may_overflow: true };
         let limit = best.rate_rad_per_s * over_best * (1.0 - RELATIVE_TOLERANCE);
-        let outcome = proof.pass(&mut judge, limit, &mut watch);
+        let outcome = proof.pass(&mut judge, limit, best.rate_rad_per_s, &mut watch);
         nodes += outcome.nodes;
         judged += outcome.judged;
         if let Some(candidate) = outcome.best {
             best = best.better(candidate);
             // Everything below the limit was judged: the best of it is the best of all.
             closed = outcome.complete;
+            if !closed {
+                proof.renew(&mut judge, &mut best);
+            }
         } else if outcome.complete {
             lower_bound_rad_per_s = limit;
             closed = over_best == 1.0;

@@ -48,6 +48,42 @@ impl Row {
         }
     }
 
+    /// Σ of rows times weights.
+    pub fn blend<'a>(parts: impl Iterator<Item = (&'a Self, f64)> + Clone, layers: usize) -> Self {
+        let sum = |of: fn(&Self) -> &[f64]| {
+            (0..layers).map(|j| parts.clone().map(|(row, y)| y * of(row)[j]).sum()).collect::<Vec<f64>>()
+        };
+        Self {
+            constant: parts.clone().map(|(row, y)| y * row.constant).sum(),
+            mean: sum(|r| &r.mean),
+            difference: sum(|r| &r.difference),
+            axial: sum(|r| &r.axial),
+        }
+    }
+
+    /// The same row with S shifted by a constant, which changes no pattern's value because Σ w_j = 0: zero in the mean
+    /// over the `open` innermost layers, or over all if none is open.
+    pub fn shifted(&self, open: usize) -> Self {
+        let count = if open == 0 { self.mean.len() } else { open };
+        let shift = self.mean[..count].iter().sum::<f64>() / count as f64;
+        Self { mean: self.mean.iter().map(|s| s - shift).collect(), ..self.clone() }
+    }
+
+    /// For each kind of term (mean, and where asked for difference and axial) the factor of each layer's place, with
+    /// lengths along the fibre in units of the innermost layer's.
+    pub fn factors(&self, lengths_m: &[f64], has_difference: bool, has_axial: bool) -> Vec<Vec<f64>> {
+        let unit_m = lengths_m[0];
+        let times = |of: &[f64]| of.iter().zip(lengths_m).map(|(v, l)| v * l * unit_m).collect::<Vec<f64>>();
+        let mut terms = vec![times(&self.mean)];
+        if has_difference {
+            terms.push(times(&self.difference));
+        }
+        if has_axial {
+            terms.push(self.axial.iter().zip(lengths_m).map(|(x, l)| 2.0 * x * l * l).collect());
+        }
+        terms
+    }
+
     /// No term of the row can be larger than this; rounding is judged against it.
     pub fn scale(&self, lengths_m: &[f64]) -> f64 {
         let length_m: f64 = lengths_m.iter().sum();

@@ -1,16 +1,14 @@
 //! Which samples a proof runs on, and the search over them.
 //!
-//! Samples at which patterns near the best known ones are worst come first; for permutations, random descents then
-//! count which of them refute most nodes. Where a pass leaves too much to be judged in full, the samples that refuted
-//! it join and the pass is repeated.
+//! Samples at which patterns near the best known ones are worst come first; for permutations, a grid over all samples
+//! joins them, and blends of them are learnt ([`blends`](super::blends)). Where a pass leaves too much to be judged in
+//! full, the samples that refuted it join and the pass is repeated.
 
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
-
+use super::blends::{Blender, Lesson};
 use super::descent::search;
 use super::ends::Ends;
-use super::judge::Judge;
-use super::orders::{Node, Orders, Places};
+use super::judge::{Candidate, Judge};
+use super::orders::Orders;
 use super::rows::Row;
 use super::{Outcome, Watch};
 use crate::pattern::Pattern;
@@ -21,20 +19,16 @@ use crate::search::signs::{segments_of_signs, signs_of_segments};
 const FIRST_ENDS_ROWS: usize = 16;
 const MOST_ENDS_ROWS: usize = 64;
 
-/// Samples that a search over permutations begins with, and the most that it may grow to.
-const FIRST_ORDERS_ROWS: usize = 32;
-const MOST_ORDERS_ROWS: usize = 128;
-
-/// Samples that the descents choose from.
-const CANDIDATES: usize = 160;
+/// Samples that a search over permutations begins with, half from near the best patterns and half from a grid, and the
+/// most that it may grow to.
+const FIRST_ORDERS_ROWS: usize = 160;
+const MOST_ORDERS_ROWS: usize = 320;
 
 /// Patterns that are asked for their worst sample.
 const NEIGHBOURS: usize = 512;
 
-const DESCENTS: usize = 512;
-
-/// The seed of the descents: they choose samples, and do not decide what is proved.
-const DESCENT_SEED: u64 = 1;
+/// Lessons that learn from the last one's open patterns.
+const LESSONS: usize = 24;
 
 #[derive(Debug)]
 enum Engine {
@@ -49,44 +43,69 @@ pub struct Proof {
     class: WindabilityClass,
     mirrored: bool,
     samples: Vec<usize>,
+    /// Of these the ones that anything is refuted by.
+    used: Vec<usize>,
     engine: Engine,
 }
 
 impl Proof {
-    pub fn new(class: WindabilityClass, judge: &mut Judge, starts: &[Pattern], best_rad_per_s: f64) -> Self {
+    pub fn new(class: WindabilityClass, judge: &mut Judge, starts: &[Pattern], best: &mut Candidate) -> Self {
         let mirrored = judge.is_mirror_symmetric();
         let near = neighbours(class, starts);
         let samples = if class == WindabilityClass::Standard {
             judge.binding_samples(&near, FIRST_ENDS_ROWS)
         } else {
-            let mut candidates = judge.binding_samples(&near, CANDIDATES / 2);
-            let stride = (judge.matrix().samples() / (CANDIDATES / 2)).max(1);
-            candidates.extend((0..judge.matrix().samples()).step_by(stride));
-            candidates.sort_unstable();
-            candidates.dedup();
-            most_refuting(judge, class, candidates, best_rad_per_s, mirrored)
+            let mut samples = judge.binding_samples(&near, FIRST_ORDERS_ROWS / 2);
+            let stride = (judge.matrix().samples() / (FIRST_ORDERS_ROWS / 2)).max(1);
+            samples.extend((0..judge.matrix().samples()).step_by(stride));
+            samples.sort_unstable();
+            samples.dedup();
+            samples
         };
-        let engine = Self::engine(class, judge, &samples, mirrored);
         judge.try_first(&samples);
-        Self { class, mirrored, samples, engine }
+        let (engine, lesson) = engine(class, judge, &samples, mirrored, best.rate_rad_per_s);
+        let mut proof = Self { class, mirrored, samples, used: lesson.used, engine };
+        proof.follow(judge, best, lesson.open);
+        proof
     }
 
-    fn engine(class: WindabilityClass, judge: &Judge, samples: &[usize], mirrored: bool) -> Engine {
-        let rows: Vec<Row> = samples.iter().map(|&s| Row::of(judge.matrix(), s)).collect();
-        if class == WindabilityClass::Standard {
-            Engine::Ends(Box::new(Ends::new(&rows, judge.lengths_m(), mirrored)))
-        } else {
-            Engine::Orders(both_directions(&rows, judge, class))
+    /// Learns from patterns that were left open, until nothing comes of it: better ones, and samples that refute them.
+    fn follow(&mut self, judge: &mut Judge, best: &mut Candidate, mut open: Vec<Vec<usize>>) {
+        for _ in 0..LESSONS {
+            let mut outcome = Outcome::default();
+            open.iter().for_each(|segments| outcome.consider(judge, segments, best.rate_rad_per_s));
+            let is_better = outcome.best.is_some();
+            if let Some(candidate) = outcome.best.take() {
+                *best = candidate;
+            }
+            let has_joined = self.join(judge, &outcome);
+            if !is_better && !has_joined {
+                break;
+            }
+            open = self.make_engine(judge, best.rate_rad_per_s);
         }
+    }
+
+    /// Makes use of a better rate than the engine was made for.
+    pub fn renew(&mut self, judge: &mut Judge, best: &mut Candidate) {
+        let open = self.make_engine(judge, best.rate_rad_per_s);
+        self.follow(judge, best, open);
+    }
+
+    /// Answers the patterns left open.
+    fn make_engine(&mut self, judge: &Judge, best_rad_per_s: f64) -> Vec<Vec<usize>> {
+        let (engine, lesson) = engine(self.class, judge, &self.samples, self.mirrored, best_rad_per_s);
+        (self.engine, self.used) = (engine, lesson.used);
+        lesson.open
     }
 
     /// Samples in use.
     pub fn rows(&self, judge: &Judge) -> Vec<Row> {
-        self.samples.iter().map(|&s| Row::of(judge.matrix(), s)).collect()
+        self.used.iter().map(|&s| Row::of(judge.matrix(), s)).collect()
     }
 
     /// Judges every pattern whose worst rate may be below the limit.
-    pub fn pass(&mut self, judge: &mut Judge, limit_rad_per_s: f64, watch: &mut Watch) -> Outcome {
+    pub fn pass(&mut self, judge: &mut Judge, limit_rad_per_s: f64, best_rad_per_s: f64, watch: &mut Watch) -> Outcome {
         let mut whole = Outcome::default();
         loop {
             let outcome = match &self.engine {
@@ -101,8 +120,12 @@ impl Proof {
             };
             let complete = outcome.complete;
             let repeat = outcome.overflowed && !watch.is_stopped();
-            if repeat && !self.add(judge, &outcome) {
-                watch.may_overflow = false;
+            if repeat {
+                if self.join(judge, &outcome) {
+                    self.make_engine(judge, best_rad_per_s);
+                } else {
+                    watch.may_overflow = false;
+                }
             }
             whole.absorb(outcome);
             if !repeat {
@@ -114,7 +137,7 @@ impl Proof {
 
     /// Takes in the samples that refuted most, and the instants at which only the reference could; false if there is
     /// no room or nothing new.
-    fn add(&mut self, judge: &mut Judge, outcome: &Outcome) -> bool {
+    fn join(&mut self, judge: &mut Judge, outcome: &Outcome) -> bool {
         let first_new = judge.matrix().samples();
         let mut joining: Vec<usize> = Vec::new();
         if judge.add_peaks(&outcome.between) {
@@ -135,16 +158,43 @@ impl Proof {
             }
         }
         if self.samples.len() > before {
-            self.engine = Self::engine(self.class, judge, &self.samples, self.mirrored);
             judge.try_first(&self.samples);
         }
         has_new_instants || self.samples.len() > before
     }
 }
 
-fn both_directions(rows: &[Row], judge: &Judge, class: WindabilityClass) -> Vec<Orders> {
-    let signs: &[Option<f32>] = if judge.matrix().layout.axial { &[Some(1.0), Some(-1.0)] } else { &[None] };
-    signs.iter().map(|&sign| Orders::new(rows, judge.lengths_m(), class, sign)).collect()
+/// The search over given samples, and which of them it uses.
+fn engine(
+    class: WindabilityClass,
+    judge: &Judge,
+    samples: &[usize],
+    mirrored: bool,
+    best_rad_per_s: f64,
+) -> (Engine, Lesson) {
+    let rows: Vec<Row> = samples.iter().map(|&s| Row::of(judge.matrix(), s)).collect();
+    let lengths_m = judge.lengths_m();
+    if class == WindabilityClass::Standard {
+        let lesson = Lesson { used: samples.to_vec(), open: Vec::new() };
+        return (Engine::Ends(Box::new(Ends::new(&rows, lengths_m, mirrored))), lesson);
+    }
+    let layout = judge.matrix().layout;
+    let signs: &[Option<f32>] = if layout.axial { &[Some(1.0), Some(-1.0)] } else { &[None] };
+    let blender = Blender::new(&rows, lengths_m, !layout.halves_alike, layout.axial);
+    let mut whole = Lesson::default();
+    let directions = signs
+        .iter()
+        .map(|&sign| {
+            let mut orders = Orders::new(lengths_m, class, !layout.halves_alike, sign);
+            let lesson = blender.teach(&mut orders, best_rad_per_s, mirrored);
+            whole.used.extend(lesson.used.iter().map(|&row| samples[row]));
+            whole.open.extend(lesson.open);
+            orders
+        })
+        .collect();
+    whole.used.sort_unstable();
+    whole.used.dedup();
+    (Engine::Orders(directions), whole)
 }
 
 /// Patterns one step away from given ones: two layers exchanged, or one or two layers at the other end.
@@ -172,44 +222,4 @@ fn neighbours(class: WindabilityClass, starts: &[Pattern]) -> Vec<Vec<usize>> {
     }
     let stride = found.len().div_ceil(NEIGHBOURS).max(1);
     found.into_iter().step_by(stride).collect()
-}
-
-/// The candidates that refute most nodes in random descents.
-fn most_refuting(
-    judge: &Judge,
-    class: WindabilityClass,
-    candidates: Vec<usize>,
-    limit_rad_per_s: f64,
-    mirrored: bool,
-) -> Vec<usize> {
-    let rows: Vec<Row> = candidates.iter().map(|&s| Row::of(judge.matrix(), s)).collect();
-    let directions = both_directions(&rows, judge, class);
-    let mut random = ChaCha8Rng::seed_from_u64(DESCENT_SEED);
-    let mut counts = vec![0usize; candidates.len()];
-    let mut places = Places::default();
-    for descent in 0..DESCENTS {
-        let orders = &directions[descent % directions.len()];
-        let mut node = orders.root();
-        while node.open != 0 {
-            let mut alive: Vec<Node> = Vec::new();
-            for place in 0..orders.layers() {
-                if orders.place(&mut node, place, mirrored) {
-                    match orders.refuting_row(&node, limit_rad_per_s as f32, &mut places) {
-                        Some(row) => counts[row] += 1,
-                        None => alive.push(node.clone()),
-                    }
-                    node.take_back();
-                }
-            }
-            if alive.is_empty() {
-                break;
-            }
-            let at = (u64::from(random.next_u32()) * alive.len() as u64) >> 32;
-            node = alive.swap_remove(at as usize);
-        }
-    }
-    let mut order: Vec<usize> = (0..candidates.len()).collect();
-    order.sort_by_key(|&i| (std::cmp::Reverse(counts[i]), i));
-    order.truncate(FIRST_ORDERS_ROWS);
-    order.into_iter().map(|i| candidates[i]).collect()
 }
