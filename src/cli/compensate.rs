@@ -10,23 +10,23 @@ use super::records::{GrossErrors, read_noticed};
 use super::schedule::pattern_of;
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
+use crate::compensate::physical::Physical;
 use crate::compensate::{Compensator, Method};
-use crate::io::compensation_file::{
-    BiasLineJson, CompensateJson, DifferenceEquation, MethodJson, StreamSummary, compensate_lines,
-};
+use crate::io::compensation_file::{BiasLineJson, CompensateJson, MethodJson, StreamSummary, compensate_lines};
+use crate::io::difference_equation::DifferenceEquation;
 use crate::io::fault::Faults;
-use crate::io::files::write_atomically;
+use crate::io::files::{NewFile, write_atomically};
 use crate::io::json::Document;
 use crate::io::model_file::{ModelFile, NamedPattern, read_model};
 use crate::numeric::statistics::rms;
 use crate::predict::noise_floor_rad_per_s;
 use crate::record::Record;
-use crate::units::deg_per_h_from_rad_per_s;
+use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s, percent_from_fraction};
 
 /// Temperature and rate in, compensated rate out, as a file or as a stream
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  coilwright compensate coil.toml day-2.csv --fit day-1.csv > compensated.csv\n  logger | coilwright compensate coil.toml - --fit day-1.csv\n  coilwright compensate coil.toml day-2.csv --fit day-1.csv --all-methods\n  coilwright compensate coil.toml --fit day-1.csv --export embedded/compensation\n\nEvery line comes out, in order, with rate_compensated_deg_per_h and flags behind it: malformed, clock_back, gap,\ntemperature_held, rate_held, rate_rejected."
+    after_help = "Examples:\n  coilwright compensate coil.toml day-2.csv --fit day-1.csv > compensated.csv\n  logger | coilwright compensate coil.toml - --fit day-1.csv\n  coilwright compensate coil.toml day-2.csv --fit day-1.csv --all-methods\n  coilwright compensate coil.toml --fit day-1.csv --export embedded/compensation\n\nEvery line comes out, in order, with rate_compensated_deg_per_h and flags behind it: malformed, clock_back, gap,\ntemperature_held, channel_held, rate_held, rate_rejected."
 )]
 pub struct Arguments {
     /// The model file
@@ -51,6 +51,12 @@ pub struct Arguments {
     /// Writes the physical compensator as FILE.json and FILE.h
     #[arg(long, value_name = "FILE")]
     export: Option<PathBuf>,
+    /// Looks so far ahead [s]; without it, as far as the fitted record says is worth it
+    #[arg(long, value_name = "SECONDS")]
+    delay: Option<f64>,
+    /// One difference equation of fixed gains, without hypotheses about breaks of the air's slope
+    #[arg(long)]
+    linear: bool,
     /// Interval of the exported difference equation [s]; without it, that of the fitted record
     #[arg(long, value_name = "SECONDS")]
     interval: Option<f64>,
@@ -87,10 +93,20 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     if arguments.all_methods {
         return all_methods(arguments, &file, &named, fitted.as_ref(), screen);
     }
-    let compensator = match &fitted {
+    let mut compensator = match &fitted {
         Some(record) => Compensator::fit(method, &file.model, &named.pattern, record)?,
         None => Compensator::declared(method, &file.model, &named.pattern)?,
     };
+    if let Compensator::Physical(physical) = &mut compensator {
+        adjust(physical, arguments, fitted.as_ref());
+        if let Some(linearised) = physical.linearised() {
+            screen.note(&format!(
+                "the conductivity is taken at {:.1} °C; over the fitted record it differs by up to {:.1} %",
+                celsius_from_kelvin(linearised.at_k),
+                percent_from_fraction(linearised.conductivity_error)
+            ));
+        }
+    }
     if let Some(prefix) = &arguments.export {
         export(&compensator, &file, fitted.as_ref(), arguments.interval, prefix, screen)?;
         if arguments.record.is_none() {
@@ -99,7 +115,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     }
     let summary = stream(arguments, &compensator, screen)?;
     screen.note(&format!(
-        "compensated {} rows ({}), {} rows behind; standard deviation {} -> {} °/h; malformed {}, clock back {}, gaps {}, temperature held {}, rate held {}, rate rejected {}",
+        "compensated {} rows ({}), {} rows behind; standard deviation {} -> {} °/h; malformed {}, clock back {}, gaps {}, temperature held {}, channel held {}, rate held {}, rate rejected {}",
         summary.rows,
         method.key(),
         summary.delay_rows,
@@ -109,6 +125,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         summary.clock_back,
         summary.gap,
         summary.temperature_held,
+        summary.channel_held,
         summary.rate_held,
         summary.rate_rejected
     ));
@@ -126,6 +143,19 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     Ok(Ending::Done)
 }
 
+/// As was asked for, tuned again for it.
+fn adjust(physical: &mut Physical, arguments: &Arguments, fitted: Option<&Record>) {
+    if arguments.linear {
+        physical.hypotheses = 1;
+        if let Some(record) = fitted {
+            physical.tune(record);
+        }
+    }
+    if let Some(delay_s) = arguments.delay.filter(|d| *d >= 0.0) {
+        physical.delay_s = delay_s;
+    }
+}
+
 fn shown(value: Option<f64>) -> String {
     value.map_or_else(|| "-".to_owned(), |v| format!("{v:.5}"))
 }
@@ -135,23 +165,21 @@ fn stream(arguments: &Arguments, compensator: &Compensator, screen: &Screen) -> 
     let name = path.display().to_string();
     // With a JSON document on stdout the lines have no place there.
     let to_stdout = arguments.output.is_none() && !screen.is_json();
-    let mut kept = Vec::new();
+    let mut file = arguments.output.as_deref().map(NewFile::create).transpose()?;
     let mut stdout = std::io::stdout().lock();
-    let output: &mut dyn Write = if to_stdout {
-        &mut stdout
-    } else if arguments.output.is_some() {
-        &mut kept
-    } else {
-        &mut std::io::sink()
+    let output: &mut dyn Write = match &mut file {
+        Some(file) => file,
+        None if to_stdout => &mut stdout,
+        None => &mut std::io::sink(),
     };
     let summary = if name == "-" {
         compensate_lines(compensator, "standard input", std::io::stdin().lock(), output)?
     } else {
-        let file = File::open(path).map_err(|e| Faults::of_file(&name, format!("cannot be read: {e}")))?;
-        compensate_lines(compensator, &name, file, output)?
+        let input = File::open(path).map_err(|e| Faults::of_file(&name, format!("cannot be read: {e}")))?;
+        compensate_lines(compensator, &name, input, output)?
     };
-    if let Some(path) = &arguments.output {
-        write_atomically(path, &kept)?;
+    if let Some(file) = file {
+        file.finish()?;
     }
     Ok(summary)
 }

@@ -7,6 +7,7 @@
 //! fitted with is taken out too.
 
 pub mod empirical;
+pub mod filter;
 pub mod physical;
 pub mod stream;
 
@@ -54,9 +55,13 @@ pub enum Compensator {
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum CompensateError {
     #[error(
-        "the model is not linear in the temperatures' rates: compensate with piecewise or regression, or leave out effects such as conductivity_temperature, self_heating, axial_gradient or channels"
+        "no difference equation holds {}: leave {} out of the model, or compensate with piecewise or regression",
+        listed(.effects),
+        if .effects.len() == 1 { "it" } else { "them" }
     )]
-    NotLinear,
+    NotLinear { effects: Vec<String> },
+    #[error("the model reads the column {name}, which the record lacks")]
+    MissingChannel { name: String },
     #[error("a fit needs at least {needed} rows, found {found}")]
     TooFew { needed: usize, found: usize },
     #[error("{method} needs a record to be fitted to: give one with --fit", method = .method.key())]
@@ -73,6 +78,14 @@ pub enum CompensateError {
     Coil(#[from] CoilError),
 }
 
+fn listed(effects: &[String]) -> String {
+    if effects.is_empty() {
+        "an effect that is not linear in the temperatures' rates".to_owned()
+    } else {
+        effects.join(", ")
+    }
+}
+
 impl Compensator {
     /// Fitted to a record; the physical one's physics stays as declared: film, noise, delay and offset are fitted.
     ///
@@ -82,7 +95,10 @@ impl Compensator {
         Ok(match method {
             Method::Physical => {
                 let boundary = predict::estimate_boundary(model, pattern, record)?;
-                let mut physical = Physical::with_boundary(model, pattern, &boundary)?;
+                let mut physical = Physical::with_boundary(model, pattern, &boundary, record)?;
+                if let Some(name) = physical.channel_names().find(|n| record.channels().iter().all(|c| c.name != *n)) {
+                    return Err(CompensateError::MissingChannel { name: name.to_owned() });
+                }
                 physical.tune(record);
                 Compensator::Physical(physical)
             }
@@ -120,6 +136,21 @@ impl Compensator {
         ((delay_s / interval_s).round() as usize).clamp(1, MOST_DELAY_ROWS)
     }
 
+    /// Further columns that are needed.
+    pub fn channel_names(&self) -> Vec<&str> {
+        match self {
+            Compensator::Physical(physical) => physical.channel_names().collect(),
+            Compensator::Piecewise(_) | Compensator::Regression(_) => Vec::new(),
+        }
+    }
+
+    fn channel_bias_of(&self, record: &Record, row: usize) -> Option<f64> {
+        match self {
+            Compensator::Physical(physical) => physical.channel_bias_of(record, row),
+            Compensator::Piecewise(_) | Compensator::Regression(_) => Some(0.0),
+        }
+    }
+
     /// The compensated rate of every row of a record [rad/s].
     pub fn batch(&self, record: &Record) -> Vec<f64> {
         let mut found = Vec::with_capacity(record.rows());
@@ -131,6 +162,7 @@ impl Compensator {
                 time_s: record.times_s()[row],
                 temperature_k: Some(record.temperature_k()[row]),
                 inner_k: record.inner_k().map(|k| k[row]),
+                channel_rad_per_s: self.channel_bias_of(record, row),
                 rate_rad_per_s: Some(rate),
             };
             stream.push(rate, Some(reading), |row| found.push(keep(row)));

@@ -1,45 +1,55 @@
-//! The physical compensator: the coil's own model driven by one thermometer, as a small linear difference equation.
+//! The physical compensator: the coil's own model driven by one thermometer, as a small difference equation.
 //!
 //! ```text
-//! x = (y_1 … y_m, a, s [, z]),  y_i' = −λ_i y_i + s,  a' = s,  s' = white,  τ z' = T_out − z
-//! x⁻ = F x,  o_0 = ω·x,  o_j = o_{j−1};   e = T − h·x⁻,  x = x⁻ + k e,  o_j = o_j + κ_j e
+//! x = (y_1 … y_m, a, s [, z]),  y_i' = −λ_i y_i + s,  a' = s,  s' = white + breaks,  τ z' = T_out − z
+//! Ω_coil = ω·x,   Ω = Ω_coil + b(T) + Σ g_c c + Ω_0
 //! ```
 //!
 //! | symbol | meaning | in code |
 //! |---|---|---|
-//! | y_i, a, s | modes of the pack behind its film, air temperature and its rate | `Filter::state` |
-//! | z | the sensor behind its lag | the last state, where there is a lag |
-//! | o_j | rate error of the row j rows ago, given all readings until now | `Filter::chain` |
-//! | k, κ | gains of the stationary Kalman filter and fixed-lag smoother | `gain`, `chain_gain` |
+//! | y_i, a, s | modes of the pack behind its film, air temperature and its rate | `decay_per_s`, `outer`, `functional` |
+//! | z | the sensor behind its lag | `lag_s` |
+//! | b(T), g_c | bias over temperature; rate per unit of a further column | `bias`, `channels` |
+//! | Ω_0 | offset of the record it was tuned on | `offset_rad_per_s` |
 //!
-//! The smoothed o_j is what a delay buys: a reading tells more about the row before it than about its own.
+//! How x is known from the readings is in [`super::filter`]. Film and thermometer's noise come from the boundary's estimate
+//! of a record; how much the slope wanders, the delay and the offset from the record's rate.
 //!
-//! Holds for models that are linear in the temperatures' rates, besides a bias that depends on temperature. Modes that
-//! settle within a quarter of a row follow at once.
+//! Holds for models that are linear in the temperatures' rates, besides a bias that depends on temperature. A conductivity
+//! that depends on temperature is taken at the middle of the fitted record's temperatures, and how much it differs at its
+//! ends is stated. Modes that settle within a quarter of a row follow at once.
 //!
 //! # Source
-//! Kalman, J. Basic Eng. 82 (1960) 35; fixed-lag smoothing by augmented states: Anderson and Moore, Optimal Filtering
-//! (1979), section 7.3.
+//! As [`super::filter`]; the pack's modes as in [`crate::thermal::pack`].
 
 use nalgebra::DMatrix;
 
 use super::CompensateError;
+use super::filter::{Dynamics, Filter, Tuning};
 use crate::boundary::Boundary;
+use crate::effect::DeclaredEffect;
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::pattern::Pattern;
 use crate::rate::{CoilModel, RateModel};
 use crate::record::Record;
 use crate::thermal::pack::Pack;
-use crate::thermal::{Extent, Location, Material, ThermalHistory};
+use crate::thermal::{Extent, HeatPath, Location, Material, ThermalHistory};
 use crate::units::REFERENCE_TEMPERATURE_K;
 
 /// The film where no record told it: moving air in a chamber.
 const USUAL_FILM_W_PER_M2_K: f64 = 25.0;
 /// The thermometer's noise where no record told it.
 const USUAL_NOISE_K: f64 = 0.005;
-/// (K/s)² per s; ramps of 1 K/min that begin every hour or so.
-const USUAL_SLOPE_NOISE: f64 = 1e-9;
-const USUAL_DELAY_S: f64 = 60.0;
+/// (K/s)² per s; a chamber's air between its breaks.
+const USUAL_SLOPE_NOISE: f64 = 3e-10;
+const USUAL_DELAY_S: f64 = 100.0;
+/// Hypotheses about the last break of the air's slope.
+pub const USUAL_HYPOTHESES: usize = 8;
+/// Slope noises within this factor of the best mean square are as good: the largest follows most of what another record
+/// may hold.
+const AS_GOOD: f64 = 1.1;
+/// Delays within this factor are as good: the shortest is taken.
+const DELAY_AS_GOOD: f64 = 1.01;
 /// Modes faster than this many times a row follow at once.
 const FAST: f64 = 4.0;
 /// A half space is this many packs deep: heat does not come back within hours.
@@ -67,10 +77,24 @@ pub struct Physical {
     rate_mean_s: f64,
     /// Over temperature, where the model has a bias that depends on it.
     bias: Option<PiecewiseLinear>,
+    /// Further columns and what each adds [rad/s per unit].
+    channels: Vec<(String, f64)>,
+    /// Where the conductivity depends on temperature.
+    linearised: Option<Linearised>,
+    /// At least 1; with 1 it is one difference equation without breaks.
+    pub hypotheses: usize,
     pub noise_k: f64,
     pub slope_noise_k2_per_s3: f64,
     pub delay_s: f64,
     pub offset_rad_per_s: f64,
+}
+
+/// A conductivity that was taken at one temperature.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Linearised {
+    pub at_k: f64,
+    /// The largest relative difference of the conductivity over the fitted record.
+    pub conductivity_error: f64,
 }
 
 impl Physical {
@@ -79,16 +103,25 @@ impl Physical {
     /// # Errors
     /// A model that is not linear in the rates, or whose heat path cannot be solved.
     pub fn new(model: &CoilModel, pattern: &Pattern) -> Result<Self, CompensateError> {
-        Self::with_film(model, pattern, USUAL_FILM_W_PER_M2_K, USUAL_NOISE_K)
+        Self::with_film(model, pattern, USUAL_FILM_W_PER_M2_K, USUAL_NOISE_K, None)
     }
 
     /// With film and noise from a record's boundary.
     ///
     /// # Errors
     /// As [`Physical::new`].
-    pub fn with_boundary(model: &CoilModel, pattern: &Pattern, boundary: &Boundary) -> Result<Self, CompensateError> {
+    pub fn with_boundary(
+        model: &CoilModel,
+        pattern: &Pattern,
+        boundary: &Boundary,
+        record: &Record,
+    ) -> Result<Self, CompensateError> {
         let film = boundary.air().film_w_per_m2_k.unwrap_or(USUAL_FILM_W_PER_M2_K);
-        Self::with_film(model, pattern, film, boundary.air().noise_k)
+        let range_k = record
+            .temperature_k()
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(*t), high.max(*t)));
+        Self::with_film(model, pattern, film, boundary.air().noise_k, Some(range_k))
     }
 
     fn with_film(
@@ -96,6 +129,7 @@ impl Physical {
         pattern: &Pattern,
         film_w_per_m2_k: f64,
         noise_k: f64,
+        range_k: Option<(f64, f64)>,
     ) -> Result<Self, CompensateError> {
         let mut path = model.heat_path()?;
         let real_layers = path.shape.layers;
@@ -106,9 +140,10 @@ impl Physical {
             path.shape.layers = real_layers + buried;
             path.shape.bore_radius_m = FLAT * path.shape.radial_pitch_m * real_layers as f64;
         }
-        if path.conductivity_slope_per_k != 0.0 || path.bore_heat.is_some() || path.flange.is_some() {
-            return Err(CompensateError::NotLinear);
+        if path.bore_heat.is_some() || path.flange.is_some() {
+            return Err(not_linear(model));
         }
+        let linearised = linearise(&mut path, range_k);
         let location = path.location;
         path.location = Location::Ambient;
         if location == Location::OuterLayer {
@@ -118,7 +153,7 @@ impl Physical {
             };
         }
         let pack = Pack::new(&path)?;
-        let (gains, gain_air, bias) = linear_gains(model, pattern, real_layers)?;
+        let LinearModel { gains, gain_air, bias, channels } = linear_gains(model, pattern, real_layers)?;
         let mut order: Vec<usize> = (0..pack.decays_per_s().len()).collect();
         order.sort_by(|a, b| pack.decays_per_s()[*a].total_cmp(&pack.decays_per_s()[*b]));
         let functional = |mode: usize| -> f64 {
@@ -133,6 +168,9 @@ impl Physical {
             lag_s: model.sensor_lag_s(),
             rate_mean_s: model.rate_mean_s,
             bias,
+            channels,
+            linearised,
+            hypotheses: USUAL_HYPOTHESES,
             noise_k,
             slope_noise_k2_per_s3: USUAL_SLOPE_NOISE,
             delay_s: USUAL_DELAY_S,
@@ -143,31 +181,39 @@ impl Physical {
     /// Chooses slope noise, delay and offset so that a record's rate is compensated best.
     pub fn tune(&mut self, record: &Record) {
         let interval_s = record.interval_s();
-        let mut best = f64::INFINITY;
-        for exponent in -26..=-8 {
-            let mut trial = self.clone();
-            trial.slope_noise_k2_per_s3 = 10f64.powf(0.5 * f64::from(exponent));
-            let (squares, means) = trial.misfit(record);
-            let least = squares.iter().copied().fold(f64::INFINITY, f64::min);
-            if least >= best {
-                continue;
-            }
-            best = least;
-            // The shortest delay that is as good as any: within half a percent of the mean square.
-            let lag = squares.iter().position(|s| *s <= 1.005 * least).unwrap_or(0).max(1);
-            self.slope_noise_k2_per_s3 = trial.slope_noise_k2_per_s3;
-            self.delay_s = lag as f64 * interval_s;
-            self.offset_rad_per_s = means[lag];
-        }
+        let dynamics = self.dynamics(interval_s);
+        let trials: Vec<(f64, Vec<f64>, Vec<f64>)> = (-24..=-12)
+            .map(|exponent| {
+                let mut trial = self.clone();
+                trial.slope_noise_k2_per_s3 = 10f64.powf(0.5 * f64::from(exponent));
+                let (squares, means) = trial.misfit(&dynamics, record);
+                (trial.slope_noise_k2_per_s3, squares, means)
+            })
+            .collect();
+        let least = |squares: &[f64]| squares.iter().copied().fold(f64::INFINITY, f64::min);
+        let best = trials.iter().map(|t| least(&t.1)).fold(f64::INFINITY, f64::min);
+        let Some((slope_noise, squares, means)) = trials.iter().rev().find(|t| least(&t.1) <= AS_GOOD * best) else {
+            return;
+        };
+        let own = least(squares);
+        let lag = squares.iter().position(|s| *s <= DELAY_AS_GOOD * own).unwrap_or(0).max(1);
+        self.slope_noise_k2_per_s3 = *slope_noise;
+        self.delay_s = lag as f64 * interval_s;
+        self.offset_rad_per_s = means[lag];
     }
 
     /// Variance and mean of the compensated rate at each lag.
-    fn misfit(&self, record: &Record) -> (Vec<f64>, Vec<f64>) {
+    fn misfit(&self, dynamics: &Dynamics, record: &Record) -> (Vec<f64>, Vec<f64>) {
         let interval_s = record.interval_s();
-        let mut filter = Filter::new(self, interval_s, TRIAL_DELAY_ROWS);
+        let mut filter = Filter::new(dynamics, &self.tuning(interval_s, TRIAL_DELAY_ROWS));
         let mut sums = vec![(0.0, 0.0, 0.0); TRIAL_DELAY_ROWS + 1];
         let rates = record.rate_rad_per_s();
-        let biases: Vec<f64> = record.temperature_k().iter().map(|t| self.temperature_bias_rad_per_s(*t)).collect();
+        let outside: Vec<f64> = (0..record.rows())
+            .map(|row| {
+                self.temperature_bias_rad_per_s(record.temperature_k()[row])
+                    + self.channel_bias_of(record, row).unwrap_or(0.0)
+            })
+            .collect();
         let mut rows_of_step: Vec<Option<usize>> = Vec::new();
         let mut last_s = record.times_s()[0];
         for (row, (&time_s, &temperature_k)) in record.times_s().iter().zip(record.temperature_k()).enumerate() {
@@ -182,12 +228,87 @@ impl Physical {
             for (lag, sum) in sums.iter_mut().enumerate() {
                 let Some(step) = rows_of_step.len().checked_sub(lag + 1) else { continue };
                 if let Some(then) = rows_of_step[step] {
-                    let left = rates[then] - filter.chain[lag] - biases[then];
+                    let left = rates[then] - filter.rate_error_rad_per_s(lag) - outside[then];
                     *sum = (sum.0 + 1.0, sum.1 + left, sum.2 + left * left);
                 }
             }
         }
         sums.iter().map(|(n, sum, square)| ((square - sum * sum / n) / n, sum / n)).unzip()
+    }
+
+    fn dynamics(&self, interval_s: f64) -> Dynamics {
+        let slow = self.decay_per_s.iter().take_while(|l| **l * interval_s < FAST).count();
+        let has_lag = self.lag_s > 0.0;
+        let n = slow + 2 + usize::from(has_lag);
+        let (air, slope) = (slow, slow + 1);
+        // What the fast modes take, being s/λ.
+        let fast = |of: &[f64]| -> f64 { of.iter().zip(&self.decay_per_s).skip(slow).map(|(c, l)| -c / l).sum() };
+        let row = |of_air: f64, of: &[f64]| -> DMatrix<f64> {
+            let mut row = DMatrix::zeros(1, n);
+            for (mode, c) in of[..slow].iter().enumerate() {
+                row[mode] = -c;
+            }
+            row[air] = of_air;
+            row[slope] = fast(of);
+            row
+        };
+        let outer = match self.location {
+            Location::OuterLayer => row(1.0, &self.outer),
+            Location::Ambient => row(1.0, &vec![0.0; self.outer.len()]),
+        };
+        let mut dynamics = DMatrix::zeros(n, n);
+        for (mode, l) in self.decay_per_s[..slow].iter().enumerate() {
+            dynamics[(mode, mode)] = -l;
+            dynamics[(mode, slope)] = 1.0;
+        }
+        dynamics[(air, slope)] = 1.0;
+        let mut reading = outer.clone();
+        let mut level_states = vec![air];
+        if has_lag {
+            for column in 0..n {
+                dynamics[(n - 1, column)] = outer[column] / self.lag_s;
+            }
+            dynamics[(n - 1, n - 1)] = -1.0 / self.lag_s;
+            reading = DMatrix::zeros(1, n);
+            reading[n - 1] = 1.0;
+            level_states.push(n - 1);
+        }
+        let functional = row(self.functional_air, &self.functional);
+        let window_s = self.rate_mean_s.min(interval_s);
+        Dynamics::new(&dynamics, &functional, reading, level_states, slope, interval_s, window_s)
+    }
+
+    fn tuning(&self, interval_s: f64, delay_rows: usize) -> Tuning {
+        Tuning {
+            slope_variance: self.slope_noise_k2_per_s3 * interval_s,
+            noise_k: self.noise_k.max(LEAST_NOISE_K),
+            delay_rows,
+            hypotheses: self.hypotheses,
+        }
+    }
+
+    /// The filter for records of one interval.
+    pub fn filter(&self, interval_s: f64, delay_rows: usize) -> Filter {
+        Filter::new(&self.dynamics(interval_s), &self.tuning(interval_s, delay_rows))
+    }
+
+    /// Further columns that the model reads.
+    pub fn channel_names(&self) -> impl Iterator<Item = &str> {
+        self.channels.iter().map(|c| c.0.as_str())
+    }
+
+    /// What the further columns add; None where one is missing.
+    pub fn channel_bias_rad_per_s(&self, values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
+        self.channels.iter().zip(values).map(|((_, gain), value)| Some(gain * value.filter(|v| v.is_finite())?)).sum()
+    }
+
+    pub(super) fn channel_bias_of(&self, record: &Record, row: usize) -> Option<f64> {
+        let value = |name: &str| Some(record.channels().iter().find(|c| c.name == name)?.values[row]);
+        self.channel_bias_rad_per_s(self.channel_names().map(value))
+    }
+
+    pub fn linearised(&self) -> Option<Linearised> {
+        self.linearised
     }
 
     pub(super) fn temperature_bias_rad_per_s(&self, temperature_k: f64) -> f64 {
@@ -196,22 +317,61 @@ impl Physical {
 
     /// Whether the difference equation is all there is.
     pub fn is_linear(&self) -> bool {
-        self.bias.is_none()
+        self.bias.is_none() && self.channels.is_empty()
     }
 }
 
 /// Rows of delay that are tried while tuning.
 const TRIAL_DELAY_ROWS: usize = 30;
+const LEAST_NOISE_K: f64 = 1e-6;
 
-/// dΩ/dṪ_j, dΩ/dȧ and the bias over temperature; an error where that is not the whole model.
-type LinearModel = (Vec<f64>, f64, Option<PiecewiseLinear>);
-
-fn linear_gains(model: &CoilModel, pattern: &Pattern, layers: usize) -> Result<LinearModel, CompensateError> {
-    let rate = RateModel::new(model, pattern, &[])?;
-    if !model.missing_channels(&[]).is_empty() {
-        return Err(CompensateError::NotLinear);
+/// Takes the conductivity at the middle of a range of temperatures.
+fn linearise(path: &mut HeatPath, range_k: Option<(f64, f64)>) -> Option<Linearised> {
+    let slope_per_k = std::mem::take(&mut path.conductivity_slope_per_k);
+    if slope_per_k == 0.0 {
+        return None;
     }
-    let at = |temperature_k: f64, rates: &[f64], air: f64| {
+    let (low_k, high_k) = range_k.unwrap_or((REFERENCE_TEMPERATURE_K, REFERENCE_TEMPERATURE_K));
+    let at_k = 0.5 * (low_k + high_k);
+    let factor = 1.0 + slope_per_k * (at_k - REFERENCE_TEMPERATURE_K);
+    match &mut path.material {
+        Material::Conductivity { w_per_m_k, .. } => *w_per_m_k *= factor,
+        Material::Diffusivity { m2_per_s } => *m2_per_s *= factor,
+    }
+    Some(Linearised { at_k, conductivity_error: (slope_per_k * 0.5 * (high_k - low_k) / factor).abs() })
+}
+
+/// The declared effects that no difference equation of this kind can hold.
+fn not_linear(model: &CoilModel) -> CompensateError {
+    const UNSUITED: [&str; 6] = [
+        "self_heating",
+        "axial_gradient",
+        "thermo_optic_temperature",
+        "glass_transition",
+        "heating_cooling_asymmetry",
+        "custom",
+    ];
+    let effects = model.effects.iter().map(DeclaredEffect::kind).filter(|k| UNSUITED.contains(&k.as_str())).collect();
+    CompensateError::NotLinear { effects }
+}
+
+/// What a model is where it is linear in the temperatures' rates.
+struct LinearModel {
+    /// dΩ/dṪ_j.
+    gains: Vec<f64>,
+    /// dΩ/dȧ.
+    gain_air: f64,
+    /// Over temperature.
+    bias: Option<PiecewiseLinear>,
+    channels: Vec<(String, f64)>,
+}
+
+/// An error where that is not the whole model.
+fn linear_gains(model: &CoilModel, pattern: &Pattern, layers: usize) -> Result<LinearModel, CompensateError> {
+    let names = model.missing_channels(&[]);
+    let rate = RateModel::new(model, pattern, &names)?;
+    let off = vec![0.0; names.len()];
+    let at = |temperature_k: f64, rates: &[f64], air: f64, channels: &[f64]| {
         let history = ThermalHistory {
             layers,
             times_s: vec![0.0],
@@ -222,205 +382,46 @@ fn linear_gains(model: &CoilModel, pattern: &Pattern, layers: usize) -> Result<L
             ambient_k: vec![temperature_k],
             ambient_rate_k_per_s: vec![air],
         };
-        rate.rate_error_rad_per_s(&rate.state(&history, 0, &[]))
+        rate.rate_error_rad_per_s(&rate.state(&history, 0, channels))
     };
     let still = vec![0.0; layers];
-    let zero = at(REFERENCE_TEMPERATURE_K, &still, 0.0);
+    let zero = at(REFERENCE_TEMPERATURE_K, &still, 0.0, &off);
     // A usual ramp's rate, so that what is linear is probed where it is used.
     let probe_k_per_s = 1e-2;
     let gains: Vec<f64> = (0..layers)
         .map(|layer| {
             let mut rates = still.clone();
             rates[layer] = probe_k_per_s;
-            (at(REFERENCE_TEMPERATURE_K, &rates, 0.0) - zero) / probe_k_per_s
+            (at(REFERENCE_TEMPERATURE_K, &rates, 0.0, &off) - zero) / probe_k_per_s
         })
         .collect();
-    let gain_air = (at(REFERENCE_TEMPERATURE_K, &still, probe_k_per_s) - zero) / probe_k_per_s;
+    let gain_air = (at(REFERENCE_TEMPERATURE_K, &still, probe_k_per_s, &off) - zero) / probe_k_per_s;
+    let channel_gains: Vec<f64> = (0..names.len())
+        .map(|channel| {
+            let mut one = off.clone();
+            one[channel] = 1.0;
+            at(REFERENCE_TEMPERATURE_K, &still, 0.0, &one) - zero
+        })
+        .collect();
     let table: Vec<f64> = (0..TABLE_ROWS).map(|i| TABLE_FROM_K + i as f64).collect();
-    let biases: Vec<f64> = table.iter().map(|&t| at(t, &still, 0.0)).collect();
+    let biases: Vec<f64> = table.iter().map(|&t| at(t, &still, 0.0, &off)).collect();
     let size: f64 = gains.iter().map(|g| g.abs() * probe_k_per_s).sum::<f64>().max(f64::MIN_POSITIVE);
     for (sign, above_k) in [(1.0, 0.0), (-1.0, 0.0), (1.0, 30.0), (-0.5, -30.0)] {
         let rates: Vec<f64> = (0..layers).map(|j| sign * probe_k_per_s * (1.0 + j as f64 / layers as f64)).collect();
         let air = 0.7 * sign * probe_k_per_s;
+        let values: Vec<f64> = (0..names.len()).map(|c| sign * (3.0 + c as f64)).collect();
         let temperature_k = REFERENCE_TEMPERATURE_K + above_k;
-        let expected =
-            gains.iter().zip(&rates).map(|(g, r)| g * r).sum::<f64>() + gain_air * air + at(temperature_k, &still, 0.0);
-        if (at(temperature_k, &rates, air) - expected).abs() > 1e-9 * size {
-            return Err(CompensateError::NotLinear);
+        let from_channels: f64 = channel_gains.iter().zip(&values).map(|(g, v)| g * v).sum();
+        let expected = gains.iter().zip(&rates).map(|(g, r)| g * r).sum::<f64>()
+            + gain_air * air
+            + at(temperature_k, &still, 0.0, &off)
+            + from_channels;
+        let found = at(temperature_k, &rates, air, &values);
+        if (found - expected).abs() > 1e-9 * (size + from_channels.abs()) {
+            return Err(not_linear(model));
         }
     }
     let varies = biases.iter().any(|b| *b != 0.0);
     let bias = if varies { PiecewiseLinear::new(table, biases).ok() } else { None };
-    Ok((gains, gain_air, bias))
-}
-
-/// The difference equation for one interval.
-///
-/// # Shapes
-/// `transition` row-major n × n; `rate`, `reading`, `gain`, `state` of length n; `chain_gain`, `chain` one entry a row of
-/// delay and one for the row itself.
-#[derive(Debug, Clone)]
-pub struct Filter {
-    pub transition: Vec<f64>,
-    pub rate: Vec<f64>,
-    pub reading: Vec<f64>,
-    pub gain: Vec<f64>,
-    pub chain_gain: Vec<f64>,
-    pub state: Vec<f64>,
-    pub chain: Vec<f64>,
-    next: Vec<f64>,
-    /// Where the air's temperature and, if there is one, the sensor's are.
-    pub level_states: Vec<usize>,
-    started: bool,
-}
-
-impl Filter {
-    pub fn new(physical: &Physical, interval_s: f64, delay_rows: usize) -> Self {
-        let slow = physical.decay_per_s.iter().take_while(|l| **l * interval_s < FAST).count();
-        let has_lag = physical.lag_s > 0.0;
-        let n = slow + 2 + usize::from(has_lag);
-        let (air, slope) = (slow, slow + 1);
-        // What the fast modes take, being s/λ.
-        let fast = |of: &[f64]| -> f64 { of.iter().zip(&physical.decay_per_s).skip(slow).map(|(c, l)| -c / l).sum() };
-        let row = |of_air: f64, of: &[f64]| -> Vec<f64> {
-            let mut row = vec![0.0; n];
-            for (entry, c) in row.iter_mut().zip(&of[..slow]) {
-                *entry = -c;
-            }
-            row[air] = of_air;
-            row[slope] = fast(of);
-            row
-        };
-        let outer = match physical.location {
-            Location::OuterLayer => row(1.0, &physical.outer),
-            Location::Ambient => row(1.0, &vec![0.0; physical.outer.len()]),
-        };
-        let mut dynamics = DMatrix::zeros(n, n);
-        for (mode, l) in physical.decay_per_s[..slow].iter().enumerate() {
-            dynamics[(mode, mode)] = -l;
-            dynamics[(mode, slope)] = 1.0;
-        }
-        dynamics[(air, slope)] = 1.0;
-        let mut reading = outer.clone();
-        let mut level_states = vec![air];
-        if has_lag {
-            for (column, c) in outer.iter().enumerate() {
-                dynamics[(n - 1, column)] = c / physical.lag_s;
-            }
-            dynamics[(n - 1, n - 1)] = -1.0 / physical.lag_s;
-            reading = vec![0.0; n];
-            reading[n - 1] = 1.0;
-            level_states.push(n - 1);
-        }
-        let functional = row(physical.functional_air, &physical.functional);
-        let after = (&dynamics * interval_s).exp();
-        let functional = DMatrix::from_row_slice(1, n, &functional);
-        let window_s = physical.rate_mean_s.min(interval_s);
-        let rate = if window_s > 0.0 {
-            let before = (&dynamics * (interval_s - window_s)).exp();
-            (&functional * (&after - before)) / window_s
-        } else {
-            &functional * &dynamics * &after
-        };
-        let (gain, chain_gain) = stationary_gains(
-            &after,
-            &rate,
-            &DMatrix::from_row_slice(1, n, &reading),
-            slope,
-            physical.slope_noise_k2_per_s3 * interval_s,
-            physical.noise_k.powi(2).max(1e-12),
-            delay_rows,
-        );
-        Self {
-            transition: after.transpose().as_slice().to_vec(),
-            rate: rate.as_slice().to_vec(),
-            reading,
-            gain,
-            chain_gain,
-            state: vec![0.0; n],
-            chain: vec![0.0; delay_rows + 1],
-            next: vec![0.0; n],
-            level_states,
-            started: false,
-        }
-    }
-
-    /// One row further; without a reading the model goes on by itself.
-    pub fn step(&mut self, temperature_k: Option<f64>) {
-        if !self.started {
-            if let Some(temperature_k) = temperature_k {
-                for &level in &self.level_states {
-                    self.state[level] = temperature_k;
-                }
-                self.started = true;
-            }
-            return;
-        }
-        let n = self.state.len();
-        let newest = dot(&self.rate, &self.state);
-        for (entry, row) in self.next.iter_mut().zip(self.transition.chunks_exact(n)) {
-            *entry = dot(row, &self.state);
-        }
-        std::mem::swap(&mut self.state, &mut self.next);
-        let last = self.chain.len() - 1;
-        self.chain.copy_within(0..last, 1);
-        self.chain[0] = newest;
-        if let Some(temperature_k) = temperature_k {
-            let error = temperature_k - dot(&self.reading, &self.state);
-            for (entry, gain) in self.state.iter_mut().zip(&self.gain) {
-                *entry += gain * error;
-            }
-            for (entry, gain) in self.chain.iter_mut().zip(&self.chain_gain) {
-                *entry += gain * error;
-            }
-        }
-    }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// Gains of the filter and of its fixed-lag smoother, where they no longer change.
-fn stationary_gains(
-    transition: &DMatrix<f64>,
-    rate: &DMatrix<f64>,
-    reading: &DMatrix<f64>,
-    slope: usize,
-    slope_variance: f64,
-    reading_variance: f64,
-    delay_rows: usize,
-) -> (Vec<f64>, Vec<f64>) {
-    const MOST_ROUNDS: usize = 20_000;
-    let n = transition.nrows();
-    let mut p = DMatrix::<f64>::identity(n, n) * 1e-4;
-    let mut cross: Vec<DMatrix<f64>> = vec![DMatrix::zeros(1, n); delay_rows + 1];
-    let (mut gain, mut chain_gain) = (DMatrix::zeros(n, 1), vec![0.0; delay_rows + 1]);
-    let mut settled = 0;
-    for _ in 0..MOST_ROUNDS {
-        p[(slope, slope)] += slope_variance;
-        let newest = rate * &p * transition.transpose();
-        for j in (1..=delay_rows).rev() {
-            cross[j] = &cross[j - 1] * transition.transpose();
-        }
-        cross[0] = newest;
-        p = transition * &p * transition.transpose();
-        let seen = &p * reading.transpose();
-        let variance = (reading * &seen)[(0, 0)] + reading_variance;
-        let new_gain = &seen / variance;
-        p -= &new_gain * &new_gain.transpose() * variance;
-        p = 0.5 * (&p + p.transpose());
-        for (entry, cross) in chain_gain.iter_mut().zip(cross.iter_mut()) {
-            *entry = (&*cross * reading.transpose())[(0, 0)] / variance;
-            *cross -= new_gain.transpose() * (*entry * variance);
-        }
-        let change = (&new_gain - &gain).norm();
-        let is_still = change <= 1e-13 * new_gain.norm();
-        gain = new_gain;
-        settled = if is_still { settled + 1 } else { 0 };
-        if settled > delay_rows + 1 {
-            break;
-        }
-    }
-    (gain.as_slice().to_vec(), chain_gain)
+    Ok(LinearModel { gains, gain_air, bias, channels: names.into_iter().zip(channel_gains).collect() })
 }

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 
 use super::Compensator;
 use super::empirical::Window;
-use super::physical::Filter;
+use super::filter::Filter;
 use crate::numeric::statistics::median;
 
 /// What one row holds; None is a drop-out.
@@ -17,6 +17,8 @@ pub struct Reading {
     pub time_s: f64,
     pub temperature_k: Option<f64>,
     pub inner_k: Option<f64>,
+    /// What the model's further columns add to the rate error; 0 where it reads none.
+    pub channel_rad_per_s: Option<f64>,
     pub rate_rad_per_s: Option<f64>,
 }
 
@@ -28,6 +30,7 @@ pub enum Flag {
     ClockBack,
     Gap,
     TemperatureHeld,
+    ChannelHeld,
     RateHeld,
     RateRejected,
 }
@@ -39,6 +42,7 @@ impl Flag {
             Flag::ClockBack => "clock_back",
             Flag::Gap => "gap",
             Flag::TemperatureHeld => "temperature_held",
+            Flag::ChannelHeld => "channel_held",
             Flag::RateHeld => "rate_held",
             Flag::RateRejected => "rate_rejected",
         }
@@ -79,6 +83,7 @@ struct Pending<T> {
     tag: T,
     step: Option<u64>,
     temperature_k: Option<f64>,
+    channel_rad_per_s: f64,
     rate_rad_per_s: Option<f64>,
     flags: Vec<Flag>,
     bias_rad_per_s: Option<f64>,
@@ -103,6 +108,7 @@ pub struct Stream<'c, T> {
     step: u64,
     last_s: f64,
     last_temperature: Option<(f64, u64)>,
+    last_channel_rad_per_s: f64,
     leaps: Vec<f64>,
     before: VecDeque<f64>,
     usual_change: f64,
@@ -122,6 +128,7 @@ impl<'c, T> Stream<'c, T> {
             step: 0,
             last_s: f64::NEG_INFINITY,
             last_temperature: None,
+            last_channel_rad_per_s: 0.0,
             leaps: Vec::new(),
             before: VecDeque::new(),
             usual_change: 0.0,
@@ -176,10 +183,18 @@ impl<'c, T> Stream<'c, T> {
     fn new_predictor(&self) -> Predictor {
         match self.compensator {
             Compensator::Physical(physical) => {
-                Predictor::Physical(Box::new(Filter::new(physical, self.interval_s, self.delay)))
+                Predictor::Physical(Box::new(physical.filter(self.interval_s, self.delay)))
             }
             Compensator::Piecewise(_) => Predictor::Piecewise,
             Compensator::Regression(_) => Predictor::Regression(Window::new(self.delay)),
+        }
+    }
+
+    fn restart(&mut self) {
+        match self.predictor.as_mut() {
+            Some(Predictor::Physical(filter)) => filter.restart(),
+            Some(Predictor::Regression(window)) => *window = Window::new(self.delay),
+            Some(Predictor::Piecewise) | None => {}
         }
     }
 
@@ -188,6 +203,7 @@ impl<'c, T> Stream<'c, T> {
             tag,
             step: None,
             temperature_k: None,
+            channel_rad_per_s: 0.0,
             rate_rad_per_s: None,
             flags: Vec::new(),
             bias_rad_per_s: None,
@@ -201,6 +217,11 @@ impl<'c, T> Stream<'c, T> {
             if temperature_k.is_none() {
                 pending.flags.push(Flag::TemperatureHeld);
             }
+            match reading.channel_rad_per_s.filter(|c| c.is_finite()) {
+                Some(channel) => self.last_channel_rad_per_s = channel,
+                None => pending.flags.push(Flag::ChannelHeld),
+            }
+            pending.channel_rad_per_s = self.last_channel_rad_per_s;
             self.advance(temperature_k, reading.inner_k.filter(|t| t.is_finite()));
             pending.step = Some(self.step);
             pending.temperature_k = temperature_k.or(self.last_temperature.map(|(t, _)| t));
@@ -235,7 +256,7 @@ impl<'c, T> Stream<'c, T> {
             for row in 0..self.pending.len() {
                 self.settle(row);
             }
-            self.predictor = Some(self.new_predictor());
+            self.restart();
             self.last_temperature = None;
             return 1;
         }
@@ -258,7 +279,7 @@ impl<'c, T> Stream<'c, T> {
                     }
                     return None;
                 }
-                self.predictor = Some(self.new_predictor());
+                self.restart();
             }
         }
         self.leaps.clear();
@@ -288,11 +309,12 @@ impl<'c, T> Stream<'c, T> {
         let Some(pending) = self.pending.get_mut(row) else { return };
         let (Some(step), None) = (pending.step, pending.bias_rad_per_s) else { return };
         let lag = (self.step - step) as usize;
-        let temperature_k = pending.temperature_k;
+        let (temperature_k, channel) = (pending.temperature_k, pending.channel_rad_per_s);
         pending.bias_rad_per_s = match (&self.predictor, self.compensator) {
             (Some(Predictor::Physical(filter)), Compensator::Physical(physical)) => {
                 let own = temperature_k.map_or(0.0, |t| physical.temperature_bias_rad_per_s(t));
-                filter.chain.get(lag).map(|bias| bias + own + physical.offset_rad_per_s)
+                (lag <= self.delay)
+                    .then(|| filter.rate_error_rad_per_s(lag) + own + channel + physical.offset_rad_per_s)
             }
             (Some(Predictor::Regression(window)), Compensator::Regression(regression)) => {
                 Some(regression.bias_rad_per_s(&window.regressors(lag, self.interval_s)))

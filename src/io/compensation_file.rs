@@ -1,4 +1,4 @@
-//! Compensation as text: CSV lines in, CSV lines out; and the physical compensator for an embedded target.
+//! Compensation as text: CSV lines in, CSV lines out.
 
 use std::fmt::Write as _;
 use std::io::{BufRead, Read, Write};
@@ -8,7 +8,6 @@ use serde::Serialize;
 use super::fault::{Fault, Faults};
 use super::record_file::{Column, Quantity, read_header};
 use crate::compensate::Compensator;
-use crate::compensate::physical::{Filter, Physical};
 use crate::compensate::stream::{Compensated, Flag, Reading, Stream};
 use crate::numeric::statistics::RunningDeviation;
 use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s};
@@ -27,6 +26,7 @@ pub struct StreamSummary {
     pub clock_back: usize,
     pub gap: usize,
     pub temperature_held: usize,
+    pub channel_held: usize,
     pub rate_held: usize,
     pub rate_rejected: usize,
     /// Standard deviations over the rows without a flag.
@@ -55,6 +55,8 @@ struct Line {
 struct Places {
     count: usize,
     columns: Vec<(usize, Column)>,
+    /// Of each further column that the compensator reads, its place among `columns`.
+    channels: Vec<usize>,
 }
 
 /// Compensates line by line; every line comes out, in order, delayed by the compensator's delay.
@@ -81,14 +83,15 @@ pub fn compensate_lines(
             sink.plain(line);
             continue;
         }
-        let places = places(name, line)?;
+        let places = places(name, line, compensator)?;
         sink.plain(&format!("{line},{ADDED_COLUMNS}"));
         break places;
     };
+    let mut channels = vec![None; places.columns.len()];
     let mut stream: Stream<Line> = Stream::new(compensator);
     while next_line(&mut input, &mut bytes)? {
         let text = String::from_utf8_lossy(&bytes).into_owned();
-        let reading = if is_comment(&text) { None } else { reading(&text, &places) };
+        let reading = if is_comment(&text) { None } else { reading(&text, &places, compensator, &mut channels) };
         let line = Line { rate_rad_per_s: reading.and_then(|r| r.rate_rad_per_s), text };
         stream.push(line, reading, |row| sink.row(row, places.count));
         if input.buffer().is_empty() {
@@ -120,7 +123,7 @@ fn next_line(input: &mut impl BufRead, bytes: &mut Vec<u8>) -> Result<bool, Stre
     Ok(read > 0)
 }
 
-fn places(name: &str, header: &str) -> Result<Places, Faults> {
+fn places(name: &str, header: &str, compensator: &Compensator) -> Result<Places, Faults> {
     let fields: Vec<&str> = header.split(',').map(|f| f.trim().trim_matches('"')).collect();
     let columns = read_header(&fields).map_err(|faults| Faults {
         file: name.to_owned(),
@@ -131,15 +134,30 @@ fn places(name: &str, header: &str) -> Result<Places, Faults> {
             .collect(),
     })?;
     let count = columns.len();
-    let needed = |c: &Column| {
-        matches!(c.quantity, Quantity::Time | Quantity::Temperature | Quantity::Rate | Quantity::InnerTemperature)
+    let names = compensator.channel_names();
+    let needed = |c: &Column| match c.quantity {
+        Quantity::Time | Quantity::Temperature | Quantity::Rate | Quantity::InnerTemperature => true,
+        Quantity::Channel => names.contains(&c.name.as_str()),
+        Quantity::AmbientTemperature => false,
     };
-    Ok(Places { count, columns: columns.into_iter().enumerate().filter(|(_, c)| needed(c)).collect() })
+    let columns: Vec<(usize, Column)> = columns.into_iter().enumerate().filter(|(_, c)| needed(c)).collect();
+    let place = |wanted: &&str| {
+        let found = columns.iter().position(|(_, c)| c.name == *wanted);
+        found.ok_or_else(|| Faults::of_file(name, format!("the model reads the column {wanted}, which is not there")))
+    };
+    let channels = names.iter().map(place).collect::<Result<_, _>>()?;
+    Ok(Places { count, columns, channels })
 }
 
-/// None where the fields are not as many as the header's or the time is no number.
-fn reading(line: &str, places: &Places) -> Option<Reading> {
-    let mut found = Reading { time_s: f64::NAN, temperature_k: None, inner_k: None, rate_rad_per_s: None };
+/// None where the fields are not as many as the header's or the time is no number; `channels` is room for the further columns.
+fn reading(line: &str, places: &Places, compensator: &Compensator, channels: &mut [Option<f64>]) -> Option<Reading> {
+    let mut found = Reading {
+        time_s: f64::NAN,
+        temperature_k: None,
+        inner_k: None,
+        channel_rad_per_s: Some(0.0),
+        rate_rad_per_s: None,
+    };
     let mut count = 0;
     let mut next = 0;
     for field in line.split(',') {
@@ -152,11 +170,15 @@ fn reading(line: &str, places: &Places) -> Option<Reading> {
                 Quantity::Temperature => found.temperature_k = value,
                 Quantity::Rate => found.rate_rad_per_s = value,
                 Quantity::InnerTemperature => found.inner_k = value,
-                Quantity::AmbientTemperature | Quantity::Channel => {}
+                Quantity::Channel => channels[next] = value,
+                Quantity::AmbientTemperature => {}
             }
             next += 1;
         }
         count += 1;
+    }
+    if let Compensator::Physical(physical) = compensator {
+        found.channel_rad_per_s = physical.channel_bias_rad_per_s(places.channels.iter().map(|c| channels[*c]));
     }
     (count == places.count).then_some(found)
 }
@@ -231,6 +253,7 @@ impl<W: Write> Sink<W> {
                 Flag::ClockBack => &mut self.summary.clock_back,
                 Flag::Gap => &mut self.summary.gap,
                 Flag::TemperatureHeld => &mut self.summary.temperature_held,
+                Flag::ChannelHeld => &mut self.summary.channel_held,
                 Flag::RateHeld => &mut self.summary.rate_held,
                 Flag::RateRejected => &mut self.summary.rate_rejected,
             };
@@ -243,137 +266,6 @@ impl<W: Write> Sink<W> {
         self.text.push('\n');
         let done = self.output.write_all(self.text.as_bytes());
         self.keep(done);
-    }
-}
-
-/// The physical compensator as a difference equation: °C in, °/h out.
-#[derive(Debug, Serialize)]
-pub struct DifferenceEquation {
-    pub model: String,
-    pub equations: [&'static str; 4],
-    pub interval_s: f64,
-    /// The rate error that comes out belongs to the row so many rows ago.
-    pub delay_rows: usize,
-    pub offset_deg_per_h: f64,
-    /// F, row by row.
-    pub transition: Vec<Vec<f64>>,
-    /// ω [°/h per °C].
-    pub rate: Vec<f64>,
-    /// h.
-    pub reading: Vec<f64>,
-    /// k.
-    pub gain: Vec<f64>,
-    /// κ [°/h per °C].
-    pub chain_gain: Vec<f64>,
-    /// States that start at the first reading; the others start at 0.
-    pub level_states: Vec<usize>,
-}
-
-impl DifferenceEquation {
-    /// None where the model has a bias over temperature, which is no difference equation.
-    pub fn new(model: &str, physical: &Physical, interval_s: f64, delay_rows: usize) -> Option<Self> {
-        if !physical.is_linear() {
-            return None;
-        }
-        let filter = Filter::new(physical, interval_s, delay_rows);
-        let shown = |values: &[f64]| values.iter().map(|v| deg_per_h_from_rad_per_s(*v)).collect::<Vec<f64>>();
-        Some(Self {
-            model: model.to_owned(),
-            equations: [
-                "x = F x_before; o[0] = rate . x_before; o[j] = o_before[j-1]",
-                "e = temperature_c - reading . x",
-                "x = x + gain e; o[j] = o[j] + chain_gain[j] e (without a reading: e = 0)",
-                "rate error of the row delay_rows ago = o[delay_rows] + offset; first reading: level_states = reading",
-            ],
-            interval_s,
-            delay_rows,
-            offset_deg_per_h: deg_per_h_from_rad_per_s(physical.offset_rad_per_s),
-            transition: filter.transition.chunks(filter.state.len()).map(<[f64]>::to_vec).collect(),
-            rate: shown(&filter.rate),
-            reading: filter.reading,
-            gain: filter.gain,
-            chain_gain: shown(&filter.chain_gain),
-            level_states: filter.level_states,
-        })
-    }
-
-    /// The same as a C header that needs nothing else.
-    pub fn c_header(&self) -> String {
-        let list = |values: &[f64]| values.iter().map(|v| format!("{v:.17e}")).collect::<Vec<_>>().join(", ");
-        let rows: Vec<String> = self.transition.iter().map(|row| format!("  {{{}}}", list(row))).collect();
-        let starts: Vec<String> = self.level_states.iter().map(|i| format!("    s->x[{i}] = temperature_c;")).collect();
-        let name: String = self.model.chars().map(|c| if c.is_ascii_graphic() { c } else { ' ' }).collect();
-        format!(
-            r"/* Thermal rate error of a fibre-optic gyro's coil from one temperature: {name}.
-   Call coilwright_step once every {interval} s. It returns the rate error [deg/h] of the call {delay} calls ago;
-   subtract it from the rate of that call. valid = 0: no reading, the model goes on by itself. */
-#ifndef COILWRIGHT_COMPENSATION_H
-#define COILWRIGHT_COMPENSATION_H
-
-#define COILWRIGHT_STATES {n}
-#define COILWRIGHT_DELAY {delay}
-
-typedef struct {{
-  double x[COILWRIGHT_STATES];
-  double o[COILWRIGHT_DELAY + 1];
-  int started;
-}} coilwright_state;
-
-static const double coilwright_transition[COILWRIGHT_STATES][COILWRIGHT_STATES] = {{
-{transition}
-}};
-static const double coilwright_rate[COILWRIGHT_STATES] = {{{rate}}};
-static const double coilwright_reading[COILWRIGHT_STATES] = {{{reading}}};
-static const double coilwright_gain[COILWRIGHT_STATES] = {{{gain}}};
-static const double coilwright_chain_gain[COILWRIGHT_DELAY + 1] = {{{chain_gain}}};
-static const double coilwright_offset = {offset:.17e};
-
-static void coilwright_start(coilwright_state *s) {{
-  int i;
-  for (i = 0; i < COILWRIGHT_STATES; ++i) s->x[i] = 0.0;
-  for (i = 0; i <= COILWRIGHT_DELAY; ++i) s->o[i] = 0.0;
-  s->started = 0;
-}}
-
-static double coilwright_step(coilwright_state *s, double temperature_c, int valid) {{
-  double next[COILWRIGHT_STATES], newest = 0.0, error = 0.0;
-  int i, j;
-  if (!s->started) {{
-    if (!valid) return coilwright_offset;
-{starts}
-    s->started = 1;
-    return coilwright_offset;
-  }}
-  for (i = 0; i < COILWRIGHT_STATES; ++i) newest += coilwright_rate[i] * s->x[i];
-  for (i = 0; i < COILWRIGHT_STATES; ++i) {{
-    next[i] = 0.0;
-    for (j = 0; j < COILWRIGHT_STATES; ++j) next[i] += coilwright_transition[i][j] * s->x[j];
-  }}
-  for (i = 0; i < COILWRIGHT_STATES; ++i) s->x[i] = next[i];
-  for (i = COILWRIGHT_DELAY; i > 0; --i) s->o[i] = s->o[i - 1];
-  s->o[0] = newest;
-  if (valid) {{
-    error = temperature_c;
-    for (i = 0; i < COILWRIGHT_STATES; ++i) error -= coilwright_reading[i] * s->x[i];
-    for (i = 0; i < COILWRIGHT_STATES; ++i) s->x[i] += coilwright_gain[i] * error;
-    for (i = 0; i <= COILWRIGHT_DELAY; ++i) s->o[i] += coilwright_chain_gain[i] * error;
-  }}
-  return s->o[COILWRIGHT_DELAY] + coilwright_offset;
-}}
-
-#endif
-",
-            interval = self.interval_s,
-            delay = self.delay_rows,
-            n = self.rate.len(),
-            transition = rows.join(",\n"),
-            rate = list(&self.rate),
-            reading = list(&self.reading),
-            gain = list(&self.gain),
-            chain_gain = list(&self.chain_gain),
-            offset = self.offset_deg_per_h,
-            starts = starts.join("\n"),
-        )
     }
 }
 

@@ -68,18 +68,54 @@ pub fn read_text_up_to(path: &Path, largest_bytes: u64) -> Result<String, Faults
 /// # Errors
 /// A folder or file that cannot be written.
 pub fn write_atomically(path: &Path, contents: &[u8]) -> Result<(), WriteError> {
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    std::fs::create_dir_all(folder).map_err(|source| WriteError::Folder { path: folder.to_owned(), source })?;
-    let fail = |source| WriteError::File { path: path.to_owned(), source };
-    let mut file = tempfile::Builder::new().prefix(".coilwright-").tempfile_in(folder).map_err(fail)?;
-    file.write_all(contents).map_err(fail)?;
-    file.as_file().sync_all().map_err(fail)?;
-    share_with_readers(file.path()).map_err(fail)?;
-    file.persist(path).map_err(|e| fail(e.error))?;
-    Ok(())
+    let mut file = NewFile::create(path)?;
+    file.write_all(contents).map_err(|source| WriteError::File { path: path.to_owned(), source })?;
+    file.finish()
+}
+
+/// A file that is written piece by piece under a temporary name in the same folder; it takes its own name at the end.
+#[derive(Debug)]
+pub struct NewFile {
+    path: PathBuf,
+    file: tempfile::NamedTempFile,
+}
+
+impl NewFile {
+    /// # Errors
+    /// A folder or file that cannot be written.
+    pub fn create(path: &Path) -> Result<Self, WriteError> {
+        let folder = match path.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        std::fs::create_dir_all(folder).map_err(|source| WriteError::Folder { path: folder.to_owned(), source })?;
+        let fail = |source| WriteError::File { path: path.to_owned(), source };
+        let file = tempfile::Builder::new().prefix(".coilwright-").tempfile_in(folder).map_err(fail)?;
+        Ok(Self { path: path.to_owned(), file })
+    }
+
+    /// Readers see the old file until here, and the new one from here on.
+    ///
+    /// # Errors
+    /// A file that cannot be written or renamed.
+    pub fn finish(self) -> Result<(), WriteError> {
+        let Self { path, file } = self;
+        let fail = |source| WriteError::File { path: path.clone(), source };
+        file.as_file().sync_all().map_err(fail)?;
+        share_with_readers(file.path()).map_err(fail)?;
+        file.persist(&path).map_err(|e| fail(e.error))?;
+        Ok(())
+    }
+}
+
+impl Write for NewFile {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.file.flush()
+    }
 }
 
 /// Temporary files are private to their owner; results are for whoever may read the folder.

@@ -6,6 +6,7 @@ pub mod comparison_json;
 pub mod comparison_rows;
 pub mod compensation_file;
 pub mod diagnosis_json;
+pub mod difference_equation;
 mod effect_tables;
 pub mod effects_json;
 pub mod fault;

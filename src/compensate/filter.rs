@@ -1,0 +1,346 @@
+//! The physical compensator at work: a difference equation with several hypotheses about when the air's slope last broke.
+//!
+//! ```text
+//! x⁻ = F x,  o_0 = ω·x,  o_j = o_{j−1};   e = T − h·x⁻,  x = x⁻ + k_a e,  o_j = o_j + κ_aj e          each hypothesis
+//! ℓ = ℓ + ln(1 − p) − ½ ln f_a − e²/(2 f_a)                                                        its logarithm of likelihood
+//! Ω = Σ w o_j,  w ∝ exp ℓ
+//! ```
+//!
+//! | symbol | meaning | in code |
+//! |---|---|---|
+//! | x | modes of the pack, air temperature and its slope, and the sensor where it lags | `Hypothesis::state` |
+//! | o_j | rate error of the row j rows ago, given all readings until now | `Hypothesis::chain` |
+//! | a | rows since the air's slope broke; the last entry: long ago | `Hypothesis::age` |
+//! | k_a, κ_a, f_a | Kalman gains of the states and of the fixed-lag smoother, variance of e | `Gains` |
+//! | p | probability of a break in a row | `BREAK_PROBABILITY` |
+//!
+//! A chamber's air runs along straight lines and breaks between them: with one fixed gain a filter either follows breaks too
+//! late or noise all the time. Covariances depend on no reading, so all gains are known beforehand, row by row after a
+//! break. Every row each hypothesis branches into "no break" and "a break within this row"; of hypotheses of one age
+//! the likelier is kept, of all at most [`Tuning::hypotheses`]. With one hypothesis, without breaks, it is the plain
+//! difference equation of the stationary Kalman filter.
+//!
+//! # Source
+//! Kalman, J. Basic Eng. 82 (1960) 35; fixed-lag smoothing by augmented states: Anderson and Moore, Optimal Filtering
+//! (1979), section 7.3; banks of hypotheses that branch and are pruned: Willsky and Jones, IEEE Trans. Autom. Control 21
+//! (1976) 108; Andersson, Int. J. Control 41 (1985) 1221.
+
+use nalgebra::DMatrix;
+
+/// Breaks are sought once in so many rows,
+pub const BREAK_PROBABILITY: f64 = 1.0 / 300.0;
+/// and as large as any chamber's [(K/s)²].
+const BREAK_VARIANCE_K2_PER_S2: f64 = 1e-3;
+/// A hypothesis so much less likely than the best is dropped (natural logarithm).
+pub const LEAST_LOG_WEIGHT: f64 = -10.0;
+/// Gains this near to those of long ago are those of long ago.
+const NEAR: f64 = 0.01;
+const MOST_AGES: usize = 256;
+/// Places within a row at which noise of the slope comes in.
+const PLACES: usize = 16;
+/// Without a reading for so many rows the next one begins anew.
+pub const FORGOTTEN_ROWS: usize = 300;
+
+/// What the pack and the sensor do from row to row.
+#[derive(Debug, Clone)]
+pub struct Dynamics {
+    /// F.
+    pub transition: DMatrix<f64>,
+    /// ω.
+    pub rate: DMatrix<f64>,
+    /// h.
+    pub reading: DMatrix<f64>,
+    /// Where the air's temperature and, if there is one, the sensor's are.
+    pub level_states: Vec<usize>,
+    /// Covariance of states and newest rate error for a unit shock of the slope somewhere within the row.
+    shock: DMatrix<f64>,
+}
+
+impl Dynamics {
+    /// # Shapes
+    /// `dynamics` n × n with x' = dynamics · x; `functional`, `reading` 1 × n; the rate error is the change of `functional`
+    /// over the last `window_s` of each row, per second.
+    pub fn new(
+        dynamics: &DMatrix<f64>,
+        functional: &DMatrix<f64>,
+        reading: DMatrix<f64>,
+        level_states: Vec<usize>,
+        slope: usize,
+        interval_s: f64,
+        window_s: f64,
+    ) -> Self {
+        let n = dynamics.nrows();
+        let after = |time_s: f64| (dynamics * time_s).exp();
+        let transition = after(interval_s);
+        let is_mean = window_s > 0.0;
+        let rate = if is_mean {
+            (functional * (&transition - after(interval_s - window_s))) / window_s
+        } else {
+            functional * dynamics * &transition
+        };
+        let mut shock = DMatrix::zeros(n + 1, n + 1);
+        for place in 0..PLACES {
+            let at_s = (place as f64 + 0.5) / PLACES as f64 * interval_s;
+            let response = after(interval_s - at_s).column(slope).into_owned();
+            let newest = if is_mean {
+                let before_s = interval_s - window_s - at_s;
+                let before = if before_s > 0.0 { (functional * after(before_s).column(slope))[(0, 0)] } else { 0.0 };
+                ((functional * &response)[(0, 0)] - before) / window_s
+            } else {
+                (functional * dynamics * &response)[(0, 0)]
+            };
+            let all = response.push(newest);
+            shock += &all * all.transpose() / PLACES as f64;
+        }
+        Self { transition, rate, reading, level_states, shock }
+    }
+
+    fn states(&self) -> usize {
+        self.transition.nrows()
+    }
+}
+
+/// What the gains depend on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tuning {
+    /// How much the air's slope wanders between breaks, in a row [(K/s)²].
+    pub slope_variance: f64,
+    pub noise_k: f64,
+    pub delay_rows: usize,
+    /// At least 1; with 1 there are no breaks.
+    pub hypotheses: usize,
+}
+
+/// Gains so many rows after a break.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gains {
+    /// k, then κ: states, then the row itself and the rows of delay.
+    pub gain: Vec<f64>,
+    /// f.
+    pub variance: f64,
+}
+
+#[derive(Debug, Clone)]
+struct Hypothesis {
+    log_weight: f64,
+    age: usize,
+    /// States, then the chain.
+    values: Vec<f64>,
+    weight: f64,
+}
+
+/// The bank of filters.
+#[derive(Debug, Clone)]
+pub struct Filter {
+    n: usize,
+    /// Row-major.
+    pub transition: Vec<f64>,
+    pub rate: Vec<f64>,
+    pub reading: Vec<f64>,
+    pub level_states: Vec<usize>,
+    pub most_hypotheses: usize,
+    /// By age; the last one is for long ago.
+    pub gains: Vec<Gains>,
+    /// −½ ln f by age.
+    log_factors: Vec<f64>,
+    hypotheses: Vec<Hypothesis>,
+    /// Log-weight, index of the parent, age.
+    branches: Vec<(f64, usize, usize)>,
+    errors: Vec<f64>,
+    spare: Vec<Vec<f64>>,
+    missing_rows: usize,
+}
+
+/// The covariance recursion.
+struct Covariance<'a> {
+    dynamics: &'a Dynamics,
+    noise_variance: f64,
+    p: DMatrix<f64>,
+    /// Of each row of the chain with the states.
+    cross: Vec<DMatrix<f64>>,
+}
+
+impl Covariance<'_> {
+    /// One row further, the slope shaken with this variance somewhere within it.
+    fn step(&mut self, slope_variance: f64) -> Gains {
+        let Dynamics { transition, rate, reading, shock, .. } = self.dynamics;
+        let n = transition.nrows();
+        for j in (1..self.cross.len()).rev() {
+            self.cross[j] = &self.cross[j - 1] * transition.transpose();
+        }
+        self.cross[0] = rate * &self.p * transition.transpose() + shock.view((n, 0), (1, n)) * slope_variance;
+        self.p = transition * &self.p * transition.transpose() + shock.view((0, 0), (n, n)) * slope_variance;
+        let seen = &self.p * reading.transpose();
+        let variance = (reading * &seen)[(0, 0)] + self.noise_variance;
+        let gain = &seen / variance;
+        self.p -= &gain * gain.transpose() * variance;
+        self.p = 0.5 * (&self.p + self.p.transpose());
+        let mut all = gain.as_slice().to_vec();
+        for cross in &mut self.cross {
+            let entry = (&*cross * reading.transpose())[(0, 0)] / variance;
+            *cross -= gain.transpose() * (entry * variance);
+            all.push(entry);
+        }
+        Gains { gain: all, variance }
+    }
+}
+
+/// The largest change of a gain, as a share of the largest one of its kind.
+fn difference(a: &Gains, b: &Gains, states: usize) -> f64 {
+    let part = |from: usize, to: usize| {
+        let pairs = || a.gain[from..to].iter().zip(&b.gain[from..to]);
+        let size = pairs().map(|(_, b)| b.abs()).fold(f64::MIN_POSITIVE, f64::max);
+        pairs().map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / size
+    };
+    part(0, states).max(part(states, a.gain.len()))
+}
+
+/// Gains of long ago, and those by age after a break before them.
+fn schedule(dynamics: &Dynamics, tuning: &Tuning) -> Vec<Gains> {
+    const MOST_ROUNDS: usize = 20_000;
+    const STILL: f64 = 1e-12;
+    let n = dynamics.states();
+    let mut covariance = Covariance {
+        dynamics,
+        noise_variance: tuning.noise_k * tuning.noise_k,
+        p: DMatrix::identity(n, n) * 1e-6,
+        cross: vec![DMatrix::zeros(1, n); tuning.delay_rows + 1],
+    };
+    let mut long_ago = covariance.step(tuning.slope_variance);
+    let mut settled = 0;
+    for _ in 0..MOST_ROUNDS {
+        let next = covariance.step(tuning.slope_variance);
+        settled = if difference(&next, &long_ago, n) <= STILL { settled + 1 } else { 0 };
+        long_ago = next;
+        if settled > tuning.delay_rows + 1 {
+            break;
+        }
+    }
+    let mut gains = Vec::new();
+    if tuning.hypotheses > 1 {
+        gains.push(covariance.step(tuning.slope_variance + BREAK_VARIANCE_K2_PER_S2));
+        while gains.len() < MOST_AGES {
+            let next = covariance.step(tuning.slope_variance);
+            let is_near = gains.len() > tuning.delay_rows && difference(&next, &long_ago, n) < NEAR;
+            gains.push(next);
+            if is_near {
+                break;
+            }
+        }
+    }
+    gains.push(long_ago);
+    gains
+}
+
+impl Filter {
+    pub fn new(dynamics: &Dynamics, tuning: &Tuning) -> Self {
+        let gains = schedule(dynamics, tuning);
+        Self {
+            n: dynamics.states(),
+            transition: dynamics.transition.transpose().as_slice().to_vec(),
+            rate: dynamics.rate.as_slice().to_vec(),
+            reading: dynamics.reading.as_slice().to_vec(),
+            level_states: dynamics.level_states.clone(),
+            most_hypotheses: tuning.hypotheses.max(1),
+            log_factors: gains.iter().map(|g| -0.5 * g.variance.ln()).collect(),
+            gains,
+            hypotheses: Vec::new(),
+            branches: Vec::new(),
+            errors: Vec::new(),
+            spare: Vec::new(),
+            missing_rows: 0,
+        }
+    }
+
+    /// Forgets every reading.
+    pub fn restart(&mut self) {
+        self.hypotheses.clear();
+    }
+
+    /// Rate error of the row `lag` rows ago, given all readings until now [rad/s]; 0 before the first reading.
+    pub fn rate_error_rad_per_s(&self, lag: usize) -> f64 {
+        self.hypotheses.iter().map(|h| h.weight * h.values[self.n + lag]).sum()
+    }
+
+    fn start(&mut self, temperature_k: f64) {
+        let mut values = vec![0.0; self.gains[0].gain.len()];
+        for &level in &self.level_states {
+            values[level] = temperature_k;
+        }
+        // As if a break had just been: the slope is not known.
+        self.hypotheses = vec![Hypothesis { log_weight: 0.0, age: 0, values, weight: 1.0 }];
+    }
+
+    /// One row further; without a reading the model goes on by itself.
+    pub fn step(&mut self, temperature_k: Option<f64>) {
+        self.missing_rows = if temperature_k.is_some() { 0 } else { self.missing_rows + 1 };
+        if self.missing_rows > FORGOTTEN_ROWS {
+            self.restart();
+        }
+        if self.hypotheses.is_empty() {
+            if let Some(temperature_k) = temperature_k {
+                self.start(temperature_k);
+            }
+            return;
+        }
+        for hypothesis in &mut self.hypotheses {
+            let mut next = self.spare.pop().unwrap_or_default();
+            next.clear();
+            let (state, chain) = hypothesis.values.split_at(self.n);
+            next.extend(self.transition.chunks_exact(self.n).map(|row| dot(row, state)));
+            next.push(dot(&self.rate, state));
+            next.extend_from_slice(&chain[..chain.len() - 1]);
+            self.spare.push(std::mem::replace(&mut hypothesis.values, next));
+        }
+        if let Some(temperature_k) = temperature_k {
+            self.branch(temperature_k);
+        }
+    }
+
+    /// Branches every hypothesis, keeps the best and corrects them by the reading.
+    fn branch(&mut self, temperature_k: f64) {
+        let long_ago = self.gains.len() - 1;
+        let has_breaks = self.most_hypotheses > 1;
+        self.branches.clear();
+        self.errors.clear();
+        for (parent, hypothesis) in self.hypotheses.iter().enumerate() {
+            let error = temperature_k - dot(&self.reading, &hypothesis.values[..self.n]);
+            self.errors.push(error);
+            let mut add = |age: usize, prior: f64| {
+                let fit = self.log_factors[age] - 0.5 * error * error / self.gains[age].variance;
+                self.branches.push((hypothesis.log_weight + prior + fit, parent, age));
+            };
+            add((hypothesis.age + 1).min(long_ago), (-BREAK_PROBABILITY).ln_1p());
+            if has_breaks {
+                add(0, BREAK_PROBABILITY.ln());
+            }
+        }
+        // Stable: of equals the one of the likelier parent comes first.
+        self.branches.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let best = self.branches[0].0;
+        let mut kept: Vec<Hypothesis> = Vec::with_capacity(self.most_hypotheses);
+        for &(log_weight, parent, age) in &self.branches {
+            if log_weight < best + LEAST_LOG_WEIGHT || kept.len() == self.most_hypotheses {
+                break;
+            }
+            if kept.iter().any(|h| h.age == age) {
+                continue;
+            }
+            let mut values = self.spare.pop().unwrap_or_default();
+            values.clear();
+            let error = self.errors[parent];
+            let before = &self.hypotheses[parent].values;
+            values.extend(before.iter().zip(&self.gains[age].gain).map(|(v, gain)| v + gain * error));
+            kept.push(Hypothesis { log_weight: log_weight - best, age, values, weight: (log_weight - best).exp() });
+        }
+        let sum: f64 = kept.iter().map(|h| h.weight).sum();
+        kept.iter_mut().for_each(|h| h.weight /= sum);
+        for old in std::mem::replace(&mut self.hypotheses, kept) {
+            self.spare.push(old.values);
+        }
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

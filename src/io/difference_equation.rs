@@ -1,0 +1,135 @@
+//! The physical compensator for an embedded target: coefficients as JSON and as a C header that needs nothing else.
+
+use serde::Serialize;
+
+use crate::compensate::filter::{BREAK_PROBABILITY, FORGOTTEN_ROWS, Filter, Gains, LEAST_LOG_WEIGHT};
+use crate::compensate::physical::Physical;
+use crate::units::deg_per_h_from_rad_per_s;
+
+/// The physical compensator as a difference equation: °C in, °/h out.
+#[derive(Debug, Serialize)]
+pub struct DifferenceEquation {
+    pub model: String,
+    pub equations: Vec<&'static str>,
+    pub interval_s: f64,
+    /// The rate error that comes out belongs to the row so many rows ago.
+    pub delay_rows: usize,
+    pub offset_deg_per_h: f64,
+    /// F, row by row.
+    pub transition: Vec<Vec<f64>>,
+    /// ω [°/h per °C].
+    pub rate: Vec<f64>,
+    /// h.
+    pub reading: Vec<f64>,
+    /// States that start at the first reading; the others start at 0.
+    pub level_states: Vec<usize>,
+    /// 1: one difference equation, whose gains are the only ones.
+    pub most_hypotheses: usize,
+    pub break_probability: f64,
+    pub least_log_weight: f64,
+    /// After so many rows without a reading the next one begins anew.
+    pub forgotten_rows: usize,
+    /// By rows since the last break; the last ones are for long ago.
+    pub gains: Vec<GainsJson>,
+}
+
+/// Gains of one age.
+#[derive(Debug, Serialize)]
+pub struct GainsJson {
+    /// k.
+    pub gain: Vec<f64>,
+    /// κ [°/h per °C].
+    pub chain_gain: Vec<f64>,
+    /// f [°C²].
+    pub variance: f64,
+}
+
+impl GainsJson {
+    fn new(gains: &Gains, states: usize) -> Self {
+        let (gain, chain) = gains.gain.split_at(states);
+        Self { gain: gain.to_vec(), chain_gain: shown(chain), variance: gains.variance }
+    }
+}
+
+fn shown(values: &[f64]) -> Vec<f64> {
+    values.iter().map(|v| deg_per_h_from_rad_per_s(*v)).collect()
+}
+
+const PLAIN: [&str; 4] = [
+    "x = F x_before; o[0] = rate . x_before; o[j] = o_before[j-1]",
+    "e = temperature_c - reading . x",
+    "x = x + gain e; o[j] = o[j] + chain_gain[j] e (without a reading: neither)",
+    "rate error of the row delay_rows ago = o[delay_rows] + offset; first reading: level_states = reading",
+];
+const BRANCHES: [&str; 4] = [
+    "each hypothesis of age a branches: a + 1 with l += ln(1 - break_probability), 0 with l += ln(break_probability)",
+    "each branch with the gains of its age: l += -ln(variance)/2 - e^2/(2 variance)",
+    "kept, from the largest l on: one of each age, at most most_hypotheses, none below the largest + least_log_weight",
+    "o[delay_rows] is the mean over the hypotheses, weighted by exp(l)",
+];
+
+impl DifferenceEquation {
+    /// None where the model has a bias over temperature or reads further columns, which is no difference equation.
+    pub fn new(model: &str, physical: &Physical, interval_s: f64, delay_rows: usize) -> Option<Self> {
+        if !physical.is_linear() {
+            return None;
+        }
+        let Filter { transition, rate, reading, level_states, most_hypotheses, gains, .. } =
+            physical.filter(interval_s, delay_rows);
+        let states = rate.len();
+        let mut equations = PLAIN.to_vec();
+        if most_hypotheses > 1 {
+            equations.extend(BRANCHES);
+        }
+        Some(Self {
+            model: model.to_owned(),
+            equations,
+            interval_s,
+            delay_rows,
+            offset_deg_per_h: deg_per_h_from_rad_per_s(physical.offset_rad_per_s),
+            transition: transition.chunks(states).map(<[f64]>::to_vec).collect(),
+            rate: shown(&rate),
+            reading,
+            level_states,
+            most_hypotheses,
+            break_probability: BREAK_PROBABILITY,
+            least_log_weight: LEAST_LOG_WEIGHT,
+            forgotten_rows: FORGOTTEN_ROWS,
+            gains: gains.iter().map(|g| GainsJson::new(g, states)).collect(),
+        })
+    }
+
+    /// The same as a C header that needs nothing but the C library's exp.
+    pub fn c_header(&self) -> String {
+        let list = |values: &[f64]| values.iter().map(|v| format!("{v:.17e}")).collect::<Vec<_>>().join(", ");
+        let rows: Vec<String> = self.transition.iter().map(|row| format!("  {{{}}}", list(row))).collect();
+        let gains: Vec<String> =
+            self.gains.iter().map(|g| format!("  {{{}, {}}}", list(&g.gain), list(&g.chain_gain))).collect();
+        let variances: Vec<f64> = self.gains.iter().map(|g| g.variance).collect();
+        let factors: Vec<f64> = variances.iter().map(|v| -0.5 * v.ln()).collect();
+        let starts: Vec<String> =
+            self.level_states.iter().map(|i| format!("    s->h[0].v[{i}] = temperature_c;")).collect();
+        let name: String = self.model.chars().map(|c| if c.is_ascii_graphic() { c } else { ' ' }).collect();
+        HEADER
+            .replace("@name@", &name.replace("*/", "* /"))
+            .replace("@interval@", &self.interval_s.to_string())
+            .replace("@delay@", &self.delay_rows.to_string())
+            .replace("@states@", &self.rate.len().to_string())
+            .replace("@ages@", &self.gains.len().to_string())
+            .replace("@hypotheses@", &self.most_hypotheses.to_string())
+            .replace("@forgotten@", &self.forgotten_rows.to_string())
+            .replace("@transition@", &rows.join(",\n"))
+            .replace("@rate@", &list(&self.rate))
+            .replace("@reading@", &list(&self.reading))
+            .replace("@gains@", &gains.join(",\n"))
+            .replace("@variances@", &list(&variances))
+            .replace("@factors@", &list(&factors))
+            .replace("@offset@", &format!("{:.17e}", self.offset_deg_per_h))
+            .replace("@no_break@", &format!("{:.17e}", (-self.break_probability).ln_1p()))
+            .replace("@break@", &format!("{:.17e}", self.break_probability.ln()))
+            .replace("@least@", &format!("{:.17e}", self.least_log_weight))
+            .replace("@starts@", &starts.join("\n"))
+    }
+}
+
+const HEADER: &str = include_str!("difference_equation.h");
