@@ -14,7 +14,8 @@ use coilwright::pattern::Pattern;
 use coilwright::pattern::classic::Classic;
 use coilwright::schedule::Schedule;
 use coilwright::search::worst_case::SolvedProfiles;
-use coilwright::verify::{Truth, Verification, verify};
+use coilwright::units::deg_per_h_from_rad_per_s;
+use coilwright::verify::{RateCheck, Truth, Verification, verify};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
@@ -36,7 +37,8 @@ model = "half_space"
 diffusivity_m2_per_s = 2.7e-7
 [profiles]
 max_rate_c_per_h = 10.0
-count = 8
+count = 2
+segments = 2
 duration_s = 6000.0
 [production]
 part_number = "FOG-200-16"
@@ -65,8 +67,9 @@ conductivity_w_per_m_k = 0.35
 volumetric_heat_capacity_j_per_m3_k = 1.7e6
 [profiles]
 max_rate_c_per_h = 60.0
-count = 8
-duration_s = 6000.0
+count = 1
+segments = 2
+duration_s = 3000.0
 "#;
 
 fn model(text: &str) -> ModelFile {
@@ -276,4 +279,97 @@ fn a_segment_wound_twice_and_a_missing_row_are_named() {
     let fields: Vec<&str> = found.violations.iter().map(|v| v.field.as_str()).collect();
     assert_eq!(fields, ["rows", "segment"]);
     assert!(found.violations[1].to_string().contains("it is in row 1"));
+}
+
+/// A pack of twelve layers whose profiles heat and cool; `{}` is where effects go.
+const WARM: &str = r#"
+name = "pack with effects"
+[fibre]
+refractive_index = 1.45
+thermo_optic_per_k = 1.0e-5
+thermal_expansion_per_k = 5.0e-7
+wavelength_nm = 1550.0
+outer_diameter_um = 165.0
+[winding]
+layers = 12
+turns_per_layer = 50
+inner_diameter_mm = 80.0
+axial_pitch_um = 170.0
+layer_length = "actual"
+[thermal]
+model = "pack"
+conductivity_w_per_m_k = 0.35
+volumetric_heat_capacity_j_per_m3_k = 1.7e6
+[profiles]
+max_rate_c_per_h = 60.0
+count = 1
+segments = 3
+duration_s = 1500.0
+"#;
+
+/// Every effect that reaches a schedule, by itself and together with others, as a model file states it.
+const EFFECTS: &[&str] = &[
+    "",
+    "kind = 'spool_mass'\nheat_capacity_j_per_m2_k = 4000.0\ncontact_w_per_m2_k = 300.0\nmount_w_per_m2_k = 20.0",
+    "kind = 'surface_film'\nfilm_w_per_m2_k = 30.0",
+    "kind = 'sensor_lag'\nlag_s = 30.0",
+    "kind = 'self_heating'\npower_w_per_m2 = 50.0\ntime_constant_s = 600.0",
+    "kind = 'axial_gradient'\nfilm_w_per_m2_k = 20.0\nflange = 'first'",
+    "kind = 'axial_gradient'\nfilm_w_per_m2_k = 60.0\nflange = 'second'",
+    "kind = 'conductivity_temperature'\nslope_per_k = 0.004",
+    "kind = 'stress_gradient'\nstrength = 0.05",
+    "kind = 'strain_mismatch'\nmismatch = 0.01",
+    "kind = 'glass_transition'\nmismatch = 0.01\ntransition_c = 25.0\nwidth_k = 5.0",
+    "kind = 'thermo_optic_temperature'\nslope_per_k = 0.002",
+    "kind = 'midpoint_offset'\noffset_m = 0.3\nlead = 'ambient'",
+    "kind = 'midpoint_offset'\noffset_m = -0.3\nlead = 'isothermal'",
+    "kind = 'turn_mismatch'\nturns = 1.0",
+    "kind = 'heating_cooling_asymmetry'\ngain = 0.1",
+    "kind = 'bias_temperature'\nlinear_deg_per_h_per_k = 0.05\nquadratic_deg_per_h_per_k2 = 0.001",
+    "kind = 'bias_temperature_rate'\ngain_deg_per_h_s_per_k = 20.0",
+    "kind = 'bias_gradient_rate'\ngain_deg_per_h_s_per_k = 40.0",
+    "kind = 'diffusivity'\nfactor = 1.3",
+    "kind = 'thermo_optic'\nfactor = 0.9",
+    "kind = 'channel:supply_v'\ngain_deg_per_h_per_unit = 0.1",
+    "kind = 'custom'\nformula = 'a*mean_rate + 0.01*(T_mean - T_in) + 1e-5*t'\n[effect.parameters]\na = 12.0",
+    "kind = 'surface_film'\nfilm_w_per_m2_k = 30.0\n[[effect]]\nkind = 'spool_mass'\nheat_capacity_j_per_m2_k = 3000.0\n\
+     contact_w_per_m2_k = 200.0\n[[effect]]\nkind = 'strain_mismatch'\nmismatch = -0.02\n[[effect]]\n\
+     kind = 'self_heating'\npower_w_per_m2 = 30.0\ntime_constant_s = 300.0\n[[effect]]\nkind = 'turn_mismatch'\nturns = 2.0",
+    "kind = 'surface_film'\nfilm_w_per_m2_k = 30.0\n[[effect]]\nkind = 'conductivity_temperature'\nslope_per_k = -0.003\n\
+     [[effect]]\nkind = 'self_heating'\npower_w_per_m2 = 30.0\ntime_constant_s = 300.0",
+];
+
+#[test]
+fn the_rate_error_of_every_effect_is_found_again_by_code_of_its_own() {
+    for effect in EFFECTS {
+        let stated = if effect.is_empty() { String::new() } else { format!("[[effect]]\n{effect}\n") };
+        let file = model(&format!("{WARM}{stated}"));
+        let name = effect.split('\'').nth(1).unwrap_or("none");
+        for classic_of in [Classic::Zyl, Classic::Qua] {
+            let (_, document) = plan(&file, &classic(classic_of, 12).unwrap());
+            let found = judged(&file, &serde_json::to_string(&document).unwrap()).unwrap();
+            let RateCheck::Independent { worst_rad_per_s } = found.rate_check else {
+                panic!("{name} is not known to the verification: {:?}", found.rate_check)
+            };
+            let (own, claimed) = (deg_per_h_from_rad_per_s(worst_rad_per_s), document.worst_rate_deg_per_h);
+            println!(
+                "{name:26} {:4} claimed {claimed:9.6} °/h, found {own:9.6} °/h, {:+.3} %",
+                classic_of.key(),
+                100.0 * (own / claimed - 1.0)
+            );
+            assert_eq!(found.violations, [], "{name}");
+            assert!((own / claimed - 1.0).abs() < 5e-3, "{name}: {own} for {claimed}");
+        }
+    }
+}
+
+#[test]
+fn a_rate_error_off_by_five_per_cent_is_noticed_even_where_it_is_not_said_when_it_occurs() {
+    let file = model(&format!("{WARM}[[effect]]\n{}\n", EFFECTS[2]));
+    let (_, mut document) = plan(&file, &classic(Classic::Qua, 12).unwrap());
+    document.worst_rate_deg_per_h *= 1.05;
+    document.worst_time_s = -1.0;
+    let found = judged(&file, &serde_json::to_string(&document).unwrap()).unwrap();
+    let fields: Vec<&str> = found.violations.iter().map(|v| v.field.as_str()).collect();
+    assert_eq!(fields, ["worst_time_s", "worst_rate_deg_per_h"]);
 }

@@ -41,7 +41,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         rate_check: match found.rate_check {
             RateCheck::None => "not claimed or not possible",
             RateCheck::Independent { .. } => "independent solution",
-            RateCheck::ReferenceOnly => "reference model only",
+            RateCheck::ReferenceOnly => "at the stated profile and time only",
         }
         .to_owned(),
         independent_worst_rate_deg_per_h: match found.rate_check {

@@ -1,5 +1,6 @@
 //! Works a winding out again from nothing but the order of the segments, and compares.
 
+use super::physics::wound_turns;
 use super::{Claim, Findings, Printed, Truth};
 use crate::coil::LayerLength;
 
@@ -43,7 +44,7 @@ pub(super) fn permutation(truth: &Truth, claim: &Claim, findings: &mut Findings)
 /// l_j again: from radius and turns, or equal shares.
 pub(super) fn layer_lengths_m(truth: &Truth) -> Vec<f64> {
     let raw = &truth.model.coil;
-    let wound = wound_turns(truth);
+    let wound = wound_turns(truth.model);
     let layers = raw.layers();
     let share_m = raw.length_m() / layers as f64;
     (0..layers)
@@ -55,11 +56,6 @@ pub(super) fn layer_lengths_m(truth: &Truth) -> Vec<f64> {
             }
         })
         .collect()
-}
-
-/// The declared turns, every second layer less those that nesting takes.
-fn wound_turns(truth: &Truth) -> Vec<f64> {
-    truth.model.wound_coil().map_or_else(|_| truth.model.coil.turns().to_vec(), |coil| coil.turns().to_vec())
 }
 
 /// The arclength at which each segment begins, and the fibre's end.
@@ -190,7 +186,7 @@ pub(super) fn check(truth: &Truth, claim: &Claim, segments: &[usize], findings: 
     let coil = &truth.model.coil;
     let lengths_m = layer_lengths_m(truth);
     let starts_m = starts_m(&lengths_m, segments);
-    let turns = wound_turns(truth);
+    let turns = wound_turns(truth.model);
     let outbound = runs_outbound(segments);
     let (supply, fed_by, from_low) = Supply::follow(segments);
     let mut layer_of = vec![0usize; count + 2];

@@ -1,0 +1,182 @@
+//! The rate error of a state of the pack, summed turn by turn.
+//!
+//! ```text
+//! Ω = n/(L D) ∫ κ(z) Ṫ(z) (2z − L) dz · gain + lead + bias
+//! ```
+//!
+//! The fibre is followed from end A through every turn; each turn's share of the integral is kept by layer and half of
+//! the fibre, because that is all that κ may depend on besides temperature. Along the axis the rate is its mean and
+//! 12 ζ times its first moment, with the mean κ of the halves.
+
+use super::heat::State;
+use super::physics::{Bias, Physics};
+use crate::coil::Coil;
+use crate::effect::custom::VARIABLES;
+use crate::units::{REFERENCE_TEMPERATURE_K, celsius_from_kelvin, rad_per_s_from_deg_per_h};
+
+/// Layers with more turns are summed in so many pieces.
+const MOST_PIECES: f64 = 100_000.0;
+
+#[derive(Debug)]
+pub(super) struct Optics {
+    physics: Physics,
+    kappa_per_k: f64,
+    /// n/(L D) [1/m²].
+    scale_per_m2: f64,
+    lengths_m: Vec<f64>,
+    /// ∫ (2z − L) dz of each layer's turns in half A and in half B \[m²\].
+    weights_m2: Vec<[f64; 2]>,
+    /// ∫ (2z − L) 12 ζ dz \[m²\].
+    axial_m2: Vec<f64>,
+    /// 1/r² less its mean over the fibre, largest size 1.
+    stress: Vec<f64>,
+}
+
+impl Optics {
+    /// `outbound`: whether arclength grows away from the first flange, a layer.
+    pub fn new(
+        coil: &Coil,
+        physics: &Physics,
+        segments: &[usize],
+        turns: &[f64],
+        lengths_m: &[f64],
+        outbound: &[bool],
+    ) -> Self {
+        let length_m: f64 = lengths_m.iter().sum();
+        let middle_m = 0.5 * length_m;
+        let mut weights_m2 = vec![[0.0; 2]; segments.len()];
+        let mut axial_m2 = vec![0.0; segments.len()];
+        let mut start_m = 0.0;
+        for segment in 1..=segments.len() {
+            let Some(layer) = segments.iter().position(|&s| s == segment) else { continue };
+            let pieces = turns[layer].ceil().clamp(1.0, MOST_PIECES);
+            let turn_m = lengths_m[layer] / pieces;
+            let direction = if outbound[layer] { 1.0 } else { -1.0 };
+            let zeta = |z_m: f64| direction * ((z_m - start_m) / lengths_m[layer] - 0.5);
+            for turn in 0..pieces as usize {
+                let (a_m, b_m) = (start_m + turn as f64 * turn_m, start_m + (turn + 1) as f64 * turn_m);
+                let cut_m = middle_m.clamp(a_m, b_m);
+                weights_m2[layer][0] += (cut_m - a_m) * (a_m + cut_m - length_m);
+                weights_m2[layer][1] += (b_m - cut_m) * (cut_m + b_m - length_m);
+                // Two Gauss points are exact for a quadratic.
+                for side in [-1.0, 1.0] {
+                    let z_m = 0.5 * (a_m + b_m) + side * 0.5 * (b_m - a_m) / 3.0_f64.sqrt();
+                    axial_m2[layer] += 0.5 * (b_m - a_m) * (2.0 * z_m - length_m) * 12.0 * zeta(z_m);
+                }
+            }
+            start_m += lengths_m[layer];
+        }
+        let (bore_m, pitch_m) = (coil.bore_radius_m(), coil.radial_pitch_m());
+        let inverse_square = |j: usize| (bore_m + pitch_m * (j as f64 + 0.5)).powi(-2);
+        let mean = (0..segments.len()).map(|j| inverse_square(j) * lengths_m[j]).sum::<f64>() / length_m;
+        let peak = (0..segments.len()).map(|j| (inverse_square(j) - mean).abs()).fold(0.0, f64::max);
+        let fibre = coil.fibre();
+        let diameter_m = 2.0 * bore_m + segments.len() as f64 * pitch_m;
+        Self {
+            kappa_per_k: fibre.thermo_optic_per_k + fibre.refractive_index * fibre.thermal_expansion_per_k,
+            scale_per_m2: fibre.refractive_index / (length_m * diameter_m),
+            lengths_m: lengths_m.to_vec(),
+            weights_m2,
+            axial_m2,
+            stress: (0..segments.len()).map(|j| (inverse_square(j) - mean) / peak).collect(),
+            physics: physics.clone(),
+        }
+    }
+
+    /// What one layer alone could make of a rate [rad/s per K/s].
+    pub fn largest_layer_rad_per_k(&self) -> f64 {
+        let sizes = self.weights_m2.iter().flatten().map(|w| w.abs());
+        self.scale_per_m2 * self.kappa_per_k * sizes.fold(0.0, f64::max)
+    }
+
+    /// κ of a layer's fibre in half A and in half B, so warm above 20 °C.
+    fn kappas_per_k(&self, layer: usize, rise_k: f64) -> [f64; 2] {
+        let p = &self.physics;
+        let mut kappa = self.kappa_per_k * p.path_factor;
+        for strength in &p.stress_strengths {
+            kappa *= 1.0 + strength * self.stress[layer];
+        }
+        for slope in &p.path_slopes_per_k {
+            kappa *= 1.0 + slope * rise_k;
+        }
+        let mut halves = [kappa, kappa];
+        for mismatch in &p.mismatches {
+            let share = mismatch.below.map_or(1.0, |(middle_k, width_k)| {
+                1.0 / (1.0 + ((rise_k + REFERENCE_TEMPERATURE_K - middle_k) / width_k).exp())
+            });
+            halves[0] *= 1.0 - 0.5 * mismatch.relative * share;
+            halves[1] *= 1.0 + 0.5 * mismatch.relative * share;
+        }
+        halves
+    }
+
+    /// Ω; the profile begins at 20 °C.
+    pub fn rate_rad_per_s(&self, state: &State) -> f64 {
+        let length_m: f64 = self.lengths_m.iter().sum();
+        let mean = |values: &[f64]| values.iter().zip(&self.lengths_m).map(|(v, l)| v * l).sum::<f64>() / length_m;
+        let mean_rate = mean(&state.rate_k_per_s);
+        // ∫ κ Ṫ (2z − L) dz, and ∫ κ Ṫ dz with the mean κ of the halves.
+        let (mut coil, mut moved) = (0.0, 0.0);
+        for (layer, rate) in state.rate_k_per_s.iter().enumerate() {
+            let [a, b] = self.kappas_per_k(layer, state.rise_k[layer]);
+            let both = 0.5 * (a + b);
+            coil += (a * self.weights_m2[layer][0] + b * self.weights_m2[layer][1]) * rate;
+            coil += state.moment_k_per_s.get(layer).map_or(0.0, |moment| both * self.axial_m2[layer] * moment);
+            moved += both * rate * self.lengths_m[layer];
+        }
+        let mut gain = 1.0;
+        for asymmetry in &self.physics.asymmetries {
+            gain *= 1.0 + asymmetry * if mean_rate == 0.0 { 0.0 } else { mean_rate.signum() };
+        }
+        // Surplus at end A moves every place of the coil by 2δ and the fibre's middle by δ; the surplus itself weighs
+        // ∫_0^{2δ} (2z − L − 2δ) dz = −2δ L. At end B, with δ < 0, both come out with the other sign.
+        let surplus = self.physics.surplus.iter().map(|s| {
+            let lead_rate = if s.follows_ambient { state.ambient_rate_k_per_s } else { 0.0 };
+            2.0 * s.offset_m * (moved - self.kappa_per_k * lead_rate * length_m)
+        });
+        let coil_rate = self.scale_per_m2 * (coil * gain + surplus.sum::<f64>());
+        let mean_rise = mean(&state.rise_k);
+        coil_rate + self.physics.biases.iter().map(|b| bias_rad_per_s(b, state, mean_rise, mean_rate)).sum::<f64>()
+    }
+}
+
+fn bias_rad_per_s(bias: &Bias, state: &State, mean_rise_k: f64, mean_rate_k_per_s: f64) -> f64 {
+    let outer = state.rise_k.len() - 1;
+    match bias {
+        Bias::Temperature { linear_rad_per_s_k, quadratic_rad_per_s_k2 } => {
+            linear_rad_per_s_k * mean_rise_k + quadratic_rad_per_s_k2 * mean_rise_k * mean_rise_k
+        }
+        Bias::MeanRate { gain_rad_per_k } => gain_rad_per_k * mean_rate_k_per_s,
+        Bias::GradientRate { gain_rad_per_k } => gain_rad_per_k * (state.rate_k_per_s[outer] - state.rate_k_per_s[0]),
+        Bias::Formula { formula, values } => {
+            // The other names are columns of a record, which a profile does not have.
+            if !formula.channels().is_empty() {
+                return 0.0;
+            }
+            let celsius = |rise_k: f64| celsius_from_kelvin(rise_k + REFERENCE_TEMPERATURE_K);
+            let known = |name: &str| match name {
+                "t" => state.time_s,
+                "T" => celsius(state.rise_k[outer]),
+                "dT_dt" => state.rate_k_per_s[outer],
+                "T_in" | "T_inner" => celsius(state.rise_k[0]),
+                "T_mean" => celsius(mean_rise_k),
+                "mean_rate" => mean_rate_k_per_s,
+                "T_ambient" => celsius(state.ambient_rise_k),
+                _ => state.ambient_rate_k_per_s,
+            };
+            let arguments: Vec<f64> = formula
+                .expression()
+                .variables()
+                .iter()
+                .map(|v| match formula.parameters().iter().position(|p| *p == v.name) {
+                    Some(i) => values[i],
+                    None => {
+                        debug_assert!(VARIABLES.contains(&v.name.as_str()));
+                        known(&v.name)
+                    }
+                })
+                .collect();
+            rad_per_s_from_deg_per_h(formula.expression().evaluate(&arguments))
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! The declared physics as plain numbers, read without the code that lets effects act.
+//!
+//! One match over the effects' names stands here on purpose: it is the second reading of `effect`'s catalogue. An
+//! effect that it does not know makes [`Physics::read`] say so, and the claim is then compared with the reference
+//! model only.
+
+use crate::effect::Subject;
+use crate::effect::custom::Formula;
+use crate::rate::CoilModel;
+use crate::thermal::{Extent, Location, Material};
+
+/// What the heat flows through and what the light sees, with every declared effect.
+#[derive(Debug, Clone)]
+pub(super) struct Physics {
+    /// Ends at a bore, instead of a half space.
+    pub is_pack: bool,
+    pub conductivity_w_per_m_k: f64,
+    pub heat_capacity_j_per_m3_k: f64,
+    /// The profile is the air's (or, without a film, the surface's) instead of the outermost layer's.
+    pub driven_from_outside: bool,
+    pub film_w_per_m2_k: Option<f64>,
+    pub spool: Option<SpoolMass>,
+    pub bore_heat: Option<BoreHeat>,
+    pub flange: Option<HeatedFlange>,
+    pub conductivity_slope_per_k: f64,
+    /// Missing on every second layer, the innermost being the first.
+    pub missing_turns: f64,
+    /// Factor on κ everywhere.
+    pub path_factor: f64,
+    pub stress_strengths: Vec<f64>,
+    pub mismatches: Vec<Mismatch>,
+    pub path_slopes_per_k: Vec<f64>,
+    pub asymmetries: Vec<f64>,
+    pub surplus: Vec<Surplus>,
+    pub biases: Vec<Bias>,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SpoolMass {
+    pub heat_capacity_j_per_m2_k: f64,
+    pub contact_w_per_m2_k: f64,
+    pub mount_w_per_m2_k: f64,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(super) struct BoreHeat {
+    pub power_w_per_m2: f64,
+    pub time_constant_s: f64,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(super) struct HeatedFlange {
+    pub is_first: bool,
+    pub film_w_per_m2_k: f64,
+}
+
+/// κ_B − κ_A = m κ, everywhere or below a transition.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mismatch {
+    pub relative: f64,
+    /// Middle \[K\] and width \[K\].
+    pub below: Option<(f64, f64)>,
+}
+
+/// Fibre 2δ beyond end A (δ > 0) or end B.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Surplus {
+    pub offset_m: f64,
+    pub follows_ambient: bool,
+}
+
+/// What adds to the rate without being the coil's.
+#[derive(Debug, Clone)]
+pub(super) enum Bias {
+    Temperature { linear_rad_per_s_k: f64, quadratic_rad_per_s_k2: f64 },
+    MeanRate { gain_rad_per_k: f64 },
+    GradientRate { gain_rad_per_k: f64 },
+    Formula { formula: Formula, values: Vec<f64> },
+}
+
+impl Physics {
+    /// None where an effect is declared that is not known here.
+    pub fn read(model: &CoilModel) -> Option<Self> {
+        let (conductivity, heat_capacity) = match model.material {
+            Material::Conductivity { w_per_m_k, heat_capacity_j_per_m3_k } => (w_per_m_k, heat_capacity_j_per_m3_k),
+            // Nothing but the ratio can matter then.
+            Material::Diffusivity { m2_per_s } => (m2_per_s, 1.0),
+        };
+        let mut p = Self {
+            is_pack: model.extent == Extent::Pack,
+            conductivity_w_per_m_k: conductivity,
+            heat_capacity_j_per_m3_k: heat_capacity,
+            driven_from_outside: model.location == Location::Ambient,
+            film_w_per_m2_k: None,
+            spool: None,
+            bore_heat: None,
+            flange: None,
+            conductivity_slope_per_k: 0.0,
+            missing_turns: 0.0,
+            path_factor: 1.0,
+            stress_strengths: Vec::new(),
+            mismatches: Vec::new(),
+            path_slopes_per_k: Vec::new(),
+            asymmetries: Vec::new(),
+            surplus: Vec::new(),
+            biases: Vec::new(),
+        };
+        for effect in &model.effects {
+            let (values, choices) = (effect.values(), effect.choices());
+            match (effect.subject(), effect.spec().kind, values) {
+                // A profile has no further columns: nothing is added.
+                (Subject::Channel(_), ..) => {}
+                (Subject::Formula(formula), ..) => {
+                    p.biases.push(Bias::Formula { formula: formula.clone(), values: values.to_vec() });
+                }
+                (_, "finite_pack", _) => p.is_pack = true,
+                (_, "spool_mass", &[capacity, contact, mount]) => {
+                    p.spool = Some(SpoolMass {
+                        heat_capacity_j_per_m2_k: capacity,
+                        contact_w_per_m2_k: contact,
+                        mount_w_per_m2_k: mount,
+                    });
+                }
+                (_, "surface_film", &[film]) => {
+                    p.driven_from_outside = true;
+                    p.film_w_per_m2_k = Some(film);
+                }
+                // Between the coil and what a record shows; a profile is the coil's own.
+                (_, "sensor_lag", _) => {}
+                (_, "self_heating", &[power_w_per_m2, time_constant_s]) => {
+                    p.bore_heat = Some(BoreHeat { power_w_per_m2, time_constant_s });
+                }
+                (_, "axial_gradient", &[film_w_per_m2_k]) => {
+                    p.flange = Some(HeatedFlange { is_first: choices == [0], film_w_per_m2_k });
+                }
+                (_, "conductivity_temperature", &[slope]) => p.conductivity_slope_per_k = slope,
+                (_, "stress_gradient", &[strength]) => p.stress_strengths.push(strength),
+                (_, "strain_mismatch", &[relative]) => p.mismatches.push(Mismatch { relative, below: None }),
+                (_, "glass_transition", &[relative, middle_k, width_k]) => {
+                    p.mismatches.push(Mismatch { relative, below: Some((middle_k, width_k)) });
+                }
+                (_, "thermo_optic_temperature", &[slope]) => p.path_slopes_per_k.push(slope),
+                (_, "midpoint_offset", &[offset_m]) => {
+                    p.surplus.push(Surplus { offset_m, follows_ambient: choices == [0] });
+                }
+                (_, "turn_mismatch", &[turns]) => p.missing_turns += turns,
+                (_, "heating_cooling_asymmetry", &[gain]) => p.asymmetries.push(gain),
+                (_, "bias_temperature", &[linear_rad_per_s_k, quadratic_rad_per_s_k2]) => {
+                    p.biases.push(Bias::Temperature { linear_rad_per_s_k, quadratic_rad_per_s_k2 });
+                }
+                (_, "bias_temperature_rate", &[gain_rad_per_k]) => p.biases.push(Bias::MeanRate { gain_rad_per_k }),
+                (_, "bias_gradient_rate", &[gain_rad_per_k]) => p.biases.push(Bias::GradientRate { gain_rad_per_k }),
+                (_, "diffusivity", &[factor]) => p.conductivity_w_per_m_k *= factor,
+                (_, "thermo_optic", &[factor]) => p.path_factor *= factor,
+                _ => return None,
+            }
+        }
+        Some(p)
+    }
+
+    pub fn diffusivity_m2_per_s(&self) -> f64 {
+        self.conductivity_w_per_m_k / self.heat_capacity_j_per_m3_k
+    }
+}
+
+/// The turns that are wound: the declared ones, every second layer less those that nesting takes.
+pub(super) fn wound_turns(model: &CoilModel) -> Vec<f64> {
+    let missing: f64 = model.effects.iter().filter(|e| e.spec().kind == "turn_mismatch").flat_map(|e| e.values()).sum();
+    let declared = model.coil.turns().iter().enumerate();
+    declared.map(|(j, turns)| if j % 2 == 1 { turns - missing } else { *turns }).collect()
+}
