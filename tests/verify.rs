@@ -1,24 +1,26 @@
 //! Every schedule that the program emits is verified without violations, and every field of it matters.
 //!
-//! Reference: src/verify works the winding out again with code of its own. A mutation counts as harmless only if the
-//! field is free text that the file itself introduces (the program's name, a pattern's own name) or if the changed
-//! number still prints as the same digits.
+//! Reference: src/verify works the winding out again with code of its own. A changed field counts as harmless only if
+//! what is claimed stays the same but for free text that the file itself introduces (the program's name, a pattern's
+//! own name) and the time at which one of several equal maxima was read.
 
 use std::path::Path;
 
 use coilwright::io::machine_program::{gcode, machine_program};
 use coilwright::io::model_file::{ModelFile, NamedPattern, parse_model};
+use coilwright::io::pattern_file::parse_pattern;
 use coilwright::io::schedule_file::{ScheduleJson, sha256_hex};
 use coilwright::io::schedule_reader::{parse_claim, shop_of};
+use coilwright::io::traveller::traveller;
 use coilwright::pattern::Pattern;
 use coilwright::pattern::classic::Classic;
+use coilwright::report::traveller::traveller_page;
 use coilwright::schedule::Schedule;
 use coilwright::search::worst_case::SolvedProfiles;
 use coilwright::units::deg_per_h_from_rad_per_s;
-use coilwright::verify::{RateCheck, Truth, Verification, verify};
+use coilwright::verify::{Claim, RateCheck, Truth, Verification, verify};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use serde_json::Value;
 
 const PAPER: &str = r#"
 name = "paper's coil"
@@ -134,114 +136,178 @@ fn schedules_of_classic_and_arbitrary_windings_hold_in_every_form() {
     }
 }
 
-/// Words that the file itself introduces, and what a human fills in.
-const FREE: &[&str] = &["program", "document", "pattern", "schema_version", "measured_length_m", "checked_by"];
+/// Every form in which a schedule leaves the program, by name.
+fn forms(file: &ModelFile, named: &NamedPattern) -> Vec<(&'static str, String)> {
+    let (schedule, document) = plan(file, named);
+    let pitch_m = file.model.coil.axial_pitch_m();
+    let traveller = traveller(&document, &schedule, &file.production, pitch_m);
+    let program = machine_program(&document, &schedule, &file.production, pitch_m);
+    vec![
+        ("schedule.csv", document.csv().unwrap()),
+        ("schedule.json", serde_json::to_string_pretty(&document).unwrap()),
+        ("traveller.csv", traveller.csv().unwrap()),
+        ("traveller.json", serde_json::to_string_pretty(&traveller).unwrap()),
+        ("traveller.html", traveller_page(&traveller, &named.pattern)),
+        ("program.csv", program.csv().unwrap()),
+        ("program.gcode", gcode(&program)),
+    ]
+}
 
-/// Changes one field of a JSON document at random; its name, and whether the change can be seen at all.
-fn mutate(value: &mut Value, name: &str, random: &mut ChaCha8Rng) -> String {
-    match value {
-        Value::Object(map) => {
-            let keys: Vec<String> = map.keys().filter(|k| !FREE.contains(&k.as_str())).cloned().collect();
-            let key = keys[random.random_range(0..keys.len())].clone();
-            mutate(&mut map[&key], &key, random)
+/// The fields of a text: words and numbers; of a page those that are seen or that are its data.
+fn fields(form: &str, text: &str) -> Vec<std::ops::Range<usize>> {
+    let mut found: Vec<std::ops::Range<usize>> = Vec::new();
+    let (mut in_tag, mut hidden) = (false, false);
+    for (i, c) in text.char_indices() {
+        if form.ends_with("html") {
+            if c == '<' {
+                in_tag = true;
+                let is_data = text[i..].starts_with("<script type=\"application/json\"");
+                let hides = ["<style", "<script"].iter().any(|tag| text[i..].starts_with(tag)) && !is_data;
+                hidden = hides || (hidden && !text[i..].starts_with("</"));
+            }
+            let inside = in_tag || hidden;
+            in_tag &= c != '>';
+            if inside {
+                continue;
+            }
         }
-        Value::Array(list) if !list.is_empty() => {
-            let i = random.random_range(0..list.len());
-            mutate(&mut list[i], name, random)
+        if c.is_alphanumeric() || "._+-".contains(c) {
+            match found.last_mut() {
+                Some(last) if last.end == i => last.end = i + c.len_utf8(),
+                _ => found.push(i..i + c.len_utf8()),
+            }
         }
-        Value::Number(number) if number.is_i64() || number.is_u64() => {
-            let old = number.as_i64().unwrap();
-            let change = [-2, -1, 1, 2, 100][random.random_range(0..5)];
-            *value = Value::from(old + change);
-            name.to_owned()
+    }
+    found
+}
+
+/// One character of a field becomes another one, goes, or is doubled.
+fn mutate(field: &str, random: &mut ChaCha8Rng) -> String {
+    let mut characters: Vec<char> = field.chars().collect();
+    let at = random.random_range(0..characters.len());
+    let old = characters[at];
+    match random.random_range(0..4) {
+        0 => drop(characters.remove(at)),
+        1 => characters.insert(at, old),
+        _ if old.is_ascii_digit() => {
+            let digit = old.to_digit(10).unwrap();
+            characters[at] = char::from_digit((digit + random.random_range(1..10)) % 10, 10).unwrap();
         }
-        Value::Number(number) => {
-            let old = number.as_f64().unwrap();
-            let new = match random.random_range(0..4) {
-                0 => old + 2e-3,
-                1 => -old - 1.0,
-                2 => old * 1.01 + 1e-2,
-                _ => 0.5 * old - 1e-2,
-            };
-            *value = Value::from(new);
-            name.to_owned()
-        }
-        Value::String(text) => {
-            text.push('x');
-            name.to_owned()
-        }
-        Value::Bool(flag) => {
-            *flag = !*flag;
-            name.to_owned()
-        }
-        other => {
-            *other = Value::from("A");
-            name.to_owned()
-        }
+        _ => characters[at] = if old == 'x' { 'y' } else { 'x' },
+    }
+    characters.into_iter().collect()
+}
+
+/// What a file claims, without what it may say as it likes: the name of its pattern and of the program that wrote it,
+/// and at which of several equal maxima the worst rate error was read.
+fn substance(text: &str) -> Option<Claim> {
+    let mut claim = parse_claim("file", text).ok()?;
+    claim.pattern = None;
+    claim.worst_time_s = None;
+    if let Some(page) = &mut claim.page
+        && let Some(i) = page.iter().position(|p| p.text == "Made by")
+        && i + 1 < page.len()
+    {
+        page.remove(i + 1);
+    }
+    Some(claim)
+}
+
+/// A number that moves by one unit of its last printed digit at most and is still within half of one of the true value
+/// (or the verification would have said so).
+fn same_to_the_last_digit(old: &str, new: &str) -> bool {
+    let decimals = old.split_once('.').map_or(0, |(_, digits)| digits.len() as i32);
+    match (old.parse::<f64>(), new.parse::<f64>()) {
+        (Ok(old), Ok(new)) => decimals > 0 && (old - new).abs() <= 1.001 * 10f64.powi(-decimals),
+        _ => false,
     }
 }
 
 #[test]
-fn of_a_thousand_single_changes_none_goes_unnoticed() {
+fn of_a_thousand_changes_of_one_field_in_any_form_each_is_noticed_or_changes_nothing_that_is_claimed() {
     let mut random = ChaCha8Rng::seed_from_u64(1);
+    let mut counts: std::collections::BTreeMap<&str, [usize; 4]> = std::collections::BTreeMap::new();
     let mut unnoticed = Vec::new();
-    for (text, named) in [
-        (PAPER, classic(Classic::Qua, 16).unwrap()),
-        (PAPER, classic(Classic::Sym, 16).unwrap()),
-        (PAPER, shuffled(16, 3)),
-        (LONG, classic(Classic::Oct, 40).unwrap()),
+    for (text, named, changes) in [
+        (PAPER, classic(Classic::Qua, 16).unwrap(), 75),
+        (PAPER, shuffled(16, 3), 75),
+        (LONG, classic(Classic::Oct, 40).unwrap(), 12),
     ] {
         let file = model(text);
-        let document = serde_json::to_value(program(&file, &named)).unwrap();
-        for _ in 0..250 {
-            let mut changed = document.clone();
-            // Half of the changes go to the rows, which are most of the file.
-            let field = if random.random::<bool>() {
-                mutate(&mut changed["steps"], "steps", &mut random)
-            } else {
-                mutate(&mut changed, "document", &mut random)
-            };
-            if changed == document {
-                continue;
-            }
-            if judged(&file, &changed.to_string()).is_some_and(|found| found.violations.is_empty()) {
-                unnoticed.push((named.name.clone(), field));
+        for (form, whole) in forms(&file, &named) {
+            let clean = judged(&file, &whole).unwrap();
+            assert_eq!(clean.violations, [], "{form}");
+            let original = substance(&whole);
+            let fields = fields(form, &whole);
+            for _ in 0..changes {
+                let span = fields[random.random_range(0..fields.len())].clone();
+                let new = mutate(&whole[span.clone()], &mut random);
+                let changed = format!("{}{new}{}", &whole[..span.start], &whole[span.end..]);
+                let count: &mut [usize; 4] = counts.entry(form).or_default();
+                match judged(&file, &changed) {
+                    None => count[0] += 1,
+                    Some(found) if !found.violations.is_empty() => count[1] += 1,
+                    Some(_) if substance(&changed) == original => count[2] += 1,
+                    Some(_) if same_to_the_last_digit(&whole[span.clone()], &new) => count[3] += 1,
+                    Some(_) => unnoticed.push(format!("{form}: \"{}\" became \"{new}\"", &whole[span])),
+                }
             }
         }
     }
-    // A worst time that moves along a flat maximum leaves the claimed digits as they are.
-    unnoticed.retain(|(_, field)| field != "worst_time_s");
-    assert_eq!(unnoticed, []);
+    let mut total = 0;
+    for (form, [refused, violations, harmless, close]) in &counts {
+        println!(
+            "{form:15} {refused:4} refused as no schedule, {violations:4} violations, {harmless:4} change nothing claimed"
+        );
+        total += refused + violations + harmless;
+    }
+    println!("{total} changes of one field, {} unnoticed", unnoticed.len());
+    assert_eq!(unnoticed, Vec::<String>::new());
+    assert!(total >= 1000, "{total}");
 }
 
 #[test]
-fn a_change_of_any_cell_of_the_csv_or_any_word_of_the_program_is_noticed() {
+fn a_page_whose_visible_table_was_altered_is_caught_though_its_data_are_right() {
     let file = model(PAPER);
-    let full = program(&file, &classic(Classic::Qua, 16).unwrap());
-    let mut random = ChaCha8Rng::seed_from_u64(2);
-    for text in [full.csv().unwrap(), gcode(&full)] {
-        let is_csv = text.starts_with("step");
-        let digits: Vec<usize> = text.char_indices().filter(|(_, c)| c.is_ascii_digit()).map(|(i, _)| i).collect();
-        for _ in 0..300 {
-            let at = digits[random.random_range(0..digits.len())];
-            let old = text.as_bytes()[at];
-            let new = b'0' + (old - b'0' + random.random_range(1..10u8)) % 10;
-            let mut changed = text.clone().into_bytes();
-            changed[at] = new;
-            let changed = String::from_utf8(changed).unwrap();
-            let line_start = text[..at].rfind('\n').map_or(0, |i| i + 1);
-            let line = text[line_start..].lines().next().unwrap();
-            let is_head = if is_csv {
-                line_start == 0
-            } else {
-                line.starts_with("; coilwright") || line.starts_with("; X") || line.starts_with("; F")
-            };
-            let names_program = line.contains("\"program\"") && !is_csv;
-            if is_head || names_program {
-                continue;
+    let (_, page) = forms(&file, &classic(Classic::Qua, 16).unwrap()).swap_remove(4);
+    for (seen, altered, field) in [
+        ("<td>12.500</td>", "<td>12.600</td>", "length_m on the page"),
+        ("first → second", "second → first", "direction on the page"),
+        ("UV acrylate", "epoxy", "Adhesive on the page"),
+        ("0.120", "0.150", "tension_n on the page"),
+        ("half A</text>", "half B</text>", "a heading on the page"),
+    ] {
+        assert!(page.contains(seen), "{seen}");
+        let found = judged(&file, &page.replacen(seen, altered, 1)).unwrap();
+        let fields: Vec<&str> = found.violations.iter().map(|v| v.field.as_str()).collect();
+        assert_eq!(fields, [field], "{seen}");
+    }
+    let found = judged(&file, &page.replacen("<h2>Release", "<p>Skip step 3.</p><h2>Release", 1)).unwrap();
+    assert!(found.violations.iter().any(|v| v.field == "the page"), "{:?}", found.violations);
+}
+
+#[test]
+fn schedules_of_the_shipped_coils_hold_in_every_form_for_classic_and_searched_windings() {
+    for (example, searched) in
+        [("paper-200m", &["searched-standard-12", "searched-any-12"][..]), ("coil-998m", &["searched-standard-40"][..])]
+    {
+        let path = Path::new("examples").join(example).with_extension("toml");
+        let file = parse_model(&path, &std::fs::read_to_string(&path).unwrap()).unwrap();
+        let layers = file.model.coil.layers();
+        let classics = Classic::ALL.into_iter().filter_map(|c| classic(c, layers));
+        let searched = searched.iter().map(|name| {
+            let text = std::fs::read_to_string(Path::new("patterns").join(name).with_extension("toml")).unwrap();
+            parse_pattern(name, &text).unwrap()
+        });
+        for named in classics.chain(searched) {
+            let mut checks = 0;
+            for (form, text) in forms(&file, &named) {
+                let found = judged(&file, &text).unwrap_or_else(|| panic!("{} {form} is not understood", named.name));
+                assert_eq!(found.violations, [], "{example} {} {form}", named.name);
+                assert!(matches!(found.rate_check, RateCheck::Independent { .. }));
+                checks += found.checks;
             }
-            let noticed = judged(&file, &changed).is_none_or(|found| !found.violations.is_empty());
-            assert!(noticed, "{line}\n{}", &changed[line_start..].lines().next().unwrap());
+            println!("{example} {}: 7 forms, {checks} checks, no violation", named.name);
         }
     }
 }

@@ -146,6 +146,10 @@ pub fn parse_gcode(file: &str, text: &str) -> Result<ScheduleJson, Faults> {
     if !ended {
         faults.push(Fault::new("the program does not end with M30: is it whole?", None));
     }
+    for step in steps.iter().filter(|step| step.crossover.is_none()) {
+        let message = format!("layer {} has no comment that begins with \"; crossover\"", step.layer);
+        faults.push(Fault::new(message, None));
+    }
     if head.is_none() {
         faults.push(Fault::new("the comment that begins with \"; head\" is missing", None));
     }

@@ -18,6 +18,7 @@ pub mod measurement_folder;
 pub mod metrics_json;
 pub mod model_edit;
 pub mod model_file;
+mod page_reader;
 pub mod pareto_json;
 pub mod pattern_file;
 mod production_table;

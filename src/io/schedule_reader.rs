@@ -10,7 +10,9 @@ use crate::verify::{Claim, ClaimedReel, Row, Shop};
 
 use super::fault::{Fault, Faults};
 use super::files::read_text;
-use super::machine_program::parse_gcode;
+use super::json::SCHEMA_VERSION;
+use super::machine_program::{PROGRAM_VERSION, parse_gcode};
+use super::page_reader::shown;
 use super::schedule_file::{ProductionJson, ScheduleJson, StepJson};
 
 /// The element of a traveller's page that holds its data.
@@ -45,16 +47,19 @@ pub fn parse_claim(file: &str, text: &str) -> Result<Claim, Faults> {
             return Err(Faults::of_file(file, "the page holds no schedule: expected one that coilwright wrote"));
         };
         let data = rest.split_once("</script>").map_or(rest, |(data, _)| data);
-        parse_json(file, text, data).map(|document| claim_of(&document))
+        let claim = parse_json(file, text, data).map(|document| claim_of(&document))?;
+        Ok(Claim { page: Some(shown(text)), ..claim })
     } else if start.starts_with('%') || start.starts_with(';') {
-        parse_gcode(file, text).map(|document| claim_of(&document))
+        parse_gcode(file, text)
+            .and_then(|document| known_kind(file, text, document))
+            .map(|document| claim_of(&document))
     } else {
         parse_csv(file, text)
     }
 }
 
 fn parse_json(file: &str, source: &str, json: &str) -> Result<ScheduleJson, Faults> {
-    serde_json::from_str(json).map_err(|error| {
+    let document: ScheduleJson = serde_json::from_str(json).map_err(|error| {
         let offset = json.as_ptr() as usize - source.as_ptr() as usize;
         let line_start: usize =
             json.split_inclusive('\n').take(error.line().saturating_sub(1)).map(str::len).sum::<usize>() + offset;
@@ -64,7 +69,30 @@ fn parse_json(file: &str, source: &str, json: &str) -> Result<ScheduleJson, Faul
         }
         let message = format!("this is no schedule as coilwright writes it: {error}");
         Faults::one(file, source, Fault::new(message, Some(at..at)))
-    })
+    })?;
+    known_kind(file, source, document)
+}
+
+/// Only what this version of the program knows how to read.
+fn known_kind(file: &str, source: &str, document: ScheduleJson) -> Result<ScheduleJson, Faults> {
+    let mut faults = Vec::new();
+    if document.schema_version != SCHEMA_VERSION {
+        let message = format!(
+            "schema_version must be {SCHEMA_VERSION}, found {}: use the program that wrote the file",
+            document.schema_version
+        );
+        faults.push(Fault::new(message, None));
+    }
+    let program = format!("machine program {PROGRAM_VERSION}");
+    if !["schedule", "traveller", &program].contains(&document.document.as_str()) {
+        let message = format!("document must be schedule, traveller or {program}, found \"{}\"", document.document);
+        faults.push(Fault::new(message, None));
+    }
+    if faults.is_empty() {
+        Ok(document)
+    } else {
+        Err(Faults { file: file.to_owned(), source: source.to_owned(), faults })
+    }
 }
 
 fn parse_csv(file: &str, text: &str) -> Result<Claim, Faults> {
@@ -210,6 +238,7 @@ fn claim_of(document: &ScheduleJson) -> Claim {
         ),
         shop: document.production.as_ref().map(shop_of_json),
         rows: document.steps.iter().map(row_of).collect(),
+        page: None,
     }
 }
 

@@ -10,8 +10,10 @@
 //! formula, and those temperatures.
 
 mod expected;
+mod grid;
 mod heat;
 mod optics;
+mod page;
 mod physics;
 mod rate;
 
@@ -39,6 +41,15 @@ pub struct Claim {
     pub supply: Option<Vec<ClaimedReel>>,
     pub shop: Option<Shop>,
     pub rows: Vec<Row>,
+    /// What a reader sees, where the file is a page.
+    pub page: Option<Vec<Shown>>,
+}
+
+/// A piece of text on a page, with the element that holds it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Shown {
+    pub element: String,
+    pub text: String,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -233,6 +244,9 @@ pub fn verify(truth: &Truth, claim: &Claim) -> Verification {
                 "the model file is not the one that the schedule was made from: use that revision or emit again";
             findings.add(None, "model_sha256", truth.model_sha256.to_owned(), found.clone(), remedy);
         }
+    }
+    if let Some(found) = &claim.page {
+        page::check(claim, found, &mut findings);
     }
     let segments = expected::permutation(truth, claim, &mut findings);
     let mut rate_check = RateCheck::None;
