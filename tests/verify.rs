@@ -257,9 +257,9 @@ fn of_a_thousand_changes_of_one_field_in_any_form_each_is_noticed_or_changes_not
     let mut total = 0;
     for (form, [refused, violations, harmless, close]) in &counts {
         println!(
-            "{form:15} {refused:4} refused as no schedule, {violations:4} violations, {harmless:4} change nothing claimed"
+            "{form:15} {refused:4} refused as no schedule, {violations:4} violations, {harmless:4} change nothing claimed, {close:4} are as close to the truth"
         );
-        total += refused + violations + harmless;
+        total += refused + violations + harmless + close;
     }
     println!("{total} changes of one field, {} unnoticed", unnoticed.len());
     assert_eq!(unnoticed, Vec::<String>::new());
