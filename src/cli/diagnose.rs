@@ -1,19 +1,36 @@
 //! `diagnose`: which effect a model lacks, judged by records.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use super::report::{REPORT_FILE, write_report};
 use super::schedule::pattern_of;
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
-use crate::diagnose::{self, Request};
-use crate::io::diagnosis_json::{DiagnosisJson, FindingJson, ParameterJson};
-use crate::io::model_file::read_model;
+use crate::diagnose::experiment::{Chamber, design, rivals};
+use crate::diagnose::{self, Diagnosis, Request};
+use crate::io::diagnosis_json::{DiagnosisJson, DiagnosisRow, FindingJson};
+use crate::io::files::write_atomically;
+use crate::io::inputs_json::{InputsJson, RecordInputJson};
+use crate::io::measurement_folder::{
+    DIAGNOSIS_FILE, MODEL_FILE, before_and_after_name, check_free, write_document, write_table,
+};
+use crate::io::model_edit::{Remark, with_effect};
+use crate::io::model_file::{ModelFile, read_model};
+use crate::io::profile_file::print_profile;
 use crate::io::record_file::read_record;
+use crate::io::schedule_file::{RATE_DECIMALS, rounded};
+use crate::pattern::Pattern;
+use crate::predict::{noise_floor_rad_per_s, predict};
+use crate::rate::CoilModel;
+use crate::record::Record;
+use crate::report::diagnosis::{self, before_and_after_chart, rest_in_words, value_in_words, verdict_in_words};
+use crate::report::ladder::ladder_chart;
+use crate::units::deg_per_h_from_rad_per_s;
 
 /// Which piece of physics a model lacks: fits every known effect to records and says what is missing, and how sure
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  coilwright diagnose coil.toml calibration.csv --holdout validation.csv\n  coilwright diagnose coil.toml monday.csv tuesday.csv --format json --strict\n\nExit code 1 with --strict if the model is not adequate."
+    after_help = "Examples:\n  coilwright diagnose coil.toml calibration.csv --holdout validation.csv\n  coilwright diagnose coil.toml monday.csv tuesday.csv --format json --strict\n  coilwright diagnose coil.toml calibration.csv --holdout validation.csv -o results/coil --experiment next.toml\n\nExit code 1 with --strict if the model is not adequate."
 )]
 pub struct Arguments {
     /// The model file
@@ -30,6 +47,23 @@ pub struct Arguments {
     /// Ends with exit code 1 unless the model is adequate
     #[arg(long)]
     strict: bool,
+    /// Writes diagnosis.json, the ladder, the extended model, residuals before and after, and report.html into this folder
+    #[arg(long, short, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Writes the profile that would tell the candidates apart, for `evaluate --profiles` and `temperatures --profiles`
+    #[arg(long, value_name = "FILE")]
+    experiment: Option<PathBuf>,
+    /// Seed of the profiles that the experiment is chosen from
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+/// What was asked and found.
+struct Found<'a> {
+    pattern: &'a Pattern,
+    records: &'a [Record],
+    holdout: &'a [Record],
+    diagnosis: &'a Diagnosis,
 }
 
 /// The diagnosis reports its progress in this many parts.
@@ -37,6 +71,9 @@ const PARTS: f64 = 100.0;
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
+    if let Some(folder) = &arguments.output {
+        check_free(folder)?;
+    }
     let pattern = pattern_of(&file, arguments.pattern.as_deref())?.pattern;
     // Gross errors are left out by the diagnosis itself, which says so.
     let read =
@@ -46,10 +83,94 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let request = Request { model: &file.model, pattern: &pattern, records: &records, holdout: &holdout };
     let diagnosis = diagnose::diagnose(&request, &|share| progress.at((share * PARTS) as u64, ""))?;
     progress.finish();
-    let body = DiagnosisJson::new(&file.model.name, &diagnosis);
+    let mut inputs = Vec::new();
+    for (paths, role) in [(&arguments.records, "fitted"), (&arguments.holdout, "held out")] {
+        for path in paths {
+            inputs.push(RecordInputJson::new(path, role)?);
+        }
+    }
+    let wanted = arguments.output.is_some() || arguments.experiment.is_some();
+    let all: Vec<&Record> = records.iter().chain(&holdout).collect();
+    let experiment = Chamber::of(&all)
+        .filter(|_| wanted)
+        .and_then(|chamber| design(&rivals(&file.model, &diagnosis), &pattern, &chamber, arguments.seed));
+    let holdout_noise = (!holdout.is_empty()).then(|| noise_of(&holdout));
+    let inputs = InputsJson::new(Some(&file), inputs);
+    let body = DiagnosisJson::new(&file.model.name, &diagnosis, holdout_noise, experiment.as_ref(), inputs);
+    if let Some(path) = &arguments.experiment {
+        match (&experiment, &body.experiment) {
+            (Some(found), Some(shown)) => {
+                let remarks = [format!("For {}: tells candidates apart.", file.model.name), shown.statement.clone()];
+                write_atomically(path, print_profile(&found.profile, &remarks).as_bytes())?;
+                screen.note(&format!("wrote {}", path.display()));
+            }
+            _ => screen.note("there is nothing to tell apart: no experiment was written"),
+        }
+    }
+    if let Some(folder) = &arguments.output {
+        let found = Found { pattern: &pattern, records: &records, holdout: &holdout, diagnosis: &diagnosis };
+        write_folder(folder, &file, &body, &found)?;
+        screen.note(&format!("wrote {}", folder.join(REPORT_FILE).display()));
+    }
     let adequate = diagnosis.verdict == diagnose::Verdict::Adequate;
     screen.answer(body, text)?;
     Ok(if arguments.strict && !adequate { Ending::No } else { Ending::Done })
+}
+
+/// Root mean square of the records' noises, each by its rows.
+fn noise_of(records: &[Record]) -> f64 {
+    let square = |r: &Record| noise_floor_rad_per_s(r).powi(2) * r.rows() as f64;
+    let rows: usize = records.iter().map(Record::rows).sum();
+    (records.iter().map(square).sum::<f64>() / rows as f64).sqrt()
+}
+
+/// Everything about the diagnosis, and the page.
+fn write_folder(folder: &Path, file: &ModelFile, body: &DiagnosisJson, found: &Found) -> Result<(), CliError> {
+    write_atomically(&folder.join("ladder.svg"), ladder_chart(body).svg().as_bytes())?;
+    write_atomically(&folder.join(MODEL_FILE), file.source.as_bytes())?;
+    if !body.effects.is_empty() {
+        let mut source = file.source.clone();
+        for (finding, shown) in found.diagnosis.effects.iter().zip(&body.effects) {
+            let name = file.path.display().to_string();
+            source = with_effect(&name, &source, &finding.effect, &remarks(shown))?;
+        }
+        write_atomically(&folder.join("extended.toml"), source.as_bytes())?;
+        for (index, record) in found.records.iter().chain(found.holdout).enumerate() {
+            let rows = before_and_after(file, found, record)?;
+            let noise = deg_per_h_from_rad_per_s(noise_floor_rad_per_s(record));
+            let chart = before_and_after_chart(&format!("Residual of {}", record.name()), &rows, noise);
+            write_table(folder, &before_and_after_name(index + 1), &rows)?;
+            let picture = diagnosis::before_and_after_name(index + 1);
+            write_atomically(&folder.join(picture), chart.svg().as_bytes())?;
+        }
+    }
+    write_document(folder, DIAGNOSIS_FILE, body)?;
+    write_report(folder, &folder.join(REPORT_FILE))?;
+    Ok(())
+}
+
+/// What the declared and the extended model leave of a record.
+fn before_and_after(file: &ModelFile, found: &Found, record: &Record) -> Result<Vec<DiagnosisRow>, CliError> {
+    let left = |model: &CoilModel| -> Result<Vec<f64>, CliError> {
+        let predicted = predict(model, found.pattern, record)?.rate_rad_per_s;
+        let residuals = record.rate_rad_per_s().iter().zip(predicted);
+        Ok(residuals.map(|(m, p)| rounded(deg_per_h_from_rad_per_s(m - p), RATE_DECIMALS)).collect())
+    };
+    let (declared, extended) = (left(&file.model)?, left(&found.diagnosis.extended)?);
+    let rows = record.times_s().iter().zip(declared).zip(extended);
+    Ok(rows
+        .map(|((&time_s, residual_declared_deg_per_h), residual_extended_deg_per_h)| DiagnosisRow {
+            time_s,
+            residual_declared_deg_per_h,
+            residual_extended_deg_per_h,
+        })
+        .collect())
+}
+
+/// What stands behind an effect's values in a model file.
+pub(super) fn remarks(effect: &FindingJson) -> Vec<Remark> {
+    let fitted = effect.parameters.iter().filter(|(_, p)| p.fitted);
+    fitted.map(|(key, p)| Remark { key: key.clone(), text: value_in_words(p) }).collect()
 }
 
 fn text(body: &DiagnosisJson) -> String {
@@ -57,20 +178,9 @@ fn text(body: &DiagnosisJson) -> String {
     for effect in &body.effects {
         text += &format!("\n{}\n", effect_in_words(effect));
     }
-    if let Some(rest) = &body.unexplained {
-        text += &format!("\nleft over: {:.4} °/h beyond the noise", rest.excess_deg_per_h);
-        if let Some(strongest) = rest.correlations.first() {
-            text += &format!("; goes with {} (correlation {:+.2})", strongest.with, strongest.correlation);
-        }
-        text += "\n";
-        for plain in &rest.plain {
-            let scale = match (plain.period_s, plain.time_constant_s) {
-                (Some(period_s), _) => format!(" of period {period_s:.0} s"),
-                (_, Some(time_constant_s)) => format!(" of time constant {time_constant_s:.0} s"),
-                _ => String::new(),
-            };
-            text += &format!("  as a {}{scale}: {:.4} °/h rms\n", plain.shape, plain.rms_deg_per_h);
-        }
+    let rest = rest_in_words(body);
+    if !rest.is_empty() {
+        text += &format!("\n{}\n", rest.join("\n"));
     }
     text += "\n";
     let number = |v: f64| format!("{v:.4}");
@@ -84,27 +194,20 @@ fn text(body: &DiagnosisJson) -> String {
         ]
     });
     text += &table(&["model", "error °/h", "hold-out °/h", "reduced χ²", "BIC"], rows);
-    text += &format!("noise floor {:.4} °/h\n", body.noise_floor_deg_per_h);
+    text += &format!("noise floor {:.4} °/h\n\n", body.noise_floor_deg_per_h);
+    for step in &body.ladder_in_words {
+        text += &format!("{step}\n");
+    }
     if let Some(experiment) = &body.suggested_experiment {
         text += &format!("next experiment: {experiment}\n");
+    }
+    if let Some(experiment) = &body.experiment {
+        text += &format!("{}\n", experiment.statement);
     }
     for caution in &body.cautions {
         text += &format!("note: {caution}\n");
     }
     text
-}
-
-fn verdict_in_words(body: &DiagnosisJson) -> String {
-    let kinds = || body.effects.iter().map(|e| e.kind.as_str()).collect::<Vec<_>>().join(" and ");
-    match body.verdict {
-        "adequate" => "adequate — these records show nothing that the model lacks".to_owned(),
-        "missing" => format!("missing — the model lacks {}", kinds()),
-        "indistinguishable" => format!("indistinguishable — {} or an equivalent is missing", kinds()),
-        _ if body.effects.is_empty() => {
-            "unexplained — something is there that no combination of known effects explains".to_owned()
-        }
-        _ => format!("unexplained — {} explains a part only", kinds()),
-    }
 }
 
 fn effect_in_words(effect: &FindingJson) -> String {
@@ -124,21 +227,6 @@ fn effect_in_words(effect: &FindingJson) -> String {
             "\n  {} does as well: χ² differs by {:.1}, the responses' correlation is {:+.4}",
             other.kind, other.chi_square_more, other.correlation
         );
-    }
-    text
-}
-
-/// With its error, and whether a bound holds it.
-pub(super) fn value_in_words(parameter: &ParameterJson) -> String {
-    let mut text = format!("{:.5e}", parameter.value);
-    if let Some(error) = parameter.standard_error {
-        text += &format!(" ± {error:.1e}");
-    }
-    if parameter.unit != "1" {
-        text += &format!(" {}", parameter.unit);
-    }
-    if parameter.at_bound {
-        text += " (at its bound)";
     }
     text
 }

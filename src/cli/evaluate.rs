@@ -9,6 +9,7 @@ use crate::io::json::{EvaluateJson, PatternJson};
 use crate::io::model_edit::with_ramps;
 use crate::io::model_file::{ModelFile, NamedPattern, read_model};
 use crate::io::pattern_file::resolve_pattern;
+use crate::io::profile_file::read_profile_file;
 use crate::pattern::classic::Classic;
 use crate::rate::RateModel;
 use crate::search::guaranteed::{GuaranteedError, UnitStep};
@@ -26,13 +27,19 @@ pub struct Arguments {
     /// model's own and all classics that fit
     #[arg(long, short, value_name = "PATTERN")]
     pattern: Vec<String>,
+    /// A file with a [profiles] table, used instead of the model's
+    #[arg(long, value_name = "FILE")]
+    profiles: Option<PathBuf>,
     /// Write a copy of the model file in which the profiles that attain the guaranteed worst cases are listed
     #[arg(long, value_name = "FILE")]
     bang_bang: Option<PathBuf>,
 }
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
-    let file = read_model(&arguments.model)?;
+    let mut file = read_model(&arguments.model)?;
+    if let Some(path) = &arguments.profiles {
+        file.profiles = read_profile_file(path)?;
+    }
     for advice in &file.advice {
         screen.note(&format!("note: {advice}"));
     }

@@ -2,21 +2,24 @@
 
 use std::path::PathBuf;
 
-use super::diagnose::value_in_words;
-use super::records::{GrossErrors, read_noticed};
+use super::diagnose::remarks;
+use super::records::{GrossErrors, Noticed, read_noticed};
 use super::schedule::pattern_of;
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
+use crate::compare::compare;
 use crate::diagnose::{self, Finding, Request};
 use crate::effect::custom::Formula;
 use crate::effect::{CUSTOM, DeclaredEffect};
-use crate::io::diagnosis_json::{AgreementJson, ExtendJson, FindingJson};
+use crate::io::comparison_json::{CompareJson, PartJson, RecordComparisonJson};
+use crate::io::diagnosis_json::{ExtendJson, FindingJson};
 use crate::io::files::write_atomically;
-use crate::io::model_edit::{Remark, with_effect};
+use crate::io::inputs_json::{InputsJson, RecordInputJson};
+use crate::io::model_edit::with_effect;
 use crate::io::model_file::{ModelFile, read_model};
-use crate::predict::predict;
 use crate::rate::CoilModel;
 use crate::record::Record;
+use crate::report::diagnosis::value_in_words;
 
 /// Adds an effect to a model file, fitted to records; comments and layout of the file are kept
 #[derive(Debug, clap::Args)]
@@ -32,6 +35,9 @@ pub struct Arguments {
     /// A record to fit the effect to; may be repeated. Without it, the effect gets its start values
     #[arg(long, value_name = "RECORD")]
     fit: Vec<PathBuf>,
+    /// A record to show before and after without fitting to it; may be repeated
+    #[arg(long, value_name = "RECORD")]
+    holdout: Vec<PathBuf>,
     /// The new model file
     #[arg(long, short, value_name = "NEW")]
     output: PathBuf,
@@ -54,35 +60,44 @@ fn named_value(stated: &str) -> Result<(String, f64), String> {
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
-    let pattern = pattern_of(&file, arguments.pattern.as_deref())?.pattern;
+    let named = pattern_of(&file, arguments.pattern.as_deref())?;
     let wanted = wanted(arguments, &file)?;
-    let records: Vec<Record> = arguments
-        .fit
-        .iter()
-        .map(|path| Ok(read_noticed(path, GrossErrors::Drop, screen)?.record))
-        .collect::<Result<_, CliError>>()?;
+    let mut given: Vec<(Noticed, RecordInputJson)> = Vec::new();
+    for (paths, role) in [(&arguments.fit, "fitted"), (&arguments.holdout, "held out")] {
+        for path in paths {
+            given.push((read_noticed(path, GrossErrors::Drop, screen)?, RecordInputJson::new(path, role)?));
+        }
+    }
+    let records: Vec<Record> = given[..arguments.fit.len()].iter().map(|(n, _)| n.record.clone()).collect();
     let (finding, extended) = if records.is_empty() {
         let mut model = file.model.clone();
         model.effects.retain(|e| e.kind() != wanted.kind());
         model.effects.push(wanted.clone());
         (Finding::unfitted(wanted), model)
     } else {
-        let request = Request { model: &file.model, pattern: &pattern, records: &records, holdout: &[] };
+        let request = Request { model: &file.model, pattern: &named.pattern, records: &records, holdout: &[] };
         let extension = diagnose::extend(&request, &wanted)?;
         (extension.finding, extension.extended)
     };
-    let agreements = |model: &CoilModel| -> Result<Vec<AgreementJson>, CliError> {
-        let of = |record: &Record| Ok(AgreementJson::new(record, &predict(model, &pattern, record)?));
-        records.iter().map(of).collect()
+    let compared = |model: &CoilModel| -> Result<CompareJson, CliError> {
+        let mut shown = Vec::with_capacity(given.len());
+        for (noticed, input) in &given {
+            let record = &noticed.record;
+            let names: Vec<String> = record.channels().iter().map(|c| c.name.clone()).collect();
+            let columns = model.missing_channels(&names);
+            if !columns.is_empty() {
+                return Err(CliError::ColumnsMissing { file: input.file.clone(), columns });
+            }
+            let found = compare(model, &named.pattern, record)?;
+            let gross_errors = noticed.gross_errors.clone();
+            shown.push(RecordComparisonJson::new(&input.file, &found, gross_errors, noticed.gaps));
+        }
+        let inputs = given.iter().map(|(_, input)| input.clone()).collect();
+        Ok(CompareJson::new(&model.name, &named.name, shown, InputsJson::new(Some(&file), inputs)))
     };
-    let (before, after) = (agreements(&file.model)?, agreements(&extended)?);
+    let (before, after) = (compared(&file.model)?, compared(&extended)?);
     let effect = FindingJson::new(&finding);
-    let remarks: Vec<Remark> = effect
-        .parameters
-        .iter()
-        .filter(|(_, p)| p.fitted)
-        .map(|(key, p)| Remark { key: key.clone(), text: value_in_words(p) })
-        .collect();
+    let remarks = remarks(&effect);
     let source = with_effect(&arguments.model.display().to_string(), &file.source, &finding.effect, &remarks)?;
     write_atomically(&arguments.output, source.as_bytes())?;
     let body = ExtendJson { written: arguments.output.display().to_string(), effect, before, after };
@@ -115,18 +130,45 @@ fn text(body: &ExtendJson) -> String {
     for (key, parameter) in &body.effect.parameters {
         text += &format!("  {key} = {}\n", value_in_words(parameter));
     }
-    if body.before.is_empty() {
-        return text + "no record was given: the values are start values, not fitted ones\n";
+    if body.before.inputs.records.iter().all(|r| r.role != "fitted") {
+        text += "no record to fit to was given: the values are start values, not fitted ones\n";
     }
-    let rows = body.before.iter().zip(&body.after).map(|(before, after)| {
+    for (input, (before, after)) in
+        body.before.inputs.records.iter().zip(body.before.records.iter().zip(&body.after.records))
+    {
+        text += &format!(
+            "\n{} ({}): error {:.4} -> {:.4} °/h, reduced chi-square {:.3} -> {:.3}, noise floor {:.4} °/h, {} -> {}\n",
+            before.file,
+            input.role,
+            before.rmse_deg_per_h,
+            after.rmse_deg_per_h,
+            before.reduced_chi_square,
+            after.reduced_chi_square,
+            after.noise_floor_deg_per_h,
+            before.verdict,
+            after.verdict
+        );
+        text += &table(
+            &["regime", "rows", "before °/h", "after °/h", "share before", "share after"],
+            regimes(before, after),
+        );
+    }
+    text
+}
+
+/// Both sides' regimes; which row belongs where may differ a little, as the boundary is estimated with the model.
+fn regimes(before: &RecordComparisonJson, after: &RecordComparisonJson) -> Vec<Vec<String>> {
+    let row = |part: &PartJson| {
+        let other = after.regimes.iter().find(|p| p.name == part.name);
+        let shown = |value: Option<f64>, digits: usize| value.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
         vec![
-            before.file.clone(),
-            format!("{:.4}", before.rmse_deg_per_h),
-            format!("{:.4}", after.rmse_deg_per_h),
-            format!("{:.3}", before.reduced_chi_square),
-            format!("{:.3}", after.reduced_chi_square),
-            format!("{:.4}", before.noise_floor_deg_per_h),
+            part.name.clone(),
+            part.rows.to_string(),
+            format!("{:.4}", part.rmse_deg_per_h),
+            shown(other.map(|p| p.rmse_deg_per_h), 4),
+            format!("{:.3}", part.share_of_squared_error),
+            shown(other.map(|p| p.share_of_squared_error), 3),
         ]
-    });
-    text + &table(&["record", "before °/h", "after °/h", "χ² before", "χ² after", "noise °/h"], rows)
+    };
+    before.regimes.iter().map(row).collect()
 }

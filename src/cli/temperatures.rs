@@ -7,6 +7,7 @@ use super::screen::Screen;
 use super::{CliError, Ending};
 use crate::io::files::write_atomically;
 use crate::io::model_file::{ModelFile, read_model};
+use crate::io::profile_file::read_profile_file;
 use crate::io::temperature_file::TemperaturesJson;
 use crate::pattern::classic::Classic;
 use crate::predict::predict;
@@ -27,6 +28,9 @@ pub struct Arguments {
     /// The profile's name; without it, the model's first
     #[arg(long, value_name = "NAME", conflicts_with = "record")]
     profile: Option<String>,
+    /// A file with a [profiles] table, used instead of the model's
+    #[arg(long, value_name = "FILE", conflicts_with = "record")]
+    profiles: Option<PathBuf>,
     /// Rows of the table for a profile, evenly spaced; a record's rows are its own
     #[arg(long, value_name = "N", default_value_t = 601, value_parser = clap::value_parser!(u32).range(2..=1_000_000), conflicts_with = "record")]
     rows: u32,
@@ -36,7 +40,10 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
-    let file = read_model(&arguments.model)?;
+    let mut file = read_model(&arguments.model)?;
+    if let Some(path) = &arguments.profiles {
+        file.profiles = read_profile_file(path)?;
+    }
     for advice in &file.advice {
         screen.note(&format!("note: {advice}"));
     }

@@ -19,6 +19,7 @@ mod candidate;
 mod conductivity;
 mod confirm;
 mod evidence;
+pub mod experiment;
 mod hypothesis;
 pub mod plain;
 mod search;
@@ -82,6 +83,8 @@ pub struct Equivalent {
     pub chi_square_more: f64,
     /// Cosine of the angle between the two responses in these records.
     pub correlation: f64,
+    /// The declared model with it and with the other effects as fitted beside it.
+    pub extended: CoilModel,
 }
 
 /// An accepted effect.

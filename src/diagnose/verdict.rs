@@ -254,11 +254,12 @@ fn settle_equivalents(
             continue;
         }
         let Ok(effect) = candidate.effect.with_values(member.values.clone()) else { continue };
+        let Some(extended) = trial.model_of(&rival.members) else { continue };
         kinds.push(candidate.kind());
         let theirs = response(&rival);
         let correlation =
             dot(&own, &theirs) / (sum_of_squares(&own) * sum_of_squares(&theirs)).sqrt().max(f64::MIN_POSITIVE);
-        equivalents.push(Equivalent { effect, chi_square_more: other - value, correlation });
+        equivalents.push(Equivalent { effect, chi_square_more: other - value, correlation, extended });
     }
     (main, equivalents)
 }

@@ -1,32 +1,75 @@
-//! The JSON documents of `diagnose` and `extend`.
+//! The JSON documents of `diagnose` and `extend`; the former is also read back for reports.
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
+use super::comparison_json::CompareJson;
+use super::inputs_json::InputsJson;
+use crate::diagnose::experiment::Experiment;
 use crate::diagnose::{
     Contender, Diagnosis, Equivalent, Finding, FittedParameter, Plain, Rung, Shape, Unexplained, Verdict,
 };
 use crate::effect::DeclaredEffect;
-use crate::predict::Prediction;
-use crate::record::Record;
-use crate::units::deg_per_h_from_rad_per_s;
+use crate::units::{c_per_h_from_k_per_s, deg_per_h_from_rad_per_s, h_from_s};
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DiagnosisJson {
     pub model: String,
-    pub verdict: &'static str,
+    pub verdict: String,
     pub effects: Vec<FindingJson>,
     pub ladder: Vec<RungJson>,
     pub candidates: Vec<ContenderJson>,
     pub noise_floor_deg_per_h: f64,
+    /// Null where no record was held out.
+    pub holdout_noise_floor_deg_per_h: Option<f64>,
+    /// What each step of the ladder bought, in words.
+    pub ladder_in_words: Vec<String>,
     /// Null unless the verdict is `unexplained`.
     pub unexplained: Option<UnexplainedJson>,
     pub suggested_experiment: Option<String>,
+    /// The profile that would tell the candidates apart; null unless it was asked for and there is something to tell apart.
+    pub experiment: Option<ExperimentJson>,
     pub cautions: Vec<String>,
+    pub inputs: InputsJson,
 }
 
-#[derive(Debug, Serialize)]
+/// One row of a record: what the declared model and the one with the accepted effects leave.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DiagnosisRow {
+    pub time_s: f64,
+    pub residual_declared_deg_per_h: f64,
+    pub residual_extended_deg_per_h: f64,
+}
+
+/// A profile, and how far apart the candidates' own models are under it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ExperimentJson {
+    pub profile: String,
+    pub pieces: Vec<PieceJson>,
+    pub duration_s: f64,
+    /// How many profiles it was chosen from.
+    pub profiles_tried: usize,
+    pub separations: Vec<SeparationJson>,
+    pub statement: String,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PieceJson {
+    pub rate_c_per_h: f64,
+    pub duration_s: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SeparationJson {
+    pub first: String,
+    pub second: String,
+    /// Root mean square of the difference of the two predictions, their offsets taken out.
+    pub rms_deg_per_h: f64,
+    pub multiple_of_noise: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FindingJson {
     pub kind: String,
     pub parameters: BTreeMap<String, ParameterJson>,
@@ -38,30 +81,30 @@ pub struct FindingJson {
     /// By how much χ² rises without it, on fitted and on unseen data.
     pub chi_square_less: f64,
     pub confirmed_by: f64,
-    pub experiment: &'static str,
+    pub experiment: String,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ParameterJson {
     pub value: f64,
     /// Null where the records do not determine it, at a bound, or where it was held.
     pub standard_error: Option<f64>,
-    pub unit: &'static str,
+    pub unit: String,
     pub fitted: bool,
     pub at_bound: bool,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EquivalentJson {
     pub kind: String,
     pub choices: BTreeMap<String, String>,
     pub chi_square_more: f64,
     /// Of the two predicted responses in these records.
     pub correlation: f64,
-    pub experiment: &'static str,
+    pub experiment: String,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RungJson {
     pub effects: Vec<String>,
     pub rmse_deg_per_h: f64,
@@ -71,7 +114,7 @@ pub struct RungJson {
     pub bic: f64,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ContenderJson {
     pub kind: String,
     pub choices: BTreeMap<String, String>,
@@ -80,7 +123,7 @@ pub struct ContenderJson {
     pub chi_square_less: f64,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct UnexplainedJson {
     pub excess_deg_per_h: f64,
     pub share_of_excess: f64,
@@ -88,15 +131,15 @@ pub struct UnexplainedJson {
     pub plain: Vec<PlainJson>,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CorrelationJson {
     pub with: String,
     pub correlation: f64,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlainJson {
-    pub shape: &'static str,
+    pub shape: String,
     pub period_s: Option<f64>,
     pub time_constant_s: Option<f64>,
     pub rms_deg_per_h: f64,
@@ -109,15 +152,23 @@ fn choices(effect: &DeclaredEffect) -> BTreeMap<String, String> {
 }
 
 impl DiagnosisJson {
-    pub fn new(model: &str, diagnosis: &Diagnosis) -> Self {
-        Self {
+    /// `holdout_noise_rad_per_s` is that of the records that were held out, if there are any.
+    pub fn new(
+        model: &str,
+        diagnosis: &Diagnosis,
+        holdout_noise_rad_per_s: Option<f64>,
+        experiment: Option<&Experiment>,
+        inputs: InputsJson,
+    ) -> Self {
+        let mut document = Self {
             model: model.to_owned(),
             verdict: match diagnosis.verdict {
                 Verdict::Adequate => "adequate",
                 Verdict::Missing => "missing",
                 Verdict::Indistinguishable => "indistinguishable",
                 Verdict::Unexplained => "unexplained",
-            },
+            }
+            .to_owned(),
             effects: diagnosis.effects.iter().map(FindingJson::new).collect(),
             ladder: diagnosis.ladder.iter().map(RungJson::new).collect(),
             candidates: diagnosis.candidates.iter().map(ContenderJson::new).collect(),
@@ -125,6 +176,93 @@ impl DiagnosisJson {
             unexplained: diagnosis.unexplained.as_ref().map(UnexplainedJson::new),
             suggested_experiment: diagnosis.suggested_experiment.clone(),
             cautions: diagnosis.cautions.iter().map(ToString::to_string).collect(),
+            holdout_noise_floor_deg_per_h: holdout_noise_rad_per_s.map(deg_per_h_from_rad_per_s),
+            experiment: experiment.map(|e| ExperimentJson::new(e, diagnosis.noise_floor_rad_per_s)),
+            ladder_in_words: Vec::new(),
+            inputs,
+        };
+        document.ladder_in_words = document.steps_in_words();
+        document
+    }
+
+    /// A value as a multiple of the noise of the fitted records, or of those held out.
+    pub fn multiple_of_noise(&self, value_deg_per_h: f64, holdout: bool) -> f64 {
+        let noise = self.holdout_noise_floor_deg_per_h.filter(|_| holdout).unwrap_or(self.noise_floor_deg_per_h);
+        value_deg_per_h / noise.max(f64::MIN_POSITIVE)
+    }
+
+    /// What each rung adds to the one before.
+    pub fn steps(&self) -> Vec<Vec<&str>> {
+        (0..self.ladder.len())
+            .map(|i| {
+                let before: &[String] = if i > 0 { &self.ladder[i - 1].effects } else { &[] };
+                self.ladder[i].effects.iter().filter(|e| !before.contains(e)).map(String::as_str).collect()
+            })
+            .collect()
+    }
+
+    fn steps_in_words(&self) -> Vec<String> {
+        self.ladder
+            .iter()
+            .zip(self.steps())
+            .enumerate()
+            .map(|(i, (rung, added))| {
+                let error = |value: f64, holdout: bool| {
+                    format!("{value:.4} °/h ({:.2} times the noise)", self.multiple_of_noise(value, holdout))
+                };
+                let model = match i {
+                    0 => "as declared".to_owned(),
+                    _ => format!("with {}", added.join(" and ")),
+                };
+                let unseen = rung
+                    .holdout_rmse_deg_per_h
+                    .map_or_else(String::new, |h| format!(", on the hold-out {}", error(h, true)));
+                format!("{model} the error is {} on the fitted records{unseen}", error(rung.rmse_deg_per_h, false))
+            })
+            .collect()
+    }
+}
+
+impl ExperimentJson {
+    fn new(experiment: &Experiment, noise_rad_per_s: f64) -> Self {
+        let profile = &experiment.profile;
+        let separations: Vec<SeparationJson> = experiment
+            .separations
+            .iter()
+            .map(|s| SeparationJson {
+                first: experiment.rivals[s.first].clone(),
+                second: experiment.rivals[s.second].clone(),
+                rms_deg_per_h: deg_per_h_from_rad_per_s(s.rms_rad_per_s),
+                multiple_of_noise: s.rms_rad_per_s / noise_rad_per_s.max(f64::MIN_POSITIVE),
+            })
+            .collect();
+        let apart: Vec<String> = separations
+            .iter()
+            .map(|s| {
+                format!(
+                    "{} and {} would be {:.4} °/h rms apart, {:.2} times the noise of one row",
+                    s.first, s.second, s.rms_deg_per_h, s.multiple_of_noise
+                )
+            })
+            .collect();
+        Self {
+            profile: profile.name().to_owned(),
+            pieces: profile
+                .pieces()
+                .iter()
+                .map(|p| PieceJson { rate_c_per_h: c_per_h_from_k_per_s(p.rate_k_per_s), duration_s: p.duration_s })
+                .collect(),
+            duration_s: profile.duration_s(),
+            profiles_tried: experiment.tried,
+            statement: format!(
+                "under the profile {} ({} ramps and soaks from 20 °C, {:.1} h, at most {:.0} °C/h) {}",
+                profile.name(),
+                profile.pieces().len(),
+                h_from_s(profile.duration_s()),
+                c_per_h_from_k_per_s(profile.max_rate_k_per_s()),
+                apart.join("; ")
+            ),
+            separations,
         }
     }
 }
@@ -139,7 +277,7 @@ impl FindingJson {
             equivalents_in_detail: finding.equivalents.iter().map(EquivalentJson::new).collect(),
             chi_square_less: finding.chi_square_less,
             confirmed_by: finding.confirmed_by,
-            experiment: finding.effect.spec().experiment,
+            experiment: finding.effect.spec().experiment.to_owned(),
         }
     }
 }
@@ -149,7 +287,7 @@ impl ParameterJson {
         Self {
             value: parameter.unit.from_si(parameter.value),
             standard_error: parameter.standard_error.map(|e| parameter.unit.difference_from_si(e)),
-            unit: parameter.unit.symbol(),
+            unit: parameter.unit.symbol().to_owned(),
             fitted: parameter.fitted,
             at_bound: parameter.at_bound,
         }
@@ -163,7 +301,7 @@ impl EquivalentJson {
             choices: choices(&equivalent.effect),
             chi_square_more: equivalent.chi_square_more,
             correlation: equivalent.correlation,
-            experiment: equivalent.effect.spec().experiment,
+            experiment: equivalent.effect.spec().experiment.to_owned(),
         }
     }
 }
@@ -215,7 +353,7 @@ impl PlainJson {
             Shape::Sinusoid { period_s } => ("sinusoid", Some(period_s), None),
         };
         Self {
-            shape,
+            shape: shape.to_owned(),
             period_s,
             time_constant_s,
             rms_deg_per_h: deg_per_h_from_rad_per_s(plain.rms_rad_per_s),
@@ -224,38 +362,12 @@ impl PlainJson {
     }
 }
 
-/// How well a model predicts a record.
-#[derive(Debug, Serialize)]
-pub struct AgreementJson {
-    pub file: String,
-    pub rows: usize,
-    pub rmse_deg_per_h: f64,
-    pub nrmse_fit_percent: f64,
-    pub noise_floor_deg_per_h: f64,
-    pub reduced_chi_square: f64,
-    pub offset_deg_per_h: f64,
-}
-
-impl AgreementJson {
-    pub fn new(record: &Record, prediction: &Prediction) -> Self {
-        let agreement = prediction.agreement(record);
-        Self {
-            file: record.name().to_owned(),
-            rows: record.rows(),
-            rmse_deg_per_h: deg_per_h_from_rad_per_s(agreement.rmse_rad_per_s),
-            nrmse_fit_percent: agreement.nrmse_fit_percent,
-            noise_floor_deg_per_h: deg_per_h_from_rad_per_s(prediction.noise_rad_per_s),
-            reduced_chi_square: agreement.reduced_chi_square,
-            offset_deg_per_h: deg_per_h_from_rad_per_s(prediction.offset_rad_per_s),
-        }
-    }
-}
-
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ExtendJson {
     /// The new model file.
     pub written: String,
     pub effect: FindingJson,
-    pub before: Vec<AgreementJson>,
-    pub after: Vec<AgreementJson>,
+    /// Every record given, as `compare` shows it.
+    pub before: CompareJson,
+    pub after: CompareJson,
 }

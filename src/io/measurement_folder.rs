@@ -9,12 +9,14 @@ use serde::{Deserialize, Serialize};
 
 use super::comparison_json::CompareJson;
 use super::comparison_rows::ComparisonRow;
+use super::diagnosis_json::{DiagnosisJson, DiagnosisRow};
 use super::fault::{Fault, Faults};
 use super::files::{WriteError, read_text, read_text_up_to, write_atomically};
 use super::json::Document;
 use super::metrics_json::MetricsJson;
 
 pub const COMPARISON_FILE: &str = "comparison.json";
+pub const DIAGNOSIS_FILE: &str = "diagnosis.json";
 pub const METRICS_FILE: &str = "metrics.json";
 /// A copy of the model file that was asked about.
 pub const MODEL_FILE: &str = "model.toml";
@@ -26,6 +28,8 @@ const LARGEST_TABLE_BYTES: u64 = 2 * 1024 * 1024 * 1024;
 pub struct Measurements {
     /// With one table a record.
     pub comparison: Option<(CompareJson, Vec<Vec<ComparisonRow>>)>,
+    /// With one table a record, where effects were found.
+    pub diagnosis: Option<(DiagnosisJson, Vec<Vec<DiagnosisRow>>)>,
     pub metrics: Option<MetricsJson>,
     /// The text of the model file.
     pub model_source: Option<String>,
@@ -33,7 +37,7 @@ pub struct Measurements {
 
 /// Whether a folder holds measurements rather than a search.
 pub fn holds_measurements(folder: &Path) -> bool {
-    [COMPARISON_FILE, METRICS_FILE].iter().any(|name| folder.join(name).is_file())
+    [COMPARISON_FILE, DIAGNOSIS_FILE, METRICS_FILE].iter().any(|name| folder.join(name).is_file())
 }
 
 /// Refuses a folder that holds a search, whose files have the same names.
@@ -60,9 +64,20 @@ pub fn read_measurements(folder: &Path) -> Result<Measurements, Faults> {
             Some((document, tables))
         }
     };
+    let diagnosis = match read_document::<DiagnosisJson>(folder, DIAGNOSIS_FILE, "diagnosis")? {
+        None => None,
+        Some(document) => {
+            let count = if document.effects.is_empty() { 0 } else { document.inputs.records.len() };
+            let tables = (1..=count)
+                .map(|number| read_table(&folder.join(before_and_after_name(number))))
+                .collect::<Result<_, _>>()?;
+            Some((document, tables))
+        }
+    };
     let model = folder.join(MODEL_FILE);
     Ok(Measurements {
         comparison,
+        diagnosis,
         metrics: read_document(folder, METRICS_FILE, "set of measures")?,
         model_source: if model.is_file() { Some(read_text(&model)?) } else { None },
     })
@@ -71,6 +86,11 @@ pub fn read_measurements(folder: &Path) -> Result<Measurements, Faults> {
 /// The name of the `number`-th record's table, counted from 1.
 pub fn table_name(number: usize) -> String {
     format!("record-{number}.csv")
+}
+
+/// The name of the `number`-th record's table of a diagnosis, counted from 1.
+pub fn before_and_after_name(number: usize) -> String {
+    format!("before-after-{number}.csv")
 }
 
 /// Writes a document under its name.

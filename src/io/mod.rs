@@ -22,6 +22,7 @@ mod page_reader;
 pub mod pareto_json;
 pub mod pattern_file;
 mod production_table;
+pub mod profile_file;
 mod profile_tables;
 pub mod record_file;
 pub mod run_directory;

@@ -1,11 +1,11 @@
 //! Edits of model files that keep the user's comments and layout.
 
-use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, value};
+use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, value};
 
 use super::fault::{Fault, Faults};
+use super::profile_file::pieces;
 use crate::effect::{DeclaredEffect, Subject};
 use crate::profile::Profile;
-use crate::units::c_per_h_from_k_per_s;
 
 /// A remark written behind a parameter's value, such as its standard error.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -68,28 +68,13 @@ pub fn with_ramps(file: &str, source: &str, profiles: &[Profile]) -> Result<Stri
         return Err(Faults::one(file, source, Fault::new(message, None)));
     };
     for profile in profiles {
-        let pieces: Array = profile
-            .pieces()
-            .iter()
-            .map(|piece| {
-                let mut table = InlineTable::new();
-                table.insert("rate_c_per_h", shortest(c_per_h_from_k_per_s(piece.rate_k_per_s)).into());
-                table.insert("duration_s", piece.duration_s.into());
-                table
-            })
-            .collect();
         let mut table = Table::new();
         table.decor_mut().set_prefix("\n");
         table["name"] = value(profile.name());
-        table["pieces"] = value(pieces);
+        table["pieces"] = value(pieces(profile));
         ramps.push(table);
     }
     Ok(document.to_string())
-}
-
-/// Without the last digits, which a conversion of units leaves: 10 °C/h stays 10.
-fn shortest(number: f64) -> f64 {
-    format!("{number:.13e}").parse().unwrap_or(number)
 }
 
 fn declare(table: &mut Table, effect: &DeclaredEffect, remarks: &[Remark]) {

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::page::page;
-use super::{allan, comparison};
+use super::{allan, comparison, diagnosis};
 use crate::io::inputs_json::InputsJson;
 use crate::io::measurement_folder::Measurements;
 use crate::io::schedule_file::sha256_hex;
@@ -11,12 +11,14 @@ use crate::io::schedule_file::sha256_hex;
 /// One page that opens offline.
 pub fn measurement_page(found: &Measurements) -> String {
     let name = found.comparison.as_ref().map(|(c, _)| format!("{} with {}", c.model, c.pattern));
+    let name = name.or_else(|| found.diagnosis.as_ref().map(|(d, _)| d.model.clone()));
     let title = match name {
         Some(name) => format!("{name}: model and measurement"),
         None => "Measures of a gyro".to_owned(),
     };
     let inputs: Vec<(&str, &InputsJson)> = [
         found.comparison.as_ref().map(|(c, _)| ("Comparison", &c.inputs)),
+        found.diagnosis.as_ref().map(|(d, _)| ("Diagnosis", &d.inputs)),
         found.metrics.as_ref().map(|m| ("Measures", &m.inputs)),
     ]
     .into_iter()
@@ -24,6 +26,7 @@ pub fn measurement_page(found: &Measurements) -> String {
     .collect();
     let body = html! {
         h1 { (title) }
+        @if let Some((document, tables)) = &found.diagnosis { (diagnosis::section(document, tables)) }
         @if let Some((document, tables)) = &found.comparison { (comparison::section(document, tables)) }
         @if let Some(document) = &found.metrics { (allan::section(document)) }
         h2 { "Inputs" }

@@ -3,6 +3,8 @@
 pub mod allan;
 pub mod comparison;
 pub mod cross_section;
+pub mod diagnosis;
+pub mod ladder;
 pub mod measurement;
 mod page;
 pub mod plot;

@@ -94,7 +94,9 @@ impl Layout {
         let mut x = x_axis.ruler(x_values.into_iter().chain(marks(Along::X)), x_wanted, x_margin);
         if lying {
             // Room for the numbers at the ends of the bars.
-            let room = 0.1 * (x.high - x.low);
+            let longest = chart.series.iter().flat_map(|s| &s.labels).map(|l| text_width_px(l)).max().unwrap_or(0);
+            let share = (f64::from(longest + 8) / (0.75 * f64::from(width))).min(0.6);
+            let room = (x.high - x.low) * (share / (1.0 - share)).max(0.1);
             x.high += room;
             if x.low < 0.0 && chart.series.iter().flat_map(|s| &s.points).any(|p| p.0 < 0.0) {
                 x.low -= room;

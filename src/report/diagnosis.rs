@@ -1,0 +1,211 @@
+//! A diagnosis in words, for the screen and for the page, and its part of the page.
+
+use maud::{Markup, html};
+
+use super::ladder::ladder_chart;
+use super::page::figure;
+use super::plot::{Axis, Chart, Mark, Series};
+use crate::io::diagnosis_json::{DiagnosisJson, DiagnosisRow, ExperimentJson, FindingJson, ParameterJson};
+use crate::units::{h_from_s, min_from_s, percent_from_fraction};
+
+/// Candidates that the page lists.
+const CANDIDATES_SHOWN: usize = 12;
+
+/// The verdict as a sentence.
+pub fn verdict_in_words(body: &DiagnosisJson) -> String {
+    let kinds = || body.effects.iter().map(|e| e.kind.as_str()).collect::<Vec<_>>().join(" and ");
+    match body.verdict.as_str() {
+        "adequate" => "adequate — these records show nothing that the model lacks".to_owned(),
+        "missing" => format!("missing — the model lacks {}", kinds()),
+        "indistinguishable" => format!("indistinguishable — {} or an equivalent is missing", kinds()),
+        _ if body.effects.is_empty() => {
+            "unexplained — something is there that no combination of known effects explains".to_owned()
+        }
+        _ => format!("unexplained — {} explains a part only", kinds()),
+    }
+}
+
+/// With its error, and whether a bound holds it.
+pub fn value_in_words(parameter: &ParameterJson) -> String {
+    let mut text = format!("{:.5e}", parameter.value);
+    if let Some(error) = parameter.standard_error {
+        text += &format!(" ± {error:.1e}");
+    }
+    if parameter.unit != "1" {
+        text += &format!(" {}", parameter.unit);
+    }
+    if parameter.at_bound {
+        text += " (at its bound)";
+    }
+    text
+}
+
+/// What is left over, a line a statement; none where everything is explained.
+pub fn rest_in_words(body: &DiagnosisJson) -> Vec<String> {
+    let Some(rest) = &body.unexplained else { return Vec::new() };
+    let mut first = format!("left over: {:.4} °/h beyond the noise", rest.excess_deg_per_h);
+    if let Some(strongest) = rest.correlations.first() {
+        first += &format!("; goes with {} (correlation {:+.2})", strongest.with, strongest.correlation);
+    }
+    let plain = rest.plain.iter().map(|plain| {
+        let scale = match (plain.period_s, plain.time_constant_s) {
+            (Some(period_s), _) => format!(" of period {period_s:.0} s"),
+            (_, Some(time_constant_s)) => format!(" of time constant {time_constant_s:.0} s"),
+            _ => String::new(),
+        };
+        format!("  as a {}{scale}: {:.4} °/h rms", plain.shape, plain.rms_deg_per_h)
+    });
+    std::iter::once(first).chain(plain).collect()
+}
+
+/// A record's residual before and after the accepted effects.
+pub fn before_and_after_chart(title: &str, rows: &[DiagnosisRow], noise_deg_per_h: f64) -> Chart {
+    let points = |value: fn(&DiagnosisRow) -> f64| -> Vec<(f64, f64)> {
+        rows.iter().map(|row| (min_from_s(row.time_s), value(row))).collect()
+    };
+    Chart::new(title)
+        .size(860, 320)
+        .x(Axis::linear("time [min]"))
+        .y(Axis::linear("measured − predicted [°/h]"))
+        .with(Series::line("as declared", points(|r| r.residual_declared_deg_per_h)))
+        .with(Series::line("with the effects found", points(|r| r.residual_extended_deg_per_h)))
+        .mark(Mark::horizontal("+3 × noise", 3.0 * noise_deg_per_h))
+        .mark(Mark::horizontal("", -3.0 * noise_deg_per_h))
+}
+
+/// Where the residuals of the `number`-th record go, counted from 1 over fitted records and hold-outs.
+pub fn before_and_after_name(number: usize) -> String {
+    format!("before-after-{number}.svg")
+}
+
+/// The whole diagnosis as a part of a page.
+pub(super) fn section(body: &DiagnosisJson, tables: &[Vec<DiagnosisRow>]) -> Markup {
+    html! {
+        h2 { "Diagnosis" }
+        p.big { (verdict_in_words(body)) }
+        (figure(&ladder_chart(body).svg(), "The ladder: the error as declared and after each piece of physics that was found, on the records that were fitted and on those that were not. No model can get below the noise floor."))
+        ul { @for step in &body.ladder_in_words { li { (step) } } }
+        (ladder_table(body))
+        @if !body.effects.is_empty() { h2 { "What is missing" } (effects(&body.effects)) }
+        @if body.unexplained.is_some() {
+            h2 { "What is left over" }
+            @for line in rest_in_words(body) { p { (line) } }
+        }
+        @if !body.effects.is_empty() {
+            @for (record, rows) in body.inputs.records.iter().zip(tables) {
+                @let noise = if record.role == "held out" { body.holdout_noise_floor_deg_per_h } else { None };
+                (figure(&before_and_after_chart(&format!("Residual of {}", record.file), rows, noise.unwrap_or(body.noise_floor_deg_per_h)).svg(),
+                    &format!("{}, {}: the residual of the declared model and what the effects found leave of it.", record.file, record.role)))
+            }
+        }
+        @if body.suggested_experiment.is_some() || body.experiment.is_some() { h2 { "Next experiment" } }
+        @if let Some(words) = &body.suggested_experiment { p { (words) } }
+        @if let Some(found) = &body.experiment { (experiment(found)) }
+        h2 { "Candidates" }
+        (candidates(body))
+        @if !body.cautions.is_empty() { ul { @for caution in &body.cautions { li { (caution) } } } }
+    }
+}
+
+fn ladder_table(body: &DiagnosisJson) -> Markup {
+    let unseen = |value: Option<f64>, digits: usize| value.map_or("–".to_owned(), |v| format!("{v:.digits$}"));
+    html! {
+        div.scroll { table {
+            thead { tr {
+                th.word { "Model" } th { "Error, fitted [°/h]" } th { "× noise" } th { "Error, hold-out [°/h]" } th { "× noise" }
+                th { "Reduced χ²" } th { "BIC" }
+            } }
+            tbody { @for rung in &body.ladder { tr {
+                td.word { (if rung.effects.is_empty() { "as declared".to_owned() } else { rung.effects.join(" + ") }) }
+                td { (format!("{:.5}", rung.rmse_deg_per_h)) }
+                td { (format!("{:.2}", body.multiple_of_noise(rung.rmse_deg_per_h, false))) }
+                td { (unseen(rung.holdout_rmse_deg_per_h, 5)) }
+                td { (unseen(rung.holdout_rmse_deg_per_h.map(|v| body.multiple_of_noise(v, true)), 2)) }
+                td { (format!("{:.3}", rung.reduced_chi_square)) }
+                td { (format!("{:.1}", rung.bic)) }
+            } } }
+        } }
+        p {
+            "Noise floor: " (format!("{:.5}", body.noise_floor_deg_per_h)) " °/h on the fitted records"
+            @if let Some(other) = body.holdout_noise_floor_deg_per_h { ", " (format!("{other:.5}")) " °/h on the hold-out" }
+            "."
+        }
+    }
+}
+
+fn effects(found: &[FindingJson]) -> Markup {
+    html! {
+        div.scroll { table {
+            thead { tr {
+                th.word { "Effect" } th.word { "Parameter" } th.word { "Value ± standard error" } th { "χ² less" } th { "χ² less, unseen data" }
+                th.word { "Does as well" }
+            } }
+            tbody { @for effect in found {
+                @let fitted: Vec<_> = effect.parameters.iter().filter(|(_, p)| p.fitted).collect();
+                tr {
+                    td.word {
+                        (effect.kind)
+                        @for (key, option) in &effect.choices { ", " (key) " = " (option) }
+                    }
+                    td.word { @for (key, _) in &fitted { (key) br; } }
+                    td.word { @for (_, parameter) in &fitted { (value_in_words(parameter)) br; } }
+                    td { (format!("{:.0}", effect.chi_square_less)) }
+                    td { (format!("{:.0}", effect.confirmed_by)) }
+                    td.word { @for other in &effect.equivalents_in_detail {
+                        (other.kind) " (χ² " (format!("{:+.1}", other.chi_square_more)) ", correlation of the responses " (format!("{:+.4}", other.correlation)) ")" br;
+                    } }
+                }
+            } }
+        } }
+    }
+}
+
+fn experiment(found: &ExperimentJson) -> Markup {
+    html! {
+        p { "Of " (found.profiles_tried) " profiles within what the records show the chamber to be capable of, this one tells the candidates apart best: " (found.statement) "." }
+        (figure(&experiment_chart(found).svg(), &format!("The profile {}, {:.2} h, from a steady state at 20 °C.", found.profile, h_from_s(found.duration_s))))
+        div.scroll { table {
+            thead { tr { th { "Piece" } th { "Rate [°C/h]" } th { "Duration [s]" } } }
+            tbody { @for (i, piece) in found.pieces.iter().enumerate() { tr {
+                td { (i + 1) } td { (format!("{:.2}", piece.rate_c_per_h).replace('-', "−")) } td { (format!("{:.0}", piece.duration_s)) }
+            } } }
+        } }
+    }
+}
+
+fn experiment_chart(found: &ExperimentJson) -> Chart {
+    let (mut time_s, mut temperature_c) = (0.0, 20.0);
+    let mut points = vec![(time_s, temperature_c)];
+    for piece in &found.pieces {
+        time_s += piece.duration_s;
+        temperature_c += piece.rate_c_per_h * h_from_s(piece.duration_s);
+        points.push((min_from_s(time_s), temperature_c));
+    }
+    Chart::new("The experiment's profile")
+        .size(860, 240)
+        .x(Axis::linear("time [min]"))
+        .y(Axis::linear("sensor's temperature [°C]"))
+        .with(Series::line("", points))
+}
+
+fn candidates(body: &DiagnosisJson) -> Markup {
+    let rest = body.candidates.len().saturating_sub(CANDIDATES_SHOWN);
+    let explained = |less: f64| {
+        let rows: f64 = body.candidates.iter().map(|c| c.chi_square_less).fold(f64::MIN_POSITIVE, f64::max);
+        percent_from_fraction(less / rows)
+    };
+    html! {
+        p { "Each effect of the catalogue alone, added to the declared model and fitted." }
+        div.scroll { table {
+            thead { tr { th.word { "Effect" } th { "Reduced χ²" } th { "χ² less" } th { "Of the best single one's [%]" } th { "BIC" } } }
+            tbody { @for c in body.candidates.iter().take(CANDIDATES_SHOWN) { tr {
+                td.word { (c.kind) @for (key, option) in &c.choices { ", " (key) " = " (option) } }
+                td { (format!("{:.3}", c.reduced_chi_square)) }
+                td { (format!("{:.1}", c.chi_square_less)) }
+                td { (format!("{:.1}", explained(c.chi_square_less))) }
+                td { (format!("{:.1}", c.bic)) }
+            } } }
+        } }
+        @if rest > 0 { p { "And " (rest) " more that do less." } }
+    }
+}
