@@ -4,7 +4,7 @@ use super::plot::{Axis, Chart, Mark, Series};
 use crate::io::diagnosis_json::DiagnosisJson;
 
 /// Noise floors that differ by less than this share are one line.
-const SAME_FLOOR: f64 = 0.03;
+const SAME_FLOOR: f64 = 0.08;
 
 /// Lying bars, a step below the other: the error on fitted records and on the hold-out, with the noise floor.
 pub fn ladder_chart(body: &DiagnosisJson) -> Chart {
