@@ -6,11 +6,13 @@
 //! ```
 //!
 //! The lines are fitted apart from each other, each to its own rows, and the break points are those of all pairs of
-//! half-kelvin borders that leave the least squares. dT/dt is the slope of a straight line through the rows
+//! tenths of a kelvin that leave the least squares, then moved row by row. Where lines are not joined, a break's place has
+//! no standard error in the usual sense (the likelihood has jumps there); its interval is that of the likelihood ratio:
+//! all places that leave less than σ² 7.35 more. dT/dt is the slope of a straight line through the rows
 //! around; the last term is there only if the record has the inner temperature.
 //!
 //! # Source
-//! Thesis chapter on FOG drift compensation (2021), sections 3.2 and 3.3, Eqs. (3-8) to (3-11). The digits of its text
+//! Intervals of break points: Hansen, Econometrica 68 (2000) 575. Thesis chapter on FOG drift compensation (2021), sections 3.2 and 3.3, Eqs. (3-8) to (3-11). The digits of its text
 //! are scrambled: "82.40" is 40.82 and "−11490.2" is −1149.2 (sub 0 belongs to the symbol), as Eq. (3-11) shows.
 
 use std::collections::VecDeque;
@@ -27,6 +29,8 @@ use crate::units::REFERENCE_TEMPERATURE_K;
 pub struct BiasLine {
     /// The piece ends here; infinite for the last.
     pub until_k: f64,
+    /// Where the end may lie, with 95 % confidence; None for the last.
+    pub until_within_k: Option<(f64, f64)>,
     /// At 20 °C.
     pub at_reference_rad_per_s: f64,
     pub slope_rad_per_s_k: f64,
@@ -41,6 +45,10 @@ pub struct PiecewiseBias {
 /// Width of the classes between which break points are sought.
 const CLASS_K: f64 = 0.1;
 const MOST_CLASSES: usize = 600;
+/// Rounds in which breaks are moved row by row.
+const REFINEMENTS: usize = 8;
+/// 95 % of −2 ln(1 − √(1 − x)): the likelihood ratio of a break's place.
+const LIKELIHOOD_RATIO_95: f64 = 7.352;
 /// A line needs this many rows.
 const LEAST_ROWS: f64 = 8.0;
 
@@ -87,55 +95,161 @@ impl Sums {
     }
 }
 
+/// Rows in the order of temperature, summed up.
+struct Cumulated {
+    temperature_k: Vec<f64>,
+    /// Of the rows before each place, one more than there are rows.
+    sums: Vec<Sums>,
+}
+
+impl Cumulated {
+    fn new(record: &Record) -> Self {
+        let mut rows: Vec<(f64, f64)> =
+            record.temperature_k().iter().copied().zip(record.rate_rad_per_s().iter().copied()).collect();
+        rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut sums = vec![Sums::default()];
+        let mut all = Sums::default();
+        for &(temperature_k, rate) in &rows {
+            all.add(temperature_k - REFERENCE_TEMPERATURE_K, rate);
+            sums.push(all);
+        }
+        Self { temperature_k: rows.into_iter().map(|r| r.0).collect(), sums }
+    }
+
+    fn rows(&self) -> usize {
+        self.temperature_k.len()
+    }
+
+    /// Value at 20 °C and slope of the line through some rows, and what is left.
+    fn piece(&self, from: usize, to: usize) -> Option<(f64, f64, f64)> {
+        self.sums[to].between(&self.sums[from]).fit()
+    }
+
+    fn left(&self, from: usize, to: usize) -> Option<f64> {
+        Some(self.piece(from, to)?.2)
+    }
+
+    fn left_by(&self, breaks: &[usize]) -> Option<f64> {
+        let mut from = 0;
+        let mut sum = 0.0;
+        for &to in breaks.iter().chain([&self.rows()]) {
+            sum += self.left(from, to)?;
+            from = to;
+        }
+        Some(sum)
+    }
+
+    /// Between the row before a place and the one at it.
+    fn border_k(&self, place: usize) -> f64 {
+        0.5 * (self.temperature_k[place - 1] + self.temperature_k[place])
+    }
+
+    /// A place is a border only where the temperature changes.
+    fn is_border(&self, place: usize) -> bool {
+        place > 0 && place < self.rows() && self.temperature_k[place] > self.temperature_k[place - 1]
+    }
+
+    /// Places between classes of temperature.
+    fn borders(&self) -> Vec<usize> {
+        let (low, high) = (self.temperature_k[0], self.temperature_k[self.rows() - 1]);
+        let width = CLASS_K.max((high - low) / MOST_CLASSES as f64);
+        let classes = ((high - low) / width).ceil() as usize;
+        let mut places: Vec<usize> =
+            (1..classes).map(|c| self.temperature_k.partition_point(|t| *t < low + width * c as f64)).collect();
+        places.dedup();
+        places.retain(|p| self.is_border(*p));
+        places
+    }
+
+    /// Each break in turn at the best row of the classes around it.
+    fn refined(&self, mut breaks: Vec<usize>) -> Vec<usize> {
+        for _ in 0..REFINEMENTS {
+            let before = breaks.clone();
+            for i in 0..breaks.len() {
+                let near = |k: f64| self.temperature_k.partition_point(|t| *t < self.border_k(before[i]) + k);
+                let mut best = (self.left_by(&breaks).unwrap_or(f64::INFINITY), breaks[i]);
+                for place in (near(-CLASS_K)..near(CLASS_K)).filter(|p| self.is_border(*p)) {
+                    let mut trial = breaks.clone();
+                    trial[i] = place;
+                    if let Some(left) = self.left_by(&trial).filter(|left| *left < best.0) {
+                        best = (left, place);
+                    }
+                }
+                breaks[i] = best.1;
+            }
+            if breaks == before {
+                break;
+            }
+        }
+        breaks
+    }
+
+    /// Where a break may lie: as far as moving it leaves no more than noise explains, the other at its best.
+    fn interval_k(&self, breaks: &[usize], which: usize, variance: f64) -> (f64, f64) {
+        let borders = self.borders();
+        let limit = self.left_by(breaks).unwrap_or(0.0) + LIKELIHOOD_RATIO_95 * variance;
+        let at_k = self.border_k(breaks[which]);
+        let possible = |place: &&usize| {
+            let others = borders.iter().filter(|other| match which {
+                0 => *other > place,
+                _ => other < place,
+            });
+            let pair = |other: usize| if which == 0 { [**place, other] } else { [other, **place] };
+            others.filter_map(|other| self.left_by(&pair(*other))).any(|left| left <= limit)
+        };
+        let is_possible: Vec<bool> = borders.iter().map(|place| possible(&place)).collect();
+        // From the last border that is not possible to the next one: what lies between was not tried.
+        let below = is_possible.iter().position(|p| *p).map(|i| i.checked_sub(1).map_or(0, |b| borders[b]));
+        let above = is_possible.iter().rposition(|p| *p).map(|i| borders.get(i + 1).copied().unwrap_or(self.rows()));
+        let border_k = |place: usize| match place {
+            0 => self.temperature_k[0],
+            _ if place == self.rows() => self.temperature_k[place - 1],
+            _ => self.border_k(place),
+        };
+        (below.map_or(at_k, |p| border_k(p).min(at_k)), above.map_or(at_k, |p| border_k(p).max(at_k)))
+    }
+}
+
 impl PiecewiseBias {
     /// # Errors
     /// A record too short for one line.
     pub fn fit(record: &Record) -> Result<Self, CompensateError> {
-        let temperatures = record.temperature_k();
-        let (low, high) =
-            temperatures.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(*t), high.max(*t)));
-        let width = CLASS_K.max((high - low) / MOST_CLASSES as f64);
-        let classes = ((high - low) / width).ceil().max(1.0) as usize;
-        let mut cumulated = vec![Sums::default(); classes + 1];
-        for (t, y) in temperatures.iter().zip(record.rate_rad_per_s()) {
-            let class = (((t - low) / width) as usize).min(classes - 1);
-            cumulated[class + 1].add(t - REFERENCE_TEMPERATURE_K, *y);
-        }
-        for i in 1..=classes {
-            let before = cumulated[i - 1];
-            let own = cumulated[i];
-            let all = &mut cumulated[i];
-            *all = Sums {
-                n: own.n + before.n,
-                x: own.x + before.x,
-                y: own.y + before.y,
-                xx: own.xx + before.xx,
-                xy: own.xy + before.xy,
-                yy: own.yy + before.yy,
-            };
-        }
-        let piece = |from: usize, to: usize| cumulated[to].between(&cumulated[from]).fit();
-        let whole =
-            piece(0, classes).ok_or(CompensateError::TooFew { needed: LEAST_ROWS as usize, found: record.rows() })?;
-        let mut best = (whole.2, vec![0, classes]);
-        let tails: Vec<Option<f64>> = (0..=classes).map(|i| piece(i, classes).map(|p| p.2)).collect();
-        for first in 1..classes {
-            let Some((_, _, head)) = piece(0, first) else { continue };
-            for (second, tail) in tails.iter().enumerate().take(classes).skip(first + 1) {
-                let (Some((_, _, middle)), Some(tail)) = (piece(first, second), tail) else { continue };
+        let cumulated = Cumulated::new(record);
+        let rows = cumulated.rows();
+        let whole = cumulated
+            .left(0, rows)
+            .ok_or(CompensateError::TooFew { needed: LEAST_ROWS as usize, found: record.rows() })?;
+        let borders = cumulated.borders();
+        let tails: Vec<Option<f64>> = borders.iter().map(|&i| cumulated.left(i, rows)).collect();
+        let mut best = (whole, Vec::new());
+        for (i, &first) in borders.iter().enumerate() {
+            let Some(head) = cumulated.left(0, first) else { continue };
+            for (&second, tail) in borders.iter().zip(&tails).skip(i + 1) {
+                let (Some(middle), Some(tail)) = (cumulated.left(first, second), tail) else { continue };
                 let left = head + middle + tail;
                 if left < best.0 {
-                    best = (left, vec![0, first, second, classes]);
+                    best = (left, vec![first, second]);
                 }
             }
         }
-        let lines = best
-            .1
+        let breaks = cumulated.refined(best.1);
+        let free = (rows as f64 - 2.0 * (breaks.len() + 1) as f64).max(1.0);
+        let variance = cumulated.left_by(&breaks).unwrap_or(whole) / free;
+        let mut ends: Vec<usize> = vec![0];
+        ends.extend(&breaks);
+        ends.push(rows);
+        let lines = ends
             .windows(2)
-            .filter_map(|w| {
-                let (at, slope, _) = piece(w[0], w[1])?;
-                let until_k = if w[1] == classes { f64::INFINITY } else { low + width * w[1] as f64 };
-                Some(BiasLine { until_k, at_reference_rad_per_s: at, slope_rad_per_s_k: slope })
+            .enumerate()
+            .filter_map(|(i, w)| {
+                let (at, slope, _) = cumulated.piece(w[0], w[1])?;
+                let is_last = w[1] == rows;
+                Some(BiasLine {
+                    until_k: if is_last { f64::INFINITY } else { cumulated.border_k(w[1]) },
+                    until_within_k: (!is_last).then(|| cumulated.interval_k(&breaks, i, variance)),
+                    at_reference_rad_per_s: at,
+                    slope_rad_per_s_k: slope,
+                })
             })
             .collect();
         Ok(Self { lines })

@@ -295,6 +295,8 @@ pub struct CompensateJson {
 pub struct BiasLineJson {
     /// Null: to the end.
     pub until_c: Option<f64>,
+    /// Where that end may lie, with 95 % confidence.
+    pub until_within_c: Option<[f64; 2]>,
     pub at_20_c_deg_per_h: f64,
     pub slope_deg_per_h_per_c: f64,
 }
@@ -305,6 +307,7 @@ impl BiasLineJson {
         let Compensator::Piecewise(piecewise) = compensator else { return Vec::new() };
         let json = |line: &crate::compensate::empirical::BiasLine| Self {
             until_c: Some(celsius_from_kelvin(line.until_k)).filter(|c| c.is_finite()),
+            until_within_c: line.until_within_k.map(|(low, high)| [low, high].map(celsius_from_kelvin)),
             at_20_c_deg_per_h: deg_per_h_from_rad_per_s(line.at_reference_rad_per_s),
             slope_deg_per_h_per_c: deg_per_h_from_rad_per_s(line.slope_rad_per_s_k),
         };

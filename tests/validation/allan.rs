@@ -1,9 +1,13 @@
 //! References: NIST SP 1065 (Riley 2008), section 12.4: the 1000-point test suite and its table of deviations, and the
 //! 10-point set of NBS Monograph 140; and allantools (PyPI) on seeded white, flicker and random-walk noise and on
 //! Stable32's PHASE.DAT (`tests/data/allan`, written by `benches/peers/allan.py`).
-//! Tolerance: the printed digits of the tables; 1e-9 relative against allantools, which sums in another order.
+//! Tolerance: the printed digits of the tables; 1e-9 relative against allantools, which sums in another order;
+//! coefficients of synthetic noises as far as 16 384 values tell them.
 
-use coilwright::numeric::allan::overlapping;
+use coilwright::numeric::allan::{NoiseModel, factors, overlapping};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use statrs::distribution::{ContinuousCDF, Normal};
 
 #[test]
 fn the_test_suite_of_nist_sp_1065_is_met_to_its_printed_digits() {
@@ -50,5 +54,53 @@ fn white_flicker_and_random_walk_noise_and_stable32s_phase_agree_with_allantools
         }
         println!("{name}: {} deviations, largest relative difference {worst:.1e}", found.len());
         assert!(worst < 1e-9, "{name}: {worst:e}");
+    }
+}
+
+const ROWS: usize = 16_384;
+const INTERVAL_S: f64 = 0.5;
+
+fn white(seed: u64, rows: usize) -> Vec<f64> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let normal = Normal::new(0.0, 1.0).unwrap();
+    (0..rows).map(|_| normal.inverse_cdf(random.random::<f64>())).collect()
+}
+
+/// 1/f noise with B = 1: white noise through (1 − z⁻¹)^(−½) (Kasdin, Proc. IEEE 83 (1995) 802).
+fn flicker(seed: u64) -> Vec<f64> {
+    const MEMORY: usize = 4096;
+    let mut weights = vec![1.0];
+    for k in 1..MEMORY {
+        weights.push(weights[k - 1] * (k as f64 - 0.5) / k as f64);
+    }
+    let source = white(seed, ROWS + MEMORY);
+    (0..ROWS).map(|i| weights.iter().enumerate().map(|(k, w)| w * source[i + MEMORY - k]).sum()).collect()
+}
+
+#[test]
+fn each_noise_alone_gives_back_its_coefficient() {
+    // Of a rate of unit deviation, in its own units: N² = τ0, K² = 1/τ0, B² = 1, Q² = τ0² of the angle's uniform error.
+    let mut angle = 0.0;
+    let walk: Vec<f64> = white(2, ROWS)
+        .iter()
+        .map(|w| {
+            angle += w;
+            angle
+        })
+        .collect();
+    let quantum = 0.01;
+    let mut random = ChaCha8Rng::seed_from_u64(4);
+    let errors: Vec<f64> = (0..=ROWS).map(|_| quantum * (random.random::<f64>() - 0.5)).collect();
+    let quantised: Vec<f64> = errors.windows(2).map(|e| (e[1] - e[0]) / INTERVAL_S).collect();
+    let found = |rates: &[f64]| NoiseModel::fit(&overlapping(rates, INTERVAL_S, &factors(rates.len())));
+    for (name, value, expected, tolerance) in [
+        ("white", found(&white(1, ROWS)).white, INTERVAL_S.sqrt(), 0.03),
+        ("random walk", found(&walk).random_walk, 1.0 / INTERVAL_S.sqrt(), 0.05),
+        ("flicker", found(&flicker(3)).flicker, 1.0, 0.1),
+        // Errors that are uniform over a quantum q have the deviation q/√12 = Q.
+        ("quantisation", found(&quantised).quantisation, quantum / 12f64.sqrt(), 0.03),
+    ] {
+        println!("{name}: {value:.4} of {expected:.4}");
+        assert!((value / expected - 1.0).abs() < tolerance, "{name}: {value} of {expected}");
     }
 }

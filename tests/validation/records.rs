@@ -11,7 +11,7 @@ use coilwright::compare::verdict::{Finding, Verdict};
 use coilwright::compare::{Comparison, Quantity, compare};
 use coilwright::io::model_file::{ModelFile, read_model};
 use coilwright::io::record_file::read_record;
-use coilwright::predict::noise_floor;
+use coilwright::predict::{estimate_boundary, noise_floor, predict_from};
 use coilwright::record::Record;
 use coilwright::units::deg_per_h_from_rad_per_s;
 
@@ -120,4 +120,76 @@ fn a_half_space_for_a_pack_that_ends_shows_as_a_wrong_prediction() {
     let found = compared("b-half-space");
     assert_eq!(found.verdict, Verdict::Missing);
     assert!(names(&found, &Quantity::Prediction) && names(&found, &Quantity::GradientRate));
+}
+
+/// A copy of the record with rows left out here and there and for ten minutes, and with gross errors; the rows of those.
+fn spoilt(record: &Record) -> (Record, Vec<usize>) {
+    let left_out: Vec<usize> = (0..record.rows()).filter(|i| (i * i) % 7 == 2 || (400..460).contains(i)).collect();
+    let sparse = record.without_rows(&left_out).unwrap();
+    let (mut temperature_k, mut rate) = (sparse.temperature_k().to_vec(), sparse.rate_rad_per_s().to_vec());
+    let rows: Vec<usize> = (100..sparse.rows() - 10).step_by(173).collect();
+    for (i, &row) in rows.iter().enumerate() {
+        if i % 2 == 0 { temperature_k[row] += 30.0 } else { rate[row] *= -40.0 }
+    }
+    (Record::new("spoilt", sparse.times_s().to_vec(), temperature_k, rate).unwrap(), rows)
+}
+
+#[test]
+fn irregular_rows_a_gap_and_gross_errors_leave_a_complete_model_adequate() {
+    let file = model("g-control-zyl");
+    let (spoilt, rows) = spoilt(&record("g-control-zyl", "validation.csv"));
+    let found: Vec<usize> = spoilt.gross_errors().iter().map(|e| e.row).collect();
+    assert_eq!(found, rows);
+    assert!(spoilt.gaps().iter().any(|(_, length_s)| *length_s > 600.0));
+    let clean = spoilt.without_rows(&rows).unwrap();
+    let found = compare(&file.model, &file.pattern.unwrap().pattern, &clean).unwrap();
+    println!("chi-square {:.3} of {} rows", found.reduced_chi_square, found.rows);
+    assert_eq!(found.verdict, Verdict::Adequate);
+    assert!((0.9..=1.15).contains(&found.reduced_chi_square));
+}
+
+#[test]
+fn a_rate_that_is_a_mean_over_its_interval_is_taken_as_one() {
+    let mut file = model("g-control-zyl");
+    let record = record("g-control-zyl", "validation.csv");
+    let pattern = file.pattern.unwrap().pattern;
+    let boundary = estimate_boundary(&file.model, &pattern, &record).unwrap();
+    let mut square = |rate_mean_s: f64| {
+        file.model.rate_mean_s = rate_mean_s;
+        let found = predict_from(&file.model, &pattern, &record, &boundary).unwrap();
+        let left = record.rate_rad_per_s().iter().zip(&found.rate_rad_per_s).map(|(m, p)| (m - p).powi(2));
+        left.sum::<f64>() / found.noise_rad_per_s.powi(2) / record.rows() as f64
+    };
+    let (mean, instant) = (square(10.0), square(0.0));
+    println!("chi-square {mean:.3} as means over 10 s, {instant:.3} as instantaneous values");
+    assert!(mean < 1.15 && instant > 1.5);
+}
+
+#[test]
+fn a_record_in_other_units_is_the_same_record() {
+    let text = std::fs::read_to_string(folder("a-control").join("validation.csv")).unwrap();
+    let known = record("a-control", "validation.csv");
+    let dir = tempfile::tempdir().unwrap();
+    for (header, time, rate) in [
+        ("time_min,temperature_k,rate_deg_per_s", 60.0, 3600.0),
+        ("time_h,temperature_k,rate_rad_per_s", 3600.0, 3600.0f64.to_degrees()),
+    ] {
+        let mut other = header.to_owned() + "\n";
+        for line in text.lines().filter(|l| !l.starts_with('#')).skip(1) {
+            let values: Vec<f64> = line.split(',').map(|v| v.parse().unwrap()).collect();
+            other += &format!("{:?},{:?},{:?}\n", values[0] / time, values[1] + 273.15, values[2] / rate);
+        }
+        let path = dir.path().join("other.csv");
+        std::fs::write(&path, other).unwrap();
+        let read = read_record(&path).unwrap();
+        for (a, b) in [
+            (read.times_s(), known.times_s()),
+            (read.temperature_k(), known.temperature_k()),
+            (read.rate_rad_per_s(), known.rate_rad_per_s()),
+        ] {
+            let size = b.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+            assert_eq!(a.len(), b.len());
+            assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12 * size), "{header}");
+        }
+    }
 }
