@@ -117,6 +117,12 @@ pub struct LayerWeights {
     pub axial_m2: Vec<f64>,
 }
 
+/// ∫(2z − L)dz over a piece of fibre, kept apart for the two halves of the fibre.
+pub(crate) fn segment_weights_m2(from_m: f64, to_m: f64, length_m: f64) -> (f64, f64) {
+    let middle_m = (0.5 * length_m).clamp(from_m, to_m);
+    ((middle_m - from_m) * (from_m + middle_m - length_m), (to_m - middle_m) * (middle_m + to_m - length_m))
+}
+
 impl LayerWeights {
     /// # Errors
     /// A pattern of another layer count.
@@ -134,9 +140,7 @@ impl LayerWeights {
         let mut from_m = 0.0;
         for layer in pattern.layers_by_segment() {
             let to_m = from_m + lengths_m[layer];
-            let middle_m = (0.5 * length_m).clamp(from_m, to_m);
-            weights.half_a_m2[layer] = (middle_m - from_m) * (from_m + middle_m - length_m);
-            weights.half_b_m2[layer] = (to_m - middle_m) * (middle_m + to_m - length_m);
+            (weights.half_a_m2[layer], weights.half_b_m2[layer]) = segment_weights_m2(from_m, to_m, length_m);
             weights.axial_m2[layer] = 2.0 * pattern.axial_direction(layer) * lengths_m[layer].powi(2);
             from_m = to_m;
         }

@@ -14,10 +14,11 @@ fn example() -> PathBuf {
 }
 
 fn campaign_file(folder: &Path) -> String {
-    std::fs::copy(example(), folder.join("paper.toml")).unwrap();
+    let spreads = "\n[tolerance]\nturns_per_layer_sd = 0.3\nmismatch_sd = 0.001\nsamples = 8\n";
+    std::fs::write(folder.join("paper.toml"), std::fs::read_to_string(example()).unwrap() + spreads).unwrap();
     let path = folder.join("grid.toml");
-    let text = "name = \"grid\"\nmodels = \"paper.toml\"\nlayers = [8, 12]\nclasses = \"standard any\"\nseeds = [1, 2]\n\
-                rounds = 1\nmoves_per_restart = 2000\n";
+    let text = "name = \"grid\"\nmodels = [\"paper.toml\"]\nlayers = [8, 12]\nclasses = [\"standard\", \"any\"]\n\
+                objectives = [\"worst-rate\", \"p95\"]\nrounds = 1\nmoves_per_restart = 500\n";
     std::fs::write(&path, text).unwrap();
     path.display().to_string()
 }
@@ -62,13 +63,13 @@ fn a_campaign_file_with_faults_names_them_all() {
     let path = root.path().join("grid.toml");
     std::fs::write(
         &path,
-        "name = \"x\"\nmodels = \"m.toml\"\nclasses = \"easy\"\nobjectives = \"speed\"\nseed = [1]\n",
+        "name = \"x\"\nmodels = \"m.toml\"\nclasses = [\"easy\", 3]\nobjectives = [\"speed\"]\nseed = [1]\n",
     )
     .unwrap();
     let output = coilwright(&["campaign", &path.display().to_string(), "-o", &root.path().display().to_string()]);
     assert_eq!(output.status.code(), Some(2));
     let words = String::from_utf8_lossy(&output.stderr);
-    for part in ["easy", "speed", "seed"] {
+    for part in ["an array of model files", "classes[1]", "speed", "seed"] {
         assert!(words.contains(part), "{part}: {words}");
     }
 }

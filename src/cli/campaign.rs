@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::optimise::bench_of;
 use super::progress::StopFlag;
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
@@ -10,19 +11,20 @@ use crate::io::campaign_file::{
 };
 use crate::io::files::write_atomically;
 use crate::report::plot::{Axis, Chart, Series};
-use crate::search::optimise::{
-    DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Optimisation, Plan, Rules, default_moves_per_restart,
-};
-use crate::search::verdict::{Bench, improvement_over_qua};
+use crate::search::guaranteed::UnitStep;
+use crate::search::objective::Objective;
+use crate::search::optimise::{DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Plan, Rules};
+use crate::search::verdict::improvement_over_qua;
 use crate::search::worst_case::SolvedProfiles;
 use crate::units::deg_per_h_from_rad_per_s;
 
 /// A grid of searches (coils, layer counts, classes, objectives, seeds)
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "A campaign file:\n  name = \"two coils\"\n  models = \"paper-200m.toml coil-998m.toml\"   # beside the campaign file\n  \
-    layers = [12, 16]                            # default: the models' own\n  classes = \"standard captive:1 any\"\n  \
-    objectives = \"worst-rate rms\"\n  seeds = [1, 2, 3]\n\n\
+    after_help = "A campaign file:\n  name = \"two coils\"\n  models = [\"paper-200m.toml\", \"coil-998m.toml\"]   # beside the campaign file\n  \
+    layers = [12, 16]                                 # default: the models' own\n  \
+    classes = [\"standard\", \"captive:1\", \"any\"]       # default: standard\n  \
+    objectives = [\"worst-rate\", \"p95\"]               # default: worst-rate\n  seeds = [1, 2, 3]                                 # default: 1\n\n\
     What is done is skipped, so the same command goes on after an interruption. Shards may run at the same time or on\n\
     other machines; copy their cells/ together and run once more without --shard for the table.\n\n\
     Example:\n  coilwright campaign grid.toml -o results/grid --shard 1/2"
@@ -105,14 +107,15 @@ fn search(
 ) -> Result<Option<CellJson>, CliError> {
     let (model, layers) = (&cell.file.model, cell.file.model.coil.layers());
     let solved = SolvedProfiles::new(model, &cell.file.profiles.profiles())?;
-    let matrix = cell.objective.compile(model, &solved, cell.file.profiles.max_rate_k_per_s)?;
-    let unit_step = crate::search::guaranteed::UnitStep::new(model, cell.file.profiles.max_rate_k_per_s).ok();
-    let bench = Bench { model, solved: &solved, objective: cell.objective, unit_step: unit_step.as_ref() };
+    let unit_step = UnitStep::new(model, cell.file.profiles.max_rate_k_per_s).ok();
+    let bench = bench_of(&cell.file, &solved, cell.objective, unit_step.as_ref());
     let plan = Plan {
         seed: cell.seed,
         norm: cell.objective.norm(),
         restarts_per_round: DEFAULT_RESTARTS_PER_ROUND,
-        moves_per_restart: campaign.moves_per_restart.unwrap_or_else(|| default_moves_per_restart(layers)),
+        moves_per_restart: campaign
+            .moves_per_restart
+            .unwrap_or_else(|| cell.objective.default_moves_per_restart(layers)),
         rules: Rules {
             rounds: campaign.rounds.unwrap_or(u64::MAX),
             patience: DEFAULT_PATIENCE,
@@ -121,7 +124,7 @@ fn search(
         },
         starts: Vec::new(),
     };
-    let mut optimisation = Optimisation::new(matrix, cell.class, plan);
+    let mut optimisation = bench.search(cell.class, plan, None)?.expect("nothing was saved that might not fit");
     while optimisation.advance() {
         if stop.is_set() {
             return Ok(None);
@@ -138,6 +141,8 @@ fn search(
         objective: cell.objective.key().to_owned(),
         seed: cell.seed,
         worst_rate_deg_per_h: deg_per_h_from_rad_per_s(best.worst.rate_rad_per_s.abs()),
+        objective_deg_per_h: (cell.objective != Objective::WorstPhase)
+            .then(|| deg_per_h_from_rad_per_s(best.objective_rad_per_s)),
         improvement_over_qua: improvement_over_qua(&best, &baselines),
         evaluations: optimisation.evaluations(),
         stopped_by: optimisation.state().stop.map_or("rounds", |s| s.key()).to_owned(),
@@ -168,10 +173,11 @@ fn text(answer: &CampaignJson) -> String {
             r.objective.clone(),
             r.seed.to_string(),
             format!("{:.4}", r.worst_rate_deg_per_h),
+            r.objective_deg_per_h.map_or_else(|| "–".to_owned(), |o| format!("{o:.4}")),
             r.improvement_over_qua.map_or_else(|| "–".to_owned(), |f| format!("{f:.3}")),
         ]
     });
-    let header = ["model", "layers", "class", "objective", "seed", "worst °/h", "QUA's over it"];
+    let header = ["model", "layers", "class", "objective", "seed", "worst °/h", "objective °/h", "QUA's over it"];
     format!(
         "{}: {} cells, {} searched now, {} missing\n\n{}",
         answer.campaign,

@@ -47,8 +47,8 @@ use crate::predict::PredictError;
 use crate::rate::RateError;
 use crate::record::RecordError;
 use crate::search::guaranteed::GuaranteedError;
-use crate::search::objective::ObjectiveError;
 use crate::search::tolerance::ToleranceError;
+use crate::search::verdict::JudgeError;
 use crate::search::worst_case::SearchError;
 use progress::ProgressMode;
 use screen::Screen;
@@ -187,7 +187,7 @@ pub enum CliError {
     #[error("error: no pattern is stated: give --pattern, or winding.pattern in the model file")]
     PatternMissing,
     #[error("error: {0}")]
-    Objective(#[from] ObjectiveError),
+    Judge(#[from] JudgeError),
     #[error("error: {option}: {message}")]
     Option { option: &'static str, message: String },
     #[error("error: {path} does not fit the model: begin again with --fresh", path = .path.display())]

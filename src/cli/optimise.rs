@@ -18,9 +18,8 @@ use crate::io::run_directory::{OptimiseJson, Request, write_request, write_resul
 use crate::pattern::windability::WindabilityClass;
 use crate::search::guaranteed::UnitStep;
 use crate::search::objective::Objective;
-use crate::search::optimise::{
-    DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Optimisation, Plan, Rules, default_moves_per_restart,
-};
+use crate::search::optimise::{DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Plan, Rules};
+use crate::search::robust::Rounds;
 use crate::search::verdict::{Bench, Judged, improvement_over_qua};
 use crate::search::worst_case::SolvedProfiles;
 use crate::units::{deg_per_h_from_rad_per_s, rad_per_s_from_deg_per_h};
@@ -33,6 +32,7 @@ use crate::units::{deg_per_h_from_rad_per_s, rad_per_s_from_deg_per_h};
     Without a clock the same seed gives the same bytes at any number of threads.\n\n\
     Examples:\n  coilwright optimise examples/paper-200m.toml -o results/paper-200m\n  \
     coilwright optimise examples/paper-200m.toml --windability any --seed 7 --budget 30s\n  \
+    coilwright optimise my-coil.toml --objective p95       the winding that is best when it is built imperfectly\n  \
     coilwright optimise examples/paper-200m.toml -o results/paper-200m --resume"
 )]
 pub struct Arguments {
@@ -69,9 +69,10 @@ pub struct SearchOptions {
     /// What can be wound: standard, captive:K or any; without it, the model's own
     #[arg(long, value_name = "CLASS", value_parser = parse_class)]
     pub windability: Option<WindabilityClass>,
-    /// What is made small: worst-rate, worst-phase, rms or guaranteed-rate
-    #[arg(long, value_name = "WHAT", value_parser = parse_objective, default_value = "worst-rate")]
-    pub objective: Objective,
+    /// What is made small: worst-rate, worst-phase, rms, guaranteed-rate or p95 (the 95 % quantile of the worst rate over
+    /// coils built with the model's [tolerance]); without it, the model's own
+    #[arg(long, value_name = "WHAT", value_parser = parse_objective)]
+    pub objective: Option<Objective>,
     /// Ends after this time, e.g. 30s or 5m (the result then depends on the machine)
     #[arg(long, value_name = "TIME")]
     pub budget: Option<String>,
@@ -90,7 +91,7 @@ pub struct SearchOptions {
     /// Restarts in a round
     #[arg(long, value_name = "N", default_value_t = DEFAULT_RESTARTS_PER_ROUND as u16, value_parser = clap::value_parser!(u16).range(1..=4096))]
     pub restarts: u16,
-    /// Moves of one restart; without it, 128 N² for N layers, at most a million
+    /// Moves of one restart; without it, 128 N² for N layers, at most a million (p95: 16 N², each over many coils)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub moves_per_restart: Option<u64>,
     /// The pattern to begin with: a winding's name or a pattern file
@@ -116,6 +117,10 @@ const PATIENCE_WITH_BUDGET: u64 = 4 * DEFAULT_PATIENCE;
 impl SearchOptions {
     pub(super) fn class(&self, file: &ModelFile) -> WindabilityClass {
         self.windability.unwrap_or(file.search.windability)
+    }
+
+    pub(super) fn objective(&self, file: &ModelFile) -> Objective {
+        self.objective.unwrap_or(file.search.objective)
     }
 
     pub(super) fn budget(&self) -> Result<Option<Duration>, CliError> {
@@ -144,12 +149,13 @@ impl SearchOptions {
             let message = format!("expected a rate error of zero or more in °/h, found {target}");
             return Err(CliError::Option { option: "--target", message });
         }
+        let objective = self.objective(file);
         let patience = if self.budget.is_some() { PATIENCE_WITH_BUDGET } else { DEFAULT_PATIENCE };
         Ok(Plan {
             seed: self.seed.unwrap_or(file.search.seed),
-            norm: self.objective.norm(),
+            norm: objective.norm(),
             restarts_per_round: self.restarts.into(),
-            moves_per_restart: self.moves_per_restart.unwrap_or_else(|| default_moves_per_restart(layers)),
+            moves_per_restart: self.moves_per_restart.unwrap_or_else(|| objective.default_moves_per_restart(layers)),
             rules: Rules {
                 rounds: self.rounds.unwrap_or(u64::MAX),
                 patience: self.patience.unwrap_or(patience),
@@ -172,7 +178,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         screen.note(&format!("note: {advice}"));
     }
     let options = &arguments.search;
-    let (class, objective) = (options.class(&file), options.objective);
+    let (class, objective) = (options.class(&file), options.objective(&file));
     let budget = options.budget()?;
     let plan = options.plan(&file)?;
     let request = Request { file: &file, class, objective, plan: &plan, budget: options.budget.as_deref() };
@@ -188,16 +194,12 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
 
     let started = Instant::now();
     let solved = SolvedProfiles::new(&file.model, &file.profiles.profiles())?;
-    let matrix = objective.compile(&file.model, &solved, file.profiles.max_rate_k_per_s)?;
     let unit_step = UnitStep::new(&file.model, file.profiles.max_rate_k_per_s).ok();
-    let bench = Bench { model: &file.model, solved: &solved, objective, unit_step: unit_step.as_ref() };
+    let bench = bench_of(&file, &solved, objective, unit_step.as_ref());
     let baselines = bench.baselines()?;
-    let mut search = match saved {
-        None => Optimisation::new(matrix, class, plan.clone()),
-        Some(state) => Optimisation::resume(matrix, class, plan.clone(), state).ok_or_else(|| {
-            CliError::Checkpoint { path: folder.map(|f| f.join(CHECKPOINT_FILE)).unwrap_or_default() }
-        })?,
-    };
+    let mut search = bench
+        .search(class, plan.clone(), saved)?
+        .ok_or_else(|| CliError::Checkpoint { path: folder.map(|f| f.join(CHECKPOINT_FILE)).unwrap_or_default() })?;
     if let Some(folder) = folder.filter(|f| !(arguments.resume && f.join(CHECKPOINT_FILE).exists())) {
         write_request(folder, &request)?;
         write_checkpoint(folder, &request.fingerprint(), search.state())?;
@@ -208,7 +210,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         fingerprint: request.fingerprint(),
         every: arguments.checkpoint_every,
     });
-    let ended = anneal(&mut search, budget, started, &stop, checkpoint, screen)?;
+    let ended = anneal(search.as_mut(), budget, started, &stop, checkpoint, screen)?;
     let seconds = started.elapsed().as_secs_f64();
 
     let Some(best) = bench.best(class, &search.state().found, &baselines)? else {
@@ -237,14 +239,25 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         evaluations: search.evaluations(),
         evaluations_per_s: Some(judged_now / seconds),
         rounds: search.state().round,
-        stopped_by: ended.words(&search).to_owned(),
+        stopped_by: ended.words(search.as_ref()).to_owned(),
         reproducible: ended == Ended::Rule && !proof_cut_short,
     };
     if let Some(folder) = folder {
-        write_folder(folder, &file, &answer, &best, &search, screen)?;
+        write_folder(folder, &file, &answer, &best, search.as_ref(), screen)?;
     }
     screen.answer(answer, text)?;
     Ok(if ended == Ended::Signal { Ending::Interrupted } else { Ending::Done })
+}
+
+/// What patterns of a model are judged by.
+pub(super) fn bench_of<'a>(
+    file: &'a ModelFile,
+    solved: &'a SolvedProfiles,
+    objective: Objective,
+    unit_step: Option<&'a UnitStep>,
+) -> Bench<'a> {
+    let ModelFile { model, profiles, tolerance, .. } = file;
+    Bench { model, solved, objective, unit_step, profiles, tolerance: tolerance.as_ref() }
 }
 
 /// The state to go on from; refuses to write over an unfinished run unasked.
@@ -291,7 +304,7 @@ enum Ended {
 }
 
 impl Ended {
-    fn words(self, search: &Optimisation) -> &'static str {
+    fn words(self, search: &dyn Rounds) -> &'static str {
         match self {
             Ended::Rule => search.state().stop.map_or("rounds", |stop| stop.key()),
             Ended::Clock => "clock",
@@ -309,7 +322,7 @@ struct Checkpointing<'a> {
 
 /// Advances a search to its end, writing checkpoints and showing progress.
 fn anneal(
-    search: &mut Optimisation,
+    search: &mut dyn Rounds,
     budget: Option<Duration>,
     started: Instant,
     stop: &StopFlag,
@@ -352,7 +365,7 @@ fn write_folder(
     file: &ModelFile,
     answer: &OptimiseJson,
     best: &Judged,
-    search: &Optimisation,
+    search: &dyn Rounds,
     screen: &Screen,
 ) -> Result<(), CliError> {
     let named = NamedPattern { name: best.name.clone(), pattern: best.pattern.clone() };
@@ -367,12 +380,16 @@ fn write_folder(
     Ok(())
 }
 
+/// Shown only where the search was over built coils.
+const P95_COLUMN: usize = 3;
+
 fn text(answer: &OptimiseJson) -> String {
     let rows = answer.baselines.iter().chain(std::iter::once(&answer.best)).map(|p| {
         vec![
             p.name.clone(),
             format!("{:.4}", p.worst_rate_deg_per_h),
             p.guaranteed_worst_rate_deg_per_h.map_or_else(|| "–".to_owned(), |g| format!("{g:.4}")),
+            p.p95_rate_deg_per_h.map_or_else(|| "–".to_owned(), |g| format!("{g:.4}")),
             p.worst_profile.clone(),
             format!("{:.2}", p.worst_time_s),
             p.windability.class.clone(),
@@ -380,7 +397,14 @@ fn text(answer: &OptimiseJson) -> String {
             p.windability.max_climb.to_string(),
         ]
     });
-    let header = ["pattern", "worst °/h", "guaranteed °/h", "profile", "at s", "class", "reels", "climb"];
+    let header = ["pattern", "worst °/h", "guaranteed °/h", "P95 °/h", "profile", "at s", "class", "reels", "climb"];
+    let is_over_coils = answer.best.p95_rate_deg_per_h.is_some();
+    let shown = |columns: Vec<String>| -> Vec<String> {
+        columns.into_iter().enumerate().filter(|(i, _)| is_over_coils || *i != P95_COLUMN).map(|(_, c)| c).collect()
+    };
+    let header = shown(header.map(str::to_owned).to_vec());
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    let rows = rows.map(shown);
     let segments: Vec<String> = answer.best.segments.iter().map(ToString::to_string).collect();
     format!(
         "{}\n\n{}\nbest pattern, innermost layer first: {}\n{} moves judged in {} rounds, ended by: {}{}\n",

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use super::optimise::bench_of;
 use super::progress::StopFlag;
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
@@ -14,9 +15,9 @@ use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::report::plot::{Axis, Chart, Series};
 use crate::search::objective::Objective;
-use crate::search::optimise::{DEFAULT_RESTARTS_PER_ROUND, Optimisation, Plan, Rules, default_moves_per_restart};
+use crate::search::optimise::{DEFAULT_RESTARTS_PER_ROUND, Plan, Rules, default_moves_per_restart};
 use crate::search::pareto::{Point, front};
-use crate::search::tolerance::study;
+use crate::search::tolerance::Coils;
 use crate::search::verdict::{Bench, Judged};
 use crate::search::worst_case::SolvedProfiles;
 
@@ -50,8 +51,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let seed = arguments.seed.unwrap_or(file.search.seed);
     let solved = SolvedProfiles::new(&file.model, &file.profiles.profiles())?;
     let unit_step = crate::search::guaranteed::UnitStep::new(&file.model, file.profiles.max_rate_k_per_s).ok();
-    let bench =
-        Bench { model: &file.model, solved: &solved, objective: Objective::WorstRate, unit_step: unit_step.as_ref() };
+    let bench = bench_of(&file, &solved, Objective::WorstRate, unit_step.as_ref());
     let mut judged = bench.baselines()?;
     let captive = (1..=usize::from(arguments.most_captive)).map(WindabilityClass::Captive);
     let classes: Vec<WindabilityClass> =
@@ -111,8 +111,7 @@ fn candidates(
         rules: Rules { rounds, patience: rounds, moves: None, target: None },
         starts: Vec::new(),
     };
-    let matrix = bench.objective.compile(bench.model, bench.solved, file.profiles.max_rate_k_per_s)?;
-    let mut search = Optimisation::new(matrix, class, plan);
+    let mut search = bench.search(class, plan, None)?.expect("nothing was saved that might not fit");
     while search.advance() {
         if stop.is_set() {
             return Ok(None);
@@ -131,11 +130,12 @@ fn with_spreads(file: &ModelFile, judged: Vec<Judged>) -> Result<Vec<Point>, Cli
         None => vec![None; judged.len()],
         Some(spec) => {
             let patterns: Vec<Pattern> = judged.iter().map(|j| j.pattern.clone()).collect();
-            let studied = study(&file.model, &file.profiles, spec, &patterns)?;
-            studied.iter().map(|d| Some(d.p95_rad_per_s())).collect()
+            let found = Coils::new(&file.model, &file.profiles, spec)?.p95_rad_per_s(&patterns)?;
+            found.into_iter().map(Some).collect()
         }
     };
-    Ok(judged.into_iter().zip(spreads).map(|(judged, p95)| Point::new(judged, p95)).collect())
+    let with = |(judged, p95_rad_per_s): (Judged, _)| Point::new(Judged { p95_rad_per_s, ..judged });
+    Ok(judged.into_iter().zip(spreads).map(with).collect())
 }
 
 /// Names made distinct by a number where several points have the same.
@@ -171,7 +171,7 @@ fn text(answer: &ParetoJson) -> String {
         vec![
             p.pattern.name.clone(),
             format!("{:.4}", p.pattern.worst_rate_deg_per_h),
-            p.p95_rate_deg_per_h.map_or_else(|| "–".to_owned(), |q| format!("{q:.4}")),
+            p.pattern.p95_rate_deg_per_h.map_or_else(|| "–".to_owned(), |q| format!("{q:.4}")),
             p.pattern.windability.captive.to_string(),
             p.pattern.windability.max_climb.to_string(),
             p.long_crossovers.to_string(),

@@ -1,5 +1,6 @@
 //! Campaigns: a grid of searches as a file, one result file a cell, and the table of them all.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -47,6 +48,9 @@ pub struct CellJson {
     pub objective: String,
     pub seed: u64,
     pub worst_rate_deg_per_h: f64,
+    /// Null for the phase, which is no rate.
+    pub objective_deg_per_h: Option<f64>,
+    /// QUA's objective over the best pattern's.
     pub improvement_over_qua: Option<f64>,
     pub evaluations: u64,
     pub stopped_by: String,
@@ -77,36 +81,26 @@ pub fn read_campaign(path: &Path) -> Result<CampaignFile, Faults> {
     let r = &mut reader;
     let mut root = r.root(&document);
     let name = root.needed_text(r, "name", "a string").map(str::to_owned);
-    let models = root.needed_text(r, "models", "model files, separated by spaces");
-    let classes = root.text(r, "classes").unwrap_or("standard");
-    let objectives = root.text(r, "objectives").unwrap_or("worst-rate");
+    let models = root.needed_texts(r, "models", "an array of model files");
+    let classes = if root.has("classes") { root.needed_texts(r, "classes", ARRAY_OF_STRINGS) } else { None };
+    let objectives = if root.has("objectives") { root.needed_texts(r, "objectives", ARRAY_OF_STRINGS) } else { None };
     let layers = if root.has("layers") { root.needed_integers(r, "layers") } else { None };
     let seeds = if root.has("seeds") { root.needed_integers(r, "seeds") } else { None };
     let rounds = root.integer(r, "rounds", 1, 1_000_000);
     let moves_per_restart = root.integer(r, "moves_per_restart", 1, 1_000_000_000);
-    let classes: Vec<WindabilityClass> = classes
-        .split_whitespace()
-        .filter_map(|word| {
-            let class = WindabilityClass::parse(word);
-            if class.is_none() {
-                let message = format!("classes: expected standard, captive:K or any, found \"{word}\"");
-                r.fault(Fault::new(message, root.span_of("classes")));
-            }
-            class
-        })
-        .collect();
-    let objectives: Vec<Objective> = objectives
-        .split_whitespace()
-        .filter_map(|word| {
-            let objective = Objective::from_key(word);
-            if objective.is_none() {
-                let keys: Vec<&str> = Objective::ALL.iter().map(|o| o.key()).collect();
-                let message = format!("objectives: expected one of {}, found \"{word}\"", keys.join(", "));
-                r.fault(Fault::new(message, root.span_of("objectives")));
-            }
-            objective
-        })
-        .collect();
+    let classes = match classes {
+        None => vec![WindabilityClass::Standard],
+        Some(stated) => understood(r, stated, WindabilityClass::parse, |word| {
+            format!("classes: expected standard, captive:K or any, found \"{word}\"")
+        }),
+    };
+    let objectives = match objectives {
+        None => vec![Objective::WorstRate],
+        Some(stated) => understood(r, stated, Objective::from_key, |word| {
+            let keys: Vec<&str> = Objective::ALL.iter().map(|o| o.key()).collect();
+            format!("objectives: expected one of {}, found \"{word}\"", keys.join(", "))
+        }),
+    };
     let mut whole_numbers = |key: &'static str, stated: Option<Vec<(i64, _)>>, least: i64| -> Vec<u64> {
         let numbers = stated.unwrap_or_default();
         for (number, span) in &numbers {
@@ -125,7 +119,7 @@ pub fn read_campaign(path: &Path) -> Result<CampaignFile, Faults> {
     let base = path.parent().unwrap_or(Path::new("."));
     let value = name.zip(models).map(|(name, models)| CampaignFile {
         name,
-        models: models.split_whitespace().map(|model| base.join(model)).collect(),
+        models: models.into_iter().map(|(model, _)| base.join(model)).collect(),
         layers,
         classes,
         objectives,
@@ -134,6 +128,25 @@ pub fn read_campaign(path: &Path) -> Result<CampaignFile, Faults> {
         moves_per_restart: moves_per_restart.map(|n| n as u64),
     });
     reader.finish(value)
+}
+
+const ARRAY_OF_STRINGS: &str = "an array of strings";
+
+/// Words with what they mean; a fault for each that means nothing.
+fn understood<T>(
+    reader: &mut TomlReader,
+    stated: Vec<(String, Option<Range<usize>>)>,
+    meaning: fn(&str) -> Option<T>,
+    complaint: impl Fn(&str) -> String,
+) -> Vec<T> {
+    let mut known = Vec::with_capacity(stated.len());
+    for (word, span) in stated {
+        match meaning(&word) {
+            Some(value) => known.push(value),
+            None => reader.fault(Fault::new(complaint(&word), span)),
+        }
+    }
+    known
 }
 
 impl CampaignFile {
@@ -215,6 +228,7 @@ pub fn summary_csv(results: &[CellJson]) -> Result<Vec<u8>, csv::Error> {
         "objective",
         "seed",
         "worst_rate_deg_per_h",
+        "objective_deg_per_h",
         "improvement_over_qua",
         "evaluations",
         "segments",
@@ -229,6 +243,7 @@ pub fn summary_csv(results: &[CellJson]) -> Result<Vec<u8>, csv::Error> {
             found.objective.clone(),
             found.seed.to_string(),
             found.worst_rate_deg_per_h.to_string(),
+            found.objective_deg_per_h.map(|o| o.to_string()).unwrap_or_default(),
             found.improvement_over_qua.map(|f| f.to_string()).unwrap_or_default(),
             found.evaluations.to_string(),
             segments.join(" "),

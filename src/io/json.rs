@@ -56,6 +56,9 @@ pub struct PatternJson {
     pub worst_time_s: f64,
     /// Null where the model is nonlinear and no bound over all profiles exists.
     pub guaranteed_worst_rate_deg_per_h: Option<f64>,
+    /// The 95 % quantile over built coils, where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub p95_rate_deg_per_h: Option<f64>,
     pub windability: WindabilityJson,
 }
 
@@ -76,6 +79,7 @@ impl PatternJson {
             worst_profile: worst.profile.clone(),
             worst_time_s: worst.time_s,
             guaranteed_worst_rate_deg_per_h: guaranteed_rad_per_s.map(deg_per_h_from_rad_per_s),
+            p95_rate_deg_per_h: None,
             windability: WindabilityJson::of(pattern),
         }
     }

@@ -11,6 +11,7 @@ use crate::pattern::windability::WindabilityClass;
 use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;
 use crate::schedule::production::Production;
+use crate::search::objective::Objective;
 use crate::search::tolerance::ToleranceSpec;
 use crate::thermal::{self, Extent, Location, Material};
 use crate::units::{m_from_mm, m_from_nm, m_from_um};
@@ -22,7 +23,7 @@ use super::pattern_file::resolve_pattern;
 use super::production_table::read_production;
 use super::profile_tables::{read_profiles, too_many_ramps};
 use super::tolerance_table::read_tolerance;
-use super::toml_reader::{Limits, TableReader, TomlReader, parse};
+use super::toml_reader::{Limits, TableReader, TomlReader, nearest, parse};
 
 /// A model file, understood.
 #[derive(Debug, Clone)]
@@ -50,6 +51,7 @@ pub struct NamedPattern {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SearchSettings {
     pub windability: WindabilityClass,
+    pub objective: Objective,
     pub seed: u64,
 }
 
@@ -136,6 +138,11 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
         if let Some(message) = too_many_ramps(&profiles, model.coil.layers()) {
             r.fault(Fault::new(message, span_in(source, "count").or_else(|| span_in(source, "segments"))));
         }
+    }
+    if search.objective == Objective::P95 && tolerance.is_none() {
+        let message =
+            "search.objective = \"p95\" needs a [tolerance] table: state there how much what is built spreads";
+        r.fault(Fault::new(message, span_in(source, "objective")));
     }
     if let (Some(model), Some(named)) = (&whole, &pattern)
         && named.pattern.layers() != model.coil.layers()
@@ -338,8 +345,21 @@ fn read_search(r: &mut TomlReader, table: &mut TableReader) -> SearchSettings {
         Some(Some(class)) => class,
         None => WindabilityClass::Standard,
     };
+    let keys = Objective::ALL.map(Objective::key);
+    let stated = table.text(r, "objective");
+    let objective = stated.map_or(Some(Objective::WorstRate), Objective::from_key).unwrap_or_else(|| {
+        let found = stated.unwrap_or_default();
+        let message = format!("search.objective must be one of {}, found \"{found}\"", keys.join(", "));
+        let near = nearest(found, &keys).map(|near| format!("did you mean \"{near}\"?"));
+        let fault = Fault::new(message, table.span_of("objective"));
+        r.fault(match near {
+            Some(note) => fault.with_note(note),
+            None => fault,
+        });
+        Objective::WorstRate
+    });
     let seed = table.integer(r, "seed", 0, i64::MAX).unwrap_or(1) as u64;
-    SearchSettings { windability, seed }
+    SearchSettings { windability, objective, seed }
 }
 
 /// Faults that only the model as a whole can have.

@@ -4,15 +4,12 @@ use serde::Serialize;
 
 use super::json::PatternJson;
 use crate::search::pareto::Point;
-use crate::units::deg_per_h_from_rad_per_s;
 
 #[derive(Debug, Serialize)]
 pub struct PointJson {
     #[serde(flatten)]
     pub pattern: PatternJson,
     pub long_crossovers: usize,
-    /// Null where the model states no tolerances.
-    pub p95_rate_deg_per_h: Option<f64>,
     /// The pattern file, where one was written.
     pub file: Option<String>,
 }
@@ -27,12 +24,7 @@ pub struct ParetoJson {
 
 impl PointJson {
     pub fn of(point: &Point, file: Option<String>) -> Self {
-        Self {
-            pattern: PatternJson::of(&point.judged),
-            long_crossovers: point.windability.long_crossovers,
-            p95_rate_deg_per_h: point.p95_rad_per_s.map(deg_per_h_from_rad_per_s),
-            file,
-        }
+        Self { pattern: PatternJson::of(&point.judged), long_crossovers: point.windability.long_crossovers, file }
     }
 }
 
@@ -59,7 +51,7 @@ pub fn front_csv(points: &[PointJson]) -> Result<Vec<u8>, csv::Error> {
         csv.write_record([
             point.pattern.name.clone(),
             point.pattern.worst_rate_deg_per_h.to_string(),
-            point.p95_rate_deg_per_h.map(|p| p.to_string()).unwrap_or_default(),
+            point.pattern.p95_rate_deg_per_h.map(|p| p.to_string()).unwrap_or_default(),
             point.pattern.windability.class.clone(),
             point.pattern.windability.captive.to_string(),
             point.pattern.windability.reels.to_string(),

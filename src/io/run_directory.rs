@@ -21,7 +21,11 @@ use crate::units::deg_per_h_from_rad_per_s;
 impl PatternJson {
     /// Of a pattern that was judged by the reference.
     pub fn of(judged: &Judged) -> Self {
-        Self::new(&judged.name, &judged.pattern, &judged.worst, judged.phase_rad, judged.guaranteed_rad_per_s)
+        let Judged { name, pattern, worst, phase_rad, guaranteed_rad_per_s, .. } = judged;
+        Self {
+            p95_rate_deg_per_h: judged.p95_rad_per_s.map(deg_per_h_from_rad_per_s),
+            ..Self::new(name, pattern, worst, *phase_rad, *guaranteed_rad_per_s)
+        }
     }
 }
 
@@ -122,11 +126,12 @@ pub fn write_request(folder: &Path, request: &Request) -> Result<(), WriteError>
 /// Files that cannot be written.
 pub fn write_results(folder: &Path, answer: &OptimiseJson, best: &Judged, state: &State) -> Result<(), WriteError> {
     let named = NamedPattern { name: best.name.clone(), pattern: best.pattern.clone() };
-    let comments = [
+    let mut comments = vec![
         format!("coil: {}", answer.model),
         format!("objective: {}, class: {}, seed: {}", answer.objective, answer.windability, answer.seed),
         format!("worst rate error: {:.6} deg/h under {}", answer.best.worst_rate_deg_per_h, answer.best.worst_profile),
     ];
+    comments.extend(answer.best.p95_rate_deg_per_h.map(|p95| format!("P95 over built coils: {p95:.6} deg/h")));
     write_atomically(&folder.join("best.toml"), print_pattern(&named, &comments).as_bytes())?;
     write_atomically(&folder.join("baselines.csv"), &baselines_csv(&answer.baselines, &answer.best))?;
     write_atomically(&folder.join("history.csv"), &history_csv(&state.history))?;
@@ -139,36 +144,40 @@ const CSV_IN_MEMORY: &str = "a buffer in memory takes every row";
 
 fn baselines_csv(baselines: &[PatternJson], best: &PatternJson) -> Vec<u8> {
     let mut csv = csv::Writer::from_writer(Vec::new());
-    csv.write_record([
+    // A column only of searches over built coils, so that the others' files stay as they are.
+    let p95 = |value: &dyn Fn() -> String| best.p95_rate_deg_per_h.map(|_| value());
+    let mut header: Vec<String> = [
         "name",
         "worst_rate_deg_per_h",
         "worst_phase_rad",
         "worst_profile",
         "worst_time_s",
         "guaranteed_worst_rate_deg_per_h",
-        "class",
-        "reels",
-        "captive",
-        "max_climb",
-        "segments",
-    ])
-    .expect(CSV_IN_MEMORY);
+    ]
+    .map(str::to_owned)
+    .to_vec();
+    header.extend(p95(&|| "p95_rate_deg_per_h".to_owned()));
+    header.extend(["class", "reels", "captive", "max_climb", "segments"].map(str::to_owned));
+    csv.write_record(&header).expect(CSV_IN_MEMORY);
     for pattern in baselines.iter().chain(std::iter::once(best)) {
         let segments: Vec<String> = pattern.segments.iter().map(ToString::to_string).collect();
-        csv.write_record([
+        let mut row = vec![
             pattern.name.clone(),
             pattern.worst_rate_deg_per_h.to_string(),
             pattern.worst_phase_rad.to_string(),
             pattern.worst_profile.clone(),
             pattern.worst_time_s.to_string(),
             pattern.guaranteed_worst_rate_deg_per_h.map(|g| g.to_string()).unwrap_or_default(),
+        ];
+        row.extend(p95(&|| pattern.p95_rate_deg_per_h.map(|v| v.to_string()).unwrap_or_default()));
+        row.extend([
             pattern.windability.class.clone(),
             pattern.windability.reels.to_string(),
             pattern.windability.captive.to_string(),
             pattern.windability.max_climb.to_string(),
             segments.join(" "),
-        ])
-        .expect(CSV_IN_MEMORY);
+        ]);
+        csv.write_record(&row).expect(CSV_IN_MEMORY);
     }
     csv.into_inner().expect(CSV_IN_MEMORY)
 }

@@ -6,6 +6,7 @@ use serde_json::{Map, Value, json};
 
 use crate::effect::{CATALOGUE, CHANNEL, CUSTOM, EffectSpec};
 use crate::pattern::classic::Classic;
+use crate::search::objective::Objective;
 
 const DIALECT: &str = "https://json-schema.org/draft/2020-12/schema";
 
@@ -85,6 +86,7 @@ pub fn model_schema() -> Value {
         &[],
         json!({
             "windability": { "type": "string", "pattern": "^(standard|any|captive:[0-9]+)$" },
+            "objective": { "enum": Objective::ALL.map(Objective::key) },
             "seed": { "type": "integer", "minimum": 0 },
         }),
     );

@@ -263,6 +263,38 @@ impl<'d> TableReader<'d> {
     }
 
     /// An array of integers that must be there, each with its place.
+    /// A non-empty array of strings, each with its place; a single string is no array.
+    pub fn needed_texts(
+        &mut self,
+        reader: &mut TomlReader,
+        key: &'static str,
+        expected: &str,
+    ) -> Option<Vec<(String, Option<Range<usize>>)>> {
+        let Some(item) = self.item(key) else {
+            self.note_missing(key, expected.to_owned());
+            return None;
+        };
+        let Item::Value(Value::Array(array)) = item else {
+            self.wrong_type(reader, key, expected, item);
+            return None;
+        };
+        if array.is_empty() {
+            let message = format!("{}{key} must not be empty: list at least one", self.prefix);
+            reader.fault(Fault::new(message, self.span_of(key)));
+        }
+        let mut texts = Vec::with_capacity(array.len());
+        for (i, value) in array.iter().enumerate() {
+            match value {
+                Value::String(v) => texts.push((v.value().clone(), value.span())),
+                other => {
+                    let message = format!("{}{key}[{i}] must be a string, found {}", self.prefix, other.type_name());
+                    reader.fault(Fault::new(message, value.span()));
+                }
+            }
+        }
+        (texts.len() == array.len()).then_some(texts)
+    }
+
     pub fn needed_integers(
         &mut self,
         reader: &mut TomlReader,

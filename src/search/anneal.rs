@@ -33,7 +33,7 @@ pub struct Cooling {
 }
 
 impl Cooling {
-    fn temperature(&self, done: u64) -> f64 {
+    pub(super) fn temperature(&self, done: u64) -> f64 {
         self.hot * libm::pow(self.cold / self.hot, done as f64 / self.moves as f64)
     }
 }

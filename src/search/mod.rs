@@ -1,12 +1,14 @@
 //! What the best pattern is: worst cases, objectives, annealing, proofs.
 
 pub mod anneal;
+pub mod builds;
 pub mod columns;
 pub mod exact;
 pub mod guaranteed;
 pub mod objective;
 pub mod optimise;
 pub mod pareto;
+pub mod robust;
 pub mod samples;
 pub mod signs;
 pub mod tolerance;

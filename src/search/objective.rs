@@ -1,20 +1,9 @@
 //! What a search makes small.
 
-use thiserror::Error;
-
 use super::columns::Norm;
-use super::guaranteed::{GuaranteedError, UnitStep};
 use super::samples::SampleMatrix;
 use super::worst_case::{SearchError, SolvedProfiles};
 use crate::rate::{CoilModel, RateModel};
-
-#[derive(Debug, Error, Clone, PartialEq)]
-pub enum ObjectiveError {
-    #[error(transparent)]
-    Search(#[from] SearchError),
-    #[error(transparent)]
-    Guaranteed(#[from] GuaranteedError),
-}
 
 /// What a search makes small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -27,56 +16,76 @@ pub enum Objective {
     RootMeanSquare,
     /// The largest |Ω| over all profiles of any length within the largest rate.
     GuaranteedRate,
+    /// The 95 % quantile of the worst case over coils built with the stated tolerances.
+    P95,
 }
 
 impl Objective {
-    pub const ALL: [Objective; 4] =
-        [Objective::WorstRate, Objective::WorstPhase, Objective::RootMeanSquare, Objective::GuaranteedRate];
+    pub const ALL: [Objective; 5] = [
+        Objective::WorstRate,
+        Objective::WorstPhase,
+        Objective::RootMeanSquare,
+        Objective::GuaranteedRate,
+        Objective::P95,
+    ];
 
-    /// As written on the command line and in campaign files.
+    /// As written on the command line and in files.
     pub fn key(self) -> &'static str {
         match self {
             Objective::WorstRate => "worst-rate",
             Objective::WorstPhase => "worst-phase",
             Objective::RootMeanSquare => "rms",
             Objective::GuaranteedRate => "guaranteed-rate",
+            Objective::P95 => "p95",
         }
     }
 
+    /// `guaranteed` is short for `guaranteed-rate`.
     pub fn from_key(key: &str) -> Option<Self> {
+        let key = if key == "guaranteed" { Objective::GuaranteedRate.key() } else { key };
         Self::ALL.into_iter().find(|o| o.key() == key)
     }
 
+    /// In words.
+    pub fn title(self) -> &'static str {
+        match self {
+            Objective::WorstRate => "worst rate error",
+            Objective::WorstPhase => "worst phase error",
+            Objective::RootMeanSquare => "rms rate error",
+            Objective::GuaranteedRate => "guaranteed worst rate error",
+            Objective::P95 => "95 % quantile of the worst rate error over built coils",
+        }
+    }
+
+    /// How the samples of a plain search make one cost; a search over built coils has its own.
     pub fn norm(self) -> Norm {
         match self {
-            Objective::WorstRate | Objective::WorstPhase => Norm::Largest,
+            Objective::WorstRate | Objective::WorstPhase | Objective::P95 => Norm::Largest,
             Objective::RootMeanSquare => Norm::RootMeanSquare,
             Objective::GuaranteedRate => Norm::Sum,
         }
     }
 
-    /// The samples whose norm is the objective, in rad/s.
+    /// Moves of a restart for a layer count.
+    pub fn default_moves_per_restart(self, layers: usize) -> u64 {
+        match self {
+            Objective::P95 => super::robust::default_moves_per_restart(layers),
+            _ => super::optimise::default_moves_per_restart(layers),
+        }
+    }
+
+    /// The samples of the declared profiles whose norm is the objective, in rad/s.
     ///
     /// # Errors
-    /// Rates that are not finite; the guaranteed worst case of a model that has none.
-    pub fn compile(
-        self,
-        model: &CoilModel,
-        solved: &SolvedProfiles,
-        max_rate_k_per_s: f64,
-    ) -> Result<SampleMatrix, ObjectiveError> {
-        if self == Objective::GuaranteedRate {
-            return Ok(UnitStep::new(model, max_rate_k_per_s)?.samples(model)?);
-        }
+    /// Rates that are not finite.
+    pub fn of_profiles(self, model: &CoilModel, solved: &SolvedProfiles) -> Result<SampleMatrix, SearchError> {
         let (matrix, origins) = SampleMatrix::of_profiles(model, solved)?;
-        Ok(match self {
-            Objective::WorstRate | Objective::WorstPhase | Objective::GuaranteedRate => matrix,
-            Objective::RootMeanSquare => {
-                let samples = origins.len() as f64;
-                let factors: Vec<f64> = time_shares(solved).iter().map(|share| (share * samples).sqrt()).collect();
-                matrix.scaled(&factors)
-            }
-        })
+        if self != Objective::RootMeanSquare {
+            return Ok(matrix);
+        }
+        let samples = origins.len() as f64;
+        let factors: Vec<f64> = time_shares(solved).iter().map(|share| (share * samples).sqrt()).collect();
+        Ok(matrix.scaled(&factors))
     }
 }
 

@@ -110,6 +110,53 @@ pub struct State {
     pub stop: Option<Stop>,
 }
 
+impl State {
+    /// Before the first round.
+    pub(super) fn new(working: Vec<usize>) -> Self {
+        Self {
+            round: 0,
+            restarts: Vec::new(),
+            found: Vec::new(),
+            rounds_without_improvement: 0,
+            working,
+            work: Work::default(),
+            history: Vec::new(),
+            stop: None,
+        }
+    }
+
+    /// Puts a pattern in its place among the best.
+    pub(super) fn keep(&mut self, found: Found) {
+        if !self.found.iter().any(|f| f.segments == found.segments) {
+            let at = self.found.partition_point(|f| (f.cost, &f.segments) < (found.cost, &found.segments));
+            self.found.insert(at, found);
+            self.found.truncate(MOST_FOUND);
+        }
+    }
+
+    /// Closes the books of a round; `before` is the best cost at its start.
+    pub(super) fn end_round(&mut self, rules: &Rules, before: f64, working_samples: usize) {
+        self.round += 1;
+        let best_cost = self.found.first().map_or(f64::INFINITY, |f| f.cost);
+        // Rounding between mirror images is no improvement.
+        let improved = best_cost < before * (1.0 - 1e-12);
+        self.rounds_without_improvement = if improved { 0 } else { self.rounds_without_improvement + 1 };
+        let evaluations = self.work.moves;
+        self.history.push(RoundRecord { round: self.round, evaluations, best_cost, working_samples });
+        self.stop = if rules.target.is_some_and(|target| best_cost <= target) {
+            Some(Stop::Target)
+        } else if rules.moves.is_some_and(|moves| evaluations >= moves) {
+            Some(Stop::Moves)
+        } else if self.rounds_without_improvement >= rules.patience {
+            Some(Stop::Patience)
+        } else if self.round >= rules.rounds {
+            Some(Stop::Rounds)
+        } else {
+            None
+        };
+    }
+}
+
 /// Patterns kept for the final judgement by the reference.
 pub const MOST_FOUND: usize = 24;
 
@@ -127,17 +174,7 @@ impl Optimisation {
     pub fn new(matrix: SampleMatrix, class: WindabilityClass, plan: Plan) -> Self {
         let full = Space::new(matrix, class);
         let working = first_working_set(&full, &plan);
-        let found = Vec::new();
-        let state = State {
-            round: 0,
-            restarts: Vec::new(),
-            found,
-            rounds_without_improvement: 0,
-            working,
-            work: Work::default(),
-            history: Vec::new(),
-            stop: None,
-        };
+        let state = State::new(working);
         let mut search = Self::resume_parts(full, plan, state);
         for start in search.plan.starts.clone() {
             search.judge(start);
@@ -233,29 +270,7 @@ impl Optimisation {
             self.state.work += restart.work;
             joining.extend(self.judge(restart.best_segments));
         }
-        self.state.round += 1;
-        let best_cost = self.best().map_or(f64::INFINITY, |f| f.cost);
-        // Rounding between mirror images is no improvement.
-        let improved = best_cost < before * (1.0 - 1e-12);
-        self.state.rounds_without_improvement = if improved { 0 } else { self.state.rounds_without_improvement + 1 };
-        self.state.history.push(RoundRecord {
-            round: self.state.round,
-            evaluations: self.state.work.moves,
-            best_cost,
-            working_samples: self.state.working.len(),
-        });
-        let rules = &self.plan.rules;
-        self.state.stop = if rules.target.is_some_and(|target| best_cost <= target) {
-            Some(Stop::Target)
-        } else if rules.moves.is_some_and(|moves| self.state.work.moves >= moves) {
-            Some(Stop::Moves)
-        } else if self.state.rounds_without_improvement >= rules.patience {
-            Some(Stop::Patience)
-        } else if self.state.round >= rules.rounds {
-            Some(Stop::Rounds)
-        } else {
-            None
-        };
+        self.state.end_round(&self.plan.rules, before, self.state.working.len());
         if self.state.stop.is_none() {
             self.renew_working_set(joining);
             self.begin_round();
@@ -272,11 +287,7 @@ impl Optimisation {
         let mirrored_cost = self.plan.norm.of(&values_of(&self.full, &mirrored));
         let same = (mirrored_cost - cost).abs() <= 1e-12 * cost;
         let kept = if same && mirrored < segments { mirrored } else { segments };
-        if !self.state.found.iter().any(|f| f.segments == kept) {
-            let at = self.state.found.partition_point(|f| (f.cost, &f.segments) < (cost, &kept));
-            self.state.found.insert(at, Found { cost, segments: kept });
-            self.state.found.truncate(MOST_FOUND);
-        }
+        self.state.keep(Found { cost, segments: kept });
         if self.plan.norm != Norm::Largest {
             return Vec::new();
         }

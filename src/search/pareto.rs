@@ -8,17 +8,15 @@ use crate::pattern::windability::{Windability, WindingGraph};
 pub struct Point {
     pub judged: Judged,
     pub windability: Windability,
-    /// The 95 % quantile of the worst rate over built coils, where tolerances are stated.
-    pub p95_rad_per_s: Option<f64>,
 }
 
 /// Errors this close count as equal, so that rounding makes no trade-off.
 const SAME_ERROR: f64 = 1e-6;
 
 impl Point {
-    pub fn new(judged: Judged, p95_rad_per_s: Option<f64>) -> Self {
+    pub fn new(judged: Judged) -> Self {
         let windability = WindingGraph::new(&judged.pattern).windability();
-        Self { judged, windability, p95_rad_per_s }
+        Self { judged, windability }
     }
 
     /// Nowhere worse and somewhere better.
@@ -27,7 +25,7 @@ impl Point {
         let better = |a: f64, b: f64| a < b * (1.0 - SAME_ERROR);
         let (a, b) = (&self.windability, &other.windability);
         let (error, other_error) = (self.judged.objective_rad_per_s, other.judged.objective_rad_per_s);
-        let spreads = self.p95_rad_per_s.zip(other.p95_rad_per_s);
+        let spreads = self.judged.p95_rad_per_s.zip(other.judged.p95_rad_per_s);
         let effort = |w: &Windability| [w.captive, w.max_climb, w.long_crossovers];
         no_worse(error, other_error)
             && spreads.is_none_or(|(p, q)| no_worse(p, q))
@@ -71,9 +69,10 @@ mod tests {
             worst,
             phase_rad: 0.0,
             guaranteed_rad_per_s: None,
+            p95_rad_per_s: None,
             objective_rad_per_s,
         };
-        Point::new(judged, None)
+        Point::new(judged)
     }
 
     #[test]

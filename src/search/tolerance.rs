@@ -71,8 +71,12 @@ pub enum ToleranceError {
     NoFilm,
     #[error("[tolerance] states no spread: give at least one standard deviation above 0")]
     NoSpread,
+    #[error("a search for the 95 % quantile needs a [tolerance] table: state there how much what is built spreads")]
+    NoTolerance,
     #[error(transparent)]
     Search(#[from] SearchError),
+    #[error(transparent)]
+    Guaranteed(#[from] GuaranteedError),
 }
 
 /// Whose worst case was drawn.
@@ -99,10 +103,7 @@ pub struct Distribution {
 impl Distribution {
     /// The value that a share of the coils does not exceed, between the order statistics.
     pub fn quantile_rad_per_s(&self, share: f64) -> f64 {
-        let place = share.clamp(0.0, 1.0) * (self.worst_rad_per_s.len() - 1) as f64;
-        let (below, above) = (place.floor() as usize, place.ceil() as usize);
-        let (a, b) = (self.worst_rad_per_s[below], self.worst_rad_per_s[above]);
-        a + (b - a) * (place - below as f64)
+        quantile(&self.worst_rad_per_s, share)
     }
 
     pub fn median_rad_per_s(&self) -> f64 {
@@ -110,12 +111,20 @@ impl Distribution {
     }
 
     pub fn p95_rad_per_s(&self) -> f64 {
-        self.quantile_rad_per_s(0.95)
+        self.quantile_rad_per_s(super::builds::SHARE)
     }
 
     pub fn p99_rad_per_s(&self) -> f64 {
         self.quantile_rad_per_s(0.99)
     }
+}
+
+/// The value that a share of ascending values does not exceed, between the order statistics.
+pub(super) fn quantile(ascending: &[f64], share: f64) -> f64 {
+    let place = share.clamp(0.0, 1.0) * (ascending.len() - 1) as f64;
+    let (below, above) = (place.floor() as usize, place.ceil() as usize);
+    let (a, b) = (ascending[below], ascending[above]);
+    a + (b - a) * (place - below as f64)
 }
 
 impl Spread {
@@ -174,6 +183,85 @@ struct Deviates {
 /// A factor is not varied below this: a coil with less is no coil.
 const LEAST_FACTOR: f64 = 0.1;
 
+/// The coils of a study, drawn once: every pattern is judged on the same ones.
+pub struct Coils<'a> {
+    model: &'a CoilModel,
+    spec: &'a ToleranceSpec,
+    active: Vec<Spread>,
+    judge: Judge<'a>,
+    deviates: Vec<Deviates>,
+}
+
+impl<'a> Coils<'a> {
+    /// # Errors
+    /// No spread at all, a film's spread without a film, models that cannot be solved.
+    pub fn new(
+        model: &'a CoilModel,
+        profiles: &'a ProfileSpec,
+        spec: &'a ToleranceSpec,
+    ) -> Result<Self, ToleranceError> {
+        let active = spec.active();
+        if active.is_empty() {
+            return Err(ToleranceError::NoSpread);
+        }
+        let has_film = model.effects.iter().any(|e| e.spec().kind == "surface_film");
+        if active.contains(&Spread::Film) && !has_film {
+            return Err(ToleranceError::NoFilm);
+        }
+        let judge = Judge::new(model, profiles)?;
+        let mut random = ChaCha8Rng::seed_from_u64(spec.seed);
+        let normal = Normal::standard();
+        let mut draw = || normal.inverse_cdf(random.random::<f64>().max(f64::MIN_POSITIVE));
+        let layers = model.coil.layers();
+        let deviates = (0..spec.samples.max(2))
+            .map(|_| Deviates { turns: (0..layers).map(|_| draw()).collect(), others: std::array::from_fn(|_| draw()) })
+            .collect();
+        Ok(Self { model, spec, active, judge, deviates })
+    }
+
+    /// As declared.
+    pub fn model(&self) -> &CoilModel {
+        self.model
+    }
+
+    pub fn profiles(&self) -> &ProfileSpec {
+        self.judge.profiles
+    }
+
+    pub fn measure(&self) -> Measure {
+        self.judge.measure
+    }
+
+    /// The models of all coils, in their order.
+    pub fn built(&self) -> impl IndexedParallelIterator<Item = Result<CoilModel, SearchError>> {
+        self.deviates.par_iter().map(|coil| built(self.model, self.spec, &self.active, coil))
+    }
+
+    /// The worst case of each pattern in every coil, with some of the spreads only.
+    ///
+    /// # Shapes
+    /// Coils × patterns.
+    fn worst(&self, spreads: &[Spread], patterns: &[Pattern]) -> Result<Vec<Vec<f64>>, SearchError> {
+        let reuse = (!spreads.iter().any(|s| s.is_thermal())).then_some(&self.judge.nominal);
+        let of = |coil: &Deviates| self.judge.worst(&built(self.model, self.spec, spreads, coil)?, reuse, patterns);
+        self.deviates.par_iter().map(of).collect()
+    }
+
+    /// The 95 % quantile of each pattern, as [`study`] reports it.
+    ///
+    /// # Errors
+    /// A pattern of another layer count.
+    pub fn p95_rad_per_s(&self, patterns: &[Pattern]) -> Result<Vec<f64>, SearchError> {
+        let worst = self.worst(&self.active, patterns)?;
+        let of = |p: usize| {
+            let mut ascending: Vec<f64> = worst.iter().map(|coil| coil[p]).collect();
+            ascending.sort_by(f64::total_cmp);
+            quantile(&ascending, super::builds::SHARE)
+        };
+        Ok((0..patterns.len()).map(of).collect())
+    }
+}
+
 /// The Monte Carlo of some patterns, all over the same coils.
 ///
 /// # Errors
@@ -184,32 +272,14 @@ pub fn study(
     spec: &ToleranceSpec,
     patterns: &[Pattern],
 ) -> Result<Vec<Distribution>, ToleranceError> {
-    let active = spec.active();
-    if active.is_empty() {
-        return Err(ToleranceError::NoSpread);
-    }
-    let has_film = model.effects.iter().any(|e| e.spec().kind == "surface_film");
-    if active.contains(&Spread::Film) && !has_film {
-        return Err(ToleranceError::NoFilm);
-    }
-    let judge = Judge::new(model, profiles)?;
-    let nominal = judge.worst(model, None, patterns)?;
-    let mut random = ChaCha8Rng::seed_from_u64(spec.seed);
-    let normal = Normal::standard();
-    let mut draw = || normal.inverse_cdf(random.random::<f64>().max(f64::MIN_POSITIVE));
-    let layers = model.coil.layers();
-    let coils: Vec<Deviates> = (0..spec.samples.max(2))
-        .map(|_| Deviates { turns: (0..layers).map(|_| draw()).collect(), others: std::array::from_fn(|_| draw()) })
-        .collect();
-    let of = |spreads: &[Spread]| -> Result<Vec<Vec<f64>>, ToleranceError> {
-        let reuse = (!spreads.iter().any(|s| s.is_thermal())).then_some(&judge.nominal);
-        coils.par_iter().map(|coil| Ok(judge.worst(&built(model, spec, spreads, coil)?, reuse, patterns)?)).collect()
-    };
-    let together = of(&active)?;
+    let coils = Coils::new(model, profiles, spec)?;
+    let active = &coils.active;
+    let nominal = coils.judge.worst(model, None, patterns)?;
+    let together = coils.worst(active, patterns)?;
     let alone: Vec<Vec<Vec<f64>>> = if active.len() == 1 {
         vec![together.clone()]
     } else {
-        active.iter().map(|s| of(&[*s])).collect::<Result<_, _>>()?
+        active.iter().map(|s| coils.worst(&[*s], patterns)).collect::<Result<_, _>>()?
     };
     Ok((0..patterns.len())
         .map(|p| {

@@ -1,15 +1,29 @@
 //! The final judgement: what was found and the classic windings, all by the reference, and what to say about it.
 
+use thiserror::Error;
+
 use super::guaranteed::{GuaranteedError, UnitStep};
 use super::objective::Objective;
 use super::optimise::Found;
+use super::tolerance::{Coils, ToleranceError, ToleranceSpec};
 use super::worst_case::{SearchError, SolvedProfiles, WorstCase};
 use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
 use crate::pattern::windability::WindabilityClass;
+use crate::profile::ProfileSpec;
 use crate::rate::{CoilModel, RateModel};
 use crate::thermal::Location;
 use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
+
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum JudgeError {
+    #[error(transparent)]
+    Search(#[from] SearchError),
+    #[error(transparent)]
+    Guaranteed(#[from] GuaranteedError),
+    #[error(transparent)]
+    Tolerance(#[from] ToleranceError),
+}
 
 /// A pattern with its reference values.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,7 +35,9 @@ pub struct Judged {
     pub phase_rad: f64,
     /// None for models that have no guaranteed worst case.
     pub guaranteed_rad_per_s: Option<f64>,
-    /// The objective by the reference, in rad/s: the worst rate, or the rate's rms.
+    /// The 95 % quantile over built coils, where it is the objective.
+    pub p95_rad_per_s: Option<f64>,
+    /// The objective by the reference, in rad/s.
     pub objective_rad_per_s: f64,
 }
 
@@ -33,6 +49,9 @@ pub struct Bench<'a> {
     pub objective: Objective,
     /// None for models that have no guaranteed worst case.
     pub unit_step: Option<&'a UnitStep>,
+    pub profiles: &'a ProfileSpec,
+    /// Needed for the objective P95.
+    pub tolerance: Option<&'a ToleranceSpec>,
 }
 
 /// Classics in the order in which one is named where several are equally good.
@@ -44,8 +63,36 @@ const EQUALLY_GOOD: f64 = 1e-9;
 
 impl Bench<'_> {
     /// # Errors
-    /// A pattern of another layer count.
-    pub fn judge(&self, name: &str, pattern: &Pattern) -> Result<Judged, SearchError> {
+    /// A pattern of another layer count; an objective that the model has not.
+    pub fn judge(&self, name: &str, pattern: &Pattern) -> Result<Judged, JudgeError> {
+        let mut judged = self.judge_all(&[(name.to_owned(), pattern.clone())])?;
+        Ok(judged.remove(0))
+    }
+
+    /// Patterns by their names; built coils are drawn and solved once for all of them.
+    ///
+    /// # Errors
+    /// As [`Bench::judge`].
+    pub fn judge_all(&self, named: &[(String, Pattern)]) -> Result<Vec<Judged>, JudgeError> {
+        let p95_rad_per_s = if self.objective == Objective::P95 {
+            let patterns: Vec<Pattern> = named.iter().map(|(_, pattern)| pattern.clone()).collect();
+            self.coils()?.p95_rad_per_s(&patterns)?.into_iter().map(Some).collect()
+        } else {
+            vec![None; named.len()]
+        };
+        named.iter().zip(p95_rad_per_s).map(|((name, pattern), p95)| Ok(self.judge_one(name, pattern, p95)?)).collect()
+    }
+
+    /// The coils that the objective P95 is about.
+    ///
+    /// # Errors
+    /// No tolerances, or none that are above zero.
+    pub(super) fn coils(&self) -> Result<Coils<'_>, ToleranceError> {
+        let tolerance = self.tolerance.ok_or(ToleranceError::NoTolerance)?;
+        Coils::new(self.model, self.profiles, tolerance)
+    }
+
+    fn judge_one(&self, name: &str, pattern: &Pattern, p95: Option<f64>) -> Result<Judged, SearchError> {
         let rate_model = RateModel::new(self.model, pattern, &[])?;
         let worst = self.solved.worst_case(self.model, pattern)?;
         let guaranteed_rad_per_s = match self.unit_step.map(|step| step.guaranteed(self.model, pattern)) {
@@ -53,17 +100,20 @@ impl Bench<'_> {
             Some(Err(GuaranteedError::Search(error))) => return Err(error),
             Some(Err(GuaranteedError::Effect { .. })) | None => None,
         };
+        // A search for what the model has not ends before.
+        let or_none = |value: Option<f64>| value.unwrap_or(f64::INFINITY);
         let objective_rad_per_s = match self.objective {
             Objective::WorstRate | Objective::WorstPhase => worst.rate_rad_per_s.abs(),
             Objective::RootMeanSquare => super::objective::rms_rad_per_s(&rate_model, self.solved),
-            // A search for it ends before where there is none.
-            Objective::GuaranteedRate => guaranteed_rad_per_s.unwrap_or(f64::INFINITY),
+            Objective::GuaranteedRate => or_none(guaranteed_rad_per_s),
+            Objective::P95 => or_none(p95),
         };
         Ok(Judged {
             name: name.to_owned(),
             pattern: pattern.clone(),
             phase_rad: rate_model.phase_rad(worst.rate_rad_per_s),
             guaranteed_rad_per_s,
+            p95_rad_per_s: p95,
             worst,
             objective_rad_per_s,
         })
@@ -72,14 +122,14 @@ impl Bench<'_> {
     /// Every classic that fits the layer count.
     ///
     /// # Errors
-    /// None that a model which could be solved would cause.
-    pub fn baselines(&self) -> Result<Vec<Judged>, SearchError> {
+    /// An objective that the model has not.
+    pub fn baselines(&self) -> Result<Vec<Judged>, JudgeError> {
         let layers = self.model.coil.layers();
-        Classic::ALL
+        let fitting: Vec<(String, Pattern)> = Classic::ALL
             .into_iter()
-            .filter_map(|classic| Some((classic, classic.pattern(layers).ok()?)))
-            .map(|(classic, pattern)| self.judge(classic.key(), &pattern))
-            .collect()
+            .filter_map(|classic| Some((classic.key().to_owned(), classic.pattern(layers).ok()?)))
+            .collect();
+        self.judge_all(&fitting)
     }
 
     /// The best of what was found and of the baselines of the class, by the reference.
@@ -94,7 +144,7 @@ impl Bench<'_> {
         class: WindabilityClass,
         found: &[Found],
         baselines: &[Judged],
-    ) -> Result<Option<Judged>, SearchError> {
+    ) -> Result<Option<Judged>, JudgeError> {
         let mut best: Option<Judged> = None;
         let is_better = |value: f64, best: &Option<Judged>| {
             best.as_ref().is_none_or(|b| value < b.objective_rad_per_s * (1.0 - EQUALLY_GOOD))
@@ -105,17 +155,27 @@ impl Bench<'_> {
                 best = Some(baseline.clone());
             }
         }
-        for candidate in found {
-            if !is_better(candidate.cost, &best) {
+        let named = |candidate: &Found| {
+            let pattern = Pattern::new(candidate.segments.clone()).expect("a walk visits permutations only");
+            (format!("searched-{}", pattern.layers()), pattern)
+        };
+        for candidates in found.chunks(self.judged_at_once()) {
+            let promising: Vec<_> = candidates.iter().filter(|c| is_better(c.cost, &best)).map(named).collect();
+            if promising.is_empty() {
                 break;
             }
-            let pattern = Pattern::new(candidate.segments.clone()).expect("a walk visits permutations only");
-            let judged = self.judge(&format!("searched-{}", pattern.layers()), &pattern)?;
-            if is_better(judged.objective_rad_per_s, &best) {
-                best = Some(judged);
+            for judged in self.judge_all(&promising)? {
+                if is_better(judged.objective_rad_per_s, &best) {
+                    best = Some(judged);
+                }
             }
         }
         Ok(best)
+    }
+
+    /// Built coils are worth being solved for several patterns at once.
+    fn judged_at_once(&self) -> usize {
+        if self.objective == Objective::P95 { 6 } else { 1 }
     }
 
     /// In words: how much better than QUA, under which class, boundary and objective.
@@ -124,16 +184,12 @@ impl Bench<'_> {
             Location::OuterLayer => "with the outermost layer's temperature prescribed",
             Location::Ambient => "with the ambient temperature prescribed",
         };
-        let what = match self.objective {
-            Objective::WorstRate => "worst rate error",
-            Objective::WorstPhase => "worst phase error",
-            Objective::RootMeanSquare => "rms rate error",
-            Objective::GuaranteedRate => "guaranteed worst rate error",
-        };
+        let what = self.objective.title();
         let shown = |judged: &Judged| deg_per_h_from_rad_per_s(judged.objective_rad_per_s);
         let count = self.solved.profiles().len();
         let over = match self.objective {
             Objective::GuaranteedRate => "all profiles within the largest rate".to_owned(),
+            Objective::P95 => format!("{} built coils", self.tolerance.map_or(0, |t| t.samples)),
             _ if count == 1 => "one profile".to_owned(),
             _ => format!("{count} profiles"),
         };

@@ -17,6 +17,7 @@ use super::samples::SampleMatrix;
 use super::signs::{segments_of_signs, sign_columns, sign_value, signs_of_segments};
 use crate::pattern::axial_direction;
 use crate::pattern::windability::WindabilityClass;
+use crate::rate::segment_weights_m2;
 
 /// A number below `count`, the same on every machine.
 pub(super) fn pick(random: &mut ChaCha8Rng, count: usize) -> usize {
@@ -122,12 +123,6 @@ impl Space {
         walk.coefficients = walk.recomputed_coefficients(self);
         walk
     }
-}
-
-/// The two halves' parts of ∫(2z − L)dz over a piece of fibre.
-fn segment_weights_m2(from_m: f64, to_m: f64, length_m: f64) -> (f64, f64) {
-    let middle_m = (0.5 * length_m).clamp(from_m, to_m);
-    ((middle_m - from_m) * (from_m + middle_m - length_m), (to_m - middle_m) * (middle_m + to_m - length_m))
 }
 
 fn invert(segments: &[usize]) -> Vec<usize> {

@@ -55,3 +55,49 @@ fn every_example_has_no_faults_and_can_be_evaluated() {
         assert!(answer["patterns"][0]["worst_rate_deg_per_h"].as_f64().unwrap() > 0.0);
     }
 }
+
+/// The paper's coil with spreads of what is built and, if wanted, further lines in front of them.
+fn spread_model(folder: &std::path::Path, spreads: &str) -> String {
+    let path = folder.join("spread.toml");
+    let source = std::fs::read_to_string(super::root().join("examples/paper-200m.toml")).unwrap();
+    std::fs::write(&path, source + spreads).unwrap();
+    path.display().to_string()
+}
+
+#[test]
+fn a_search_for_p95_reports_what_tolerance_reports_and_writes_the_same_bytes_at_any_number_of_threads() {
+    let root = tempfile::tempdir().unwrap();
+    let spreads = "\n[tolerance]\nturns_per_layer_sd = 0.3\nmismatch_sd = 0.001\nsamples = 20\n";
+    let model = spread_model(root.path(), spreads);
+    let run_with = |threads: &str| {
+        let folder = root.path().join(threads).display().to_string();
+        let short = ["--rounds", "1", "--moves-per-restart", "300", "--restarts", "2"];
+        let request = [&["optimise", &model, "--objective", "p95", "--threads", threads, "-o", &folder], &short[..]];
+        json(&request.concat())
+    };
+    let (one, two) = (run_with("1"), run_with("2"));
+    for file in ["best.toml", "summary.json", "baselines.csv", "history.csv", "checkpoint.json"] {
+        let read = |threads: &str| std::fs::read(root.path().join(threads).join(file)).unwrap();
+        assert_eq!(read("1"), read("2"), "{file}");
+    }
+    assert_eq!(one["best"], two["best"]);
+    assert!(one["baselines"].as_array().unwrap().iter().any(|b| b["name"] == "qua"));
+    let best = root.path().join("1/best.toml").display().to_string();
+    let studied = json(&["tolerance", &model, "--pattern", &best]);
+    let (found, studied) = (&one["best"]["p95_rate_deg_per_h"], &studied["patterns"][0]["p95_deg_per_h"]);
+    assert!(found.is_f64() && found == studied, "{found} {studied}");
+}
+
+#[test]
+fn a_search_for_p95_without_tolerances_is_told_what_is_missing() {
+    let output = run(&["optimise", "examples/paper-200m.toml", "--objective", "p95"]);
+    assert_eq!(code(&output), 2);
+    assert!(stderr(&output).contains("[tolerance]"), "{}", stderr(&output));
+    let root = tempfile::tempdir().unwrap();
+    let model = spread_model(root.path(), "");
+    let source = std::fs::read_to_string(&model).unwrap();
+    std::fs::write(&model, source.replace("[search]\n", "[search]\nobjective = \"p95\"\n")).unwrap();
+    let output = run(&["check", &model]);
+    assert_eq!(code(&output), 2);
+    assert!(stderr(&output).contains("[tolerance]"), "{}", stderr(&output));
+}

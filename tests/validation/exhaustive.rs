@@ -25,7 +25,7 @@ fn profiles(count: usize) -> ProfileSpec {
 }
 
 fn search(bench: &Bench, class: WindabilityClass, seed: u64) -> f64 {
-    let matrix = bench.objective.compile(bench.model, bench.solved, k_per_s_from_c_per_h(10.0)).unwrap();
+    let matrix = bench.objective.of_profiles(bench.model, bench.solved).unwrap();
     let plan = Plan {
         seed,
         norm: bench.objective.norm(),
@@ -41,7 +41,7 @@ fn search(bench: &Bench, class: WindabilityClass, seed: u64) -> f64 {
 
 /// Patterns in the order of their largest sample, which the reference cannot be below, until no further one can win.
 fn exhaustive_minimum(bench: &Bench) -> f64 {
-    let matrix = bench.objective.compile(bench.model, bench.solved, k_per_s_from_c_per_h(10.0)).unwrap();
+    let matrix = bench.objective.of_profiles(bench.model, bench.solved).unwrap();
     let patterns = (0..1u32 << 11).map(|bits| {
         let high: Vec<bool> = (0..11).map(|m| bits >> m & 1 == 1).collect();
         Pattern::new(segments_of_signs(&high)).unwrap()
@@ -61,10 +61,11 @@ fn exhaustive_minimum(bench: &Bench) -> f64 {
 
 #[test]
 fn twenty_seeds_of_twenty_find_the_exhaustive_minimum_over_2048_standard_patterns_for_every_objective() {
-    let model = paper_model(200.0, 2.7e-7);
-    let solved = SolvedProfiles::new(&model, &profiles(64).profiles()).unwrap();
+    let (model, profiles) = (paper_model(200.0, 2.7e-7), profiles(64));
+    let solved = SolvedProfiles::new(&model, &profiles.profiles()).unwrap();
     for objective in [Objective::WorstRate, Objective::RootMeanSquare] {
-        let bench = Bench { model: &model, solved: &solved, objective, unit_step: None };
+        let bench =
+            Bench { model: &model, solved: &solved, objective, unit_step: None, profiles: &profiles, tolerance: None };
         let smallest = exhaustive_minimum(&bench);
         println!("{}: exhaustive minimum {:.6} °/h", objective.key(), deg_per_h_from_rad_per_s(smallest));
         for seed in 1..=20 {
@@ -76,9 +77,11 @@ fn twenty_seeds_of_twenty_find_the_exhaustive_minimum_over_2048_standard_pattern
 
 #[test]
 fn without_the_class_limit_the_paper_coil_does_far_better_than_a_quadrupole() {
-    let model = paper_model(200.0, 2.7e-7);
-    let solved = SolvedProfiles::new(&model, &[paper_ramp()]).unwrap();
-    let bench = Bench { model: &model, solved: &solved, objective: Objective::WorstRate, unit_step: None };
+    let (model, profiles) = (paper_model(200.0, 2.7e-7), profiles(0));
+    let solved = SolvedProfiles::new(&model, &profiles.profiles()).unwrap();
+    let objective = Objective::WorstRate;
+    let bench =
+        Bench { model: &model, solved: &solved, objective, unit_step: None, profiles: &profiles, tolerance: None };
     let baselines = bench.baselines().unwrap();
     let qua = baselines.iter().find(|b| b.name == "qua").unwrap().objective_rad_per_s;
     let any = search(&bench, WindabilityClass::Any, 1);

@@ -1,0 +1,432 @@
+//! Coils as they leave the workshop, compiled for a search: the worst case of every drawn coil, for any pattern.
+//!
+//! ```text
+//! W_b(P) = |v_b0| + Σ_i |v_bi|,   v_b = c_b + Σ_j D_bj ( w_bj^A + ρ_bj w_bj^B )          guaranteed worst case of coil b
+//! P95(P) = 95 % quantile of W_b(P) over the coils b
+//! ```
+//!
+//! | symbol | meaning | in code |
+//! |---|---|---|
+//! | D_bj | what G(0+) and each change of G owe to a unit weight of layer j in half A | `Part::columns` |
+//! | ρ_bj | half B's response over half A's | `Part::half_b_over_a` |
+//! | w_bj | the layer weights of coil b, whose lengths are its own | `Build::lengths_m` |
+//!
+//! Where electronics heat the bore, W is the largest of all partial sums plus the size of the heat's error at their
+//! ends. Where the model has no guaranteed worst case, W is the largest |v| over the instants at which probing patterns
+//! were seen to be worst under the declared profiles.
+//!
+//! Every coil is solved once. W falls short of the coil's true worst case only by what lies between the times that were
+//! compiled, so it is never above it; what is reported is judged by [`super::tolerance`] on the same coils.
+//!
+//! # Source
+//! The same random numbers for every candidate: Law, Simulation Modeling and Analysis (2015), section 11.2.
+
+use rayon::prelude::*;
+
+use super::guaranteed::UnitStep;
+use super::samples::{SampleMatrix, any_rate_model};
+use super::tolerance::{Coils, Measure, ToleranceError, quantile};
+use super::worst_case::{SearchError, SolvedProfiles};
+use crate::pattern::{Pattern, axial_direction};
+use crate::profile::ProfileSpec;
+use crate::rate::{CoilModel, WeightResponse, segment_weights_m2};
+use crate::thermal::{Drive, Instant, solve};
+use crate::units::REFERENCE_TEMPERATURE_K;
+
+/// The quantile that is made small.
+pub const SHARE: f64 = 0.95;
+
+/// Every so many-th time of a unit step's grid is compiled: neighbours are then 9 % apart, and the quantile falls short by
+/// at most 0.04 % (all 128 standard patterns of eight layers under a film, a test allows 0.2 %).
+const STRIDE: usize = 3;
+
+/// The most instants of profiles that are compiled for models without a guaranteed worst case.
+const MOST_INSTANTS: usize = 256;
+
+/// Every drawn coil, ready to be judged with any pattern.
+#[derive(Debug, Clone)]
+pub struct Builds {
+    layers: usize,
+    share: f64,
+    builds: Vec<Build>,
+}
+
+/// A linear map from layer weights to samples.
+///
+/// # Shapes
+/// `columns` holds one column a layer, each `rows` long; the columns of half B and of the axial moments follow where they
+/// are needed.
+#[derive(Debug, Clone)]
+struct Part {
+    rows: usize,
+    constant: Vec<f64>,
+    columns: Vec<f64>,
+    /// Where half B's columns are multiples of half A's.
+    half_b_over_a: Option<Vec<f64>>,
+    axial: bool,
+}
+
+#[derive(Debug, Clone)]
+enum Worst {
+    /// Of samples: the largest size.
+    Largest(Part),
+    /// Of G(0+) and its changes: the sum of their sizes.
+    Variation(Part),
+    /// Of changes and of the heat's error at the same times.
+    Heated(Part, Part),
+}
+
+#[derive(Debug, Clone)]
+struct Build {
+    lengths_m: Vec<f64>,
+    worst: Worst,
+}
+
+/// Room for the weights and values of one coil.
+#[derive(Debug, Clone, Default)]
+struct Scratch {
+    half_a_m2: Vec<f64>,
+    half_b_m2: Vec<f64>,
+    axial_m2: Vec<f64>,
+    values: Vec<f64>,
+    heat: Vec<f64>,
+}
+
+impl Part {
+    fn new(layers: usize, responses: &[WeightResponse]) -> Self {
+        let column = |part: fn(&WeightResponse) -> &[f64], j: usize| -> Vec<f64> {
+            responses.iter().map(|r| part(r).get(j).copied().unwrap_or(0.0)).collect()
+        };
+        fn half_a(response: &WeightResponse) -> &[f64] {
+            &response.half_a_rad_per_s_m2
+        }
+        fn half_b(response: &WeightResponse) -> &[f64] {
+            &response.half_b_rad_per_s_m2
+        }
+        fn axial(response: &WeightResponse) -> &[f64] {
+            &response.axial_rad_per_s_m2
+        }
+        let mut columns: Vec<f64> = (0..layers).flat_map(|j| column(half_a, j)).collect();
+        let half_b_over_a: Option<Vec<f64>> =
+            (0..layers).map(|j| ratio(&column(half_a, j), &column(half_b, j))).collect();
+        if half_b_over_a.is_none() {
+            columns.extend((0..layers).flat_map(|j| column(half_b, j)));
+        }
+        let has_axial = responses.iter().any(|r| r.axial_rad_per_s_m2.iter().any(|x| *x != 0.0));
+        if has_axial {
+            columns.extend((0..layers).flat_map(|j| column(axial, j)));
+        }
+        Self {
+            rows: responses.len(),
+            constant: responses.iter().map(|r| r.constant_rad_per_s).collect(),
+            columns,
+            half_b_over_a,
+            axial: has_axial,
+        }
+    }
+
+    fn values(&self, scratch: &Scratch, values: &mut Vec<f64>) {
+        values.clone_from(&self.constant);
+        let layers = scratch.half_a_m2.len();
+        let mut add = |index: usize, factor: f64| {
+            let column = &self.columns[index * self.rows..(index + 1) * self.rows];
+            for (v, d) in values.iter_mut().zip(column) {
+                *v += factor * d;
+            }
+        };
+        for j in 0..layers {
+            match &self.half_b_over_a {
+                Some(ratio) => add(j, scratch.half_a_m2[j] + ratio[j] * scratch.half_b_m2[j]),
+                None => {
+                    add(j, scratch.half_a_m2[j]);
+                    add(layers + j, scratch.half_b_m2[j]);
+                }
+            }
+            if self.axial {
+                add(self.columns.len() / self.rows - layers + j, scratch.axial_m2[j]);
+            }
+        }
+    }
+}
+
+/// b/a where b is one multiple of a but for rounding.
+fn ratio(a: &[f64], b: &[f64]) -> Option<f64> {
+    const ROUNDING: f64 = 1e-12;
+    let largest = a.iter().map(|v| v.abs()).fold(0.0, f64::max);
+    let at = a.iter().position(|v| v.abs() == largest)?;
+    if largest == 0.0 {
+        return b.iter().all(|v| *v == 0.0).then_some(1.0);
+    }
+    let ratio = b[at] / a[at];
+    a.iter().zip(b).all(|(a, b)| (b - ratio * a).abs() <= ROUNDING * largest * ratio.abs()).then_some(ratio)
+}
+
+impl Build {
+    fn worst(&self, pattern: &Arrangement, scratch: &mut Scratch) -> f64 {
+        pattern.weigh(&self.lengths_m, scratch);
+        let mut values = std::mem::take(&mut scratch.values);
+        let worst = match &self.worst {
+            Worst::Largest(part) => {
+                part.values(scratch, &mut values);
+                values.iter().map(|v| v.abs()).fold(0.0, f64::max)
+            }
+            Worst::Variation(part) => {
+                part.values(scratch, &mut values);
+                sum_of_sizes(&values)
+            }
+            Worst::Heated(changes, heat) => {
+                changes.values(scratch, &mut values);
+                let mut heated = std::mem::take(&mut scratch.heat);
+                heat.values(scratch, &mut heated);
+                let mut sum = 0.0;
+                let mut largest = 0.0_f64;
+                for (change, heat) in values.iter().zip(&heated) {
+                    sum += change.abs();
+                    largest = largest.max(sum + heat.abs());
+                }
+                scratch.heat = heated;
+                largest
+            }
+        };
+        scratch.values = values;
+        worst
+    }
+}
+
+/// Eight lanes, so that the order of additions is the same on every machine.
+fn sum_of_sizes(values: &[f64]) -> f64 {
+    let mut lanes = [0.0_f64; 8];
+    let chunks = values.chunks_exact(8);
+    let rest: f64 = chunks.remainder().iter().map(|v| v.abs()).sum();
+    for chunk in chunks {
+        for (lane, v) in lanes.iter_mut().zip(chunk) {
+            *lane += v.abs();
+        }
+    }
+    lanes.iter().sum::<f64>() + rest
+}
+
+/// A pattern as a search handles it.
+struct Arrangement<'a> {
+    segments: &'a [usize],
+    layers_by_segment: Vec<usize>,
+}
+
+impl<'a> Arrangement<'a> {
+    fn new(segments: &'a [usize]) -> Self {
+        let mut layers_by_segment = vec![0; segments.len()];
+        for (layer, &segment) in segments.iter().enumerate() {
+            layers_by_segment[segment - 1] = layer;
+        }
+        Self { segments, layers_by_segment }
+    }
+
+    fn weigh(&self, lengths_m: &[f64], scratch: &mut Scratch) {
+        let length_m: f64 = lengths_m.iter().sum();
+        for weights in [&mut scratch.half_a_m2, &mut scratch.half_b_m2, &mut scratch.axial_m2] {
+            weights.resize(lengths_m.len(), 0.0);
+        }
+        let mut from_m = 0.0;
+        for &layer in &self.layers_by_segment {
+            let to_m = from_m + lengths_m[layer];
+            let (a, b) = segment_weights_m2(from_m, to_m, length_m);
+            scratch.half_a_m2[layer] = a;
+            scratch.half_b_m2[layer] = b;
+            scratch.axial_m2[layer] = 2.0 * axial_direction(self.segments, layer) * lengths_m[layer].powi(2);
+            from_m = to_m;
+        }
+    }
+}
+
+impl Builds {
+    /// Solves every coil of a study; `probes` are patterns that show when coils without a guaranteed worst case err most.
+    ///
+    /// # Errors
+    /// As [`super::tolerance::study`].
+    pub fn new(coils: &Coils, probes: &[Pattern]) -> Result<Self, ToleranceError> {
+        let layers = coils.model().coil.layers();
+        let builds = match coils.measure() {
+            Measure::Guaranteed => {
+                let compile = |model: CoilModel| -> Result<Build, ToleranceError> {
+                    let step = UnitStep::new(&model, coils.profiles().max_rate_k_per_s)?;
+                    Build::guaranteed(&model, &step, STRIDE)
+                };
+                coils.built().map(|model| compile(model?)).collect::<Result<Vec<Build>, ToleranceError>>()?
+            }
+            Measure::Sampled => {
+                let instants = binding_instants(coils.model(), coils.profiles(), probes)?;
+                coils.built().map(|model| Ok(Build::sampled(&model?, coils.profiles(), &instants)?)).collect::<Result<
+                    Vec<Build>,
+                    ToleranceError,
+                >>(
+                )?
+            }
+        };
+        Ok(Self { layers, share: SHARE, builds })
+    }
+
+    /// The coil as declared and nothing else: its guaranteed worst case, the bore's heat included.
+    ///
+    /// # Errors
+    /// Effects that leave a layer no turns.
+    pub fn nominal(model: &CoilModel, step: &UnitStep) -> Result<Self, ToleranceError> {
+        Ok(Self { layers: model.coil.layers(), share: SHARE, builds: vec![Build::guaranteed(model, step, 1)?] })
+    }
+
+    pub fn layers(&self) -> usize {
+        self.layers
+    }
+
+    /// Numbers held for all coils together.
+    pub fn samples(&self) -> usize {
+        let rows = |build: &Build| match &build.worst {
+            Worst::Largest(part) | Worst::Variation(part) => part.rows,
+            Worst::Heated(changes, heat) => changes.rows + heat.rows,
+        };
+        self.builds.iter().map(rows).sum()
+    }
+
+    /// The quantile of the worst cases with a pattern P(j), innermost layer first.
+    pub fn cost(&self, segments: &[usize]) -> f64 {
+        BuiltWorst::new(self, segments).cost
+    }
+}
+
+impl Build {
+    fn guaranteed(model: &CoilModel, step: &UnitStep, stride: usize) -> Result<Self, ToleranceError> {
+        let coil = model.wound_coil().map_err(SearchError::from)?;
+        let parts = step.parts(model, stride)?;
+        let changes = Part::new(coil.layers(), &parts.changes);
+        let worst = if parts.heat.is_empty() {
+            Worst::Variation(changes)
+        } else {
+            Worst::Heated(changes, Part::new(coil.layers(), &parts.heat))
+        };
+        Ok(Self { lengths_m: coil.layer_lengths_m().to_vec(), worst })
+    }
+
+    fn sampled(model: &CoilModel, profiles: &ProfileSpec, instants: &[Vec<Instant>]) -> Result<Self, SearchError> {
+        let coil = model.wound_coil()?;
+        let rate_model = any_rate_model(model)?;
+        let path = model.heat_path()?;
+        let mut responses = Vec::new();
+        for (profile, instants) in profiles.profiles().iter().zip(instants) {
+            if !instants.is_empty() {
+                let history =
+                    solve(&path, &Drive::boundary(profile.temperature(REFERENCE_TEMPERATURE_K)))?.at(instants);
+                let rows = 0..history.len();
+                responses.extend(rows.map(|row| rate_model.weight_response(&rate_model.state(&history, row, &[]))));
+            }
+        }
+        let worst = Worst::Largest(Part::new(coil.layers(), &responses));
+        Ok(Self { lengths_m: coil.layer_lengths_m().to_vec(), worst })
+    }
+}
+
+/// The instants of each profile at which the probing patterns' errors peak; those that come nearest to a worst case first.
+fn binding_instants(
+    model: &CoilModel,
+    profiles: &ProfileSpec,
+    probes: &[Pattern],
+) -> Result<Vec<Vec<Instant>>, SearchError> {
+    let listed = profiles.profiles();
+    let solved = SolvedProfiles::new(model, &listed)?;
+    let (matrix, origins) = SampleMatrix::of_profiles(model, &solved)?;
+    let mut scores = vec![0.0_f64; origins.len()];
+    for pattern in probes {
+        let values = matrix.rates_rad_per_s(model, pattern)?;
+        let size = |i: usize| values[i].abs();
+        let largest = values.iter().map(|v| v.abs()).fold(0.0, f64::max);
+        for i in 0..values.len() {
+            let is_peak = (i == 0 || size(i) >= size(i - 1)) && (i + 1 == values.len() || size(i) >= size(i + 1));
+            if is_peak && largest > 0.0 {
+                scores[i] += (size(i) / largest).powi(8);
+            }
+        }
+    }
+    let mut order: Vec<usize> = (0..origins.len()).filter(|&i| scores[i] > 0.0).collect();
+    order.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]).then(a.cmp(&b)));
+    order.truncate(MOST_INSTANTS);
+    order.sort_unstable();
+    let mut instants = vec![Vec::new(); listed.len()];
+    for i in order {
+        instants[origins[i].profile].push(origins[i].instant);
+    }
+    Ok(instants)
+}
+
+/// The worst case of every coil with the present pattern, and room for a proposal.
+#[derive(Debug, Clone)]
+pub struct BuiltWorst {
+    worst: Vec<f64>,
+    proposed: Vec<f64>,
+    /// Coils with the largest worst cases first: they are the ones that refuse a move.
+    order: Vec<usize>,
+    cost: f64,
+    proposed_cost: f64,
+    scratch: Scratch,
+    /// Coils judged since the last reading.
+    pub judged: u64,
+}
+
+impl BuiltWorst {
+    pub fn new(builds: &Builds, segments: &[usize]) -> Self {
+        let mut scratch = Scratch::default();
+        let pattern = Arrangement::new(segments);
+        let worst: Vec<f64> = builds.builds.iter().map(|build| build.worst(&pattern, &mut scratch)).collect();
+        let cost = quantile_of(&worst, builds.share);
+        let mut state = Self {
+            proposed: worst.clone(),
+            order: (0..worst.len()).collect(),
+            worst,
+            cost,
+            proposed_cost: cost,
+            scratch,
+            judged: builds.builds.len() as u64,
+        };
+        state.sort();
+        state
+    }
+
+    pub fn cost(&self) -> f64 {
+        self.cost
+    }
+
+    /// The quantile with another pattern, or `None` as soon as so many coils are above `limit` that it must be too.
+    pub fn propose(&mut self, builds: &Builds, segments: &[usize], limit: f64) -> Option<f64> {
+        let pattern = Arrangement::new(segments);
+        let count = builds.builds.len();
+        let mut left = count - (builds.share * (count - 1) as f64).floor() as usize;
+        for &index in &self.order {
+            let worst = builds.builds[index].worst(&pattern, &mut self.scratch);
+            self.judged += 1;
+            self.proposed[index] = worst;
+            if !(worst <= limit) {
+                left -= 1;
+                if left == 0 {
+                    return None;
+                }
+            }
+        }
+        self.proposed_cost = quantile_of(&self.proposed, builds.share);
+        (self.proposed_cost <= limit).then_some(self.proposed_cost)
+    }
+
+    /// Makes the last proposal, which must have passed, the present state.
+    pub fn accept(&mut self) {
+        std::mem::swap(&mut self.worst, &mut self.proposed);
+        self.cost = self.proposed_cost;
+        self.sort();
+    }
+
+    fn sort(&mut self) {
+        let worst = &self.worst;
+        self.order.sort_by(|&a, &b| worst[b].total_cmp(&worst[a]).then(a.cmp(&b)));
+    }
+}
+
+fn quantile_of(worst: &[f64], share: f64) -> f64 {
+    let mut sorted = worst.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    quantile(&sorted, share)
+}
