@@ -13,7 +13,8 @@ use crate::io::profile_file::read_profile_file;
 use crate::pattern::classic::Classic;
 use crate::rate::RateModel;
 use crate::search::guaranteed::{GuaranteedError, UnitStep};
-use crate::search::worst_case::SolvedProfiles;
+use crate::search::worst_case::{SolvedProfiles, WorstCase};
+use crate::units::deg_per_h_from_rad_per_s;
 
 /// Worst rate error of windings over a model's profiles
 #[derive(Debug, clap::Args)]
@@ -54,10 +55,14 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     if let Err(reason @ GuaranteedError::Effect { .. }) = &step {
         screen.note(&format!("note: {reason}"));
     }
+    let after = SolvedProfiles::after_the_ends(&file.model, &file.profiles.profiles())?;
     let mut answers = Vec::with_capacity(patterns.len());
     let mut extremes = Vec::new();
     for NamedPattern { name, pattern } in &patterns {
         let worst = solved.worst_case(&file.model, pattern)?;
+        if let Some(after) = &after {
+            warn_of_growth(name, &worst, &after.worst_case(&file.model, pattern)?, screen);
+        }
         let phase_rad = RateModel::new(&file.model, pattern, &[])?.phase_rad(worst.rate_rad_per_s);
         let bound = match &step {
             Ok(step) => Some(step.guaranteed(&file.model, pattern)?),
@@ -94,6 +99,20 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         )
     })?;
     Ok(Ending::Done)
+}
+
+/// Profiles end with their last piece; the error may still grow while the pack settles.
+fn warn_of_growth(name: &str, within: &WorstCase, after: &WorstCase, screen: &Screen) {
+    const GROWTH: f64 = 1e-3;
+    if after.rate_rad_per_s.abs() > within.rate_rad_per_s.abs() * (1.0 + GROWTH) {
+        screen.note(&format!(
+            "note: with {name} the error still grows after the end of profile {}, to {:.4} °/h at {:.0} s if the drive stands \
+             still: end the profile with a soak to have it counted",
+            after.profile,
+            deg_per_h_from_rad_per_s(after.rate_rad_per_s.abs()),
+            after.time_s
+        ));
+    }
 }
 
 /// The model's own pattern first, unless it is a classic anyway.

@@ -14,9 +14,11 @@ use crate::io::pattern_file::print_pattern;
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::report::plot::{Axis, Chart, Series};
+use crate::search::builds::Builds;
 use crate::search::objective::Objective;
 use crate::search::optimise::{DEFAULT_RESTARTS_PER_ROUND, Plan, Rules, default_moves_per_restart};
 use crate::search::pareto::{Point, front};
+use crate::search::robust::{Limits, RobustSearch, Rounds, Whose};
 use crate::search::tolerance::Coils;
 use crate::search::verdict::{Bench, Judged};
 use crate::search::worst_case::SolvedProfiles;
@@ -25,7 +27,9 @@ use crate::search::worst_case::SolvedProfiles;
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Weighed are the worst rate, captive reels, largest climb, crossovers over other layers and, where the model has a\n\
-    [tolerance] table, the 95 % quantile over built coils. Every point is a pattern file that schedule takes.\n\n\
+    [tolerance] table, the 95 % quantile over built coils. Searched are all classes and, within each, climbs of up to 2, 3, 4,\n\
+    5, 6, 8 and any number of layers, for the worst rate and for the quantile. Every point is a pattern file that schedule\n\
+    takes.\n\n\
     Example:\n  coilwright pareto examples/paper-200m.toml -o results/paper-200m-front"
 )]
 pub struct Arguments {
@@ -56,13 +60,33 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let captive = (1..=usize::from(arguments.most_captive)).map(WindabilityClass::Captive);
     let classes: Vec<WindabilityClass> =
         std::iter::once(WindabilityClass::Standard).chain(captive).chain([WindabilityClass::Any]).collect();
-    let progress = screen.progress("pareto", Some(classes.len() as u64));
-    for (done, &class) in classes.iter().enumerate() {
+    let climbs: Vec<Option<usize>> =
+        CLIMBS.into_iter().filter(|c| *c < file.model.coil.layers()).map(Some).chain([None]).collect();
+    let mut whose = vec![bench.builds(Whose::Declared, WindabilityClass::Any, seed)?];
+    if file.tolerance.is_some() {
+        whose.push(bench.builds(Whose::Built, WindabilityClass::Any, seed)?);
+    }
+    let progress = screen.progress("pareto", Some((classes.len() * (climbs.len() + 1)) as u64));
+    let mut done = 0;
+    for &class in &classes {
         match candidates(&bench, &file, class, seed, arguments.rounds, &stop)? {
             Some(found) => judged.extend(found),
             None => return Ok(Ending::Interrupted),
         }
-        progress.at(done as u64 + 1, &class.to_string());
+        done += 1;
+        progress.at(done, &class.to_string());
+        for &most_climb in &climbs {
+            let limits = Limits { class, most_climb };
+            for builds in &whose {
+                match limited(&bench, builds, limits, seed, &stop)? {
+                    Some(found) => judged.extend(found),
+                    None => return Ok(Ending::Interrupted),
+                }
+            }
+            done += 1;
+            let climb = most_climb.map_or_else(String::new, |most| format!(", climbs up to {most}"));
+            progress.at(done, &format!("{class}{climb}"));
+        }
     }
     progress.finish();
     let points = front(&with_spreads(&file, judged)?);
@@ -93,6 +117,11 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     Ok(Ending::Done)
 }
 
+/// Largest climbs that are searched one by one; any climb is searched besides.
+const CLIMBS: [usize; 6] = [2, 3, 4, 5, 6, 8];
+
+const LIMITED_RESTARTS: usize = 8;
+
 /// What a search of a class found, judged by the reference; none if a signal came first.
 fn candidates(
     bench: &Bench,
@@ -122,6 +151,36 @@ fn candidates(
         bench.judge(&class.to_string().replace(':', "-"), &pattern)
     };
     Ok(Some(search.state().found.iter().map(judge).collect::<Result<_, _>>()?))
+}
+
+/// What a search within limits found, judged by the reference; none if a signal came first.
+fn limited(
+    bench: &Bench,
+    builds: &Builds,
+    limits: Limits,
+    seed: u64,
+    stop: &StopFlag,
+) -> Result<Option<Vec<Judged>>, CliError> {
+    let layers = bench.model.coil.layers();
+    let plan = Plan {
+        seed,
+        norm: bench.objective.norm(),
+        restarts_per_round: LIMITED_RESTARTS,
+        moves_per_restart: 4 * (layers * layers) as u64,
+        rules: Rules { rounds: 1, patience: 1, moves: None, target: None },
+        starts: Vec::new(),
+    };
+    let mut search = RobustSearch::new(builds.clone(), limits, plan);
+    while search.advance() {
+        if stop.is_set() {
+            return Ok(None);
+        }
+    }
+    let found = search.state().found.iter().take(LIMITED_RESTARTS / 2);
+    let name = limits.class.to_string().replace(':', "-");
+    let named: Vec<(String, Pattern)> =
+        found.filter_map(|f| Some((name.clone(), Pattern::new(f.segments.clone()).ok()?))).collect();
+    Ok(Some(bench.judge_all(&named)?))
 }
 
 /// The points with their 95 % quantiles, where the model states tolerances.

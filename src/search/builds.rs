@@ -273,6 +273,16 @@ impl Builds {
         Ok(Self { layers: model.coil.layers(), share: SHARE, builds: vec![Build::guaranteed(model, step, 1)?] })
     }
 
+    /// The coil as declared and nothing else: its sampled worst case.
+    ///
+    /// # Errors
+    /// Models that cannot be solved.
+    pub fn declared(model: &CoilModel, profiles: &ProfileSpec, probes: &[Pattern]) -> Result<Self, SearchError> {
+        let instants = binding_instants(model, profiles, probes)?;
+        let builds = vec![Build::sampled(model, profiles, &instants)?];
+        Ok(Self { layers: model.coil.layers(), share: SHARE, builds })
+    }
+
     pub fn layers(&self) -> usize {
         self.layers
     }
@@ -337,10 +347,10 @@ fn binding_instants(
         let values = matrix.rates_rad_per_s(model, pattern)?;
         let size = |i: usize| values[i].abs();
         let largest = values.iter().map(|v| v.abs()).fold(0.0, f64::max);
-        for i in 0..values.len() {
+        for (i, score) in scores.iter_mut().enumerate() {
             let is_peak = (i == 0 || size(i) >= size(i - 1)) && (i + 1 == values.len() || size(i) >= size(i + 1));
             if is_peak && largest > 0.0 {
-                scores[i] += (size(i) / largest).powi(8);
+                *score += (size(i) / largest).powi(8);
             }
         }
     }

@@ -36,6 +36,10 @@ impl Point {
     }
 }
 
+fn is_same(a: f64, b: f64) -> bool {
+    (a - b).abs() <= SAME_ERROR * b.abs()
+}
+
 /// The points that no other beats, smallest error first; of several that are equal in every respect the first.
 pub fn front(points: &[Point]) -> Vec<Point> {
     let mut kept: Vec<Point> = Vec::new();
@@ -43,8 +47,11 @@ pub fn front(points: &[Point]) -> Vec<Point> {
         let beaten = points.iter().any(|other| other.beats(point));
         let same_before = points[..index].iter().any(|other| {
             other.windability == point.windability
-                && (other.judged.objective_rad_per_s - point.judged.objective_rad_per_s).abs()
-                    <= SAME_ERROR * point.judged.objective_rad_per_s
+                && is_same(other.judged.objective_rad_per_s, point.judged.objective_rad_per_s)
+                && match (other.judged.p95_rad_per_s, point.judged.p95_rad_per_s) {
+                    (Some(a), Some(b)) => is_same(a, b),
+                    _ => true,
+                }
         });
         if !beaten && !same_before {
             kept.push(point.clone());

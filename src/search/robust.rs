@@ -72,6 +72,15 @@ impl Rounds for Optimisation {
     }
 }
 
+/// Whose worst case a search is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Whose {
+    /// The coil's as declared, sampled over its profiles.
+    Declared,
+    /// That of the coils built with the tolerances: their 95 % quantile.
+    Built,
+}
+
 impl Bench<'_> {
     /// Begins a search for what the bench judges by, or goes on from a saved state; everything else must then be as it
     /// was when it was saved. `None` for a state that no such search can have been in.
@@ -85,14 +94,7 @@ impl Bench<'_> {
         saved: Option<State>,
     ) -> Result<Option<Box<dyn Rounds>>, JudgeError> {
         let builds = match (self.objective, self.unit_step) {
-            (Objective::P95, _) => {
-                let coils = self.coils()?;
-                let probes = match coils.measure() {
-                    Measure::Guaranteed => Vec::new(),
-                    Measure::Sampled => self.probes(class, plan.seed)?,
-                };
-                Some(Builds::new(&coils, &probes)?)
-            }
+            (Objective::P95, _) => Some(self.builds(Whose::Built, class, plan.seed)?),
             (Objective::GuaranteedRate, Some(step)) if step.is_heated() => Some(Builds::nominal(self.model, step)?),
             _ => None,
         };
@@ -113,6 +115,24 @@ impl Bench<'_> {
             None => Some(Box::new(RobustSearch::new(builds, class, plan))),
             Some(state) => RobustSearch::resume(builds, class, plan, state).map(|s| Box::new(s) as Box<dyn Rounds>),
         })
+    }
+
+    /// The declared coil alone, or all coils built with the tolerances, ready to be searched within [`Limits`].
+    ///
+    /// # Errors
+    /// No tolerances, or none that are above zero.
+    pub fn builds(&self, of: Whose, class: WindabilityClass, seed: u64) -> Result<Builds, JudgeError> {
+        match of {
+            Whose::Declared => Ok(Builds::declared(self.model, self.profiles, &self.probes(class, seed)?)?),
+            Whose::Built => {
+                let coils = self.coils()?;
+                let probes = match coils.measure() {
+                    Measure::Guaranteed => Vec::new(),
+                    Measure::Sampled => self.probes(class, seed)?,
+                };
+                Ok(Builds::new(&coils, &probes)?)
+            }
+        }
     }
 
     /// Patterns that show at which instants the coil as declared errs most: the classics, random ones, and what a short
@@ -154,20 +174,55 @@ pub fn default_moves_per_restart(layers: usize) -> u64 {
     ((layers as u64).pow(2) * 16).max(1000)
 }
 
+/// What the winding shop puts up with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    pub class: WindabilityClass,
+    /// No crossover may climb more layers.
+    pub most_climb: Option<usize>,
+}
+
+impl From<WindabilityClass> for Limits {
+    fn from(class: WindabilityClass) -> Self {
+        Self { class, most_climb: None }
+    }
+}
+
+impl Limits {
+    fn admits(self, segments: &[usize]) -> bool {
+        let in_class = match self.class {
+            WindabilityClass::Standard => signs_of_segments(segments).is_some(),
+            WindabilityClass::Captive(most) => most_captive(segments) <= most,
+            WindabilityClass::Any => true,
+        };
+        in_class && self.most_climb.is_none_or(|most| largest_climb(segments) <= most)
+    }
+}
+
+/// Layers between the two ends of the longest crossover.
+fn largest_climb(segments: &[usize]) -> usize {
+    let mut layers = vec![0; segments.len()];
+    for (layer, &segment) in segments.iter().enumerate() {
+        layers[segment - 1] = layer;
+    }
+    layers.windows(2).map(|pair| pair[0].abs_diff(pair[1])).max().unwrap_or(0)
+}
+
 /// A search under way.
 #[derive(Debug)]
 pub struct RobustSearch {
     builds: Builds,
-    class: WindabilityClass,
+    limits: Limits,
     plan: Plan,
     cooling: Cooling,
     state: State,
 }
 
 impl RobustSearch {
-    pub fn new(builds: Builds, class: WindabilityClass, plan: Plan) -> Self {
-        let cooling = cooling_for(&builds, class, &plan);
-        let mut search = Self { builds, class, plan, cooling, state: State::new(Vec::new()) };
+    pub fn new(builds: Builds, limits: impl Into<Limits>, plan: Plan) -> Self {
+        let limits = limits.into();
+        let cooling = cooling_for(&builds, limits, &plan);
+        let mut search = Self { builds, limits, plan, cooling, state: State::new(Vec::new()) };
         for start in search.plan.starts.clone() {
             search.judge(start);
         }
@@ -176,18 +231,18 @@ impl RobustSearch {
     }
 
     /// Goes on from a saved state; everything else must be as it was when it was saved. `None` for a state that no
-    /// search over these coils and this class can have been in.
-    pub fn resume(builds: Builds, class: WindabilityClass, plan: Plan, state: State) -> Option<Self> {
+    /// search over these coils within these limits can have been in.
+    pub fn resume(builds: Builds, limits: impl Into<Limits>, plan: Plan, state: State) -> Option<Self> {
+        let limits = limits.into();
         let fits = |segments: &Vec<usize>| {
-            segments.len() == builds.layers()
-                && Pattern::new(segments.clone()).is_ok_and(|pattern| class.admits(&pattern))
+            segments.len() == builds.layers() && Pattern::new(segments.clone()).is_ok() && limits.admits(segments)
         };
         let is_ours = state.working.is_empty()
             && state.found.iter().all(|f| fits(&f.segments))
             && state.restarts.iter().all(|r| fits(&r.segments) && fits(&r.best_segments))
             && (state.stop.is_some() || state.restarts.len() == plan.restarts_per_round);
-        let cooling = cooling_for(&builds, class, &plan);
-        is_ours.then(|| Self { builds, class, plan, cooling, state })
+        let cooling = cooling_for(&builds, limits, &plan);
+        is_ours.then(|| Self { builds, limits, plan, cooling, state })
     }
 
     fn begin_round(&mut self) {
@@ -197,7 +252,7 @@ impl RobustSearch {
             .map(|index| {
                 let mut random = generator(self.plan.seed, index + 1);
                 let start = self.plan.starts.get(index as usize).cloned();
-                let segments = start.unwrap_or_else(|| draw(self.class, layers, &mut random));
+                let segments = start.unwrap_or_else(|| draw(self.limits, layers, &mut random));
                 Restart {
                     index,
                     moves: 0,
@@ -221,9 +276,9 @@ impl Rounds for RobustSearch {
         if self.state.stop.is_some() {
             return false;
         }
-        let (builds, class, cooling) = (&self.builds, self.class, &self.cooling);
+        let (builds, limits, cooling) = (&self.builds, self.limits, &self.cooling);
         let unfinished = self.state.restarts.par_iter_mut().filter(|r| !r.is_done(cooling));
-        unfinished.for_each(|restart| advance(restart, builds, class, cooling));
+        unfinished.for_each(|restart| advance(restart, builds, limits, cooling));
         if self.state.restarts.iter().all(|r| r.is_done(&self.cooling)) {
             let before = self.best().map_or(f64::INFINITY, |f| f.cost);
             for restart in std::mem::take(&mut self.state.restarts) {
@@ -254,7 +309,7 @@ impl Rounds for RobustSearch {
 }
 
 /// One slice of a restart.
-fn advance(restart: &mut Restart, builds: &Builds, class: WindabilityClass, cooling: &Cooling) {
+fn advance(restart: &mut Restart, builds: &Builds, limits: Limits, cooling: &Cooling) {
     let mut worst = BuiltWorst::new(builds, &restart.segments);
     if worst.cost() < restart.best_cost {
         (restart.best_cost, restart.best_segments) = (worst.cost(), restart.segments.clone());
@@ -269,7 +324,7 @@ fn advance(restart: &mut Restart, builds: &Builds, class: WindabilityClass, cool
         restart.moves += 1;
         restart.work.moves += 1;
         let limit = worst.cost() - temperature * libm::log(uniform(&mut restart.random));
-        let Some(candidate) = neighbour(class, &restart.segments, &mut restart.random) else { continue };
+        let Some(candidate) = neighbour(limits, &restart.segments, &mut restart.random) else { continue };
         if worst.propose(builds, &candidate, limit).is_some() {
             worst.accept();
             restart.work.accepted += 1;
@@ -282,9 +337,20 @@ fn advance(restart: &mut Restart, builds: &Builds, class: WindabilityClass, cool
     restart.work.samples += worst.judged;
 }
 
-/// A pattern of the class drawn at random; `captive:K` starts from a standard one.
-fn draw(class: WindabilityClass, layers: usize, random: &mut ChaCha8Rng) -> Vec<usize> {
-    match class {
+/// A pattern within the limits drawn at random; `captive:K` starts from a standard one, and where climbs are limited a
+/// random walk starts from the cylindrical winding, which climbs least.
+fn draw(limits: impl Into<Limits>, layers: usize, random: &mut ChaCha8Rng) -> Vec<usize> {
+    let limits: Limits = limits.into();
+    if limits.most_climb.is_some() {
+        let mut segments: Vec<usize> = (1..=layers).collect();
+        for _ in 0..STEPS_A_LAYER * layers {
+            if let Some(next) = neighbour(limits, &segments, random) {
+                segments = next;
+            }
+        }
+        return segments;
+    }
+    match limits.class {
         WindabilityClass::Any => {
             let mut segments: Vec<usize> = (1..=layers).collect();
             for i in (1..layers).rev() {
@@ -296,10 +362,14 @@ fn draw(class: WindabilityClass, layers: usize, random: &mut ChaCha8Rng) -> Vec<
     }
 }
 
-/// One end or two of a standard pattern; three swaps to one insertion elsewhere. `None` if it would leave the class.
-fn neighbour(class: WindabilityClass, segments: &[usize], random: &mut ChaCha8Rng) -> Option<Vec<usize>> {
+/// Steps of a random walk that draws a pattern.
+const STEPS_A_LAYER: usize = 32;
+
+/// One end or two of a standard pattern; three swaps to one insertion elsewhere. `None` if it would leave the limits.
+fn neighbour(limits: Limits, segments: &[usize], random: &mut ChaCha8Rng) -> Option<Vec<usize>> {
     let layers = segments.len();
-    if class == WindabilityClass::Standard {
+    let is_within = |candidate: &Vec<usize>| limits.admits(candidate);
+    if limits.class == WindabilityClass::Standard {
         let mut high = signs_of_segments(segments)?;
         let first = pick(random, high.len());
         high[first] = !high[first];
@@ -308,7 +378,7 @@ fn neighbour(class: WindabilityClass, segments: &[usize], random: &mut ChaCha8Rn
             let second = if second >= first { second + 1 } else { second };
             high[second] = !high[second];
         }
-        return Some(segments_of_signs(&high));
+        return Some(segments_of_signs(&high)).filter(is_within);
     }
     let from = pick(random, layers);
     let other = pick(random, layers - 1);
@@ -321,23 +391,20 @@ fn neighbour(class: WindabilityClass, segments: &[usize], random: &mut ChaCha8Rn
     } else {
         candidate[to..=from].rotate_right(1);
     }
-    match class {
-        WindabilityClass::Captive(most) if most_captive(&candidate) > most => None,
-        _ => Some(candidate),
-    }
+    Some(candidate).filter(is_within)
 }
 
 /// As hot as a typical move is large, cooled until no such move passes; measured on stream 0 of the seed.
-fn cooling_for(builds: &Builds, class: WindabilityClass, plan: &Plan) -> Cooling {
+fn cooling_for(builds: &Builds, limits: Limits, plan: &Plan) -> Cooling {
     const PATTERNS: usize = 4;
     const MOVES: usize = 16;
     let mut random = generator(plan.seed, 0);
     let (mut total, mut count) = (0.0, 0usize);
     for _ in 0..PATTERNS {
-        let segments = draw(class, builds.layers(), &mut random);
+        let segments = draw(limits, builds.layers(), &mut random);
         let cost = builds.cost(&segments);
         for _ in 0..MOVES {
-            if let Some(candidate) = neighbour(class, &segments, &mut random) {
+            if let Some(candidate) = neighbour(limits, &segments, &mut random) {
                 total += (builds.cost(&candidate) - cost).abs();
                 count += 1;
             }

@@ -3,6 +3,10 @@
 //! The supremum is taken over all times, both one-sided limits at every break point of a profile included, because
 //! the outermost layer's rate jumps there. Between break points the error is sampled on a grid that is fine where the
 //! field changes fast, and each local maximum of |Ω| is refined by golden-section search on the exact field.
+//!
+//! A profile ends where its last piece ends: what is to count afterwards is declared as a soak. Where electronics heat the
+//! bore or a bias follows the pack's temperature the error can still grow then, which [`SolvedProfiles::after_the_ends`]
+//! shows.
 
 use rayon::prelude::*;
 use thiserror::Error;
@@ -11,9 +15,9 @@ use crate::coil::CoilError;
 use crate::numeric::maximise::golden_section;
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
-use crate::profile::Profile;
+use crate::profile::{Piece, Profile};
 use crate::rate::{CoilModel, RateError, RateModel};
-use crate::thermal::{Drive, Field, HeatPath, Instant, ThermalError, ThermalHistory, solve};
+use crate::thermal::{Drive, Field, HeatPath, Instant, StepResponse, ThermalError, ThermalHistory, solve};
 use crate::units::REFERENCE_TEMPERATURE_K;
 
 #[derive(Debug, Error, Clone, PartialEq)]
@@ -86,23 +90,32 @@ impl SolvedProfiles {
             return Err(SearchError::NoProfiles);
         }
         let path = model.heat_path()?;
-        let profiles = profiles
+        let profiles = profiles.par_iter().map(|p| SolvedProfile::new(p.clone(), 0, &path));
+        Ok(Self { profiles: profiles.collect::<Result<_, ThermalError>>()? })
+    }
+
+    /// What comes after the ends of profiles that end on the move: the soak in which the pack settles, without the
+    /// profiles themselves. `None` where every profile ends with such a soak of its own.
+    ///
+    /// # Errors
+    /// A heat path that cannot be solved.
+    pub fn after_the_ends(model: &CoilModel, profiles: &[Profile]) -> Result<Option<Self>, SearchError> {
+        let path = model.heat_path()?;
+        let settling_s = settling_s(&path)?;
+        let soaked: Vec<SolvedProfile> = profiles
             .par_iter()
-            .map(|profile| {
-                let drive = Drive::boundary(profile.temperature(REFERENCE_TEMPERATURE_K));
-                let field = solve(&path, &drive)?;
-                let pieces: Vec<Vec<Instant>> = drive
-                    .boundary_k
-                    .knots()
-                    .windows(2)
-                    .map(|knots| instants_of_piece(knots[0], knots[1], &path))
-                    .chain(std::iter::once(vec![Instant::after(profile.duration_s())]))
-                    .collect();
-                let history = field.at(&pieces.concat());
-                Ok(SolvedProfile { profile: profile.clone(), field, pieces, history })
+            .filter_map(|profile| {
+                let soak = Piece { rate_k_per_s: 0.0, duration_s: settling_s };
+                let last = profile.pieces()[profile.pieces().len() - 1];
+                let settles = last.rate_k_per_s == 0.0 && last.duration_s >= settling_s;
+                let pieces = profile.pieces().iter().copied().chain([soak]).collect();
+                (!settles).then(|| {
+                    let longer = Profile::new(profile.name(), pieces).expect("a soak of a positive duration");
+                    SolvedProfile::new(longer, profile.pieces().len(), &path)
+                })
             })
             .collect::<Result<_, ThermalError>>()?;
-        Ok(Self { profiles })
+        Ok((!soaked.is_empty()).then_some(Self { profiles: soaked }))
     }
 
     pub fn profiles(&self) -> &[SolvedProfile] {
@@ -135,7 +148,32 @@ impl SolvedProfiles {
     }
 }
 
+/// Ten time constants of the slowest mode, and of the bore's heat; for the half space the time to its power-law tail.
+fn settling_s(path: &HeatPath) -> Result<f64, ThermalError> {
+    let heat_s = path.bore_heat.map_or(0.0, |heat| 10.0 * heat.time_constant_s);
+    let linear = HeatPath { bore_heat: None, conductivity_slope_per_k: 0.0, ..path.clone() };
+    let response = StepResponse::of(&linear)?;
+    let settled_s = match response {
+        StepResponse::Pack(_) => response.settling_s() / 5.0,
+        StepResponse::HalfSpace(_) => response.settling_s(),
+    };
+    Ok(settled_s.max(heat_s))
+}
+
 impl SolvedProfile {
+    /// Sampled from a piece on.
+    fn new(profile: Profile, first_piece: usize, path: &HeatPath) -> Result<Self, ThermalError> {
+        let drive = Drive::boundary(profile.temperature(REFERENCE_TEMPERATURE_K));
+        let field = solve(path, &drive)?;
+        let pieces: Vec<Vec<Instant>> = drive.boundary_k.knots()[first_piece..]
+            .windows(2)
+            .map(|knots| instants_of_piece(knots[0], knots[1], path))
+            .chain(std::iter::once(vec![Instant::after(profile.duration_s())]))
+            .collect();
+        let history = field.at(&pieces.concat());
+        Ok(Self { profile, field, pieces, history })
+    }
+
     /// The rate error with its sign and the time at which its size is largest.
     pub(super) fn worst(&self, rate_model: &RateModel) -> (f64, f64) {
         let series = rate_model.series_rad_per_s(&self.history);
@@ -164,5 +202,36 @@ impl SolvedProfile {
             offset += piece.len();
         }
         (best_rate, best_time_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coil::LayerLength;
+    use crate::pattern::classic::Classic;
+    use crate::search::samples::tests::model;
+
+    #[test]
+    fn what_comes_after_a_profile_is_what_a_soak_at_its_end_would_show_and_can_be_the_worst() {
+        let model = model(8, LayerLength::Actual, &["surface_film", "self_heating"]);
+        let ramp = Piece { rate_k_per_s: 1e-6, duration_s: 2.0 };
+        let soak = Piece { rate_k_per_s: 0.0, duration_s: 3e4 };
+        let short = [Profile::new("short", vec![ramp]).unwrap()];
+        let soaked = [Profile::new("soaked", vec![ramp, soak]).unwrap()];
+        let within = SolvedProfiles::new(&model, &short).unwrap();
+        let whole = SolvedProfiles::new(&model, &soaked).unwrap();
+        let after = SolvedProfiles::after_the_ends(&model, &short).unwrap().unwrap();
+        let mut grows = 0;
+        for classic in [Classic::Zyl, Classic::Dip, Classic::Qua] {
+            let worst = |solved: &SolvedProfiles| {
+                solved.worst_case(&model, &classic.pattern(8).unwrap()).unwrap().rate_rad_per_s.abs()
+            };
+            let (within, whole, after) = (worst(&within), worst(&whole), worst(&after));
+            assert!((within.max(after) / whole - 1.0).abs() < 1e-6, "{classic:?}: {within} {after} {whole}");
+            grows += usize::from(after > 1.01 * within);
+        }
+        assert!(grows > 0);
+        assert!(SolvedProfiles::after_the_ends(&model, &soaked).unwrap().is_none());
     }
 }

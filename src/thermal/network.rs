@@ -160,12 +160,9 @@ pub(super) struct Slices {
     pub flange: FlangeFilm,
 }
 
-/// Enough for the first moment to be within 0.1 % of the continuum for the packs in `examples/`.
-const SLICES: usize = 32;
-
 impl Slices {
     pub fn new(path: &HeatPath, flange: FlangeFilm) -> Self {
-        Self { count: SLICES, width_m: path.shape.height_m / SLICES as f64, flange }
+        Self { count: path.axial_slices, width_m: path.shape.height_m / path.axial_slices as f64, flange }
     }
 
     /// The slice that touches the heated flange.

@@ -11,9 +11,9 @@ use coilwright::thermal::{
 };
 use libm::{j0, j1, y0, y1};
 
-const DIFFUSIVITY_M2_PER_S: f64 = 2.7e-7;
+pub const DIFFUSIVITY_M2_PER_S: f64 = 2.7e-7;
 
-fn path(shape: PackShape, location: Location, cells_per_layer: usize) -> HeatPath {
+pub fn path(shape: PackShape, location: Location, cells_per_layer: usize) -> HeatPath {
     let material = Material::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 0.35 / DIFFUSIVITY_M2_PER_S };
     HeatPath { cells_per_layer, ..HeatPath::new(shape, Extent::Pack, material, location) }
 }
@@ -73,7 +73,7 @@ fn the_inner_face_of_a_3_mm_slab_follows_as_stated_and_the_half_space_lags_behin
 }
 
 /// A hollow cylinder a < r < b with an adiabatic bore; `biot_per_m` = h/k at r = b, or an imposed temperature there.
-struct Cylinder {
+pub struct Cylinder {
     bore_m: f64,
     outer_m: f64,
     roots_per_m: Vec<f64>,
@@ -88,7 +88,7 @@ impl Cylinder {
         j1(beta * r) * y1(beta * self.bore_m) - y1(beta * r) * j1(beta * self.bore_m)
     }
 
-    fn new(bore_m: f64, outer_m: f64, biot_per_m: Option<f64>) -> Self {
+    pub fn new(bore_m: f64, outer_m: f64, biot_per_m: Option<f64>) -> Self {
         let mut cylinder = Self { bore_m, outer_m, roots_per_m: Vec::new() };
         let condition = |c: &Self, beta: f64| match biot_per_m {
             None => c.u0(beta, outer_m),
@@ -112,7 +112,7 @@ impl Cylinder {
     }
 
     /// Mean of Ṫ/k0 over the ring r1 … r2 after a step of the outer rate.
-    fn ring_rate(&self, r1: f64, r2: f64, time_s: f64) -> f64 {
+    pub fn ring_rate(&self, r1: f64, r2: f64, time_s: f64) -> f64 {
         let (a, b) = (self.bore_m, self.outer_m);
         1.0 - self
             .roots_per_m

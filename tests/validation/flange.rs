@@ -1,0 +1,134 @@
+//! Reference: a finite hollow cylinder whose one flange and outer surface exchange heat with the same air, the bore and the
+//! other flange being adiabatic. The excess of temperature after a step is the product of the hollow cylinder's Bessel
+//! series and the slab's Fourier series (Carslaw and Jaeger, Conduction of Heat in Solids, 1959, sections 1.15 and 3.11);
+//! after a step of the drive's *rate* the rates are one minus that product.
+//! Tolerance: what cells and slices leave of the continuum, from the printed errors; the order of convergence must be at
+//! least 1.8.
+
+use std::f64::consts::PI;
+
+use coilwright::numeric::piecewise::PiecewiseLinear;
+use coilwright::thermal::{Drive, Flange, FlangeFilm, HeatPath, Instant, Location, PackShape, solve};
+
+use crate::pack::{Cylinder, DIFFUSIVITY_M2_PER_S, path};
+
+const CONDUCTIVITY_W_PER_M_K: f64 = 0.35;
+
+/// A slab with an adiabatic face and h/k at the other, cooling from one.
+struct Slab {
+    height_m: f64,
+    /// μ H of each term, from μ H tan μ H = h H/k.
+    roots: Vec<f64>,
+}
+
+impl Slab {
+    fn new(height_m: f64, biot_per_m: f64) -> Self {
+        let biot = biot_per_m * height_m;
+        let roots = (0..60)
+            .map(|n| {
+                // One root in each (nπ, nπ + π/2).
+                let (mut low, mut high) = (f64::from(n) * PI, f64::from(n) * PI + 0.5 * PI);
+                for _ in 0..200 {
+                    let middle = 0.5 * (low + high);
+                    if middle * middle.sin() * (n_sign(n)) < biot * middle.cos() * n_sign(n) {
+                        low = middle;
+                    } else {
+                        high = middle;
+                    }
+                }
+                0.5 * (low + high)
+            })
+            .collect();
+        Self { height_m, roots }
+    }
+
+    /// ∫ Z dζ and ∫ Z ζ dζ over −½ ≤ ζ ≤ ½, ζ growing away from the face with the film.
+    fn mean_and_moment(&self, time_s: f64) -> (f64, f64) {
+        self.roots.iter().fold((0.0, 0.0), |(mean, moment), &m| {
+            let amplitude = 2.0 * m.sin() / (m + m.sin() * m.cos());
+            let left = amplitude * (-DIFFUSIVITY_M2_PER_S * (m / self.height_m).powi(2) * time_s).exp();
+            (mean + left * m.sin() / m, moment + left * ((1.0 - m.cos()) / (m * m) - 0.5 * m.sin() / m))
+        })
+    }
+}
+
+/// Of the sine and cosine between nπ and nπ + π/2.
+fn n_sign(n: i32) -> f64 {
+    if n % 2 == 0 { 1.0 } else { -1.0 }
+}
+
+const TIMES_S: [f64; 7] = [2.0, 5.0, 10.0, 20.0, 40.0, 80.0, 160.0];
+
+/// The largest difference of any layer's mean rate and moment to the product of the series; the moment's in shares of the
+/// largest moment.
+fn errors(path: &HeatPath) -> (f64, f64) {
+    let PackShape { layers, bore_radius_m, radial_pitch_m, height_m } = path.shape;
+    let is_ambient = path.location == Location::Ambient;
+    let outer_m = bore_radius_m + radial_pitch_m * (layers as f64 - if is_ambient { 0.0 } else { 0.5 });
+    let biot_per_m = path.film_w_per_m2_k.map(|film| film / CONDUCTIVITY_W_PER_M_K);
+    let cylinder = Cylinder::new(bore_radius_m, outer_m, biot_per_m);
+    let flange = path.flange.unwrap();
+    let slab = Slab::new(height_m, flange.film_w_per_m2_k / CONDUCTIVITY_W_PER_M_K);
+    let away = if flange.flange == Flange::First { 1.0 } else { -1.0 };
+    let ramp = PiecewiseLinear::new(vec![0.0, 1e4], vec![300.0, 300.0 + 1e4]).unwrap();
+    let instants = TIMES_S.map(Instant::after);
+    let history = solve(path, &Drive::boundary(ramp)).unwrap().at(&instants);
+    let solved = layers - usize::from(!is_ambient);
+    let (mut mean_error, mut moment_error, mut largest) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for (row, time_s) in TIMES_S.into_iter().enumerate() {
+        let (mean, moment) = slab.mean_and_moment(time_s);
+        for j in 0..solved {
+            let edge_m = |j: usize| bore_radius_m + j as f64 * radial_pitch_m;
+            let radial = 1.0 - cylinder.ring_rate(edge_m(j), edge_m(j + 1), time_s);
+            let expected = -away * radial * moment;
+            largest = largest.max(expected.abs());
+            mean_error = mean_error.max((history.rates_k_per_s(row)[j] - (1.0 - radial * mean)).abs());
+            moment_error = moment_error.max((history.axial_moments_k_per_s(row)[j] - expected).abs());
+        }
+    }
+    (mean_error, moment_error / largest)
+}
+
+fn flanged(location: Location, outer_film: Option<f64>, flange: Flange, flange_film: f64, height_m: f64) -> HeatPath {
+    let shape = PackShape { layers: 12, bore_radius_m: 0.004, radial_pitch_m: 250e-6, height_m };
+    HeatPath {
+        film_w_per_m2_k: outer_film,
+        flange: Some(FlangeFilm { flange, film_w_per_m2_k: flange_film }),
+        ..path(shape, location, 2)
+    }
+}
+
+#[test]
+fn a_heated_flange_gives_the_means_and_moments_of_the_product_of_both_series_and_converges_with_second_order() {
+    for (name, location, outer_film, flange) in [
+        ("imposed outer layer, first flange", Location::OuterLayer, None, Flange::First),
+        ("ambient through a film, second flange", Location::Ambient, Some(40.0), Flange::Second),
+    ] {
+        let refined: Vec<(f64, f64)> = [(2, 8), (4, 16), (8, 32)]
+            .into_iter()
+            .map(|(cells_per_layer, axial_slices)| {
+                let coarse = flanged(location, outer_film, flange, 200.0, 8.5e-3);
+                errors(&HeatPath { cells_per_layer, axial_slices, ..coarse })
+            })
+            .collect();
+        println!("{name}: errors of mean and moment at 2/8, 4/16, 8/32 cells a layer and slices {refined:?}");
+        for (coarse, fine) in refined.iter().zip(&refined[1..]) {
+            let orders = ((coarse.0 / fine.0).log2(), (coarse.1 / fine.1).log2());
+            println!("  orders {orders:.3?}");
+            assert!(orders.0 >= 1.8 && orders.1 >= 1.8, "{name}: {orders:?}");
+        }
+        assert!(refined[2].0 < 3e-4 && refined[2].1 < 6e-3, "{name}: {refined:?}");
+    }
+}
+
+#[test]
+fn the_default_slices_leave_little_of_the_moment() {
+    for (film, allowed) in [(20.0, 1.5e-3), (200.0, 5e-3), (2000.0, 1.5e-2)] {
+        for height_m in [8.0e-3, 17.0e-3] {
+            let path = flanged(Location::Ambient, Some(20.0), Flange::First, film, height_m);
+            let (mean, moment) = errors(&HeatPath { cells_per_layer: 8, ..path });
+            println!("{height_m} m, {film} W/(m²K): mean {mean:.1e}, moment {moment:.1e} of the largest");
+            assert!(moment < allowed, "{height_m} m, {film} W/(m²K): {moment}");
+        }
+    }
+}
