@@ -100,7 +100,7 @@ fn reading_noise_k(temperature_k: &[f64]) -> f64 {
 
 fn smooth(scene: &Scene, air: &Air) -> Result<(AirSpace, Smoothed), BoundaryError> {
     let built = scene.space(air)?;
-    let smoothed = built.space.smooth(&vec![0.0; built.space.size]);
+    let smoothed = built.space.scores();
     Ok((built, smoothed))
 }
 

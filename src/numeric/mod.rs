@@ -2,6 +2,7 @@
 
 pub mod allan;
 pub mod expression;
+mod kalman;
 pub mod maximise;
 pub mod noise;
 pub mod piecewise;

@@ -20,6 +20,8 @@
 //! Kalman, J. Basic Eng. 82 (1960) 35; de Jong, J. Am. Stat. Assoc. 84 (1989) 1085 (smoothing without inverses); de Jong
 //! and Penzer, J. Am. Stat. Assoc. 93 (1998) 796 (shocks); de Jong, Ann. Stat. 19 (1991) 1073 (regression columns).
 
+use super::kalman::{Keep, Sparse, forward, smooth};
+
 /// One scalar measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measurement {
@@ -73,8 +75,8 @@ pub struct Smoothed {
 #[derive(Debug, Clone)]
 pub struct Whitener {
     size: usize,
-    rows: Vec<Vec<f64>>,
-    transitions: Vec<Vec<f64>>,
+    rows: Sparse,
+    transitions: Vec<Sparse>,
     /// For each stage: the transition, and of each measurement the row and the place of its gain.
     steps: Vec<(usize, Vec<(usize, usize)>)>,
     gains: Vec<f64>,
@@ -82,116 +84,26 @@ pub struct Whitener {
     weights: Vec<f64>,
 }
 
-/// What the forward pass leaves for the backward pass.
-#[derive(Default)]
-struct Trace {
-    means: Vec<f64>,
-    covariances: Vec<f64>,
-    gains: Vec<f64>,
-    innovations: Vec<(f64, f64)>,
-}
-
 impl StateSpace {
+    /// # Panics
+    /// With more than 64 states, as do all the passes.
     pub fn log_likelihood(&self) -> f64 {
-        self.forward(None).0
-    }
-
-    /// The forward pass: log-likelihood and Σ v²/f; fills `trace` if there is one.
-    fn forward(&self, mut trace: Option<&mut Trace>) -> (f64, f64) {
-        let n = self.size;
-        let (mut mean, mut covariance) = (self.mean.clone(), self.covariance.clone());
-        let (mut gain, mut product) = (vec![0.0; n], vec![0.0; n * n]);
-        let (mut log_likelihood, mut squares) = (0.0, 0.0);
-        for (index, stage) in self.stages.iter().enumerate() {
-            if let Some(trace) = trace.as_deref_mut() {
-                trace.means.extend_from_slice(&mean);
-                trace.covariances.extend_from_slice(&covariance);
-            }
-            for measurement in &stage.measurements {
-                let row = &self.rows[measurement.row];
-                for (g, covariances) in gain.iter_mut().zip(covariance.chunks_exact(n)) {
-                    *g = dot(covariances, row);
-                }
-                let variance = dot(row, &gain) + measurement.variance;
-                let innovation = measurement.value - dot(row, &mean);
-                for i in 0..n {
-                    let share = gain[i] / variance;
-                    mean[i] += share * innovation;
-                    for j in 0..n {
-                        covariance[i * n + j] -= share * gain[j];
-                    }
-                }
-                log_likelihood -= 0.5 * ((std::f64::consts::TAU * variance).ln() + innovation * innovation / variance);
-                squares += innovation * innovation / variance;
-                if let Some(trace) = trace.as_deref_mut() {
-                    trace.gains.extend(gain.iter().map(|g| g / variance));
-                    trace.innovations.push((innovation, variance));
-                }
-            }
-            if index + 1 == self.stages.len() {
-                break;
-            }
-            for &(direction, variance) in &stage.disturbances {
-                spread(&self.directions[direction], variance, &mut covariance);
-            }
-            let transition = &self.transitions[stage.transition];
-            mean = transition.chunks_exact(n).map(|row| dot(row, &mean)).collect();
-            propagate(transition, &mut covariance, &mut product, n);
-        }
-        (log_likelihood, squares)
+        forward(self, Keep::Nothing).0
     }
 
     /// The states given all measurements, and the variance of the functional `functional` · x of each.
     pub fn smooth(&self, functional: &[f64]) -> Smoothed {
-        let n = self.size;
-        let mut trace = Trace::default();
-        let (log_likelihood, squared_innovations) = self.forward(Some(&mut trace));
-        let stages = self.stages.len();
-        let mut smoothed = Smoothed {
-            log_likelihood,
-            squared_innovations,
-            measurements: trace.innovations.len(),
-            states: vec![0.0; stages * n],
-            score: vec![0.0; stages * self.directions.len()],
-            information: vec![0.0; stages * self.directions.len()],
-            functional_variance: vec![0.0; stages],
-        };
-        let (mut r, mut information, mut product) = (vec![0.0; n], vec![0.0; n * n], vec![0.0; n * n]);
-        let mut taken = trace.innovations.len();
-        for index in (0..stages).rev() {
-            let stage = &self.stages[index];
-            if index + 1 < stages {
-                let transition = &self.transitions[stage.transition];
-                r = transposed_product(transition, &r, n);
-                pull_back(transition, &mut information, &mut product, n);
-                for (d, direction) in self.directions.iter().enumerate() {
-                    let place = index * self.directions.len() + d;
-                    smoothed.score[place] = dot(direction, &r);
-                    smoothed.information[place] = quadratic(direction, &information);
-                }
-            }
-            for measurement in stage.measurements.iter().rev() {
-                taken -= 1;
-                let gain = &trace.gains[taken * n..(taken + 1) * n];
-                let (innovation, variance) = trace.innovations[taken];
-                absorb(&self.rows[measurement.row], gain, innovation, variance, &mut r, &mut information);
-            }
-            let mean = &trace.means[index * n..(index + 1) * n];
-            let covariance = &trace.covariances[index * n * n..(index + 1) * n * n];
-            for state in 0..n {
-                smoothed.states[index * n + state] = mean[state] + dot(&covariance[state * n..(state + 1) * n], &r);
-            }
-            let along: Vec<f64> = covariance.chunks_exact(n).map(|row| dot(row, functional)).collect();
-            let reduced: Vec<f64> = information.chunks_exact(n).map(|row| dot(row, &along)).collect();
-            smoothed.functional_variance[index] = (dot(functional, &along) - dot(&along, &reduced)).max(0.0);
-        }
-        smoothed
+        smooth(self, Some(functional))
+    }
+
+    /// As [`Self::smooth`] without states and functional, which stay empty: much less work.
+    pub fn scores(&self) -> Smoothed {
+        smooth(self, None)
     }
 
     /// The gains of this model's filter.
     pub fn whitener(&self) -> Whitener {
-        let mut trace = Trace::default();
-        self.forward(Some(&mut trace));
+        let trace = forward(self, Keep::Gains).2;
         let mut taken = 0;
         let steps = self
             .stages
@@ -210,8 +122,8 @@ impl StateSpace {
             .collect();
         Whitener {
             size: self.size,
-            rows: self.rows.clone(),
-            transitions: self.transitions.clone(),
+            rows: Sparse::new(&self.rows.concat(), self.size),
+            transitions: self.transitions.iter().map(|t| Sparse::new(t, self.size)).collect(),
             steps,
             gains: trace.gains,
             weights: trace.innovations.iter().map(|(_, variance)| variance.sqrt().recip()).collect(),
@@ -242,16 +154,14 @@ impl Whitener {
         let mut whitened = Vec::with_capacity(measurements.len());
         for (transition, measured) in &self.steps {
             for &(row, taken) in measured {
-                let innovation = measurements[taken] - dot(&self.rows[row], &state);
+                let innovation = measurements[taken] - self.rows.dot(row, &state);
                 whitened.push(innovation * self.weights[taken]);
                 for (s, g) in state.iter_mut().zip(&self.gains[taken * n..(taken + 1) * n]) {
                     *s += g * innovation;
                 }
             }
             if let Some(transition) = self.transitions.get(*transition) {
-                for (x, row) in next.iter_mut().zip(transition.chunks_exact(n)) {
-                    *x = dot(row, &state);
-                }
+                transition.times(&state, &mut next);
                 std::mem::swap(&mut state, &mut next);
             }
         }
@@ -259,98 +169,13 @@ impl Whitener {
     }
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// P ← P + u q uᵀ.
-fn spread(direction: &[f64], variance: f64, covariance: &mut [f64]) {
-    let n = direction.len();
-    for (i, a) in direction.iter().enumerate().filter(|(_, a)| **a != 0.0) {
-        for (c, b) in covariance[i * n..(i + 1) * n].iter_mut().zip(direction) {
-            *c += variance * a * b;
-        }
-    }
-}
-
-/// uᵀ N u.
-fn quadratic(direction: &[f64], information: &[f64]) -> f64 {
-    let rows = direction.iter().zip(information.chunks_exact(direction.len()));
-    rows.filter(|(a, _)| **a != 0.0).map(|(a, row)| a * dot(row, direction)).sum()
-}
-
-/// P ← F P Fᵀ, kept symmetric.
-fn propagate(transition: &[f64], covariance: &mut [f64], product: &mut [f64], n: usize) {
-    for i in 0..n {
-        let row = &transition[i * n..(i + 1) * n];
-        // P is symmetric: its rows are its columns.
-        for j in 0..n {
-            product[i * n + j] = dot(row, &covariance[j * n..(j + 1) * n]);
-        }
-    }
-    for i in 0..n {
-        for j in 0..=i {
-            let value = dot(&product[i * n..(i + 1) * n], &transition[j * n..(j + 1) * n]);
-            covariance[i * n + j] = value;
-            covariance[j * n + i] = value;
-        }
-    }
-}
-
-/// N ← Fᵀ N F.
-fn pull_back(transition: &[f64], information: &mut [f64], product: &mut [f64], n: usize) {
-    product.fill(0.0);
-    for i in 0..n {
-        for (k, &value) in information[i * n..(i + 1) * n].iter().enumerate() {
-            if value != 0.0 {
-                for j in 0..n {
-                    product[i * n + j] += value * transition[k * n + j];
-                }
-            }
-        }
-    }
-    information.fill(0.0);
-    for k in 0..n {
-        for i in 0..n {
-            let factor = transition[k * n + i];
-            if factor != 0.0 {
-                for j in 0..n {
-                    information[i * n + j] += factor * product[k * n + j];
-                }
-            }
-        }
-    }
-}
-
-fn transposed_product(matrix: &[f64], vector: &[f64], n: usize) -> Vec<f64> {
-    let mut product = vec![0.0; n];
-    for (row, &v) in matrix.chunks_exact(n).zip(vector) {
-        for (p, m) in product.iter_mut().zip(row) {
-            *p += m * v;
-        }
-    }
-    product
-}
-
-/// r ← h v/f + (I − K h)ᵀ r and N ← h hᵀ/f + (I − K h)ᵀ N (I − K h).
-fn absorb(row: &[f64], gain: &[f64], innovation: f64, variance: f64, r: &mut [f64], information: &mut [f64]) {
-    let n = row.len();
-    let along = dot(gain, r);
-    for i in 0..n {
-        r[i] += row[i] * (innovation / variance - along);
-    }
-    let spread: Vec<f64> = information.chunks_exact(n).map(|line| dot(line, gain)).collect();
-    let total = dot(gain, &spread) + 1.0 / variance;
-    for i in 0..n {
-        for j in 0..n {
-            information[i * n + j] += row[i] * row[j] * total - row[i] * spread[j] - spread[i] * row[j];
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn dot(a: &[f64], b: &[f64]) -> f64 {
+        a.iter().zip(b).map(|(a, b)| a * b).sum()
+    }
 
     /// A random walk with a drift, seen with noise; 6 stages.
     fn walk() -> StateSpace {
