@@ -12,14 +12,14 @@
 
 use thiserror::Error;
 
-use crate::boundary::{self, Boundary, BoundaryError, Observation};
+use crate::boundary::{self, Air, Boundary, BoundaryError, Observation};
 use crate::coil::CoilError;
 use crate::numeric::noise::{WhiteNoise, white_noise};
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::pattern::Pattern;
 use crate::rate::{CoilModel, RateError, RateModel};
 use crate::record::Record;
-use crate::thermal::{self, ThermalError, ThermalHistory};
+use crate::thermal::{self, HeatPath, ThermalError, ThermalHistory};
 use crate::units::percent_from_fraction;
 
 /// A model's prediction of one record.
@@ -95,16 +95,33 @@ pub fn predict(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<
 /// # Errors
 /// As [`predict`].
 pub fn estimate_boundary(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<Boundary, PredictError> {
-    let path = model.heat_path()?;
-    let gains = layer_gains_rad_per_k(model, pattern)?;
-    Ok(boundary::estimate(&Observation {
+    let (path, gains) = (model.heat_path()?, layer_gains_rad_per_k(model, pattern)?);
+    Ok(boundary::estimate(&observation(model, record, &path, &gains))?)
+}
+
+/// As [`estimate_boundary`], beginning with what was found under a model that is nearly this one.
+///
+/// # Errors
+/// As [`predict`].
+pub fn refine_boundary(
+    model: &CoilModel,
+    pattern: &Pattern,
+    record: &Record,
+    known: &Air,
+) -> Result<Boundary, PredictError> {
+    let (path, gains) = (model.heat_path()?, layer_gains_rad_per_k(model, pattern)?);
+    Ok(boundary::refine(&observation(model, record, &path, &gains), known)?)
+}
+
+fn observation<'a>(model: &CoilModel, record: &'a Record, path: &'a HeatPath, gains: &'a [f64]) -> Observation<'a> {
+    Observation {
         times_s: record.times_s(),
         temperature_k: record.temperature_k(),
-        path: &path,
+        path,
         lag_s: model.sensor_lag_s(),
-        layer_gain_rad_per_k: &gains,
+        layer_gain_rad_per_k: gains,
         rate_mean_s: model.rate_mean_s,
-    })?)
+    }
 }
 
 /// Predicts a record from a boundary that is known already.

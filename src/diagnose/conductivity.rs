@@ -10,10 +10,17 @@
 //! Holds for slopes that change the conductivity by some ten per cent over the record (the next term is of third order).
 //! Leaves out how the other changes of a hypothesis change the effect of the slope.
 
+use crate::numeric::piecewise::PiecewiseLinear;
 use crate::thermal::{self, Drive, HeatPath, ThermalHistory};
 
 /// a₁ [1/K].
 const TRIED_SLOPE_PER_K: f64 = 0.002;
+
+/// By how much the drive of the tried solutions may differ from the estimated one \[K\]: all three have the same drive, so
+/// that this only changes the effect of the slope by its own share, and there are ten times fewer steps.
+const DRIVE_TOLERANCE_K: f64 = 2e-3;
+/// Error of one step, as a share of the drive's span.
+const STEP_TOLERANCE: f64 = 1e-6;
 
 /// First and second derivative of a pack's history with respect to the slope.
 pub(super) struct SlopeResponse {
@@ -31,9 +38,11 @@ struct Parts {
 impl SlopeResponse {
     /// None where the path cannot be solved with such a slope.
     pub fn new(path: &HeatPath, drive: &Drive, times_s: &[f64], rate_mean_s: f64) -> Option<Self> {
+        let simple = |course: &PiecewiseLinear| course.simplified(DRIVE_TOLERANCE_K);
+        let drive = Drive { boundary_k: simple(&drive.boundary_k), ambient_k: drive.ambient_k.as_ref().map(simple) };
         let at = |slope_per_k: f64| {
             let path = HeatPath { conductivity_slope_per_k: slope_per_k, ..path.clone() };
-            Some(thermal::solve(&path, drive).ok()?.means(times_s, rate_mean_s))
+            Some(thermal::solve_within(&path, &drive, STEP_TOLERANCE).ok()?.means(times_s, rate_mean_s))
         };
         let (none, more, less) = (at(0.0)?, at(TRIED_SLOPE_PER_K)?, at(-TRIED_SLOPE_PER_K)?);
         let first = |above: f64, below: f64, _: f64| (above - below) / (2.0 * TRIED_SLOPE_PER_K);
@@ -78,7 +87,6 @@ impl Parts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numeric::piecewise::PiecewiseLinear;
     use crate::thermal::{Extent, Location, Material, PackShape};
 
     #[test]

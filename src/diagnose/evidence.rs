@@ -8,7 +8,7 @@ use super::DiagnoseError;
 use super::conductivity::SlopeResponse;
 use crate::boundary::{Boundary, RateWhitener};
 use crate::pattern::Pattern;
-use crate::predict::{estimate_boundary, noise_floor_rad_per_s, rates_rad_per_s};
+use crate::predict::{estimate_boundary, noise_floor_rad_per_s, rates_rad_per_s, refine_boundary};
 use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::thermal::{self, Drive, HeatPath, Location, ThermalHistory};
@@ -34,6 +34,11 @@ pub(super) struct Case {
     /// Rows left out because of a gross error.
     pub outliers: usize,
     anchors: Vec<Anchor>,
+    /// Solved when it is first asked for, under the first boundary: what a slope does to the pack hardly depends on how the
+    /// sensor is connected to it. None where it cannot be solved.
+    slope_response: OnceLock<Option<SlopeResponse>>,
+    /// Fields that are asked for again and again, and those asked for lately.
+    pinned: Mutex<Vec<Arc<Solved>>>,
     recent: Mutex<Vec<Arc<Solved>>>,
 }
 
@@ -44,8 +49,6 @@ struct Anchor {
     boundary: Boundary,
     /// Under which it was estimated.
     path: HeatPath,
-    /// Solved when it is first asked for; none where it cannot be.
-    slope_response: OnceLock<Option<SlopeResponse>>,
     whitener: RateWhitener,
     /// The measured rates and a constant of one noise, whitened; the latter of unit length.
     measured: Vec<f64>,
@@ -60,8 +63,25 @@ struct Solved {
     history: ThermalHistory,
 }
 
-/// Fields kept for models that differ only in what is done with them.
+/// Fields kept for models that differ only in what is done with them …
 const KEPT_FIELDS: usize = 8;
+/// … and for the starts of the candidates.
+const PINNED_FIELDS: usize = 64;
+
+/// How long a field is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Keep {
+    Recent,
+    Pinned,
+}
+
+/// How a boundary's estimate begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Begin {
+    Anew,
+    /// With what was found for the nearest sensor.
+    Nearby,
+}
 
 impl<'a> Evidence<'a> {
     /// Cleans the records and estimates their boundaries under the declared model.
@@ -78,7 +98,7 @@ impl<'a> Evidence<'a> {
         let mut cases = with_role(records, Role::Fit);
         cases.extend(with_role(holdout, Role::Holdout));
         let mut evidence = Self { pattern, cases };
-        evidence.anchor(model)?;
+        evidence.anchor(model, Begin::Anew)?;
         for case in &evidence.cases {
             case.check()?;
         }
@@ -89,21 +109,17 @@ impl<'a> Evidence<'a> {
     ///
     /// # Errors
     /// As [`Evidence::new`].
-    pub fn anchor(&mut self, model: &CoilModel) -> Result<(), DiagnoseError> {
+    pub fn anchor(&mut self, model: &CoilModel, begin: Begin) -> Result<(), DiagnoseError> {
         let pattern = self.pattern;
         let anchors = self
             .cases
             .par_iter()
-            .map(|case| case.estimate(model, pattern))
+            .map(|case| case.estimate(model, pattern, begin))
             .collect::<Result<Vec<_>, DiagnoseError>>()?;
-        for (case, mut anchor) in self.cases.iter_mut().zip(anchors) {
-            // The slope's effect hardly depends on the sensor: what was solved is kept.
-            if let Some(known) = case.anchors.iter_mut().find(|a| a.location == anchor.location) {
-                anchor.slope_response = std::mem::take(&mut known.slope_response);
-            }
+        for (case, anchor) in self.cases.iter_mut().zip(anchors) {
             case.anchors.retain(|a| a.location != anchor.location || a.lag_s != anchor.lag_s);
             case.anchors.push(anchor);
-            case.recent = Mutex::default();
+            (case.recent, case.pinned) = Default::default();
         }
         Ok(())
     }
@@ -119,9 +135,18 @@ impl<'a> Evidence<'a> {
 
     /// Whitened residuals of a model, each record's offset taken out; None where the model cannot be solved.
     pub fn residuals(&self, model: &CoilModel, role: Role) -> Option<Vec<f64>> {
+        self.residuals_of(model, role, Keep::Recent)
+    }
+
+    /// As [`Evidence::residuals`] of the fitted records, for a model that will be asked for again.
+    pub fn residuals_often(&self, model: &CoilModel) -> Option<Vec<f64>> {
+        self.residuals_of(model, Role::Fit, Keep::Pinned)
+    }
+
+    fn residuals_of(&self, model: &CoilModel, role: Role, keep: Keep) -> Option<Vec<f64>> {
         let mut all = Vec::new();
         for case in self.of(role) {
-            all.extend(case.residuals(model, self.pattern)?);
+            all.extend(case.residuals(model, self.pattern, keep)?);
         }
         Some(all)
     }
@@ -142,7 +167,16 @@ impl Case {
         let record = record.without_rows(&rows).unwrap_or_else(|_| record.clone());
         let outliers = rows.len();
         let noise_rad_per_s = noise_floor_rad_per_s(&record);
-        Self { record, role, noise_rad_per_s, outliers, anchors: Vec::new(), recent: Mutex::default() }
+        Self {
+            record,
+            role,
+            noise_rad_per_s,
+            outliers,
+            anchors: Vec::new(),
+            slope_response: OnceLock::new(),
+            pinned: Mutex::default(),
+            recent: Mutex::default(),
+        }
     }
 
     /// Whether anything can be learnt from the record.
@@ -162,9 +196,16 @@ impl Case {
         Ok(())
     }
 
-    fn estimate(&self, model: &CoilModel, pattern: &Pattern) -> Result<Anchor, DiagnoseError> {
-        let boundary = estimate_boundary(model, pattern, &self.record)
-            .map_err(|source| DiagnoseError::Record { record: self.record.name().to_owned(), source })?;
+    fn estimate(&self, model: &CoilModel, pattern: &Pattern, begin: Begin) -> Result<Anchor, DiagnoseError> {
+        let lag_s = model.sensor_lag_s();
+        let known = (begin == Begin::Nearby)
+            .then(|| self.anchors.iter().min_by(|a, b| (a.lag_s - lag_s).abs().total_cmp(&(b.lag_s - lag_s).abs())));
+        let boundary = match known.flatten() {
+            Some(near) => refine_boundary(model, pattern, &self.record, near.boundary.air()),
+            None => estimate_boundary(model, pattern, &self.record),
+        };
+        let boundary =
+            boundary.map_err(|source| DiagnoseError::Record { record: self.record.name().to_owned(), source })?;
         if self.noise_rad_per_s <= 0.0 {
             return Err(DiagnoseError::NoNoise { record: self.record.name().to_owned() });
         }
@@ -176,8 +217,8 @@ impl Case {
         let length = sum_of_squares(&one).sqrt();
         one.iter_mut().for_each(|v| *v /= length);
         let path = model.heat_path()?;
-        let (location, lag_s, slope_response) = (path.location, model.sensor_lag_s(), OnceLock::new());
-        Ok(Anchor { location, lag_s, boundary, path, slope_response, whitener, measured, one })
+        let location = path.location;
+        Ok(Anchor { location, lag_s, boundary, path, whitener, measured, one })
     }
 
     /// The anchor for a sensor: that of its place whose lag is nearest.
@@ -188,40 +229,30 @@ impl Case {
     }
 
     /// The pack over each averaging interval under a model.
-    fn solved(&self, model: &CoilModel) -> Option<Arc<Solved>> {
+    fn solved(&self, model: &CoilModel, keep: Keep) -> Option<Arc<Solved>> {
         let path = model.heat_path().ok()?;
-        let slope_per_k = path.conductivity_slope_per_k;
-        if slope_per_k == 0.0 {
-            return self.solved_path(path, model);
-        }
-        // A nonlinear field costs a hundred linear ones, but it is nearly linear in the slope: it is solved at slopes of
-        // 0.002/K times powers of two and scaled from the nearest.
-        let octave = (slope_per_k.abs() / REFERENCE_SLOPE_PER_K).log2().round().clamp(LEAST_OCTAVE, MOST_OCTAVE);
-        let reference_per_k = slope_per_k.signum() * REFERENCE_SLOPE_PER_K * octave.exp2();
-        let linear = self.solved_path(HeatPath { conductivity_slope_per_k: 0.0, ..path.clone() }, model)?;
-        let reference =
-            self.solved_path(HeatPath { conductivity_slope_per_k: reference_per_k, ..path.clone() }, model)?;
-        let history = between(&linear.history, &reference.history, slope_per_k / reference_per_k);
-        Some(Arc::new(Solved { path, anchor: linear.anchor, lag_s: linear.lag_s, history }))
-    }
-
-    /// The pack under a model whose heat path is `path`, remembered if it was asked for lately.
-    fn solved_path(&self, path: HeatPath, model: &CoilModel) -> Option<Arc<Solved>> {
         let lag_s = model.sensor_lag_s();
         let anchor = self.anchor_for(path.location, lag_s)?;
-        if let Ok(recent) = self.recent.lock()
-            && let Some(known) = recent.iter().find(|s| s.anchor == anchor && s.lag_s == lag_s && s.path == path)
-        {
-            return Some(known.clone());
+        for fields in [&self.pinned, &self.recent] {
+            if let Ok(fields) = fields.lock()
+                && let Some(known) = fields.iter().find(|s| s.anchor == anchor && s.lag_s == lag_s && s.path == path)
+            {
+                return Some(known.clone());
+            }
         }
         let from = &self.anchors[anchor];
         let mut drive = from.boundary.delayed_drive(path.location, lag_s - from.lag_s);
         if let Some(measured) = crate::predict::measured_ambient(&self.record) {
             drive.ambient_k = Some(measured);
         }
-        let history = self.history(&path, &drive, from, model.rate_mean_s)?;
+        let history = self.history(&path, &drive, model.rate_mean_s)?;
         let solved = Arc::new(Solved { path, anchor, lag_s, history });
-        if let Ok(mut recent) = self.recent.lock() {
+        if keep == Keep::Pinned
+            && let Ok(mut pinned) = self.pinned.lock()
+            && pinned.len() < PINNED_FIELDS
+        {
+            pinned.push(solved.clone());
+        } else if let Ok(mut recent) = self.recent.lock() {
             if recent.len() >= KEPT_FIELDS {
                 // The first is that of the declared model, which is asked for most.
                 recent.remove(1);
@@ -232,24 +263,24 @@ impl Case {
     }
 
     /// The pack under a drive; the effect of a conductivity's slope is taken from two solutions made before.
-    fn history(&self, path: &HeatPath, drive: &Drive, anchor: &Anchor, rate_mean_s: f64) -> Option<ThermalHistory> {
+    fn history(&self, path: &HeatPath, drive: &Drive, rate_mean_s: f64) -> Option<ThermalHistory> {
         let times_s = self.record.times_s();
         let slope_per_k = path.conductivity_slope_per_k;
         let linear = HeatPath { conductivity_slope_per_k: 0.0, ..path.clone() };
         let mut history = thermal::solve(&linear, drive).ok()?.means(times_s, rate_mean_s);
         if slope_per_k != 0.0 {
             thermal::check(path).ok()?;
-            let own_drive = || anchor.boundary.drive(anchor.location);
-            let response = anchor
-                .slope_response
-                .get_or_init(|| SlopeResponse::new(&anchor.path, &own_drive(), times_s, rate_mean_s));
+            let response = self.slope_response.get_or_init(|| {
+                let first = self.anchors.first()?;
+                SlopeResponse::new(&first.path, &first.boundary.drive(first.location), times_s, rate_mean_s)
+            });
             response.as_ref()?.add_to(&mut history, slope_per_k);
         }
         Some(history)
     }
 
-    fn residuals(&self, model: &CoilModel, pattern: &Pattern) -> Option<Vec<f64>> {
-        let solved = self.solved(model)?;
+    fn residuals(&self, model: &CoilModel, pattern: &Pattern, keep: Keep) -> Option<Vec<f64>> {
+        let solved = self.solved(model, keep)?;
         let predicted = rates_rad_per_s(model, pattern, &self.record, &solved.history).ok()?;
         let anchor = &self.anchors[solved.anchor];
         let mut residuals = anchor.whitener.whiten(&predicted);
@@ -281,7 +312,7 @@ impl Case {
 
     /// Σ (Ω_model − mean)²/σ²: how much of the noise the coil's own error is.
     pub fn signal_square(&self, model: &CoilModel, pattern: &Pattern) -> f64 {
-        let Some(solved) = self.solved(model) else { return 0.0 };
+        let Some(solved) = self.solved(model, Keep::Recent) else { return 0.0 };
         let Ok(rates) = rates_rad_per_s(model, pattern, &self.record, &solved.history) else { return 0.0 };
         let mean = rates.iter().sum::<f64>() / rates.len() as f64;
         rates.iter().map(|r| ((r - mean) / self.noise_rad_per_s).powi(2)).sum()
@@ -289,29 +320,12 @@ impl Case {
 
     /// Plain residuals, their mean taken out [rad/s], and the pack under the model.
     pub fn plain_residuals(&self, model: &CoilModel, pattern: &Pattern) -> Option<(Vec<f64>, ThermalHistory)> {
-        let solved = self.solved(model)?;
+        let solved = self.solved(model, Keep::Recent)?;
         let predicted = rates_rad_per_s(model, pattern, &self.record, &solved.history).ok()?;
         let mut residuals: Vec<f64> = self.record.rate_rad_per_s().iter().zip(&predicted).map(|(m, p)| m - p).collect();
         let mean = residuals.iter().sum::<f64>() / residuals.len() as f64;
         residuals.iter_mut().for_each(|r| *r -= mean);
         Some((residuals, solved.history.clone()))
-    }
-}
-
-/// Slope at which a conductivity that depends on temperature is solved, and the octaves above and below it.
-const REFERENCE_SLOPE_PER_K: f64 = 0.002;
-const LEAST_OCTAVE: f64 = -2.0;
-const MOST_OCTAVE: f64 = 2.0;
-
-/// from + share · (to − from), field by field.
-fn between(from: &ThermalHistory, to: &ThermalHistory, share: f64) -> ThermalHistory {
-    let mix = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect::<Vec<f64>>();
-    ThermalHistory {
-        temperature_k: mix(&from.temperature_k, &to.temperature_k),
-        rate_k_per_s: mix(&from.rate_k_per_s, &to.rate_k_per_s),
-        axial_moment_k: mix(&from.axial_moment_k, &to.axial_moment_k),
-        axial_moment_k_per_s: mix(&from.axial_moment_k_per_s, &to.axial_moment_k_per_s),
-        ..from.clone()
     }
 }
 

@@ -153,12 +153,21 @@ impl Trial<'_> {
                 self.candidates[candidate].starts.iter().map(move |v| Member { candidate, values: v.clone() })
             })
             .collect();
+        // Without an effect that moves heat the candidates' fields are the same whatever else the hypothesis holds.
+        let moved =
+            |m: &Member| self.candidates[m.candidate].moves_heat() || self.candidates[m.candidate].moves_sensor();
+        let often = !hypothesis.members.iter().any(moved);
         starts
             .into_par_iter()
             .filter_map(|member| {
                 let mut members = hypothesis.members.clone();
                 members.push(member.clone());
-                let moved = self.residuals(&members)?;
+                let model = self.model_of(&members)?;
+                let moved = if often {
+                    self.evidence.residuals_often(&model)?
+                } else {
+                    self.evidence.residuals(&model, Role::Fit)?
+                };
                 if moved.len() != hypothesis.residuals.len() {
                     return None;
                 }

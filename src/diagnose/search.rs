@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::DiagnoseError;
 use super::candidate::Candidate;
-use super::evidence::{Evidence, Role};
+use super::evidence::{Begin, Evidence, Role};
 use super::hypothesis::{Hypothesis, Response, Trial, pairs};
 use super::plain::best_gain;
 use crate::fit::Effort;
@@ -22,7 +22,7 @@ pub(super) struct Found {
 
 /// A set must be this much better than a smaller one.
 const MARGIN: f64 = 10.0;
-const MAX_EFFECTS: usize = 4;
+const MAX_EFFECTS: usize = 3;
 /// Sets that are fitted in earnest after a linear look at all of them.
 const PAIRS_TRIED: usize = 6;
 const KINDS_TRIED: usize = 4;
@@ -36,6 +36,8 @@ const WORTH_A_BOUNDARY: f64 = 0.3;
 const NOTHING_LEFT: f64 = 3.0;
 /// A start is not worth a fit either that promises less than this share of what the best start of its candidate, or a removed effect, does.
 const WORTH_BESIDE: f64 = 0.5;
+/// Nor is a single effect whose best start promises less than this share of what the most promising one does.
+const WORTH_BESIDE_THE_BEST: f64 = 0.1;
 /// Starts from which a candidate is fitted alone.
 const STARTS_TRIED: usize = 2;
 /// Times that a boundary is estimated again with the sensor that was found.
@@ -77,7 +79,10 @@ pub(super) fn search(
     progress(0.8);
     while !best.members.is_empty() && best.members.len() < MAX_EFFECTS {
         let mut further = fit_forward(&trial, &best);
-        further.extend(fit_swaps(&trial, &best));
+        // What a single effect could be exchanged for was fitted alone already.
+        if best.members.len() > 1 {
+            further.extend(fit_swaps(&trial, &best));
+        }
         variance = noise_variance(&best, &further, rows).min(variance);
         let Some(next) = least(&further, variance) else { break };
         let grows = next.members.len() > best.members.len();
@@ -106,7 +111,7 @@ pub(super) fn all_singles(
         if let (Ok(there), Ok(here)) = (moved.heat_path(), model.heat_path())
             && there.location != here.location
         {
-            evidence.anchor(&moved)?;
+            evidence.anchor(&moved, Begin::Nearby)?;
         }
     }
     let mut singles = fit_singles(&Trial { evidence, model, candidates }, base);
@@ -129,13 +134,14 @@ fn noise_variance<'h>(base: &Hypothesis, others: impl IntoIterator<Item = &'h Hy
 /// Each candidate alone, from its most promising starts; one that promises nothing keeps its linear estimate.
 fn fit_singles(trial: &Trial, base: &Hypothesis) -> Vec<Hypothesis> {
     let responses = trial.responses(base);
+    let foremost = responses.iter().map(Response::gain).fold(0.0, f64::max);
     (0..trial.candidates.len())
         .into_par_iter()
         .filter_map(|candidate| {
             let mut own: Vec<_> = responses.iter().filter(|r| r.member.candidate == candidate).collect();
             own.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
             let best = own.first()?;
-            if best.gain() < WORTH_A_FIT {
+            if best.gain() < WORTH_A_FIT.max(WORTH_BESIDE_THE_BEST * foremost) {
                 return Some(Hypothesis {
                     members: vec![trial.scaled(&best.member, best.amplitude())],
                     chi_square: base.chi_square - best.gain(),
@@ -256,7 +262,7 @@ pub(super) fn settle_sensor(
     for _ in 0..rounds {
         let members = hypothesis.members.clone();
         let Some(with) = (Trial { evidence, model, candidates }).model_of(&members) else { break };
-        evidence.anchor(&with)?;
+        evidence.anchor(&with, Begin::Anew)?;
         match (Trial { evidence, model, candidates }).fit(&members, Effort::QUICK) {
             Some(settled) => hypothesis = settled,
             None => break,

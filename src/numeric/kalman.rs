@@ -35,11 +35,13 @@ impl Sparse {
         self.starts.len() - 1
     }
 
+    #[inline]
     fn row(&self, row: usize) -> &[(usize, f64)] {
         &self.entries[self.starts[row]..self.starts[row + 1]]
     }
 
     /// One row times a vector.
+    #[inline]
     pub fn dot(&self, row: usize, vector: &[f64]) -> f64 {
         self.row(row).iter().map(|&(k, v)| v * vector[k]).sum()
     }
@@ -59,6 +61,7 @@ impl Sparse {
     }
 
     /// Σ_k m_k X_k over one row of M.
+    #[inline(always)]
     fn combine<const N: usize>(&self, row: usize, x: &Square<N>) -> [f64; N] {
         let mut sum = [0.0; N];
         for &(k, v) in self.row(row) {

@@ -365,6 +365,18 @@ pub fn solve(path: &HeatPath, drive: &Drive) -> Result<Field, ThermalError> {
     })
 }
 
+/// As [`solve`], but a nonlinear field only to `tolerance_share` of the span of the drive's temperatures in each step.
+///
+/// # Errors
+/// As [`solve`].
+pub fn solve_within(path: &HeatPath, drive: &Drive, tolerance_share: f64) -> Result<Field, ThermalError> {
+    check(path)?;
+    if path.extent == Extent::HalfSpace || path.conductivity_slope_per_k == 0.0 {
+        return solve(path, drive);
+    }
+    Ok(Field::Stepped(Box::new(SteppedField::within(path, drive, tolerance_share)?)))
+}
+
 /// What a heat path cannot be.
 ///
 /// # Errors
@@ -447,21 +459,48 @@ impl Field {
         if window_s <= 0.0 {
             return self.at(&ends_s.iter().map(|&t| Instant::after(t)).collect::<Vec<_>>());
         }
-        let ends = self.sample(&ends_s.iter().map(|&t| Instant::before(t)).collect::<Vec<_>>(), Wanted::Temperatures);
-        // Temperatures are continuous; just before a knot the fast modes are over.
-        let starts = self
-            .sample(&ends_s.iter().map(|&t| Instant::before(t - window_s)).collect::<Vec<_>>(), Wanted::Temperatures);
-        let middle = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| 0.5 * (a + b)).collect::<Vec<f64>>();
-        let change = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (b - a) / window_s).collect::<Vec<f64>>();
+        // Where a window begins at the end of the one before, one instant serves both.
+        let joined = |row: usize| row > 0 && (ends_s[row] - window_s - ends_s[row - 1]).abs() <= 1e-9 * window_s;
+        let mut instants = Vec::with_capacity(2 * ends_s.len());
+        let places: Vec<usize> = ends_s
+            .iter()
+            .enumerate()
+            .map(|(row, &end_s)| {
+                if !joined(row) {
+                    // Temperatures are continuous; just before a knot the fast modes are over.
+                    instants.push(Instant::before(end_s - window_s));
+                }
+                instants.push(Instant::before(end_s));
+                instants.len() - 1
+            })
+            .collect();
+        let at = self.sample(&instants, Wanted::Temperatures);
+        let over = |values: &[f64], columns: usize, f: fn(f64, f64) -> f64| -> Vec<f64> {
+            if values.is_empty() {
+                return Vec::new();
+            }
+            let mut out = Vec::with_capacity(places.len() * columns);
+            for &place in &places {
+                let (start, end) = values[(place - 1) * columns..(place + 1) * columns].split_at(columns);
+                out.extend(start.iter().zip(end).map(|(a, b)| f(*a, *b)));
+            }
+            out
+        };
+        let middle = |a: f64, b: f64| 0.5 * (a + b);
+        let change = |values: &[f64], columns: usize| {
+            let mut changes = over(values, columns, |a, b| b - a);
+            changes.iter_mut().for_each(|c| *c /= window_s);
+            changes
+        };
         ThermalHistory {
-            layers: ends.layers,
+            layers: at.layers,
             times_s: ends_s.to_vec(),
-            temperature_k: middle(&starts.temperature_k, &ends.temperature_k),
-            rate_k_per_s: change(&starts.temperature_k, &ends.temperature_k),
-            axial_moment_k: middle(&starts.axial_moment_k, &ends.axial_moment_k),
-            axial_moment_k_per_s: change(&starts.axial_moment_k, &ends.axial_moment_k),
-            ambient_k: middle(&starts.ambient_k, &ends.ambient_k),
-            ambient_rate_k_per_s: change(&starts.ambient_k, &ends.ambient_k),
+            temperature_k: over(&at.temperature_k, at.layers, middle),
+            rate_k_per_s: change(&at.temperature_k, at.layers),
+            axial_moment_k: over(&at.axial_moment_k, at.layers, middle),
+            axial_moment_k_per_s: change(&at.axial_moment_k, at.layers),
+            ambient_k: over(&at.ambient_k, 1, middle),
+            ambient_rate_k_per_s: change(&at.ambient_k, 1),
         }
     }
 }

@@ -356,6 +356,14 @@ impl SteppedField {
     /// # Errors
     /// Values so extreme that nothing converges; a conductivity that does not stay positive.
     pub fn new(path: &HeatPath, drive: &Drive) -> Result<Self, ThermalError> {
+        Self::within(path, drive, TOLERANCE_SHARE)
+    }
+
+    /// With another error allowed in one step, as a share of the span of the drive's temperatures.
+    ///
+    /// # Errors
+    /// As [`SteppedField::new`].
+    pub fn within(path: &HeatPath, drive: &Drive, tolerance_share: f64) -> Result<Self, ThermalError> {
         let system = System::new(path, drive.start_s());
         // The linear pack at the declared conductivity tells the time scales.
         let linear = Pack::new(path)?;
@@ -367,7 +375,7 @@ impl SteppedField {
                 return Err(ThermalError::ConductivityNotPositive { temperature_k, slope_per_k });
             }
         }
-        let tolerance_k = (TOLERANCE_SHARE * (highest_k - lowest_k)).max(LEAST_TOLERANCE_K);
+        let tolerance_k = (tolerance_share * (highest_k - lowest_k)).max(LEAST_TOLERANCE_K);
         let slowest = system.factor(lowest_k).min(system.factor(highest_k)).min(1.0);
         let settling_s = linear.settling_s() / slowest;
         let mut integrator = Integrator::new(&system, drive.boundary_k.first_value(), tolerance_k, linear.shortest_s());
