@@ -99,7 +99,7 @@ pub fn estimate_boundary(model: &CoilModel, pattern: &Pattern, record: &Record) 
     Ok(boundary::estimate(&observation(model, record, &path, &gains))?)
 }
 
-/// As [`estimate_boundary`], beginning with what was found under a model that is nearly this one.
+/// As [`estimate_boundary`] for a sensor of another lag, beginning with what was found under nearly the same model.
 ///
 /// # Errors
 /// As [`predict`].
@@ -107,10 +107,11 @@ pub fn refine_boundary(
     model: &CoilModel,
     pattern: &Pattern,
     record: &Record,
+    lag_s: f64,
     known: &Air,
 ) -> Result<Boundary, PredictError> {
     let (path, gains) = (model.heat_path()?, layer_gains_rad_per_k(model, pattern)?);
-    Ok(boundary::refine(&observation(model, record, &path, &gains), known)?)
+    Ok(boundary::refine(&Observation { lag_s, ..observation(model, record, &path, &gains) }, known)?)
 }
 
 fn observation<'a>(model: &CoilModel, record: &'a Record, path: &'a HeatPath, gains: &'a [f64]) -> Observation<'a> {

@@ -34,6 +34,8 @@ pub(super) struct Case {
     /// Rows left out because of a gross error.
     pub outliers: usize,
     anchors: Vec<Anchor>,
+    /// Three of the anchors, between which the pack is interpolated.
+    bracket: Option<Bracket>,
     /// Solved when it is first asked for, under the first boundary: what a slope does to the pack hardly depends on how the
     /// sensor is connected to it. None where it cannot be solved.
     slope_response: OnceLock<Option<SlopeResponse>>,
@@ -54,6 +56,37 @@ struct Anchor {
     measured: Vec<f64>,
     one: Vec<f64>,
 }
+
+/// Three estimates for one sensor: at a lag, and at a shorter and a longer one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Bracket {
+    location: Location,
+    middle_s: f64,
+    half_width_s: f64,
+}
+
+impl Bracket {
+    fn lags_s(&self) -> [f64; 3] {
+        [self.middle_s - self.half_width_s, self.middle_s, self.middle_s + self.half_width_s]
+    }
+
+    fn holds(&self, location: Location, lag_s: f64) -> bool {
+        location == self.location && (lag_s - self.middle_s).abs() <= self.half_width_s
+    }
+
+    /// Of the three estimates, at a lag between the outer two: those of the parabola through them.
+    fn weights(&self, lag_s: f64) -> [f64; 3] {
+        let x = (lag_s - self.middle_s) / self.half_width_s;
+        [0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0)]
+    }
+}
+
+/// Half width of a bracket, as a share of the lag, and the least \[s\]: much more than a standard error, and so little
+/// that no kink moves by more than a reading.
+const BRACKET_SHARE: f64 = 0.04;
+const LEAST_BRACKET_S: f64 = 1.0;
+/// Share of the half width within which a fit has found the middle.
+const CENTRAL: f64 = 0.4;
 
 /// A field that was solved lately.
 struct Solved {
@@ -124,6 +157,55 @@ impl<'a> Evidence<'a> {
         Ok(())
     }
 
+    /// Estimates every record's boundary under a model and for a lag a little shorter and longer, so that between them
+    /// the fitted lag moves the boundary as a new estimate would.
+    ///
+    /// # Errors
+    /// As [`Evidence::new`].
+    pub fn bracket(&mut self, model: &CoilModel, begin: Begin) -> Result<(), DiagnoseError> {
+        let lag_s = model.sensor_lag_s();
+        let half_width_s = (BRACKET_SHARE * lag_s).max(LEAST_BRACKET_S).min(0.5 * lag_s);
+        self.anchor(model, begin)?;
+        let pattern = self.pattern;
+        let sides = self
+            .cases
+            .par_iter()
+            .map(|case| {
+                let nearby = |lag_s: f64| case.estimate_at(model, pattern, Begin::Nearby, lag_s);
+                Ok([nearby(lag_s - half_width_s)?, nearby(lag_s + half_width_s)?])
+            })
+            .collect::<Result<Vec<_>, DiagnoseError>>()?;
+        for (case, sides) in self.cases.iter_mut().zip(sides) {
+            let new = Bracket { location: sides[0].location, middle_s: lag_s, half_width_s };
+            if let Some(old) = case.bracket.replace(new).filter(|b| b.location == new.location) {
+                case.anchors
+                    .retain(|a| a.location != old.location || a.lag_s == lag_s || !old.lags_s().contains(&a.lag_s));
+            }
+            case.anchors.extend(sides);
+            (case.recent, case.pinned) = Default::default();
+        }
+        Ok(())
+    }
+
+    /// Whether boundaries were estimated on both sides of a model's lag.
+    pub fn is_bracketed(&self, model: &CoilModel) -> bool {
+        self.bracketed_within(model, 1.0)
+    }
+
+    /// … and close enough to it for the parabola to be exact.
+    pub fn is_central(&self, model: &CoilModel) -> bool {
+        self.bracketed_within(model, CENTRAL)
+    }
+
+    fn bracketed_within(&self, model: &CoilModel, share: f64) -> bool {
+        let Ok(path) = model.heat_path() else { return false };
+        let lag_s = model.sensor_lag_s();
+        self.cases.iter().all(|case| {
+            case.bracket
+                .is_some_and(|b| b.location == path.location && (lag_s - b.middle_s).abs() <= share * b.half_width_s)
+        })
+    }
+
     /// Number of rows in the records of a role.
     pub fn rows(&self, role: Role) -> usize {
         self.cases.iter().filter(|c| c.role == role).map(|c| c.record.rows()).sum()
@@ -173,6 +255,7 @@ impl Case {
             noise_rad_per_s,
             outliers,
             anchors: Vec::new(),
+            bracket: None,
             slope_response: OnceLock::new(),
             pinned: Mutex::default(),
             recent: Mutex::default(),
@@ -197,11 +280,21 @@ impl Case {
     }
 
     fn estimate(&self, model: &CoilModel, pattern: &Pattern, begin: Begin) -> Result<Anchor, DiagnoseError> {
-        let lag_s = model.sensor_lag_s();
+        self.estimate_at(model, pattern, begin, model.sensor_lag_s())
+    }
+
+    /// As if the sensor lagged by `lag_s`.
+    fn estimate_at(
+        &self,
+        model: &CoilModel,
+        pattern: &Pattern,
+        begin: Begin,
+        lag_s: f64,
+    ) -> Result<Anchor, DiagnoseError> {
         let known = (begin == Begin::Nearby)
             .then(|| self.anchors.iter().min_by(|a, b| (a.lag_s - lag_s).abs().total_cmp(&(b.lag_s - lag_s).abs())));
         let boundary = match known.flatten() {
-            Some(near) => refine_boundary(model, pattern, &self.record, near.boundary.air()),
+            Some(near) => refine_boundary(model, pattern, &self.record, lag_s, near.boundary.air()),
             None => estimate_boundary(model, pattern, &self.record),
         };
         let boundary =
@@ -232,7 +325,28 @@ impl Case {
     fn solved(&self, model: &CoilModel, keep: Keep) -> Option<Arc<Solved>> {
         let path = model.heat_path().ok()?;
         let lag_s = model.sensor_lag_s();
+        if let Some(bracket) = self.bracket.filter(|b| b.holds(path.location, lag_s)) {
+            let anchors = bracket.lags_s().map(|at_s| {
+                let nearest = self.anchor_for(path.location, at_s)?;
+                self.solved_at(path.clone(), nearest, self.anchors[nearest].lag_s, model.rate_mean_s, Keep::Recent)
+            });
+            let [Some(shorter), Some(middle), Some(longer)] = anchors else { return None };
+            let history = mixed([&shorter.history, &middle.history, &longer.history], bracket.weights(lag_s));
+            return Some(Arc::new(Solved { path, anchor: middle.anchor, lag_s, history }));
+        }
         let anchor = self.anchor_for(path.location, lag_s)?;
+        self.solved_at(path, anchor, lag_s, model.rate_mean_s, keep)
+    }
+
+    /// The pack under one anchor's boundary, remembered if it was asked for lately.
+    fn solved_at(
+        &self,
+        path: HeatPath,
+        anchor: usize,
+        lag_s: f64,
+        rate_mean_s: f64,
+        keep: Keep,
+    ) -> Option<Arc<Solved>> {
         for fields in [&self.pinned, &self.recent] {
             if let Ok(fields) = fields.lock()
                 && let Some(known) = fields.iter().find(|s| s.anchor == anchor && s.lag_s == lag_s && s.path == path)
@@ -245,7 +359,7 @@ impl Case {
         if let Some(measured) = crate::predict::measured_ambient(&self.record) {
             drive.ambient_k = Some(measured);
         }
-        let history = self.history(&path, &drive, model.rate_mean_s)?;
+        let history = self.history(&path, &drive, rate_mean_s)?;
         let solved = Arc::new(Solved { path, anchor, lag_s, history });
         if keep == Keep::Pinned
             && let Ok(mut pinned) = self.pinned.lock()
@@ -326,6 +440,24 @@ impl Case {
         let mean = residuals.iter().sum::<f64>() / residuals.len() as f64;
         residuals.iter_mut().for_each(|r| *r -= mean);
         Some((residuals, solved.history.clone()))
+    }
+}
+
+/// Σ_i w_i H_i.
+fn mixed(histories: [&ThermalHistory; 3], weights: [f64; 3]) -> ThermalHistory {
+    let mix = |part: fn(&ThermalHistory) -> &Vec<f64>| -> Vec<f64> {
+        let [a, b, c] = histories.map(part);
+        a.iter().zip(b).zip(c).map(|((a, b), c)| weights[0] * a + weights[1] * b + weights[2] * c).collect()
+    };
+    ThermalHistory {
+        layers: histories[1].layers,
+        times_s: histories[1].times_s.clone(),
+        temperature_k: mix(|h| &h.temperature_k),
+        rate_k_per_s: mix(|h| &h.rate_k_per_s),
+        axial_moment_k: mix(|h| &h.axial_moment_k),
+        axial_moment_k_per_s: mix(|h| &h.axial_moment_k_per_s),
+        ambient_k: mix(|h| &h.ambient_k),
+        ambient_rate_k_per_s: mix(|h| &h.ambient_rate_k_per_s),
     }
 }
 

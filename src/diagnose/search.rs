@@ -40,7 +40,7 @@ const WORTH_BESIDE: f64 = 0.5;
 const WORTH_BESIDE_THE_BEST: f64 = 0.1;
 /// Starts from which a candidate is fitted alone.
 const STARTS_TRIED: usize = 2;
-/// Times that a boundary is estimated again with the sensor that was found.
+/// Times that a bracket of lags is moved to where the fit wants it.
 const SENSOR_ROUNDS: usize = 3;
 
 /// Searches; boundaries for other sensors are added to the evidence on the way.
@@ -120,7 +120,7 @@ pub(super) fn all_singles(
         let gain = base.chi_square - single.chi_square;
         let moves_sensor = candidates[single.members[0].candidate].moves_sensor();
         if moves_sensor && gain > MARGIN.max(WORTH_A_BOUNDARY * best) {
-            *single = settle_sensor(evidence, model, candidates, single.clone(), SENSOR_ROUNDS)?;
+            *single = settle_sensor(evidence, model, candidates, single.clone())?;
         }
     }
     Ok(singles)
@@ -251,21 +251,39 @@ pub(super) fn without(trial: &Trial, from: &Hypothesis, out: usize) -> Option<Hy
     trial.fit(&rest, Effort::QUICK)
 }
 
-/// Estimates the boundary anew with the sensor that a hypothesis found, and fits again.
+/// Estimates the boundary anew under what a hypothesis found, and fits again.
+///
+/// A boundary that was estimated for one lag is only extrapolated to another: the minimum over estimates made for each lag
+/// is where the middle of a bracket and the fit agree.
 pub(super) fn settle_sensor(
     evidence: &mut Evidence,
     model: &CoilModel,
     candidates: &[Candidate],
     mut hypothesis: Hypothesis,
-    rounds: usize,
 ) -> Result<Hypothesis, DiagnoseError> {
-    for _ in 0..rounds {
-        let members = hypothesis.members.clone();
-        let Some(with) = (Trial { evidence, model, candidates }).model_of(&members) else { break };
-        evidence.anchor(&with, Begin::Anew)?;
-        match (Trial { evidence, model, candidates }).fit(&members, Effort::QUICK) {
-            Some(settled) => hypothesis = settled,
-            None => break,
+    let with = |evidence: &Evidence, h: &Hypothesis| (Trial { evidence, model, candidates }).model_of(&h.members);
+    let fit = |evidence: &Evidence, h: &Hypothesis| {
+        (Trial { evidence, model, candidates }).fit(&h.members, Effort::QUICK).unwrap_or_else(|| h.clone())
+    };
+    let Some(found) = with(evidence, &hypothesis) else { return Ok(hypothesis) };
+    let lags = hypothesis.members.iter().any(|m| candidates[m.candidate].moves_sensor());
+    if !lags {
+        evidence.anchor(&found, Begin::Anew)?;
+        return Ok(fit(evidence, &hypothesis));
+    }
+    let mut begin = Begin::Nearby;
+    if !evidence.is_bracketed(&found) {
+        evidence.anchor(&found, Begin::Anew)?;
+        hypothesis = fit(evidence, &hypothesis);
+        begin = Begin::Anew;
+    }
+    for _ in 0..SENSOR_ROUNDS {
+        let Some(found) = with(evidence, &hypothesis) else { break };
+        evidence.bracket(&found, begin)?;
+        begin = Begin::Nearby;
+        hypothesis = fit(evidence, &hypothesis);
+        if with(evidence, &hypothesis).is_some_and(|m| evidence.is_central(&m)) {
+            break;
         }
     }
     Ok(hypothesis)

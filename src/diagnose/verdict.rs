@@ -45,7 +45,7 @@ pub(super) fn judge(
     let rows = evidence.rows(Role::Fit);
     let mut cautions = cautions_of(evidence);
     if best.members.iter().any(|m| candidates[m.candidate].moves_heat() || candidates[m.candidate].moves_sensor()) {
-        best = settle_sensor(evidence, model, candidates, best, 1)?;
+        best = settle_sensor(evidence, model, candidates, best)?;
     }
     let trial = Trial { evidence, model, candidates };
     let signal = trial.evidence.of(Role::Fit).map(|c| c.signal_square(model, trial.evidence.pattern)).sum::<f64>();
@@ -156,7 +156,7 @@ pub(super) fn settle_one(
     let Some(mut best) = least else { return Ok(None) };
     let candidate = &candidates[best.members[0].candidate];
     if candidate.moves_heat() || candidate.moves_sensor() {
-        best = settle_sensor(evidence, model, candidates, best, 1)?;
+        best = settle_sensor(evidence, model, candidates, best)?;
     }
     let trial = Trial { evidence, model, candidates };
     let Some(best) = trial.fit(&best.members, Effort { standard_errors: true, ..Effort::QUICK }) else {
