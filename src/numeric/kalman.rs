@@ -77,12 +77,8 @@ impl Sparse {
         let mut product = [[0.0; N]; N];
         self.times_square(square, &mut product);
         let turned = std::array::from_fn(|i| std::array::from_fn(|j| product[j][i]));
-        self.times_square(&turned, square);
-        for i in 1..N {
-            for j in 0..i {
-                square[j][i] = square[i][j];
-            }
-        }
+        self.times_square(&turned, &mut product);
+        *square = std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (product[i][j] + product[j][i])));
     }
 }
 
@@ -240,8 +236,10 @@ fn smooth_of<const N: usize>(model: &StateSpace, functional: Option<&[f64]>) -> 
         }
         let Some(functional) = &functional else { continue };
         let covariance: Square<N> = wide_square(&trace.covariances[index * n * n..(index + 1) * n * n], n);
-        for state in 0..n {
-            smoothed.states[index * n + state] = trace.means[index * n + state] + dot(&covariance[state], &r);
+        let place = index * n..(index + 1) * n;
+        let means = &trace.means[place.clone()];
+        for ((state, mean), line) in smoothed.states[place].iter_mut().zip(means).zip(&covariance) {
+            *state = mean + dot(line, &r);
         }
         let along = combined(functional, &covariance);
         smoothed.functional_variance[index] =
