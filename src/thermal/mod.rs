@@ -355,14 +355,7 @@ pub enum Field {
 /// # Errors
 /// A heat path whose parts contradict each other or lack a material property.
 pub fn solve(path: &HeatPath, drive: &Drive) -> Result<Field, ThermalError> {
-    check(path)?;
-    Ok(match path.extent {
-        Extent::HalfSpace => Field::HalfSpace(HalfSpaceField::new(half_space::HalfSpace::new(path), drive)),
-        Extent::Pack if path.conductivity_slope_per_k != 0.0 => {
-            Field::Stepped(Box::new(SteppedField::new(path, drive)?))
-        }
-        Extent::Pack => Field::Pack(Box::new(PackField::new(Pack::new(path)?, drive))),
-    })
+    solve_within(path, drive, stepped::TOLERANCE_SHARE)
 }
 
 /// As [`solve`], but a nonlinear field only to `tolerance_share` of the span of the drive's temperatures in each step.
@@ -371,10 +364,13 @@ pub fn solve(path: &HeatPath, drive: &Drive) -> Result<Field, ThermalError> {
 /// As [`solve`].
 pub fn solve_within(path: &HeatPath, drive: &Drive, tolerance_share: f64) -> Result<Field, ThermalError> {
     check(path)?;
-    if path.extent == Extent::HalfSpace || path.conductivity_slope_per_k == 0.0 {
-        return solve(path, drive);
-    }
-    Ok(Field::Stepped(Box::new(SteppedField::within(path, drive, tolerance_share)?)))
+    Ok(match path.extent {
+        Extent::HalfSpace => Field::HalfSpace(HalfSpaceField::new(half_space::HalfSpace::new(path), drive)),
+        Extent::Pack if path.conductivity_slope_per_k != 0.0 => {
+            Field::Stepped(Box::new(SteppedField::new(path, drive, tolerance_share)?))
+        }
+        Extent::Pack => Field::Pack(Box::new(PackField::new(Pack::new(path)?, drive))),
+    })
 }
 
 /// What a heat path cannot be.

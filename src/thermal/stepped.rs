@@ -26,9 +26,9 @@ use crate::units::REFERENCE_TEMPERATURE_K;
 
 const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
 
-/// Error allowed in one step, as a share of the span of the drive's temperatures: rates right after a change of ramp
-/// are off by far more, and a winding that cancels most of them shows it (`tests/verify.rs`) …
-const TOLERANCE_SHARE: f64 = 1e-8;
+/// Error allowed in one step unless another is asked for, as a share of the span of the drive's temperatures: rates right
+/// after a change of ramp are off by far more, and a winding that cancels most of them shows it (`tests/verify.rs`) …
+pub(super) const TOLERANCE_SHARE: f64 = 1e-8;
 /// … but no less than this [K].
 const LEAST_TOLERANCE_K: f64 = 1e-9;
 /// A step is never shorter than this share of the fastest response.
@@ -355,15 +355,7 @@ impl<'a> Integrator<'a> {
 impl SteppedField {
     /// # Errors
     /// Values so extreme that nothing converges; a conductivity that does not stay positive.
-    pub fn new(path: &HeatPath, drive: &Drive) -> Result<Self, ThermalError> {
-        Self::within(path, drive, TOLERANCE_SHARE)
-    }
-
-    /// With another error allowed in one step, as a share of the span of the drive's temperatures.
-    ///
-    /// # Errors
-    /// As [`SteppedField::new`].
-    pub fn within(path: &HeatPath, drive: &Drive, tolerance_share: f64) -> Result<Self, ThermalError> {
+    pub fn new(path: &HeatPath, drive: &Drive, tolerance_share: f64) -> Result<Self, ThermalError> {
         let system = System::new(path, drive.start_s());
         // The linear pack at the declared conductivity tells the time scales.
         let linear = Pack::new(path)?;
@@ -457,7 +449,7 @@ mod tests {
     fn differences(path: &HeatPath) -> [f64; 4] {
         let instants: Vec<Instant> = (0..240).map(|i| Instant::after(1.0 + 4.9 * i as f64)).collect();
         let exact = PackField::new(Pack::new(path).unwrap(), &drive()).at(&instants, Wanted::All);
-        let stepped = SteppedField::new(path, &drive()).unwrap().at(&instants, Wanted::All);
+        let stepped = SteppedField::new(path, &drive(), TOLERANCE_SHARE).unwrap().at(&instants, Wanted::All);
         let share =
             |a: &[f64], b: &[f64], scale: f64| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / scale;
         let largest = |a: &[f64]| a.iter().map(|v| v.abs()).fold(1e-300, f64::max);
@@ -489,11 +481,14 @@ mod tests {
     fn a_steep_slope_of_the_conductivity_is_refused_and_a_small_one_changes_the_field_in_proportion() {
         let mut steep = path(Location::OuterLayer);
         steep.conductivity_slope_per_k = -0.5;
-        assert!(matches!(SteppedField::new(&steep, &drive()), Err(ThermalError::ConductivityNotPositive { .. })));
+        assert!(matches!(
+            SteppedField::new(&steep, &drive(), TOLERANCE_SHARE),
+            Err(ThermalError::ConductivityNotPositive { .. })
+        ));
         let instants: Vec<Instant> = (0..50).map(|i| Instant::after(20.0 * i as f64)).collect();
         let with_slope = |slope_per_k: f64| {
             let path = HeatPath { conductivity_slope_per_k: slope_per_k, ..path(Location::OuterLayer) };
-            SteppedField::new(&path, &drive()).unwrap().at(&instants, Wanted::All).temperature_k
+            SteppedField::new(&path, &drive(), TOLERANCE_SHARE).unwrap().at(&instants, Wanted::All).temperature_k
         };
         let (none, one, two) = (with_slope(0.0), with_slope(1e-3), with_slope(2e-3));
         let change = |a: &[f64]| a.iter().zip(&none).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
