@@ -161,6 +161,10 @@ pub enum Caution {
     Outliers { record: String, rows: usize },
     #[error("{record}: column {channel} lacks values and was not considered")]
     ChannelIncomplete { record: String, channel: String },
+    #[error(
+        "{record}: the declared coil predicts its rate no better than a constant does: does the model file belong to this coil?"
+    )]
+    WrongCoil { record: String },
     #[error("no hold-out record: effects were confirmed on blocks in time that they were not fitted to")]
     NoHoldout,
     #[error("{kind} was not accepted: {reason}")]

@@ -2,7 +2,7 @@
 
 use super::candidate::{Candidate, is_declared_number};
 use super::confirm::confirmation;
-use super::evidence::{Evidence, Role, dot, sum_of_squares};
+use super::evidence::{Case, Evidence, Role, dot, sum_of_squares};
 use super::hypothesis::{Hypothesis, Trial};
 use super::plain::{Plain, best_gain, compete};
 use super::search::{Found, all_singles, fit_swap, settle_sensor, without};
@@ -112,6 +112,9 @@ pub(super) fn judge(
             Verdict::Missing
         }
     };
+    if verdict == Verdict::Unexplained {
+        cautions.extend(strangers(trial.evidence, model));
+    }
     let unexplained = (verdict == Verdict::Unexplained).then(|| describe(&trial, &extended, plain, left));
     let ladder = ladder(&trial, &base, &best, rows);
     let suggested_experiment = experiment(verdict, &effects);
@@ -192,6 +195,19 @@ fn cautions_of(evidence: &Evidence) -> Vec<Caution> {
         cautions.push(Caution::NoHoldout);
     }
     cautions
+}
+
+/// Records that the declared model predicts no better than a constant does.
+fn strangers(evidence: &Evidence, model: &CoilModel) -> Vec<Caution> {
+    let is_strange = |case: &&Case| {
+        let rates = case.record.rate_rad_per_s();
+        let mean = rates.iter().sum::<f64>() / rates.len() as f64;
+        let spread: f64 = rates.iter().map(|r| (r - mean).powi(2)).sum();
+        let residuals = case.plain_residuals(model, evidence.pattern);
+        residuals.is_some_and(|(residuals, _)| sum_of_squares(&residuals) >= spread)
+    };
+    let strange = evidence.cases.iter().filter(is_strange);
+    strange.map(|case| Caution::WrongCoil { record: case.record.name().to_owned() }).collect()
 }
 
 /// The first member that cannot stay, and why; the least significant first.

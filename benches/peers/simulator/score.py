@@ -1,6 +1,7 @@
 """Runs `BINARY diagnose` over trial cases and scores it: `python score.py CASES_DIR BINARY OUT_DIR [CASE...]`.
 
-Answers are kept in OUT_DIR/answers.jsonl; cases that are there already are not run again. OUT_DIR/table.md is written anew.
+A CASE that begins with @ names a file with one case a line; a BINARY of `-` runs nothing and writes the table anew. Answers
+are kept in OUT_DIR/answers.jsonl; cases that are there already are not run again. Each case runs on one thread.
 """
 import json, os, resource, subprocess, sys, time
 
@@ -66,32 +67,67 @@ def judge(truth, answer):
     return word, worst, ratio
 
 
+def kind_of(truth):
+    if truth.get("outside"):
+        return "outside the catalogue"
+    return {0: "controls", 1: "one effect"}.get(len(truth["answers"]), "two effects")
+
+
+def values(truth, answer):
+    """Fitted values beside the true ones, where they mean the same."""
+    said = []
+    for key, value in list(truth["hidden"].items()) + [("gain", g) for g in (truth.get("gains") or {}).values()]:
+        kind, name = SAME.get(key, ("channel", "gain_deg_per_h_per_unit") if key == "gain" else (None, None))
+        for e in answer["effects"]:
+            p = e["parameters"].get(name) if e["kind"].split(":")[0] == kind else None
+            if p:
+                error = f" ± {p['standard_error']:.2g}" if p["standard_error"] else ""
+                said.append(f"{name} {p['value']:.4g}{error} ({value:g})")
+    return "; ".join(said)
+
+
+def write_table(truths, answers, file):
+    rows = ["| case | hidden | rms/noise | answer | judged | value (truth) | worst parameter [s.e.] | validation RMSE/noise | CPU s |"]
+    rows.append("|---" * 9 + "|")
+    counts = {}
+    for case in (c for c in truths if c in answers):
+        truth, answer = truths[case], answers[case]
+        word, worst, ratio = judge(truth, answer)
+        of_kind = counts.setdefault(kind_of(truth), {})
+        of_kind[word] = of_kind.get(word, 0) + 1
+        said = answer["verdict"] + (": " + "; ".join("/".join([e["kind"]] + e["equivalents"]) for e in answer["effects"]) if answer["effects"] else "")
+        hidden = " + ".join(truth["answers"] + ([truth["outside"] + " (outside)"] if truth.get("outside") else [])) or "nothing"
+        size = truth["hidden_rms"]["calibration"] / truth["noise_sigma_deg_per_h"]
+        error = f"{worst:.1f}" if worst else ""
+        rows.append(f"| {case} | {hidden} | {size:.2f} | {said} | {word} | {values(truth, answer)} | {error} | {ratio:.3f} | {answer['cpu_s']} |")
+    summary = ["| | cases | " + " | ".join(w for w in WORDS) + " |", "|---" * (len(WORDS) + 2) + "|"]
+    for kind, of_kind in counts.items():
+        summary.append(f"| {kind} | {sum(of_kind.values())} | " + " | ".join(str(of_kind.get(w, 0)) for w in WORDS) + " |")
+    open(file, "w").write("\n".join(summary) + "\n\n" + "\n".join(rows) + "\n")
+
+
+WORDS = ["right: adequate", "right: named", "right: in a set", "right: unexplained", "missed", "unexplained", "WRONG", "WRONG NAME", "FALSE ALARM", "error"]
+
+
 def main():
     cases, binary, out, wanted = sys.argv[1], sys.argv[2], sys.argv[3], sys.argv[4:]
     os.makedirs(out, exist_ok=True)
+    os.environ["RAYON_NUM_THREADS"] = "1"
+    wanted = [c for w in wanted for c in (open(w[1:]).read().split() if w.startswith("@") else [w])]
     file = f"{out}/answers.jsonl"
     truths = json.load(open(f"{cases}/truth.json"))
     answers = {}
     if os.path.exists(file):
         answers = {a["case"]: a for a in map(json.loads, open(file))}
-    for name in wanted or truths:
+    for name in [] if binary == "-" else wanted or truths:
         if name not in answers:
             answers[name] = dict(run(binary, f"{cases}/{name}"), case=name)
             with open(file, "a") as f:
                 f.write(json.dumps(answers[name]) + "\n")
-        rows = ["| case | hidden | rms/noise | answer | judged | worst parameter [s.e.] | validation RMSE/noise | cpu s |", "|---|---|---|---|---|---|---|---|"]
-        counts = {}
-        for case in (c for c in truths if c in answers):
-            truth, answer = truths[case], answers[case]
-            word, worst, ratio = judge(truth, answer)
-            counts[word] = counts.get(word, 0) + 1
-            said = answer["verdict"] + (": " + "; ".join("/".join([e["kind"]] + e["equivalents"]) for e in answer["effects"]) if answer["effects"] else "")
-            hidden = " + ".join(truth["answers"] + ([truth["outside"] + " (outside)"] if truth.get("outside") else [])) or "nothing"
-            sizes = truth["noise_sigma_deg_per_h"]
-            rows.append(f"| {case} | {hidden} | {truth['hidden_rms']['calibration'] / sizes:.2f} | {said} | {word} | {worst:.1f} | {ratio:.3f} | {answer['cpu_s']} |")
-        summary = ", ".join(f"{k}: {v}" for k, v in sorted(counts.items()))
-        open(f"{out}/table.md", "w").write(f"{len(rows) - 2} cases; {summary}\n\n" + "\n".join(rows) + "\n")
-        print(name, judge(truths[name], answers[name]), answers[name]["verdict"], [[e["kind"]] + e["equivalents"] for e in answers[name]["effects"]], answers[name]["cpu_s"], answers[name]["wall_s"], answers[name]["most_mb"], answers[name].get("error", ""), flush=True)
+            write_table(truths, answers, f"{out}/table.md")
+            a = answers[name]
+            print(name, judge(truths[name], a), a["verdict"], [[e["kind"]] + e["equivalents"] for e in a["effects"]], a["cpu_s"], a["most_mb"], a.get("error", ""), flush=True)
+    write_table(truths, answers, f"{out}/table.md")
 
 
 if __name__ == "__main__":
