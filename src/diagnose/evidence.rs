@@ -103,7 +103,7 @@ const PINNED_FIELDS: usize = 64;
 
 /// How long a field is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Keep {
+pub(super) enum Keep {
     Recent,
     Pinned,
 }
@@ -393,7 +393,7 @@ impl Case {
         Some(history)
     }
 
-    fn residuals(&self, model: &CoilModel, pattern: &Pattern, keep: Keep) -> Option<Vec<f64>> {
+    pub fn residuals(&self, model: &CoilModel, pattern: &Pattern, keep: Keep) -> Option<Vec<f64>> {
         let solved = self.solved(model, keep)?;
         let predicted = rates_rad_per_s(model, pattern, &self.record, &solved.history).ok()?;
         let anchor = &self.anchors[solved.anchor];

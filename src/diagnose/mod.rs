@@ -23,6 +23,7 @@ pub mod experiment;
 mod hypothesis;
 pub mod plain;
 mod search;
+mod stranger;
 mod verdict;
 
 use thiserror::Error;
@@ -165,6 +166,8 @@ pub enum Caution {
         "{record}: the declared coil predicts its rate no better than a constant does: does the model file belong to this coil?"
     )]
     WrongCoil { record: String },
+    #[error("the winding {winding} explains the records without any effect: is the declared pattern the coil's?")]
+    OtherWinding { winding: &'static str },
     #[error("no hold-out record: effects were confirmed on blocks in time that they were not fitted to")]
     NoHoldout,
     #[error("{kind} was not accepted: {reason}")]

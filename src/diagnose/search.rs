@@ -62,22 +62,34 @@ pub(super) fn search(
         list.iter().min_by(|a, b| a.merit(rows, variance).total_cmp(&b.merit(rows, variance))).cloned()
     };
     // What plain functions of time explain better than an effect does is no evidence for the effect.
-    let plain_gain = |from: &Hypothesis| trial.model_of(&from.members).map_or(0.0, |m| best_gain(evidence, &m, from));
+    let plain_gain = |trial: &Trial, from: &Hypothesis| {
+        trial.model_of(&from.members).map_or(0.0, |m| best_gain(trial.evidence, &m, from))
+    };
+    let noise_only = rows as f64 + NOTHING_LEFT * (2.0 * rows as f64).sqrt();
     let best_single = singles.iter().map(|h| h.chi_square).fold(base.chi_square, f64::min);
     let mut twos = Vec::new();
-    if best_single > rows as f64 + NOTHING_LEFT * (2.0 * rows as f64).sqrt() {
+    if best_single > noise_only {
         twos = fit_pairs(&trial, &base, best_single);
     }
     let mut variance = noise_variance(&base, singles.iter().chain(&twos), rows);
     let mut best = base.clone();
     for step in [least(&singles, variance), least(&twos, variance)].into_iter().flatten() {
         let better = step.merit(rows, variance) < best.merit(rows, variance) - MARGIN;
-        if better && plain_gain(&best) < best.chi_square - step.chi_square {
+        if better && plain_gain(&trial, &best) < best.chi_square - step.chi_square {
             best = step;
         }
     }
     progress(0.8);
+    let mut anchored = Vec::new();
     while !best.members.is_empty() && best.members.len() < MAX_EFFECTS {
+        // The boundary was estimated with the heat path as declared: what a wrong path leaves there would be taken for a
+        // further effect.
+        let moved = moving(candidates, &best);
+        if moved != anchored && best.chi_square > noise_only {
+            best = settle_sensor(evidence, model, candidates, best)?;
+            anchored = moved;
+        }
+        let trial = Trial { evidence, model, candidates };
         let mut further = fit_forward(&trial, &best);
         // What a single effect could be exchanged for was fitted alone already.
         if best.members.len() > 1 {
@@ -88,14 +100,21 @@ pub(super) fn search(
         let grows = next.members.len() > best.members.len();
         let margin = if grows { MARGIN } else { 0.5 };
         let better = next.merit(rows, variance) < best.merit(rows, variance) - margin;
-        if !better || (grows && plain_gain(&best) > best.chi_square - next.chi_square) {
+        if !better || (grows && plain_gain(&trial, &best) > best.chi_square - next.chi_square) {
             break;
         }
         best = next;
     }
+    let trial = Trial { evidence, model, candidates };
     best = step_back(&trial, best, rows, variance);
     singles.sort_by(|a, b| a.merit(rows, variance).total_cmp(&b.merit(rows, variance)));
     Ok(Found { base, singles, best, variance })
+}
+
+/// The members that the boundary's estimate depends on.
+pub(super) fn moving(candidates: &[Candidate], of: &Hypothesis) -> Vec<String> {
+    let members = of.members.iter().map(|m| &candidates[m.candidate]);
+    members.filter(|c| c.moves_heat() || c.moves_sensor()).map(Candidate::kind).collect()
 }
 
 /// Each candidate alone; boundaries for other sensors are added to the evidence.

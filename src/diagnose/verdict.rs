@@ -2,10 +2,11 @@
 
 use super::candidate::{Candidate, is_declared_number};
 use super::confirm::confirmation;
-use super::evidence::{Case, Evidence, Role, dot, sum_of_squares};
+use super::evidence::{Begin, Evidence, Role, dot, sum_of_squares};
 use super::hypothesis::{Hypothesis, Trial};
 use super::plain::{Plain, best_gain, compete};
-use super::search::{Found, all_singles, fit_swap, settle_sensor, without};
+use super::search::{Found, all_singles, fit_swap, moving, settle_sensor, without};
+use super::stranger::{other_winding, strangers};
 use super::{
     Caution, Contender, DiagnoseError, Diagnosis, Equivalent, Extension, Finding, FittedParameter, Refusal, Rung,
     Unexplained, Verdict,
@@ -24,6 +25,8 @@ const CONFIRMED: f64 = 4.0;
 /// Sets whose χ² differ by less explain the records equally well (odds of 400 at best).
 const EQUAL: f64 = 12.0;
 const MAX_EQUIVALENTS: usize = 2;
+/// Times that boundaries are estimated again because an effect went that they depend on.
+const MOST_ROUNDS: usize = 3;
 /// Kinds that are tried in the place of an accepted one.
 const RIVALS: usize = 6;
 /// Reduced χ² beyond 1 that noise floor and boundary may make, besides chance.
@@ -44,41 +47,31 @@ pub(super) fn judge(
     let Found { base, singles, mut best, variance } = found;
     let rows = evidence.rows(Role::Fit);
     let mut cautions = cautions_of(evidence);
-    if best.members.iter().any(|m| candidates[m.candidate].moves_heat() || candidates[m.candidate].moves_sensor()) {
-        best = settle_sensor(evidence, model, candidates, best)?;
-    }
-    let trial = Trial { evidence, model, candidates };
-    let signal = trial.evidence.of(Role::Fit).map(|c| c.signal_square(model, trial.evidence.pattern)).sum::<f64>();
-    let mut reasons = Vec::new();
-    // What is not needed, not confirmed or not of a practical size goes, the least significant first.
-    while let Some((out, kind, reason)) = refusal(&trial, &best, rows, variance, signal) {
-        cautions.push(Caution::Refused { kind, reason });
-        match without(&trial, &best, out) {
-            Some(smaller) => best = smaller,
-            None => break,
-        }
-    }
     let freedom = |h: &Hypothesis| (rows as f64 - h.parameters as f64 - 1.0).max(1.0);
     let excess = |h: &Hypothesis| h.chi_square - freedom(h);
     let tolerated = TOLERATED_EXCESS + 3.0 * (2.0 / rows as f64).sqrt();
-    // An effect that explains less than what is left over, or than a plain function of time does, may be that thing's shadow.
-    if !best.members.is_empty() && best_gain(trial.evidence, model, &base) > base.chi_square - best.chi_square - EQUAL {
-        let kinds = best.members.iter().map(|m| candidates[m.candidate].kind());
-        cautions.extend(kinds.map(|kind| Caution::Refused { kind, reason: Refusal::Outdone }));
-        best = base.clone();
-    }
-    while excess(&best) > tolerated * freedom(&best) {
-        let rests = (0..best.members.len()).filter_map(|out| Some((out, without(&trial, &best, out)?)));
-        let weakest = rests.min_by(|a, b| a.1.chi_square.total_cmp(&b.1.chi_square));
-        match weakest {
-            Some((out, rest)) if rest.chi_square - best.chi_square < excess(&best) => {
-                let kind = candidates[best.members[out].candidate].kind();
-                cautions.push(Caution::Refused { kind, reason: Refusal::Outdone });
-                best = rest;
-            }
-            _ => break,
+    let mut anchored = Vec::new();
+    for _ in 0..MOST_ROUNDS {
+        let moved = moving(candidates, &best);
+        if moved.is_empty() && !anchored.is_empty() {
+            evidence.anchor(model, Begin::Anew)?;
+            best = (Trial { evidence, model, candidates }).fit(&best.members, Effort::QUICK).unwrap_or(best);
+        } else if moved != anchored {
+            best = settle_sensor(evidence, model, candidates, best)?;
+        }
+        anchored = moved;
+        let trial = Trial { evidence, model, candidates };
+        best = prune(&trial, best, &base, variance, tolerated, &mut cautions);
+        if moving(candidates, &best) == anchored {
+            break;
         }
     }
+    let trial = Trial { evidence, model, candidates };
+    let stranger = other_winding(&trial, &base, &best, 1.0 + tolerated);
+    if stranger.is_some() {
+        best = base.clone();
+    }
+    let mut reasons = Vec::new();
     let mut effects = Vec::new();
     for place in 0..best.members.len() {
         let (main, equivalents) = settle_equivalents(&trial, best, place, rows, variance);
@@ -112,7 +105,9 @@ pub(super) fn judge(
             Verdict::Missing
         }
     };
-    if verdict == Verdict::Unexplained {
+    if let Some(winding) = stranger {
+        cautions.push(Caution::OtherWinding { winding });
+    } else if verdict == Verdict::Unexplained {
         cautions.extend(strangers(trial.evidence, model));
     }
     let unexplained = (verdict == Verdict::Unexplained).then(|| describe(&trial, &extended, plain, left));
@@ -197,17 +192,47 @@ fn cautions_of(evidence: &Evidence) -> Vec<Caution> {
     cautions
 }
 
-/// Records that the declared model predicts no better than a constant does.
-fn strangers(evidence: &Evidence, model: &CoilModel) -> Vec<Caution> {
-    let is_strange = |case: &&Case| {
-        let rates = case.record.rate_rad_per_s();
-        let mean = rates.iter().sum::<f64>() / rates.len() as f64;
-        let spread: f64 = rates.iter().map(|r| (r - mean).powi(2)).sum();
-        let residuals = case.plain_residuals(model, evidence.pattern);
-        residuals.is_some_and(|(residuals, _)| sum_of_squares(&residuals) >= spread)
-    };
-    let strange = evidence.cases.iter().filter(is_strange);
-    strange.map(|case| Caution::WrongCoil { record: case.record.name().to_owned() }).collect()
+/// What is not needed, not confirmed or not of a practical size goes, the least significant first; so does what explains
+/// less than what is left over, or than a plain function of time: it may be that thing's shadow.
+fn prune(
+    trial: &Trial,
+    mut best: Hypothesis,
+    base: &Hypothesis,
+    variance: f64,
+    tolerated: f64,
+    cautions: &mut Vec<Caution>,
+) -> Hypothesis {
+    let rows = trial.evidence.rows(Role::Fit);
+    let kind = |h: &Hypothesis, place: usize| trial.candidates[h.members[place].candidate].kind();
+    let signal =
+        trial.evidence.of(Role::Fit).map(|c| c.signal_square(trial.model, trial.evidence.pattern)).sum::<f64>();
+    while let Some((out, kind, reason)) = refusal(trial, &best, rows, variance, signal) {
+        cautions.push(Caution::Refused { kind, reason });
+        match without(trial, &best, out) {
+            Some(smaller) => best = smaller,
+            None => break,
+        }
+    }
+    if !best.members.is_empty()
+        && best_gain(trial.evidence, trial.model, base) > base.chi_square - best.chi_square - EQUAL
+    {
+        let kinds = (0..best.members.len()).map(|place| kind(&best, place));
+        cautions.extend(kinds.map(|kind| Caution::Refused { kind, reason: Refusal::Outdone }));
+        return base.clone();
+    }
+    let excess = |h: &Hypothesis| h.chi_square - rows as f64;
+    while excess(&best) > tolerated * rows as f64 {
+        let rests = (0..best.members.len()).filter_map(|out| Some((out, without(trial, &best, out)?)));
+        let weakest = rests.min_by(|a, b| a.1.chi_square.total_cmp(&b.1.chi_square));
+        match weakest {
+            Some((out, rest)) if rest.chi_square - best.chi_square < excess(&best) => {
+                cautions.push(Caution::Refused { kind: kind(&best, out), reason: Refusal::Outdone });
+                best = rest;
+            }
+            _ => break,
+        }
+    }
+    best
 }
 
 /// The first member that cannot stay, and why; the least significant first.
