@@ -70,7 +70,8 @@ Examples:
   coilwright evaluate my-coil.toml               the classic windings' worst rate errors
   coilwright optimise my-coil.toml -o results/my-coil
 
-Exit codes: 0 done; 1 the answer is no; 2 the request was wrong; 130 interrupted";
+Exit codes: 0 done; 1 the answer is no; 2 the request was wrong; 130 interrupted.
+Nothing is coloured but what a terminal shows; NO_COLOR switches colours off.";
 
 #[derive(Debug, Clone, clap::Args)]
 pub struct OutputOptions {
@@ -80,6 +81,9 @@ pub struct OutputOptions {
     /// Nothing on stderr but errors
     #[arg(long, short, global = true)]
     pub quiet: bool,
+    /// Says on stderr which version ran, with how many threads, and how long it took
+    #[arg(long, short, global = true, conflicts_with = "quiet")]
+    pub verbose: bool,
     /// How progress is shown on stderr
     #[arg(long, global = true, value_enum, default_value_t = ProgressMode::Auto)]
     pub progress: ProgressMode,
@@ -210,6 +214,7 @@ impl From<StreamError> for CliError {
 pub fn run() -> ExitCode {
     let cli = Cli::parse();
     let screen = Screen::new(&cli.output);
+    let started = std::time::Instant::now();
     let ending = match &cli.command {
         Command::Evaluate(arguments) => evaluate::run(arguments, &screen),
         Command::Exact(arguments) => exact::run(arguments, &screen),
@@ -235,6 +240,11 @@ pub fn run() -> ExitCode {
         Command::Verify(arguments) => verify::run(arguments, &screen),
         Command::Report(arguments) => report::run(arguments, &screen),
     };
+    if cli.output.verbose {
+        let (version, threads) = (env!("CARGO_PKG_VERSION"), rayon::current_num_threads());
+        let seconds = started.elapsed().as_secs_f64();
+        screen.note(&format!("coilwright {version}, {threads} threads, {seconds:.2} s"));
+    }
     match ending {
         Ok(Ending::Done) => ExitCode::SUCCESS,
         Ok(Ending::No) => ExitCode::from(1),

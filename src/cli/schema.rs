@@ -4,7 +4,7 @@ use clap::ValueEnum;
 
 use super::screen::Screen;
 use super::{CliError, Ending};
-use crate::io::schema::{model_schema, pattern_schema, record_schema};
+use crate::io::schema::{model_schema, pattern_schema, record_schema, schedule_schema};
 
 /// The JSON Schema of a file format, for editors
 #[derive(Debug, clap::Args)]
@@ -20,6 +20,8 @@ enum Kind {
     Model,
     Pattern,
     Record,
+    /// Schedule, traveller and winder's program as JSON
+    Schedule,
 }
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
@@ -27,6 +29,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         Kind::Model => model_schema(),
         Kind::Pattern => pattern_schema(),
         Kind::Record => record_schema(),
+        Kind::Schedule => schedule_schema(),
     };
     screen.write(&format!("{schema:#}\n"))?;
     Ok(Ending::Done)

@@ -68,6 +68,17 @@ pub struct Run {
     pub history: Vec<HistoryRow>,
     pub run_toml: String,
     pub file: ModelFile,
+    /// Where `pareto -o` wrote into the same folder.
+    pub front: Option<Vec<FrontPoint>>,
+}
+
+/// A point of a searched front of error against winding effort.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct FrontPoint {
+    pub name: String,
+    pub worst_rate_deg_per_h: f64,
+    pub captive: usize,
+    pub max_climb: usize,
 }
 
 /// # Errors
@@ -97,10 +108,12 @@ pub fn read_run(folder: &Path) -> Result<Run, Faults> {
             return Err(Faults::of_file(summary_path.display().to_string(), message));
         }
     }
-    Ok(Run { summary, history: read_history(&folder.join("history.csv"))?, run_toml, file })
+    let front_path = folder.join("pareto.csv");
+    let front = if front_path.is_file() { Some(read_rows(&front_path)?) } else { None };
+    Ok(Run { summary, history: read_rows(&folder.join("history.csv"))?, run_toml, file, front })
 }
 
-fn read_history(path: &Path) -> Result<Vec<HistoryRow>, Faults> {
+fn read_rows<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Vec<T>, Faults> {
     let text = read_text(path)?;
     csv::Reader::from_reader(text.as_bytes())
         .deserialize()

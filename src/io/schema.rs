@@ -8,6 +8,8 @@ use crate::effect::{CATALOGUE, CHANNEL, CUSTOM, EffectSpec};
 use crate::pattern::classic::Classic;
 use crate::search::objective::Objective;
 
+use super::json::SCHEMA_VERSION;
+
 const DIALECT: &str = "https://json-schema.org/draft/2020-12/schema";
 
 fn table(title: &str, needed: &[&str], properties: Value) -> Value {
@@ -227,6 +229,108 @@ pub fn pattern_schema() -> Value {
     ))
 }
 
+/// The schema of a schedule, a traveller or a winder's program as JSON.
+pub fn schedule_schema() -> Value {
+    let word = |description: &str| described("string", description);
+    let number = |description: &str| described("number", description);
+    let whole = |description: &str| described("integer", description);
+    let flag = |description: &str| described("boolean", description);
+    let windability = table(
+        "windability",
+        &["class", "reels", "captive", "max_climb"],
+        json!({
+            "class": word("standard or captive:K"),
+            "reels": whole("supply reels with fibre on them at the same time, at most"),
+            "captive": whole("captive runs at the same time, at most"),
+            "max_climb": whole("longest crossover [layers]"),
+        }),
+    );
+    let reel = table(
+        "a supply reel",
+        &["name", "captive", "prepared_before_step", "taken_from", "from_m", "to_m"],
+        json!({
+            "name": word("A, B, C1, C2, …"),
+            "captive": flag("held by the coil at both its ends"),
+            "prepared_before_step": whole("counted from 1"),
+            "taken_from": { "type": ["string", "null"], "description": "the reel from which its fibre is spooled over" },
+            "from_m": number("arclength from end A"),
+            "to_m": number("arclength from end A"),
+            "load_m": number("what to load, with the allowance"),
+        }),
+    );
+    let production = table(
+        "the winding shop's settings, copied from the model file",
+        &[],
+        json!({
+            "part_number": word(""), "revision": word(""), "spool": word(""), "adhesive": word(""), "cure": word(""),
+            "tension_n": number("on the first layer"),
+            "tension_taper_percent_per_layer": number("of the first layer's"),
+            "allowance_m": number("on each reel with an end of the fibre"),
+            "potting_every_layers": whole("0: only after the last layer"),
+            "winding_speed_turns_per_min": number(""),
+        }),
+    );
+    let step = table(
+        "a step: one layer",
+        &[
+            "step", "layer", "half", "segment", "supply_reel", "direction", "turns", "fibre_from_m", "fibre_to_m",
+            "length_m", "radius_mm", "climb", "cumulative_m",
+        ],
+        json!({
+            "step": whole("counted from 1"),
+            "layer": whole("counted from 1, innermost first"),
+            "half": { "enum": ["A", "B"] },
+            "segment": whole("1 … N from end A"),
+            "supply_reel": word("the reel that feeds the layer"),
+            "direction": { "enum": ["first-to-second", "second-to-first"] },
+            "turns": number("of the layer"),
+            "fibre_from_m": number("arclength of the segment's low end"),
+            "fibre_to_m": number("arclength of the segment's high end"),
+            "length_m": number("of the layer"),
+            "radius_mm": number("of the layer's middle"),
+            "climb": whole("longest crossover completed here [layers]"),
+            "cumulative_m": number("drawn from the reel so far"),
+            "crossover": word("flange, layer and climb of each crossover completed here"),
+            "balance_m": number("wound of half A less half B"),
+            "rotation": { "enum": ["cw", "ccw"] },
+            "axial_pitch_mm": number("from turn to turn"),
+            "tension_n": number("set-point"),
+            "turns_per_min": number("winding speed"),
+            "reel_change": flag("another reel than for the layer before"),
+            "potting": flag("adhesive is applied after the layer"),
+            "measured_length_m": word("entered by hand"),
+            "checked_by": word("entered by hand"),
+        }),
+    );
+    with_dialect(table(
+        "coilwright schedule, traveller or winder's program",
+        &[
+            "schema_version", "document", "program", "model", "model_sha256", "pattern", "segments", "windability",
+            "worst_rate_deg_per_h", "worst_profile", "worst_time_s", "length_m", "start_mark_m", "expected_trim_m", "reels",
+            "steps",
+        ],
+        json!({
+            "schema_version": { "const": SCHEMA_VERSION },
+            "document": word("schedule, traveller or machine program 1"),
+            "program": word("what wrote the file"),
+            "model": word("the model's name"),
+            "model_sha256": word("of the model file"),
+            "pattern": word("the winding's name"),
+            "segments": { "type": "array", "items": { "type": "integer", "minimum": 1 } },
+            "windability": windability,
+            "worst_rate_deg_per_h": number("over the model's profiles and all times"),
+            "worst_profile": word("under which it occurs"),
+            "worst_time_s": number("at which it occurs"),
+            "length_m": number("of the fibre"),
+            "start_mark_m": number("fixed at the first flange before layer 1"),
+            "expected_trim_m": number("from end A; below 0 from end B"),
+            "reels": { "type": "array", "items": reel },
+            "production": production,
+            "steps": { "type": "array", "items": step },
+        }),
+    ))
+}
+
 /// The schema of one row of a record, as a table schema for CSV tools.
 pub fn record_schema() -> Value {
     with_dialect(json!({
@@ -257,6 +361,39 @@ mod tests {
         let faults = parse_model(Path::new("x.toml"), &source).unwrap_err();
         let note = faults.faults.iter().filter(|f| f.message.contains("zzzzzz")).find_map(|f| f.note.clone()).unwrap();
         note.trim_start_matches("known here: ").split(", ").map(str::to_owned).collect()
+    }
+
+    /// What a document holds that a schema does not describe, and what it lacks though it must not.
+    fn faults(schema: &Value, document: &Value, at: &str, found: &mut Vec<String>) {
+        match document {
+            Value::Object(map) => {
+                let known = schema["properties"].as_object().unwrap();
+                found.extend(map.keys().filter(|k| !known.contains_key(*k)).map(|k| format!("{at}.{k} is unknown")));
+                let needed = schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str);
+                found.extend(needed.filter(|k| !map.contains_key(*k)).map(|k| format!("{at}.{k} is missing")));
+                for (key, value) in map.iter().filter(|(key, _)| known.contains_key(*key)) {
+                    faults(&known[key], value, &format!("{at}.{key}"), found);
+                }
+            }
+            Value::Array(list) => list.iter().for_each(|item| faults(&schema["items"], item, at, found)),
+            _ => {}
+        }
+    }
+
+    #[test]
+    fn schedules_have_exactly_the_keys_of_their_schema() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus/schedule");
+        let text = std::fs::read_to_string(folder.join("schedule.json")).unwrap();
+        let mut found = Vec::new();
+        let schema = schedule_schema();
+        faults(&schema, &serde_json::from_str(&text).unwrap(), "schedule", &mut found);
+        assert_eq!(found, Vec::<String>::new());
+        // The traveller's columns are all that a step can have.
+        let text = std::fs::read_to_string(folder.join("traveller.csv")).unwrap();
+        let columns: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+        for key in schema["properties"]["steps"]["items"]["properties"].as_object().unwrap().keys() {
+            assert!(columns.contains(&key.as_str()), "{key}");
+        }
     }
 
     #[test]

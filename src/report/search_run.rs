@@ -13,13 +13,18 @@ use crate::io::schedule_file::sha256_hex;
 use crate::pattern::{Pattern, PatternError};
 use crate::profile::Profile;
 use crate::rate::RateModel;
+use crate::search::tolerance::{ToleranceError, ToleranceSpec, study};
 use crate::search::worst_case::{SearchError, SolvedProfiles};
-use crate::units::{REFERENCE_TEMPERATURE_K, c_per_h_from_k_per_s, deg_per_h_from_rad_per_s, min_from_s};
+use crate::units::{
+    REFERENCE_TEMPERATURE_K, c_per_h_from_k_per_s, deg_per_h_from_rad_per_s, min_from_s, percent_from_fraction,
+};
 
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum ReportError {
     #[error(transparent)]
     Search(#[from] SearchError),
+    #[error(transparent)]
+    Tolerance(#[from] ToleranceError),
     #[error("the summary holds a pattern that is none: {0}")]
     Pattern(#[from] PatternError),
     #[error("the profile {name} of the summary is not one of model.toml: run the search again")]
@@ -50,9 +55,11 @@ pub fn search_page(run: &Run) -> Result<String, ReportError> {
         h2 { "Rate error over time" }
         @for (svg, caption) in over_time(run)? { (figure(&svg, &caption)) }
         h2 { "Tolerance" }
-        (figure(&tolerance(run, &best)?, &format!("{TOLERANCE_COILS} coils, the turns of each layer off by up to half a turn (uniform, independent; seed {}), under the best pattern's worst profile.", summary.seed)))
+        @let (svg, caption) = tolerance(run, &best)?;
+        (figure(&svg, &caption))
         h2 { "What it costs the winding shop" }
-        (figure(&trade_off(run), "Every step to the left is an easier crossover, every step down a smaller error."))
+        @let (svg, caption) = trade_off(run);
+        (figure(&svg, &caption))
         h2 { "How the search went" }
         (figure(&convergence(run), &format!("Best value known after so many judged moves; {} rounds, ended by: {}.", summary.rounds, summary.stopped_by)))
         (certificate(run))
@@ -156,7 +163,12 @@ fn over_time(run: &Run) -> Result<Vec<(String, String)>, ReportError> {
     let worst = profiles.iter().find(|p| p.name() == worst_name);
     // A guaranteed worst case may be attained by a profile that is no member of the list.
     let mut shown: Vec<&Profile> = worst.into_iter().collect();
-    shown.extend(profiles.first().filter(|first| first.name() != worst_name));
+    let others = all(run).filter_map(|p| profiles.iter().find(|profile| profile.name() == p.worst_profile));
+    for profile in others.chain(profiles.first()) {
+        if !shown.iter().any(|known| known.name() == profile.name()) {
+            shown.push(profile);
+        }
+    }
     if shown.is_empty() {
         return Err(ReportError::Profile { name: worst_name.clone() });
     }
@@ -177,12 +189,14 @@ fn over_time(run: &Run) -> Result<Vec<(String, String)>, ReportError> {
             let points = history.times_s.iter().zip(rates).map(|(t, r)| (min_from_s(*t), deg_per_h_from_rad_per_s(r)));
             chart = chart.with(Series::line(&found.name, points.collect()));
         }
-        let what = if profile.name() == worst_name {
-            "The profile under which the best pattern is at its worst."
+        let sufferers: Vec<&str> =
+            all(run).filter(|p| p.worst_profile == profile.name()).map(|p| p.name.as_str()).collect();
+        let what = if sufferers.is_empty() {
+            "The first profile of the model; no pattern is at its worst under it.".to_owned()
         } else {
-            "The first profile of the model."
+            format!("At their worst under this profile: {}.", sufferers.join(", "))
         };
-        figures.push((chart.svg(), what.to_owned()));
+        figures.push((chart.svg(), what));
         figures.push((profile_chart(profile), format!("What drives it: {}, from a steady state.", profile.name())));
     }
     Ok(figures)
@@ -193,8 +207,76 @@ const TOLERANCE_BINS: usize = 24;
 /// Largest error of a layer's turn count [turns].
 const TURN_ERROR: f64 = 0.5;
 
-/// How the best pattern's worst rate error spreads when turns are miscounted.
-fn tolerance(run: &Run, best: &Pattern) -> Result<String, ReportError> {
+/// How the best pattern's worst rate error spreads over coils as built, with what is drawn.
+fn tolerance(run: &Run, best: &Pattern) -> Result<(String, String), ReportError> {
+    match &run.file.tolerance {
+        Some(declared) => declared_tolerance(run, best, declared),
+        None => Ok((turn_tolerance(run, best)?, format!(
+            "The model file has no [tolerance]: {TOLERANCE_COILS} coils, only the turns of each layer off by up to half a turn (uniform, independent; seed {}), under the best pattern's worst profile.",
+            run.summary.seed
+        ))),
+    }
+}
+
+/// With every spread that the model file declares; QUA beside.
+fn declared_tolerance(run: &Run, best: &Pattern, declared: &ToleranceSpec) -> Result<(String, String), ReportError> {
+    let spec = ToleranceSpec { samples: declared.samples.min(TOLERANCE_COILS), ..declared.clone() };
+    let mut named = vec![(run.summary.best.name.as_str(), best.clone())];
+    if let Some(qua) = run.summary.baselines.iter().find(|p| p.name == "qua" && p.name != run.summary.best.name) {
+        named.push(("qua", Pattern::new(qua.segments.clone())?));
+    }
+    let patterns: Vec<Pattern> = named.iter().map(|(_, pattern)| pattern.clone()).collect();
+    let found = study(&run.file.model, &run.file.profiles, &spec, &patterns)?;
+    let all: Vec<f64> =
+        found.iter().flat_map(|d| &d.worst_rad_per_s).map(|r| deg_per_h_from_rad_per_s(*r)).collect();
+    let edges = bin_edges(&all);
+    let mut chart = Chart::new("Worst rate error of coils as built")
+        .size(720, 320)
+        .x(Axis::linear("worst |rate error| [°/h]"))
+        .y(Axis::linear("coils [1]"));
+    let mut words = Vec::new();
+    for ((name, _), distribution) in named.iter().zip(&found) {
+        let values: Vec<f64> = distribution.worst_rad_per_s.iter().map(|r| deg_per_h_from_rad_per_s(*r)).collect();
+        chart = chart.with(Series::histogram(*name, &edges, &binned(&values, &edges)));
+        let shares: Vec<String> = distribution
+            .variance_shares
+            .iter()
+            .map(|(spread, share)| format!("{} {:.0} %", spread.key(), percent_from_fraction(*share)))
+            .collect();
+        words.push(format!(
+            "{name}: as designed {:.4}, median {:.4}, 95 % below {:.4} °/h; of its variance {}",
+            deg_per_h_from_rad_per_s(distribution.nominal_rad_per_s),
+            deg_per_h_from_rad_per_s(distribution.median_rad_per_s()),
+            deg_per_h_from_rad_per_s(distribution.p95_rad_per_s()),
+            shares.join(", ")
+        ));
+    }
+    let caption = format!(
+        "{} coils with every spread of the model file's [tolerance] (seed {}), over all profiles. {}.",
+        spec.samples,
+        spec.seed,
+        words.join(". ")
+    );
+    Ok((chart.svg(), caption))
+}
+
+fn bin_edges(values: &[f64]) -> Vec<f64> {
+    let (low, high) = values.iter().fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
+    let width = ((high - low) / TOLERANCE_BINS as f64).max(f64::MIN_POSITIVE);
+    (0..=TOLERANCE_BINS).map(|i| low + i as f64 * width).collect()
+}
+
+fn binned(values: &[f64], edges: &[f64]) -> Vec<f64> {
+    let mut counts = vec![0.0; TOLERANCE_BINS];
+    let width = edges[1] - edges[0];
+    for value in values {
+        counts[(((value - edges[0]) / width) as usize).min(TOLERANCE_BINS - 1)] += 1.0;
+    }
+    counts
+}
+
+/// With miscounted turns only.
+fn turn_tolerance(run: &Run, best: &Pattern) -> Result<String, ReportError> {
     let profiles = run.file.profiles.profiles();
     let worst = profiles.iter().find(|p| p.name() == run.summary.best.worst_profile).or(profiles.first());
     let Some(profile) = worst else {
@@ -211,13 +293,8 @@ fn tolerance(run: &Run, best: &Pattern) -> Result<String, ReportError> {
         let rates = RateModel::new(&model, best, &[]).map_err(SearchError::from)?.series_rad_per_s(history);
         found.push(deg_per_h_from_rad_per_s(rates.iter().fold(0.0, |most: f64, r| most.max(r.abs()))));
     }
-    let (low, high) = found.iter().fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
-    let width = ((high - low) / TOLERANCE_BINS as f64).max(f64::MIN_POSITIVE);
-    let edges: Vec<f64> = (0..=TOLERANCE_BINS).map(|i| low + i as f64 * width).collect();
-    let mut counts = vec![0.0; TOLERANCE_BINS];
-    for value in &found {
-        counts[(((value - low) / width) as usize).min(TOLERANCE_BINS - 1)] += 1.0;
-    }
+    let edges = bin_edges(&found);
+    let counts = binned(&found, &edges);
     Ok(Chart::new("Worst rate error of coils as wound")
         .size(720, 280)
         .x(Axis::linear("worst |rate error| [°/h]"))
@@ -240,14 +317,34 @@ fn profile_chart(profile: &Profile) -> String {
         .svg()
 }
 
-fn trade_off(run: &Run) -> String {
-    let points = all(run).map(|p| (p.windability.max_climb as f64, p.worst_rate_deg_per_h)).collect();
-    let labels = all(run).map(|p| p.name.clone()).collect();
-    Chart::new("Rate error against the largest crossover")
+/// The searched front where there is one, else the patterns of this search.
+fn trade_off(run: &Run) -> (String, String) {
+    let chart = Chart::new("Rate error against the largest crossover")
         .x(Axis::linear("largest climb of a crossover [layers]").reaching(0.0))
-        .y(Axis::log("worst |rate error| [°/h]"))
-        .with(Series::points("patterns", points).labelled(labels))
-        .svg()
+        .y(Axis::log("worst |rate error| [°/h]"));
+    let compared = |name: &str| {
+        let points = all(run).map(|p| (p.windability.max_climb as f64, p.worst_rate_deg_per_h)).collect();
+        Series::points(name, points).labelled(all(run).map(|p| p.name.clone()).collect())
+    };
+    let better = "Every step to the left is an easier crossover, every step down a smaller error.";
+    match &run.front {
+        None => (
+            chart.with(compared("patterns compared")).svg(),
+            format!("The patterns compared above, not a searched front: `coilwright pareto` searches one, and with this folder as its -o it is shown here. {better}"),
+        ),
+        Some(front) => {
+            let mut chart = chart.with(compared("patterns of this search"));
+            let mut captive: Vec<usize> = front.iter().map(|p| p.captive).collect();
+            captive.sort_unstable();
+            captive.dedup();
+            for count in captive {
+                let points = front.iter().filter(|p| p.captive == count);
+                let points = points.map(|p| (p.max_climb as f64, p.worst_rate_deg_per_h)).collect();
+                chart = chart.with(Series::points(format!("front, {count} captive"), points));
+            }
+            (chart.svg(), format!("The front that `coilwright pareto` searched (captive reels are weighed besides), and the patterns compared above. {better}"))
+        }
+    }
 }
 
 fn convergence(run: &Run) -> String {

@@ -1,0 +1,154 @@
+//! The book's chapter of effects: what each is, and what it adds to one coil's rate error, as text and pictures.
+//!
+//! `cargo run --example effect_signatures` writes docs/src/effects.md and docs/src/effects/*.svg again; another folder can
+//! be named. The coil is a quadrupole of twelve layers whose outermost layer is heated and cooled; every effect has the
+//! parameters from which a fit would start.
+
+use std::error::Error;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use coilwright::effect::{CATALOGUE, DeclaredEffect, EffectSpec};
+use coilwright::io::model_file::parse_model;
+use coilwright::numeric::piecewise::PiecewiseLinear;
+use coilwright::pattern::classic::Classic;
+use coilwright::profile::{Piece, Profile};
+use coilwright::rate::{CoilModel, RateModel};
+use coilwright::report::plot::{Axis, Band, Chart, Series};
+use coilwright::thermal::{Drive, Extent, Instant, solve};
+use coilwright::units::{REFERENCE_TEMPERATURE_K, deg_per_h_from_rad_per_s, k_per_s_from_c_per_min, min_from_s, s_from_min};
+
+const MODEL: &str = r#"
+name = "twelve layers"
+[fibre]
+refractive_index = 1.45
+thermo_optic_per_k = 1.0e-5
+wavelength_nm = 1550.0
+outer_diameter_um = 165.0
+[winding]
+layers = 12
+turns_per_layer = 50
+inner_diameter_mm = 80.0
+axial_pitch_um = 170.0
+layer_length = "actual"
+[thermal]
+model = "pack"
+conductivity_w_per_m_k = 0.35
+volumetric_heat_capacity_j_per_m3_k = 1.70e6
+"#;
+
+/// Rate and duration of each piece.
+const PIECES: [(f64, f64); 4] = [(1.0, 10.0), (0.0, 10.0), (-1.0, 10.0), (0.0, 10.0)];
+const STEP_S: f64 = 2.0;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let folder = std::env::args().nth(1).map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/src"),
+        PathBuf::from,
+    );
+    std::fs::create_dir_all(folder.join("effects"))?;
+    let model = parse_model(Path::new("model.toml"), MODEL)?.model;
+    let mut page = String::from(HEAD);
+    for spec in CATALOGUE {
+        let name = format!("effects/{}.svg", spec.kind);
+        std::fs::write(folder.join(&name), signature(&model, spec)? + "\n")?;
+        describe(&mut page, spec, &name)?;
+    }
+    std::fs::write(folder.join("effects.md"), page)?;
+    Ok(())
+}
+
+const HEAD: &str = "# Effects
+
+One piece of physics each. A model file names the ones that it includes; `diagnose` tries the others against a record. Each picture
+shows what the effect adds to the rate error of one coil, a quadrupole of twelve layers (24 m of fibre between radii of 40 mm and
+42 mm), whose outermost layer warms for ten minutes at 1 °C/min, rests, cools as fast, and rests: the error with the effect less the
+error without it, with the parameters from which a fit starts. This chapter and its pictures are written by
+`cargo run --release --example effect_signatures`; a test compares them.
+
+Two more effects have no picture, because a profile does not have what they read: `channel:NAME` is linear in any further column
+of a record, `custom` is a formula of your own (`coilwright effects` describes both).
+";
+
+fn describe(page: &mut String, spec: &EffectSpec, picture: &str) -> Result<(), std::fmt::Error> {
+    writeln!(page, "\n## {}\n\n{}.\n\n```text\n{}\n```\n", spec.kind, spec.summary, spec.equation)?;
+    writeln!(page, "![What {} adds to the rate error]({picture})\n", spec.kind)?;
+    if !spec.parameters.is_empty() {
+        writeln!(page, "| key | meaning | from | to | here |\n|---|---|---|---|---|")?;
+        for p in spec.parameters {
+            writeln!(page, "| `{}` | {} | {} | {} | {} |", p.key, p.meaning, p.lower, p.upper, p.start)?;
+        }
+        writeln!(page)?;
+    }
+    for choice in spec.choices {
+        writeln!(page, "`{}` ({}): {}; here {}.\n", choice.key, choice.options.join(" or "), choice.meaning, choice.options[0])?;
+    }
+    writeln!(page, "In a record: {}. To isolate it: {}. Source: {}.", spec.signature, spec.experiment, spec.source)
+}
+
+/// The error with the effect less the error without it.
+fn signature(model: &CoilModel, spec: &'static EffectSpec) -> Result<String, Box<dyn Error>> {
+    let effect = DeclaredEffect::at_start(spec);
+    let mut without = model.clone();
+    if spec.kind == "finite_pack" {
+        without.extent = Extent::HalfSpace;
+    }
+    let with = without.with_effect(effect);
+    let lag_s = with.sensor_lag_s();
+    let profile = profile()?;
+    let course = profile.temperature(REFERENCE_TEMPERATURE_K);
+    let reading = if lag_s > 0.0 { lagging(&course, profile.duration_s(), lag_s)? } else { course.clone() };
+    let (after, before) = (rates(&with, &course, &profile)?, rates(&without, &reading, &profile)?);
+    let points = after.iter().zip(&before).map(|((t, a), (_, b))| (min_from_s(*t), deg_per_h_from_rad_per_s(a - b)));
+    let mut chart = Chart::new(format!("What {} adds", spec.kind))
+        .size(720, 300)
+        .x(Axis::linear("time [min]").reaching(0.0))
+        .y(Axis::linear("added rate error [°/h]").reaching(0.0))
+        .with(Series::line("", points.collect()));
+    let mut start_min = 0.0;
+    for (rate, duration_min) in PIECES {
+        let end_min = start_min + duration_min;
+        if rate != 0.0 {
+            let (words, hue) = if rate > 0.0 { ("+1 °C/min", 1) } else { ("−1 °C/min", 0) };
+            chart = chart.band(Band::vertical(words, start_min, end_min).hue(hue));
+        }
+        start_min = end_min;
+    }
+    Ok(chart.svg())
+}
+
+fn profile() -> Result<Profile, Box<dyn Error>> {
+    let pieces = PIECES.iter().map(|(rate, duration_min)| Piece {
+        rate_k_per_s: k_per_s_from_c_per_min(*rate),
+        duration_s: s_from_min(*duration_min),
+    });
+    Ok(Profile::new("up and down", pieces.collect())?)
+}
+
+fn rates(model: &CoilModel, course: &PiecewiseLinear, profile: &Profile) -> Result<Vec<(f64, f64)>, Box<dyn Error>> {
+    let pattern = Classic::Qua.pattern(model.coil.layers())?;
+    let field = solve(&model.heat_path()?, &Drive::boundary(course.clone()))?;
+    let mut instants = Vec::new();
+    let mut start_s = 0.0;
+    for piece in profile.pieces() {
+        let steps = (piece.duration_s / STEP_S) as usize;
+        instants.extend((0..steps).map(|i| Instant::after(start_s + i as f64 * STEP_S)));
+        start_s += piece.duration_s;
+        instants.push(Instant::before(start_s));
+    }
+    let history = field.at(&instants);
+    let found = RateModel::new(model, &pattern, &[])?.series_rad_per_s(&history);
+    Ok(history.times_s.iter().copied().zip(found).collect())
+}
+
+/// What a sensor shows that follows with a first-order lag.
+fn lagging(course: &PiecewiseLinear, duration_s: f64, lag_s: f64) -> Result<PiecewiseLinear, Box<dyn Error>> {
+    let (mut times, mut values) = (vec![0.0], vec![course.value(0.0)]);
+    while times[times.len() - 1] < duration_s {
+        let (time_s, shown_k) = (times[times.len() - 1], values[values.len() - 1]);
+        let middle_k = course.value(time_s + 0.5 * STEP_S);
+        times.push(time_s + STEP_S);
+        values.push(middle_k + (shown_k - middle_k) * (-STEP_S / lag_s).exp());
+    }
+    Ok(PiecewiseLinear::new(times, values)?)
+}
