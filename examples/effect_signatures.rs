@@ -16,7 +16,9 @@ use coilwright::profile::{Piece, Profile};
 use coilwright::rate::{CoilModel, RateModel};
 use coilwright::report::plot::{Axis, Band, Chart, Series};
 use coilwright::thermal::{Drive, Extent, Instant, solve};
-use coilwright::units::{REFERENCE_TEMPERATURE_K, deg_per_h_from_rad_per_s, k_per_s_from_c_per_min, min_from_s, s_from_min};
+use coilwright::units::{
+    REFERENCE_TEMPERATURE_K, deg_per_h_from_rad_per_s, k_per_s_from_c_per_min, min_from_s, s_from_min,
+};
 
 const MODEL: &str = r#"
 name = "twelve layers"
@@ -42,10 +44,12 @@ const PIECES: [(f64, f64); 4] = [(1.0, 10.0), (0.0, 10.0), (-1.0, 10.0), (0.0, 1
 const STEP_S: f64 = 2.0;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let folder = std::env::args().nth(1).map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/src"),
-        PathBuf::from,
-    );
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/src");
+    write_chapter(&std::env::args().nth(1).map_or(shipped, PathBuf::from))
+}
+
+/// The chapter and its pictures.
+pub fn write_chapter(folder: &Path) -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(folder.join("effects"))?;
     let model = parse_model(Path::new("model.toml"), MODEL)?.model;
     let mut page = String::from(HEAD);
@@ -81,7 +85,14 @@ fn describe(page: &mut String, spec: &EffectSpec, picture: &str) -> Result<(), s
         writeln!(page)?;
     }
     for choice in spec.choices {
-        writeln!(page, "`{}` ({}): {}; here {}.\n", choice.key, choice.options.join(" or "), choice.meaning, choice.options[0])?;
+        writeln!(
+            page,
+            "`{}` ({}): {}; here {}.\n",
+            choice.key,
+            choice.options.join(" or "),
+            choice.meaning,
+            choice.options[0]
+        )?;
     }
     writeln!(page, "In a record: {}. To isolate it: {}. Source: {}.", spec.signature, spec.experiment, spec.source)
 }

@@ -106,6 +106,25 @@ fn shown<T, E: std::fmt::Display>(result: Result<T, E>) -> bool {
     result.map_err(|error| error.to_string()).is_ok()
 }
 
+/// What coverage-guided fuzzing found to lead somewhere new: one text a line, as JSON strings.
+fn found_by_fuzzing(target: &str, parse: Parse) {
+    let path = Path::new("fuzz/found").join(target).with_extension("jsonl");
+    let lines = std::fs::read_to_string(path).unwrap();
+    let texts: Vec<String> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let accepted = texts.iter().filter(|text| parse(text)).count();
+    println!("{target}: {accepted} of {} texts found by fuzzing accepted", texts.len());
+    assert!(texts.len() > 100 && accepted < texts.len());
+}
+
+#[test]
+fn what_fuzzing_found_is_refused_or_understood() {
+    found_by_fuzzing("model", |text| shown(parse_model(Path::new("model.toml"), text)));
+    found_by_fuzzing("pattern", |text| shown(parse_pattern("pattern.toml", text)));
+    found_by_fuzzing("record", |text| shown(parse_record("record.csv", text)));
+    found_by_fuzzing("schedule", |text| shown(parse_claim("schedule", text)));
+    found_by_fuzzing("expression", |text| shown(Expression::parse(text)));
+}
+
 #[test]
 fn a_damaged_model_file_is_refused_or_understood() {
     survives("model", 1500, |text| shown(parse_model(Path::new("examples/model.toml"), text)));

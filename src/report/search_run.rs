@@ -211,10 +211,13 @@ const TURN_ERROR: f64 = 0.5;
 fn tolerance(run: &Run, best: &Pattern) -> Result<(String, String), ReportError> {
     match &run.file.tolerance {
         Some(declared) => declared_tolerance(run, best, declared),
-        None => Ok((turn_tolerance(run, best)?, format!(
-            "The model file has no [tolerance]: {TOLERANCE_COILS} coils, only the turns of each layer off by up to half a turn (uniform, independent; seed {}), under the best pattern's worst profile.",
-            run.summary.seed
-        ))),
+        None => Ok((
+            turn_tolerance(run, best)?,
+            format!(
+                "The model file has no [tolerance]: {TOLERANCE_COILS} coils, only the turns of each layer off by up to half a turn (uniform, independent; seed {}), under the best pattern's worst profile.",
+                run.summary.seed
+            ),
+        )),
     }
 }
 
@@ -227,8 +230,7 @@ fn declared_tolerance(run: &Run, best: &Pattern, declared: &ToleranceSpec) -> Re
     }
     let patterns: Vec<Pattern> = named.iter().map(|(_, pattern)| pattern.clone()).collect();
     let found = study(&run.file.model, &run.file.profiles, &spec, &patterns)?;
-    let all: Vec<f64> =
-        found.iter().flat_map(|d| &d.worst_rad_per_s).map(|r| deg_per_h_from_rad_per_s(*r)).collect();
+    let all: Vec<f64> = found.iter().flat_map(|d| &d.worst_rad_per_s).map(|r| deg_per_h_from_rad_per_s(*r)).collect();
     let edges = bin_edges(&all);
     let mut chart = Chart::new("Worst rate error of coils as built")
         .size(720, 320)
@@ -330,7 +332,9 @@ fn trade_off(run: &Run) -> (String, String) {
     match &run.front {
         None => (
             chart.with(compared("patterns compared")).svg(),
-            format!("The patterns compared above, not a searched front: `coilwright pareto` searches one, and with this folder as its -o it is shown here. {better}"),
+            format!(
+                "The patterns compared above, not a searched front: `coilwright pareto` searches one, and with this folder as its -o it is shown here. {better}"
+            ),
         ),
         Some(front) => {
             let mut chart = chart.with(compared("patterns of this search"));
@@ -342,7 +346,12 @@ fn trade_off(run: &Run) -> (String, String) {
                 let points = points.map(|p| (p.max_climb as f64, p.worst_rate_deg_per_h)).collect();
                 chart = chart.with(Series::points(format!("front, {count} captive"), points));
             }
-            (chart.svg(), format!("The front that `coilwright pareto` searched (captive reels are weighed besides), and the patterns compared above. {better}"))
+            (
+                chart.svg(),
+                format!(
+                    "The front that `coilwright pareto` searched (captive reels are weighed besides), and the patterns compared above. {better}"
+                ),
+            )
         }
     }
 }
