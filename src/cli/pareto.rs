@@ -8,6 +8,7 @@ use super::progress::StopFlag;
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
 use crate::io::files::write_atomically;
+use crate::io::json::PatternJson;
 use crate::io::model_file::{ModelFile, NamedPattern, read_model};
 use crate::io::pareto_json::{ParetoJson, PointJson, front_csv};
 use crate::io::pattern_file::print_pattern;
@@ -35,7 +36,7 @@ use crate::search::worst_case::SolvedProfiles;
 pub struct Arguments {
     /// The model file
     model: PathBuf,
-    /// Writes pareto.csv, pareto.svg and one pattern file a point into this folder
+    /// Writes pareto.csv, pareto.svg (with tolerances also pareto-p95.svg) and one pattern file a point into this folder
     #[arg(long, short, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Seed of the searches; without it, the model's own
@@ -110,7 +111,12 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     if let Some(folder) = &arguments.output {
         let csv = front_csv(&shown).map_err(|e| CliError::Stdout(e.into()))?;
         write_atomically(&folder.join("pareto.csv"), &csv)?;
-        write_atomically(&folder.join("pareto.svg"), chart(&file, &shown).as_bytes())?;
+        let worst = chart(&file, &shown, "worst rate error", |p| Some(p.worst_rate_deg_per_h));
+        write_atomically(&folder.join("pareto.svg"), worst.as_bytes())?;
+        if file.tolerance.is_some() {
+            let p95 = chart(&file, &shown, "P95 over built coils", |p| p.p95_rate_deg_per_h);
+            write_atomically(&folder.join("pareto-p95.svg"), p95.as_bytes())?;
+        }
         screen.note(&format!("wrote {}", folder.display()));
     }
     screen.answer(ParetoJson { model: file.model.name.clone(), seed, points: shown }, text)?;
@@ -209,18 +215,22 @@ fn named<'n>(names: impl Iterator<Item = &'n str>) -> Vec<String> {
         .collect()
 }
 
-fn chart(file: &ModelFile, points: &[PointJson]) -> String {
-    let mut chart = Chart::new(format!("{}: error against largest climb", file.model.name))
+fn chart(
+    file: &ModelFile,
+    points: &[PointJson],
+    what: &str,
+    error_deg_per_h: fn(&PatternJson) -> Option<f64>,
+) -> String {
+    let mut chart = Chart::new(format!("{}: {what} against largest climb", file.model.name))
         .x(Axis::linear("largest climb [layers]"))
-        .y(Axis::log("worst rate error [°/h]"));
+        .y(Axis::log(format!("{what} [°/h]")));
     let mut captive: Vec<usize> = points.iter().map(|p| p.pattern.windability.captive).collect();
     captive.sort_unstable();
     captive.dedup();
     for count in captive {
         let of_count = points.iter().filter(|p| p.pattern.windability.captive == count);
-        let places =
-            of_count.map(|p| (p.pattern.windability.max_climb as f64, p.pattern.worst_rate_deg_per_h)).collect();
-        chart = chart.with(Series::points(format!("{count} captive"), places));
+        let place = |p: &PointJson| Some((p.pattern.windability.max_climb as f64, error_deg_per_h(&p.pattern)?));
+        chart = chart.with(Series::points(format!("{count} captive"), of_count.filter_map(place).collect()));
     }
     chart.svg()
 }
