@@ -9,7 +9,7 @@ use super::{Air, BoundaryError, Kink, Observation};
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::numeric::state_space::{Measurement, Smoothed, Stage, StateSpace};
 use crate::thermal::pack::Pack;
-use crate::thermal::{Extent, HeatPath, Location, Material};
+use crate::thermal::{self, BoreHeat, Drive, Extent, HeatPath, Instant, Location, Material};
 
 /// Modes faster than this share of the sampling interval follow without delay.
 const FASTEST_MODE_PER_INTERVAL: f64 = 0.1;
@@ -42,6 +42,8 @@ pub(super) struct Scene {
     pub interval_s: f64,
     pub location: Location,
     path: HeatPath,
+    /// Into the bore, where it warms what the sensor is attached to.
+    bore_heat: Option<BoreHeat>,
     lag_s: f64,
     layer_gain_rad_per_k: Vec<f64>,
     rate_mean_s: f64,
@@ -58,6 +60,8 @@ pub(super) struct AirSpace {
     pub rate_places: Vec<usize>,
     stage_times_s: Vec<f64>,
     outer: Vec<f64>,
+    /// By how much the bore's heat warms the outermost layer.
+    warmed_k: Option<PiecewiseLinear>,
     /// Change of the rate functional over the window, per window.
     rate_row: Vec<f64>,
     dynamics: DMatrix<f64>,
@@ -95,7 +99,7 @@ impl Scene {
         let location = path.location;
         path.extent = Extent::Pack;
         path.location = Location::Ambient;
-        path.bore_heat = None;
+        let bore_heat = path.bore_heat.take().filter(|_| location == Location::OuterLayer);
         path.flange = None;
         path.conductivity_slope_per_k = 0.0;
         if let Material::Diffusivity { m2_per_s } = path.material {
@@ -114,6 +118,7 @@ impl Scene {
             interval_s,
             location,
             path,
+            bore_heat,
             lag_s,
             layer_gain_rad_per_k: observation.layer_gain_rad_per_k.to_vec(),
             rate_mean_s: observation.rate_mean_s,
@@ -134,6 +139,17 @@ impl Scene {
         self.build(air, Rates::Measured { noise_rad_per_s })
     }
 
+    /// What the bore's heat adds to the outermost layer behind a film, the air standing still.
+    fn warmed_k(&self, path: &HeatPath) -> Result<Option<PiecewiseLinear>, BoundaryError> {
+        let Some(heat) = self.bore_heat else { return Ok(None) };
+        let heated = HeatPath { bore_heat: Some(heat), ..path.clone() };
+        let cold = PiecewiseLinear::new(vec![self.times_s[0]], vec![0.0]).expect("one knot is in order");
+        let instants: Vec<Instant> = self.times_s.iter().map(|&t| Instant::after(t)).collect();
+        let field = thermal::solve(&heated, &Drive::boundary(cold))?.at(&instants);
+        let outermost = (0..instants.len()).map(|row| field.temperatures_k(row)[path.shape.layers - 1]).collect();
+        Ok(Some(PiecewiseLinear::new(self.times_s.clone(), outermost).expect("readings are in order")))
+    }
+
     fn build(&self, air: &Air, rates: Rates) -> Result<AirSpace, BoundaryError> {
         let with_rate = rates != Rates::None;
         let mut path = self.path.clone();
@@ -141,6 +157,7 @@ impl Scene {
             path.film_w_per_m2_k = air.film_w_per_m2_k;
         }
         let pack = Pack::new(&path)?;
+        let warmed_k = self.warmed_k(&path)?;
         let mut order: Vec<usize> = (0..pack.decays_per_s().len()).collect();
         order.sort_by(|&a, &b| pack.decays_per_s()[a].total_cmp(&pack.decays_per_s()[b]));
         let fastest_per_s = 1.0 / (FASTEST_MODE_PER_INTERVAL * self.interval_s);
@@ -228,9 +245,12 @@ impl Scene {
             match event {
                 Event::Reading(reading) => {
                     reading_stages[reading] = index;
+                    // Warming takes far longer than the sensor's lag.
+                    let warmed_k =
+                        warmed_k.as_ref().map_or(0.0, |w| w.value(time_s) - self.lag_s * w.slope_before(time_s));
                     measurements.push(Measurement {
                         row: 0,
-                        value: self.temperature_k[reading],
+                        value: self.temperature_k[reading] - warmed_k,
                         variance: air.noise_k * air.noise_k,
                     });
                     taken += 1;
@@ -302,6 +322,7 @@ impl Scene {
             kink_stages,
             reading_stages,
             rate_places,
+            warmed_k,
             stage_times_s: events.iter().map(|e| e.0).collect(),
             outer,
             rate_row,
@@ -347,7 +368,8 @@ impl Scene {
         let mut push = |time_s: f64, state: &[f64]| {
             if knots_s.last().is_none_or(|&last: &f64| time_s > last + 1e3 * SAME_TIME_S) {
                 knots_s.push(time_s);
-                outer_k.push(state.iter().zip(&built.outer).map(|(x, o)| x * o).sum());
+                let warmed_k = built.warmed_k.as_ref().map_or(0.0, |w| w.value(time_s));
+                outer_k.push(warmed_k + state.iter().zip(&built.outer).map(|(x, o)| x * o).sum::<f64>());
                 air_k.push(state[layout.temperature()]);
             }
         };

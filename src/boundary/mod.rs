@@ -22,8 +22,9 @@
 //! dropped where they do not stand out. The uncertainty of what is left (that of the kinks' times included) is carried
 //! into the predicted rate error.
 //!
-//! Leaves out: heat from the bore and the flanges, and a conductivity that depends on temperature, all of which the
-//! estimated air absorbs; a half space is estimated as if the pack ended at its bore.
+//! What heat from the bore adds to the outermost layer is taken from the readings first, and put back.
+//!
+//! Leaves out: heat from the flanges and a conductivity that depends on temperature, which the estimated air absorbs; a half space is estimated as if the pack ended at its bore.
 //!
 //! # Source
 //! Structural time-series models: Harvey, Forecasting, Structural Time Series Models and the Kalman Filter (1989),
@@ -240,7 +241,7 @@ impl RateWhitener {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::thermal::{self, Extent, Instant, Material, PackShape};
+    use crate::thermal::{self, BoreHeat, Extent, Instant, Material, PackShape};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use statrs::distribution::{ContinuousCDF, Normal};
@@ -299,6 +300,38 @@ mod tests {
         }
         assert!(error_k < 0.25 * NOISE_K);
         assert!((found.air().noise_k / NOISE_K - 1.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn heat_from_the_bore_is_not_taken_for_a_change_of_the_air() {
+        let (times_s, outer_k, readings, _) = record();
+        let mut heated = path();
+        heated.location = Location::Ambient;
+        heated.film_w_per_m2_k = Some(FILM_W_PER_M2_K);
+        heated.bore_heat = Some(BoreHeat { power_w_per_m2: 200.0, time_constant_s: 400.0 });
+        let cold = PiecewiseLinear::new(vec![0.0], vec![0.0]).unwrap();
+        let instants: Vec<Instant> = times_s.iter().map(|&t| Instant::after(t)).collect();
+        let field = thermal::solve(&heated, &Drive::boundary(cold)).unwrap().at(&instants);
+        let warmed: Vec<f64> = (0..900).map(|row| field.temperatures_k(row)[23]).collect();
+        let sum = |a: &[f64]| a.iter().zip(&warmed).map(|(a, b)| a + b).collect::<Vec<f64>>();
+        let (outer_k, readings) = (sum(&outer_k), sum(&readings));
+        let path = HeatPath { bore_heat: heated.bore_heat, ..path() };
+        let found = estimate(&Observation {
+            times_s: &times_s,
+            temperature_k: &readings,
+            path: &path,
+            lag_s: 0.0,
+            layer_gain_rad_per_k: &[0.0; 24],
+            rate_mean_s: 10.0,
+        })
+        .unwrap();
+        let error_k = (outer_k.iter().zip(&times_s).map(|(t, s)| (found.outer_k().value(*s) - t).powi(2)).sum::<f64>()
+            / 900.0)
+            .sqrt();
+        let (air_k, warmest_k) = (found.air_k().value(800.0), warmed[80]);
+        println!("outer layer {error_k:.5} K rms; air at 800 s {air_k:.4} K, heat adds {warmest_k:.3} K to the layer");
+        assert!(warmest_k > 1.0 && error_k < 0.25 * NOISE_K);
+        assert!((air_k - 293.0).abs() < 0.02);
     }
 
     #[test]
