@@ -8,6 +8,7 @@
 
 pub mod empirical;
 pub mod filter;
+mod heating;
 pub mod physical;
 pub mod stream;
 
@@ -47,7 +48,7 @@ impl Method {
 /// A compensator, ready for any record of the same gyro.
 #[derive(Debug, Clone)]
 pub enum Compensator {
-    Physical(Physical),
+    Physical(Box<Physical>),
     Piecewise(PiecewiseBias),
     Regression(Regression),
 }
@@ -100,7 +101,7 @@ impl Compensator {
                     return Err(CompensateError::MissingChannel { name: name.to_owned() });
                 }
                 physical.tune(record);
-                Compensator::Physical(physical)
+                Compensator::Physical(Box::new(physical))
             }
             Method::Piecewise => Compensator::Piecewise(PiecewiseBias::fit(record)?),
             Method::Regression => Compensator::Regression(Regression::fit(record)?),
@@ -113,7 +114,7 @@ impl Compensator {
     /// A model that is not linear; a method that needs a record.
     pub fn declared(method: Method, model: &CoilModel, pattern: &Pattern) -> Result<Self, CompensateError> {
         match method {
-            Method::Physical => Ok(Compensator::Physical(Physical::new(model, pattern)?)),
+            Method::Physical => Ok(Compensator::Physical(Box::new(Physical::new(model, pattern)?))),
             Method::Piecewise | Method::Regression => Err(CompensateError::NeedsRecord { method }),
         }
     }

@@ -2,20 +2,21 @@
 //!
 //! ```text
 //! x = (y_1 … y_m, a, s [, z]),  y_i' = −λ_i y_i + s,  a' = s,  s' = white + breaks,  τ z' = T_out − z
-//! Ω_coil = ω·x,   Ω = Ω_coil + b(T) + Σ g_c c + Ω_0
+//! Ω_coil = ω·x,   Ω = f(T) (Ω_coil + Ω_h(t)) + b(T) + Σ g_c c + Ω_0
 //! ```
 //!
 //! | symbol | meaning | in code |
 //! |---|---|---|
 //! | y_i, a, s | modes of the pack behind its film, air temperature and its rate | `decay_per_s`, `outer`, `functional` |
 //! | z | the sensor behind its lag | `lag_s` |
+//! | f(T), Ω_h | factor of the coil's error over temperature; heat from the electronics | `factor`, `heating` |
 //! | b(T), g_c | bias over temperature; rate per unit of a further column | `bias`, `channels` |
 //! | Ω_0 | offset of the record it was tuned on | `offset_rad_per_s` |
 //!
 //! How x is known from the readings is in [`super::filter`]. Film and thermometer's noise come from the boundary's estimate
 //! of a record; how much the slope wanders, the delay and the offset from the record's rate.
 //!
-//! Holds for models that are linear in the temperatures' rates, besides a bias that depends on temperature. A conductivity
+//! Holds for models that are linear in the temperatures' rates, besides a factor and a bias over temperature. A conductivity
 //! that depends on temperature is taken at the middle of the fitted record's temperatures, and how much it differs at its
 //! ends is stated. Modes that settle within a quarter of a row follow at once.
 //!
@@ -26,6 +27,7 @@ use nalgebra::DMatrix;
 
 use super::CompensateError;
 use super::filter::{Dynamics, Filter, Tuning};
+use super::heating::Heating;
 use crate::boundary::Boundary;
 use crate::effect::DeclaredEffect;
 use crate::numeric::piecewise::PiecewiseLinear;
@@ -77,6 +79,9 @@ pub struct Physical {
     rate_mean_s: f64,
     /// Over temperature, where the model has a bias that depends on it.
     bias: Option<PiecewiseLinear>,
+    /// Over temperature, where the whole coil's error scales with it.
+    factor: Option<PiecewiseLinear>,
+    heating: Option<Heating>,
     /// Further columns and what each adds [rad/s per unit].
     channels: Vec<(String, f64)>,
     /// Where the conductivity depends on temperature.
@@ -140,7 +145,8 @@ impl Physical {
             path.shape.layers = real_layers + buried;
             path.shape.bore_radius_m = FLAT * path.shape.radial_pitch_m * real_layers as f64;
         }
-        if path.bore_heat.is_some() || path.flange.is_some() {
+        let cannot_be_heated = buried > 0 || matches!(path.material, Material::Diffusivity { .. });
+        if path.flange.is_some() || (path.bore_heat.is_some() && cannot_be_heated) {
             return Err(not_linear(model));
         }
         let linearised = linearise(&mut path, range_k);
@@ -153,9 +159,14 @@ impl Physical {
             };
         }
         let pack = Pack::new(&path)?;
-        let LinearModel { gains, gain_air, bias, channels } = linear_gains(model, pattern, real_layers)?;
+        let LinearModel { gains, gain_air, factor, bias, channels } = linear_gains(model, pattern, real_layers)?;
         let mut order: Vec<usize> = (0..pack.decays_per_s().len()).collect();
         order.sort_by(|a, b| pack.decays_per_s()[*a].total_cmp(&pack.decays_per_s()[*b]));
+        let slowest_per_s = order.first().map_or(f64::INFINITY, |&i| pack.decays_per_s()[i]);
+        let mut heating = Heating::of(&path, &gains, slowest_per_s, model.rate_mean_s, model.sensor_lag_s())?;
+        if location == Location::Ambient {
+            heating = heating.map(Heating::unseen);
+        }
         let functional = |mode: usize| -> f64 {
             gains.iter().enumerate().map(|(layer, gain)| gain * pack.amplitude(buried + layer, mode)).sum()
         };
@@ -168,6 +179,8 @@ impl Physical {
             lag_s: model.sensor_lag_s(),
             rate_mean_s: model.rate_mean_s,
             bias,
+            factor,
+            heating,
             channels,
             linearised,
             hypotheses: USUAL_HYPOTHESES,
@@ -208,12 +221,10 @@ impl Physical {
         let mut filter = Filter::new(dynamics, &self.tuning(interval_s, TRIAL_DELAY_ROWS));
         let mut sums = vec![(0.0, 0.0, 0.0); TRIAL_DELAY_ROWS + 1];
         let rates = record.rate_rad_per_s();
-        let outside: Vec<f64> = (0..record.rows())
-            .map(|row| {
-                self.temperature_bias_rad_per_s(record.temperature_k()[row])
-                    + self.channel_bias_of(record, row).unwrap_or(0.0)
-            })
-            .collect();
+        let error = |row: usize, air: f64| {
+            let channel = self.channel_bias_of(record, row).unwrap_or(0.0);
+            self.error_rad_per_s(air, record.times_s()[row], Some(record.temperature_k()[row]), channel)
+        };
         let mut rows_of_step: Vec<Option<usize>> = Vec::new();
         let mut last_s = record.times_s()[0];
         for (row, (&time_s, &temperature_k)) in record.times_s().iter().zip(record.temperature_k()).enumerate() {
@@ -222,13 +233,13 @@ impl Physical {
                 filter.step(None);
                 rows_of_step.push(None);
             }
-            filter.step(Some(temperature_k));
+            filter.step(Some(self.of_the_air_k(time_s, temperature_k)));
             rows_of_step.push(Some(row));
             last_s = time_s;
             for (lag, sum) in sums.iter_mut().enumerate() {
                 let Some(step) = rows_of_step.len().checked_sub(lag + 1) else { continue };
                 if let Some(then) = rows_of_step[step] {
-                    let left = rates[then] - filter.rate_error_rad_per_s(lag) - outside[then];
+                    let left = rates[then] - error(then, filter.rate_error_rad_per_s(lag));
                     *sum = (sum.0 + 1.0, sum.1 + left, sum.2 + left * left);
                 }
             }
@@ -311,13 +322,30 @@ impl Physical {
         self.linearised
     }
 
-    pub(super) fn temperature_bias_rad_per_s(&self, temperature_k: f64) -> f64 {
-        self.bias.as_ref().map_or(0.0, |b| b.value(temperature_k))
+    /// A reading without what the heat in the bore does to it.
+    pub(super) fn of_the_air_k(&self, time_s: f64, temperature_k: f64) -> f64 {
+        self.heating.as_ref().map_or(temperature_k, |h| temperature_k - h.reading_k(time_s))
+    }
+
+    /// The whole rate error of a row but for the offset, `air_rad_per_s` being what the air's temperature makes in the coil.
+    pub(super) fn error_rad_per_s(
+        &self,
+        air_rad_per_s: f64,
+        time_s: f64,
+        temperature_k: Option<f64>,
+        channel_rad_per_s: f64,
+    ) -> f64 {
+        let coil = air_rad_per_s + self.heating.as_ref().map_or(0.0, |h| h.rate_rad_per_s(time_s));
+        let at = |table: &Option<PiecewiseLinear>, without: f64| match (table, temperature_k) {
+            (Some(table), Some(temperature_k)) => table.value(temperature_k),
+            _ => without,
+        };
+        coil * at(&self.factor, 1.0) + at(&self.bias, 0.0) + channel_rad_per_s
     }
 
     /// Whether the difference equation is all there is.
     pub fn is_linear(&self) -> bool {
-        self.bias.is_none() && self.channels.is_empty()
+        self.bias.is_none() && self.factor.is_none() && self.heating.is_none() && self.channels.is_empty()
     }
 }
 
@@ -343,14 +371,8 @@ fn linearise(path: &mut HeatPath, range_k: Option<(f64, f64)>) -> Option<Lineari
 
 /// The declared effects that no difference equation of this kind can hold.
 fn not_linear(model: &CoilModel) -> CompensateError {
-    const UNSUITED: [&str; 6] = [
-        "self_heating",
-        "axial_gradient",
-        "thermo_optic_temperature",
-        "glass_transition",
-        "heating_cooling_asymmetry",
-        "custom",
-    ];
+    const UNSUITED: [&str; 5] =
+        ["self_heating", "axial_gradient", "glass_transition", "heating_cooling_asymmetry", "custom"];
     let effects = model.effects.iter().map(DeclaredEffect::kind).filter(|k| UNSUITED.contains(&k.as_str())).collect();
     CompensateError::NotLinear { effects }
 }
@@ -361,6 +383,8 @@ struct LinearModel {
     gains: Vec<f64>,
     /// dΩ/dȧ.
     gain_air: f64,
+    /// By which both grow with temperature, over it; None where they do not.
+    factor: Option<PiecewiseLinear>,
     /// Over temperature.
     bias: Option<PiecewiseLinear>,
     channels: Vec<(String, f64)>,
@@ -406,22 +430,28 @@ fn linear_gains(model: &CoilModel, pattern: &Pattern, layers: usize) -> Result<L
     let table: Vec<f64> = (0..TABLE_ROWS).map(|i| TABLE_FROM_K + i as f64).collect();
     let biases: Vec<f64> = table.iter().map(|&t| at(t, &still, 0.0, &off)).collect();
     let size: f64 = gains.iter().map(|g| g.abs() * probe_k_per_s).sum::<f64>().max(f64::MIN_POSITIVE);
+    // All layers as they push the error: the largest there is, and so the one that tells a factor best.
+    let all: Vec<f64> = gains.iter().map(|g| probe_k_per_s * g.signum()).collect();
+    let pushed = |temperature_k: f64| at(temperature_k, &all, 0.0, &off) - at(temperature_k, &still, 0.0, &off);
+    let factor_at = |temperature_k: f64| pushed(temperature_k) / size;
+    let factors: Vec<f64> = table.iter().map(|&t| factor_at(t)).collect();
     for (sign, above_k) in [(1.0, 0.0), (-1.0, 0.0), (1.0, 30.0), (-0.5, -30.0)] {
         let rates: Vec<f64> = (0..layers).map(|j| sign * probe_k_per_s * (1.0 + j as f64 / layers as f64)).collect();
         let air = 0.7 * sign * probe_k_per_s;
         let values: Vec<f64> = (0..names.len()).map(|c| sign * (3.0 + c as f64)).collect();
         let temperature_k = REFERENCE_TEMPERATURE_K + above_k;
         let from_channels: f64 = channel_gains.iter().zip(&values).map(|(g, v)| g * v).sum();
-        let expected = gains.iter().zip(&rates).map(|(g, r)| g * r).sum::<f64>()
-            + gain_air * air
-            + at(temperature_k, &still, 0.0, &off)
-            + from_channels;
+        let coil = gains.iter().zip(&rates).map(|(g, r)| g * r).sum::<f64>() + gain_air * air;
+        let expected = factor_at(temperature_k) * coil + at(temperature_k, &still, 0.0, &off) + from_channels;
         let found = at(temperature_k, &rates, air, &values);
         if (found - expected).abs() > 1e-9 * (size + from_channels.abs()) {
             return Err(not_linear(model));
         }
     }
-    let varies = biases.iter().any(|b| *b != 0.0);
-    let bias = if varies { PiecewiseLinear::new(table, biases).ok() } else { None };
-    Ok(LinearModel { gains, gain_air, bias, channels: names.into_iter().zip(channel_gains).collect() })
+    let over_temperature = |values: Vec<f64>, without: f64| {
+        let varies = values.iter().any(|v| (v - without).abs() > 1e-9 * without);
+        if varies { PiecewiseLinear::new(table.clone(), values).ok() } else { None }
+    };
+    let (factor, bias) = (over_temperature(factors, 1.0), over_temperature(biases, 0.0));
+    Ok(LinearModel { gains, gain_air, factor, bias, channels: names.into_iter().zip(channel_gains).collect() })
 }

@@ -82,6 +82,7 @@ const SETTLING_ROWS: u64 = 30;
 struct Pending<T> {
     tag: T,
     step: Option<u64>,
+    time_s: f64,
     temperature_k: Option<f64>,
     channel_rad_per_s: f64,
     rate_rad_per_s: Option<f64>,
@@ -202,6 +203,7 @@ impl<'c, T> Stream<'c, T> {
         let mut pending = Pending {
             tag,
             step: None,
+            time_s: f64::NAN,
             temperature_k: None,
             channel_rad_per_s: 0.0,
             rate_rad_per_s: None,
@@ -222,7 +224,12 @@ impl<'c, T> Stream<'c, T> {
                 None => pending.flags.push(Flag::ChannelHeld),
             }
             pending.channel_rad_per_s = self.last_channel_rad_per_s;
-            self.advance(temperature_k, reading.inner_k.filter(|t| t.is_finite()));
+            let of_the_air_k = match self.compensator {
+                Compensator::Physical(physical) => temperature_k.map(|t| physical.of_the_air_k(reading.time_s, t)),
+                Compensator::Piecewise(_) | Compensator::Regression(_) => temperature_k,
+            };
+            self.advance(of_the_air_k, reading.inner_k.filter(|t| t.is_finite()));
+            pending.time_s = reading.time_s;
             pending.step = Some(self.step);
             pending.temperature_k = temperature_k.or(self.last_temperature.map(|(t, _)| t));
             pending.rate_rad_per_s = reading.rate_rad_per_s.filter(|r| r.is_finite());
@@ -309,13 +316,12 @@ impl<'c, T> Stream<'c, T> {
         let Some(pending) = self.pending.get_mut(row) else { return };
         let (Some(step), None) = (pending.step, pending.bias_rad_per_s) else { return };
         let lag = (self.step - step) as usize;
-        let (temperature_k, channel) = (pending.temperature_k, pending.channel_rad_per_s);
+        let (time_s, temperature_k, channel) = (pending.time_s, pending.temperature_k, pending.channel_rad_per_s);
         pending.bias_rad_per_s = match (&self.predictor, self.compensator) {
-            (Some(Predictor::Physical(filter)), Compensator::Physical(physical)) => {
-                let own = temperature_k.map_or(0.0, |t| physical.temperature_bias_rad_per_s(t));
-                (lag <= self.delay)
-                    .then(|| filter.rate_error_rad_per_s(lag) + own + channel + physical.offset_rad_per_s)
-            }
+            (Some(Predictor::Physical(filter)), Compensator::Physical(physical)) => (lag <= self.delay).then(|| {
+                let air = filter.rate_error_rad_per_s(lag);
+                physical.error_rad_per_s(air, time_s, temperature_k, channel) + physical.offset_rad_per_s
+            }),
             (Some(Predictor::Regression(window)), Compensator::Regression(regression)) => {
                 Some(regression.bias_rad_per_s(&window.regressors(lag, self.interval_s)))
             }

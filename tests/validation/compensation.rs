@@ -15,9 +15,11 @@ use coilwright::compensate::{CompensateError, Compensator, Method};
 use coilwright::io::compensation_file::compensate_lines;
 use coilwright::io::difference_equation::DifferenceEquation;
 use coilwright::io::model_file::{ModelFile, read_model};
+use coilwright::numeric::piecewise::PiecewiseLinear;
 use coilwright::numeric::statistics::{median, rms};
-use coilwright::predict::noise_floor_rad_per_s;
+use coilwright::predict::{noise_floor_rad_per_s, rates_rad_per_s};
 use coilwright::record::Record;
+use coilwright::thermal::{self, Drive, Instant, Location};
 use coilwright::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s, kelvin_from_celsius, rad_per_s_from_deg_per_s};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -108,6 +110,44 @@ fn a_conductivity_over_temperature_is_linearised_and_what_cannot_be_held_is_name
     let error = declared_with("[[effect]]\nkind = \"heating_cooling_asymmetry\"\ngain = 0.1\n").unwrap_err();
     assert_eq!(error, CompensateError::NotLinear { effects: vec!["heating_cooling_asymmetry".to_owned()] });
     println!("{error}");
+}
+
+/// What a declared compensator makes of a temperature that the model itself was driven with: the rate less the error.
+fn left_of(effects: &str, celsius: impl Fn(f64) -> f64) -> (f64, f64) {
+    let file = with_effects("g-control-zyl", effects);
+    let (model, pattern) = (&file.model, file.pattern.unwrap().pattern);
+    let times_s: Vec<f64> = (0..1200).map(|i| 10.0 * f64::from(i)).collect();
+    let air_k: Vec<f64> = times_s.iter().map(|t| kelvin_from_celsius(celsius(*t))).collect();
+    let drive = Drive::boundary(PiecewiseLinear::new(times_s.clone(), air_k).unwrap());
+    let mut path = model.heat_path().unwrap();
+    path.location = Location::Ambient;
+    path.film_w_per_m2_k = Some(25.0);
+    let field = thermal::solve(&path, &drive).unwrap();
+    let history = field.means(&times_s, model.rate_mean_s);
+    let instants: Vec<Instant> = times_s.iter().map(|t| Instant::after(*t)).collect();
+    let temperatures = field.at(&instants);
+    let outer_k: Vec<f64> = (0..1200).map(|row| temperatures.temperatures_k(row)[23]).collect();
+    let still = Record::new("x", times_s.clone(), outer_k.clone(), vec![0.0; 1200]).unwrap();
+    let rate = rates_rad_per_s(model, &pattern, &still, &history).unwrap();
+    let record = Record::new("x", times_s, outer_k, rate.clone()).unwrap();
+    let left = Compensator::declared(Method::Physical, model, &pattern).unwrap().batch(&record);
+    (rms(&left), rms(&rate))
+}
+
+#[test]
+fn heat_in_the_bore_and_a_factor_over_temperature_are_compensated_as_the_model_has_them() {
+    let ramps = |t: f64| 20.0 + 0.01 * (t - 2000.0).clamp(0.0, 3000.0) - 0.01 * (t - 7000.0).clamp(0.0, 3000.0);
+    let heat = "[[effect]]\nkind = \"self_heating\"\npower_w_per_m2 = 120.0\ntime_constant_s = 900.0\n";
+    let factor = "[[effect]]\nkind = \"thermo_optic_temperature\"\nslope_per_k = 0.004\n";
+    // The factor is taken at the thermometer's temperature for all layers; left out it would leave a tenth.
+    for (name, effects, tolerance) in [("neither", "", 0.02), ("heat", heat, 0.02), ("factor", factor, 0.05)] {
+        let (left, raw) = left_of(effects, ramps);
+        println!("{name}: {left:.2e} of {raw:.2e} rad/s");
+        assert!(left < tolerance * raw, "{name}");
+    }
+    let (left, raw) = left_of(heat, |_| 20.0);
+    println!("heat alone: {left:.2e} of {raw:.2e} rad/s");
+    assert!(left < 0.02 * raw);
 }
 
 #[test]
