@@ -9,10 +9,11 @@ use super::screen::{Screen, table};
 use super::{CliError, Ending};
 use crate::compare::compare;
 use crate::diagnose::{self, Finding, Request};
-use crate::effect::custom::Formula;
+use crate::effect::custom::{Formula, FormulaError};
 use crate::effect::{CUSTOM, DeclaredEffect};
 use crate::io::comparison_json::{CompareJson, PartJson, RecordComparisonJson};
 use crate::io::diagnosis_json::{ExtendJson, FindingJson};
+use crate::io::fault::{Fault, Faults};
 use crate::io::files::write_atomically;
 use crate::io::inputs_json::{InputsJson, RecordInputJson};
 use crate::io::model_edit::with_effect;
@@ -65,7 +66,14 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let mut given: Vec<(Noticed, RecordInputJson)> = Vec::new();
     for (paths, role) in [(&arguments.fit, "fitted"), (&arguments.holdout, "held out")] {
         for path in paths {
-            given.push((read_noticed(path, GrossErrors::Drop, screen)?, RecordInputJson::new(path, role)?));
+            let noticed = read_noticed(path, GrossErrors::Drop, screen)?;
+            let names: Vec<String> = noticed.record.channels().iter().map(|c| c.name.clone()).collect();
+            let mut columns = file.model.missing_channels(&names);
+            columns.extend(wanted.channels().into_iter().filter(|c| !names.contains(c)));
+            if !columns.is_empty() {
+                return Err(CliError::ColumnsMissing { file: path.display().to_string(), columns });
+            }
+            given.push((noticed, RecordInputJson::new(path, role)?));
         }
     }
     let records: Vec<Record> = given[..arguments.fit.len()].iter().map(|(n, _)| n.record.clone()).collect();
@@ -83,11 +91,6 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         let mut shown = Vec::with_capacity(given.len());
         for (noticed, input) in &given {
             let record = &noticed.record;
-            let names: Vec<String> = record.channels().iter().map(|c| c.name.clone()).collect();
-            let columns = model.missing_channels(&names);
-            if !columns.is_empty() {
-                return Err(CliError::ColumnsMissing { file: input.file.clone(), columns });
-            }
             let found = compare(model, &named.pattern, record)?;
             let gross_errors = noticed.gross_errors.clone();
             shown.push(RecordComparisonJson::new(&input.file, &found, gross_errors, noticed.gaps));
@@ -110,7 +113,15 @@ fn wanted(arguments: &Arguments, file: &ModelFile) -> Result<DeclaredEffect, Cli
     if arguments.effect == CUSTOM.kind {
         let Some(formula) = &arguments.formula else { return Err(CliError::FormulaMissing) };
         let names = arguments.parameter.iter().map(|(name, _)| name.clone()).collect();
-        let formula = Formula::new(formula, names)?;
+        let formula = Formula::new(formula, names).map_err(|error| {
+            let at = match &error {
+                FormulaError::Expression(error) => error.at(),
+                _ => None,
+            };
+            // At the end of the text there is no character to mark: the last one is.
+            let at = at.map(|at| at.start.min(formula.len().saturating_sub(1))..at.end.min(formula.len()));
+            Faults::one("--formula", formula.as_str(), Fault::new(error.to_string(), at))
+        })?;
         let values = arguments.parameter.iter().map(|(_, value)| *value).collect();
         return Ok(DeclaredEffect::custom(formula, values)?);
     }

@@ -11,6 +11,7 @@ mod effects;
 mod evaluate;
 mod exact;
 mod extend;
+mod former;
 mod man;
 mod metrics;
 mod new;

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use super::budget::parse_duration;
+use super::former::{compare_with_former, former_pattern};
 use super::progress::StopFlag;
 use super::prove::{prove_best, words};
 use super::screen::{Screen, table};
@@ -33,7 +34,8 @@ use crate::units::{deg_per_h_from_rad_per_s, rad_per_s_from_deg_per_h};
     Examples:\n  coilwright optimise examples/paper-200m.toml -o results/paper-200m\n  \
     coilwright optimise examples/paper-200m.toml --windability any --seed 7 --budget 30s\n  \
     coilwright optimise my-coil.toml --objective p95       the winding that is best when it is built imperfectly\n  \
-    coilwright optimise examples/paper-200m.toml -o results/paper-200m --resume"
+    coilwright optimise examples/paper-200m.toml -o results/paper-200m --resume\n  \
+    coilwright optimise extended.toml --compare-with results/paper-200m"
 )]
 pub struct Arguments {
     /// The model file
@@ -49,6 +51,10 @@ pub struct Arguments {
     /// Begins again although the output folder holds an unfinished run
     #[arg(long, requires = "output")]
     fresh: bool,
+    /// Says whether the best pattern differs from a former one and what that costs under this model: a winding's name, a
+    /// pattern file, or the folder of a search; without it, the pattern of --init
+    #[arg(long, value_name = "PATTERN")]
+    compare_with: Option<String>,
     /// Tries for so long to prove that the best pattern is the best of its class
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     prove: Option<Duration>,
@@ -181,6 +187,8 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let (class, objective) = (options.class(&file), options.objective(&file));
     let budget = options.budget()?;
     let plan = options.plan(&file)?;
+    let former = arguments.compare_with.as_ref().or(options.init.as_ref());
+    let former = former.map(|stated| former_pattern(stated, file.model.coil.layers())).transpose()?;
     let request = Request { file: &file, class, objective, plan: &plan, budget: options.budget.as_deref() };
     if arguments.prove.is_some() && !matches!(objective, Objective::WorstRate | Objective::WorstPhase) {
         let message = format!("proofs are of the worst rate and the worst phase, not of {}", objective.key());
@@ -225,6 +233,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
             (best, (proof, cut))
         }
     };
+    let compared_with = former.map(|f| compare_with_former(&bench, class, &best, &f)).transpose()?;
     let judged_now = (search.evaluations() - evaluated_before) as f64;
     let answer = OptimiseJson {
         model: file.model.name.clone(),
@@ -235,6 +244,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         baselines: baselines.iter().map(PatternJson::of).collect(),
         improvement_over_qua: improvement_over_qua(&best, &baselines),
         statement: bench.statement(&best, &baselines, class) + &words(&proof),
+        compared_with,
         proof,
         evaluations: search.evaluations(),
         evaluations_per_s: Some(judged_now / seconds),
@@ -407,8 +417,9 @@ fn text(answer: &OptimiseJson) -> String {
     let rows = rows.map(shown);
     let segments: Vec<String> = answer.best.segments.iter().map(ToString::to_string).collect();
     format!(
-        "{}\n\n{}\nbest pattern, innermost layer first: {}\n{} moves judged in {} rounds, ended by: {}{}\n",
+        "{}\n{}\n{}\nbest pattern, innermost layer first: {}\n{} moves judged in {} rounds, ended by: {}{}\n",
         answer.statement,
+        answer.compared_with.as_ref().map_or_else(String::new, |former| former.statement.clone() + "\n"),
         table(&header, rows),
         segments.join(" "),
         answer.evaluations,

@@ -89,7 +89,9 @@ fn declare(table: &mut Table, effect: &DeclaredEffect, remarks: &[Remark]) {
             named.insert(key, (*number).into());
         }
         table["parameters"] = value(named);
-        remark(table, "parameters", remarks);
+        let stated: Vec<String> = remarks.iter().map(|r| format!("{} = {}", r.key, r.text)).collect();
+        let all = Remark { key: "parameters".to_owned(), text: stated.join("; ") };
+        remark(table, "parameters", if stated.is_empty() { &[] } else { std::slice::from_ref(&all) });
         return;
     }
     for (key, number) in &stated {

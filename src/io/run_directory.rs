@@ -41,6 +41,8 @@ pub struct OptimiseJson {
     /// QUA's objective over the best pattern's; null where QUA does not fit the layer count.
     pub improvement_over_qua: Option<f64>,
     pub statement: String,
+    /// Null where no former pattern was stated.
+    pub compared_with: Option<FormerJson>,
     pub proof: ProofJson,
     pub evaluations: u64,
     /// On the screen only: files don't depend on the clock.
@@ -51,6 +53,19 @@ pub struct OptimiseJson {
     pub stopped_by: String,
     /// False where the clock or a signal ended the search: the same request may then end elsewhere.
     pub reproducible: bool,
+}
+
+/// A former pattern under the model of this search.
+#[derive(Debug, Clone, Serialize)]
+pub struct FormerJson {
+    #[serde(flatten)]
+    pub pattern: PatternJson,
+    /// Whether the best pattern of this search is better by more than rounding.
+    pub best_changed: bool,
+    /// The former pattern's objective, and as a multiple of the best one's.
+    pub cost_deg_per_h: f64,
+    pub cost_factor: Option<f64>,
+    pub statement: String,
 }
 
 /// A request, as far as the search's course depends on it.

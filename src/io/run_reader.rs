@@ -21,12 +21,19 @@ pub struct RunSummary {
     pub improvement_over_qua: Option<f64>,
     #[serde(default)]
     pub statement: String,
+    #[serde(default)]
+    pub compared_with: Option<RunFormer>,
     pub proof: RunProof,
     pub evaluations: u64,
     #[serde(default)]
     pub rounds: u64,
     #[serde(default)]
     pub stopped_by: String,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct RunFormer {
+    pub statement: String,
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]

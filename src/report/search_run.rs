@@ -41,6 +41,7 @@ pub fn search_page(run: &Run) -> Result<String, ReportError> {
     let body = html! {
         h1 { (title) }
         p.big { (summary.statement) }
+        @if let Some(former) = &summary.compared_with { p { b { (former.statement) } } }
         (facts(run))
         h2 { "Patterns compared" }
         (baselines(run))

@@ -59,7 +59,7 @@ const PREFERENCE: [Classic; 7] =
     [Classic::Qua, Classic::Oct, Classic::Hex, Classic::Dip, Classic::SymText, Classic::Sym, Classic::Zyl];
 
 /// Relative difference below which two patterns count as equally good.
-const EQUALLY_GOOD: f64 = 1e-9;
+pub const EQUALLY_GOOD: f64 = 1e-9;
 
 impl Bench<'_> {
     /// # Errors

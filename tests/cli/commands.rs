@@ -101,3 +101,25 @@ fn a_search_for_p95_without_tolerances_is_told_what_is_missing() {
     assert_eq!(code(&output), 2);
     assert!(stderr(&output).contains("[tolerance]"), "{}", stderr(&output));
 }
+
+#[test]
+fn optimise_says_what_a_former_pattern_costs_and_whether_the_best_one_changed() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("old").display().to_string();
+    let quick = ["optimise", "examples/paper-200m.toml", "--rounds", "1", "--moves-per-restart", "2000", "-q"];
+    let first = json(&[&quick[..], &["--compare-with", "zyl", "-o", &out]].concat());
+    let former = &first["compared_with"];
+    assert_eq!((former["name"].as_str(), former["best_changed"].as_bool()), (Some("zyl"), Some(true)));
+    let cost = |value: &serde_json::Value, key: &str| value[key].as_f64().unwrap();
+    let factor = cost(former, "cost_deg_per_h") / cost(&first["best"], "worst_rate_deg_per_h");
+    assert!((cost(former, "cost_factor") / factor - 1.0).abs() < 1e-9 && factor > 1.0);
+    let page = std::fs::read_to_string(folder.path().join("old/report.html")).unwrap();
+    assert!(page.contains("The best pattern changed: under this model the former one, zyl, costs 9.6566 °/h"));
+    // The folder of a search stands for its best pattern.
+    let again = json(&[&quick[..], &["--compare-with", &out]].concat());
+    assert_eq!(again["compared_with"]["best_changed"], false);
+    assert_eq!(again["compared_with"]["segments"], first["best"]["segments"]);
+    let refused = run(&[&quick[..], &["--compare-with", "examples"]].concat());
+    assert_eq!((code(&refused), stdout(&refused)), (2, ""));
+    assert!(stderr(&refused).contains("holds no best.toml"), "{}", stderr(&refused));
+}

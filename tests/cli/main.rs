@@ -3,8 +3,11 @@
 mod bad_input;
 mod commands;
 mod compare;
+mod compensate;
 mod diagnose;
 mod examples;
+mod experiment;
+mod extend;
 mod metrics;
 mod readme;
 mod reproduce;

@@ -1,0 +1,81 @@
+//! `extend`: what it writes, shows and refuses.
+
+use super::{code, run, stderr, stdout};
+
+const COIL: &str = "examples/chamber-coil.toml";
+const RECORD: &str = "examples/chamber-day-1.csv";
+
+fn extend(arguments: &[&str]) -> (i32, String, String, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let new = folder.path().join("new.toml").display().to_string();
+    let output = run(&[&["extend", COIL, "-o", &new][..], arguments].concat());
+    let written = std::fs::read_to_string(&new).unwrap_or_default();
+    (code(&output), stdout(&output).to_owned(), stderr(&output).to_owned(), written)
+}
+
+#[test]
+fn an_effect_is_fitted_with_its_error_and_the_rest_of_the_file_stays_as_it_was() {
+    let formula = ["--effect", "custom", "--formula", "a * dT_dt", "--parameter", "a=1"];
+    let (code, text, errors, written) = extend(&[&formula[..], &["--fit", RECORD]].concat());
+    assert_eq!(code, 0, "{errors}");
+    let source = std::fs::read_to_string(super::root().join(COIL)).unwrap();
+    let added = written.strip_prefix(&source).unwrap_or_else(|| panic!("{written}"));
+    assert!(
+        added.starts_with("\n[[effect]]\nkind = \"custom\"\nformula = \"a * dT_dt\"\nparameters = { a = "),
+        "{added}"
+    );
+    assert!(added.contains(" ± "), "{added}");
+    for needed in ["examples/chamber-day-1.csv (fitted): error ", "before °/h", "heating_ramp", "transient", " ± "] {
+        assert!(text.contains(needed), "{needed}: {text}");
+    }
+}
+
+#[test]
+fn before_and_after_are_comparisons_of_every_record_given() {
+    let (code, text, errors, written) = extend(&["--effect", "finite_pack", "--fit", RECORD, "--format", "json"]);
+    assert_eq!(code, 0, "{errors}");
+    let answer: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(answer["schema_version"], 1);
+    let rmse = |side: &str| answer[side]["records"][0]["rmse_deg_per_h"].as_f64().unwrap();
+    assert!(rmse("before") > 2.5 && rmse("after") < 0.22, "{} {}", rmse("before"), rmse("after"));
+    for side in ["before", "after"] {
+        assert_eq!(answer[side]["inputs"]["records"][0]["role"], "fitted");
+        assert!(answer[side]["records"][0]["regimes"].as_array().is_some_and(|r| r.len() >= 4));
+    }
+    assert!(written.ends_with("\n[[effect]]\nkind = \"finite_pack\"\n"), "{written}");
+}
+
+#[test]
+fn without_a_record_the_values_are_said_to_be_no_fitted_ones() {
+    let (code, text, _, written) = extend(&["--effect", "strain_mismatch"]);
+    assert_eq!(code, 0);
+    assert!(text.contains("the values are start values, not fitted ones"), "{text}");
+    assert!(written.contains("kind = \"strain_mismatch\"\nmismatch = "), "{written}");
+}
+
+#[test]
+fn errors_of_a_formula_point_at_the_character() {
+    for (formula, mark) in
+        [("a * (dT_dt", "--formula:1:10"), ("a * dT_dt ! 2", "--formula:1:11"), ("sin(", "--formula:1:4")]
+    {
+        let arguments = ["--effect", "custom", "--formula", formula, "--parameter", "a=1"];
+        let (code, text, errors, written) = extend(&arguments);
+        assert_eq!((code, text.as_str(), written.as_str()), (2, "", ""), "{formula}");
+        assert!(errors.contains(mark), "{formula}: {errors}");
+    }
+}
+
+#[test]
+fn effects_and_columns_that_are_not_there_are_refused() {
+    let cases: [(&[&str], &str); 4] = [
+        (&["--effect", "strain_mismach"], "did you mean strain_mismatch?"),
+        (&["--effect", "custom"], "needs --formula"),
+        (&["--effect", "channel:pressure_pa", "--fit", RECORD], "pressure_pa"),
+        (&["--effect", "finite_pack", "--fit", "absent.csv"], "absent.csv"),
+    ];
+    for (arguments, expected) in cases {
+        let (code, text, errors, written) = extend(arguments);
+        assert_eq!((code, text.as_str(), written.as_str()), (2, "", ""), "{arguments:?}");
+        assert!(errors.contains(expected), "{expected}: {errors}");
+    }
+}
