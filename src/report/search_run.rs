@@ -13,7 +13,7 @@ use crate::io::schedule_file::sha256_hex;
 use crate::pattern::{Pattern, PatternError};
 use crate::profile::Profile;
 use crate::rate::RateModel;
-use crate::search::tolerance::{ToleranceError, ToleranceSpec, study};
+use crate::search::tolerance::{Measure, ToleranceError, ToleranceSpec, measure, study};
 use crate::search::worst_case::{SearchError, SolvedProfiles};
 use crate::units::{
     REFERENCE_TEMPERATURE_K, c_per_h_from_k_per_s, deg_per_h_from_rad_per_s, min_from_s, percent_from_fraction,
@@ -231,11 +231,17 @@ fn declared_tolerance(run: &Run, best: &Pattern, declared: &ToleranceSpec) -> Re
     }
     let patterns: Vec<Pattern> = named.iter().map(|(_, pattern)| pattern.clone()).collect();
     let found = study(&run.file.model, &run.file.profiles, &spec, &patterns)?;
+    let (axis, over) = match measure(&run.file.model, run.file.profiles.max_rate_k_per_s)? {
+        Measure::Guaranteed => {
+            ("guaranteed worst |rate error| [°/h]", "over every profile within the model's largest ramp (guaranteed)")
+        }
+        Measure::Sampled => ("worst |rate error| [°/h]", "over the model's profiles"),
+    };
     let all: Vec<f64> = found.iter().flat_map(|d| &d.worst_rad_per_s).map(|r| deg_per_h_from_rad_per_s(*r)).collect();
     let edges = bin_edges(&all);
     let mut chart = Chart::new("Worst rate error of coils as built")
         .size(720, 320)
-        .x(Axis::linear("worst |rate error| [°/h]"))
+        .x(Axis::linear(axis))
         .y(Axis::linear("coils [1]"));
     let mut words = Vec::new();
     for ((name, _), distribution) in named.iter().zip(&found) {
@@ -255,7 +261,7 @@ fn declared_tolerance(run: &Run, best: &Pattern, declared: &ToleranceSpec) -> Re
         ));
     }
     let caption = format!(
-        "{} coils with every spread of the model file's [tolerance] (seed {}), over all profiles. {}.",
+        "Worst rate error {over} of {} coils with every spread of the model file's [tolerance] (seed {}). {}.",
         spec.samples,
         spec.seed,
         words.join(". ")
@@ -334,7 +340,7 @@ fn trade_off(run: &Run) -> (String, String) {
         None => (
             chart.with(compared("patterns compared")).svg(),
             format!(
-                "The patterns compared above, not a searched front: `coilwright pareto` searches one, and with this folder as its -o it is shown here. {better}"
+                "The patterns compared above, not a searched front: coilwright pareto searches one, and with this folder as its -o it is shown here. {better}"
             ),
         ),
         Some(front) => {
@@ -350,7 +356,7 @@ fn trade_off(run: &Run) -> (String, String) {
             (
                 chart.svg(),
                 format!(
-                    "The front that `coilwright pareto` searched (captive reels are weighed besides), and the patterns compared above. {better}"
+                    "The front that coilwright pareto searched (captive reels are weighed besides), and the patterns compared above. {better}"
                 ),
             )
         }
