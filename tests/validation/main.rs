@@ -2,6 +2,7 @@
 
 mod allan;
 mod compensation;
+mod diagnosis;
 mod effects;
 mod exact_integers;
 mod exhaustive;

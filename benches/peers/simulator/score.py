@@ -87,8 +87,8 @@ def values(truth, answer):
 
 
 def write_table(truths, answers, file):
-    rows = ["| case | hidden | rms/noise | answer | judged | value (truth) | worst parameter [s.e.] | validation RMSE/noise | CPU s |"]
-    rows.append("|---" * 9 + "|")
+    rows = ["| case | hidden | rms/noise | answer | judged | value (truth) | worst parameter [s.e.] | validation RMSE/noise | CPU s | build |"]
+    rows.append("|---" * 10 + "|")
     counts = {}
     for case in (c for c in truths if c in answers):
         truth, answer = truths[case], answers[case]
@@ -99,7 +99,7 @@ def write_table(truths, answers, file):
         hidden = " + ".join(truth["answers"] + ([truth["outside"] + " (outside)"] if truth.get("outside") else [])) or "nothing"
         size = truth["hidden_rms"]["calibration"] / truth["noise_sigma_deg_per_h"]
         error = f"{worst:.1f}" if worst else ""
-        rows.append(f"| {case} | {hidden} | {size:.2f} | {said} | {word} | {values(truth, answer)} | {error} | {ratio:.3f} | {answer['cpu_s']} |")
+        rows.append(f"| {case} | {hidden} | {size:.2f} | {said} | {word} | {values(truth, answer)} | {error} | {ratio:.3f} | {answer['cpu_s']} | {answer.get('build', '')} |")
     summary = ["| | cases | " + " | ".join(w for w in WORDS) + " |", "|---" * (len(WORDS) + 2) + "|"]
     for kind, of_kind in counts.items():
         summary.append(f"| {kind} | {sum(of_kind.values())} | " + " | ".join(str(of_kind.get(w, 0)) for w in WORDS) + " |")

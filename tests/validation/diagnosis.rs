@@ -1,0 +1,56 @@
+//! Reference: the seven records of [`crate::records`], whose hidden effects their simulator states (`truth.json` of the
+//! set; the sizes are repeated here).
+//! Tolerance: the effects themselves or a set of at most three that holds them, hold-out error within 10 % of the noise
+//! floor, parameters within three of their standard errors.
+//!
+//! Takes a minute and a half: `cargo test --release --test validation diagnosis -- --ignored`.
+
+use coilwright::diagnose::{Diagnosis, Request, Verdict, diagnose};
+
+use crate::records::{model, record};
+
+fn diagnosed(name: &str) -> Diagnosis {
+    let file = model(name);
+    let pattern = file.pattern.unwrap().pattern;
+    let (fitted, holdout) = ([record(name, "calibration.csv")], [record(name, "validation.csv")]);
+    let request = Request { model: &file.model, pattern: &pattern, records: &fitted, holdout: &holdout };
+    diagnose(&request, &|_| ()).unwrap()
+}
+
+/// Checks effects, parameters in SI, and what is left on the hold-out record.
+fn assert_found(name: &str, expected: &[(&str, &[(&str, f64)])]) {
+    let found = diagnosed(name);
+    println!("{name}: {:?} {:?}", found.verdict, found.effects);
+    assert_eq!(found.effects.len(), expected.len(), "{name}");
+    for (kind, parameters) in expected {
+        let own = found.effects.iter().find(|f| f.effect.kind() == *kind);
+        let equal = found.effects.iter().flat_map(|f| &f.equivalents).any(|e| e.effect.kind() == *kind);
+        assert!(own.is_some() || equal, "{name}: no {kind}");
+        let Some(own) = own else { continue };
+        assert!(own.equivalents.len() <= 2, "{name}");
+        for (key, truth) in *parameters {
+            let fitted = own.parameters.iter().find(|p| p.key == *key).unwrap();
+            let error = fitted.standard_error.unwrap();
+            assert!((fitted.value - truth).abs() < 3.0 * error, "{name}: {key} {} ± {error}", fitted.value);
+        }
+    }
+    let floor = coilwright::predict::noise_floor(&record(name, "validation.csv")).deviation;
+    let left = found.ladder.last().unwrap().holdout_rmse_rad_per_s.unwrap();
+    assert!(left < 1.1 * floor, "{name}: {}", left / floor);
+    if expected.is_empty() {
+        assert_eq!(found.verdict, Verdict::Adequate, "{name}");
+    }
+}
+
+#[test]
+#[ignore = "a minute and a half of processor time in release"]
+fn the_seven_records_get_the_effects_that_they_hide() {
+    assert_found("a-control", &[]);
+    assert_found("g-control-zyl", &[]);
+    assert_found("b-half-space", &[("finite_pack", &[])]);
+    let spool: &[_] = &[("heat_capacity_j_per_m2_k", 5500.0), ("contact_w_per_m2_k", 400.0)];
+    assert_found("c-spool", &[("spool_mass", spool)]);
+    assert_found("d-mismatch", &[("strain_mismatch", &[("mismatch", 0.004)])]);
+    assert_found("e-sensor", &[("sensor_lag", &[("lag_s", 45.0)])]);
+    assert_found("f-two", &[("stress_gradient", &[("strength", 0.06)]), ("bias_temperature", &[])]);
+}
