@@ -131,7 +131,11 @@ fn search(
         }
     }
     let baselines = bench.baselines()?;
-    let best = bench.best(cell.class, &optimisation.state().found, &baselines)?;
+    let found = &optimisation.state().found;
+    let best = match bench.best(cell.class, found, &baselines)? {
+        Some(best) => Some(bench.improved(cell.class, best, found)?.0),
+        None => None,
+    };
     Ok(best.map(|best| CellJson {
         cell: index + 1,
         fingerprint,

@@ -19,7 +19,7 @@ use crate::io::run_directory::{OptimiseJson, Request, write_request, write_resul
 use crate::pattern::windability::WindabilityClass;
 use crate::search::guaranteed::UnitStep;
 use crate::search::objective::Objective;
-use crate::search::optimise::{DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Plan, Rules};
+use crate::search::optimise::{DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Plan, Rules, Stop};
 use crate::search::robust::Rounds;
 use crate::search::verdict::{Bench, Judged, improvement_over_qua};
 use crate::search::worst_case::SolvedProfiles;
@@ -30,6 +30,7 @@ use crate::units::{deg_per_h_from_rad_per_s, rad_per_s_from_deg_per_h};
 #[command(
     alias = "optimize",
     after_help = "The search ends with the first rule that fires: rounds without improvement, rounds, moves, target, or the clock.\n\
+    With equal layers, up to 16 of them, a search over permutations also ends once its best pattern is proved to be the best.\n\
     Without a clock the same seed gives the same bytes at any number of threads.\n\n\
     Examples:\n  coilwright optimise examples/paper-200m.toml -o results/paper-200m\n  \
     coilwright optimise examples/paper-200m.toml --windability any --seed 7 --budget 30s\n  \
@@ -218,12 +219,28 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         fingerprint: request.fingerprint(),
         every: arguments.checkpoint_every,
     });
-    let ended = anneal(search.as_mut(), budget, started, &stop, checkpoint, screen)?;
+    let mut proved = None;
+    let mut is_proved = |search: &dyn Rounds| -> Result<bool, CliError> {
+        if !bench.is_provable(class) {
+            return Ok(false);
+        }
+        let Some(best) = bench.best(class, &search.state().found, &baselines)? else { return Ok(false) };
+        let (best, is_optimal) = bench.improved(class, best, &search.state().found)?;
+        proved = is_optimal.then_some(best);
+        Ok(is_optimal)
+    };
+    let ended = anneal(search.as_mut(), &mut is_proved, budget, started, &stop, checkpoint, screen)?;
     let seconds = started.elapsed().as_secs_f64();
 
     let Some(best) = bench.best(class, &search.state().found, &baselines)? else {
         screen.note("interrupted before anything was found");
         return Ok(Ending::Interrupted);
+    };
+    let is_unhurried = ended == Ended::Rule && search.state().stop != Some(Stop::Target);
+    let best = match proved {
+        Some(proved) => proved,
+        None if is_unhurried => bench.improved(class, best, &search.state().found)?.0,
+        None => best,
     };
     let nothing_proved = (ProofJson::none(), false);
     let (best, (proof, proof_cut_short)) = match arguments.prove.filter(|_| ended != Ended::Signal) {
@@ -330,9 +347,11 @@ struct Checkpointing<'a> {
     every: Duration,
 }
 
-/// Advances a search to its end, writing checkpoints and showing progress.
+/// Advances a search to its end, writing checkpoints and showing progress. After its first round `is_proved` is asked
+/// whether what was found is the best there is.
 fn anneal(
     search: &mut dyn Rounds,
+    is_proved: &mut impl FnMut(&dyn Rounds) -> Result<bool, CliError>,
     budget: Option<Duration>,
     started: Instant,
     stop: &StopFlag,
@@ -342,8 +361,13 @@ fn anneal(
     let total = search.plan().rules.moves;
     let progress = screen.progress("optimise", total);
     let mut last_checkpoint = Instant::now();
+    let mut asked = false;
     let ended = loop {
         if !search.advance() {
+            break Ended::Rule;
+        }
+        if search.state().round == 1 && !std::mem::replace(&mut asked, true) && is_proved(search)? {
+            search.conclude();
             break Ended::Rule;
         }
         if let Some(Checkpointing { folder, fingerprint, every }) = &checkpoint

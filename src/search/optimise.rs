@@ -58,10 +58,12 @@ pub enum Stop {
     Moves,
     Patience,
     Target,
+    /// No pattern of the class is better.
+    Proved,
 }
 
 impl Stop {
-    const ALL: [Stop; 4] = [Stop::Rounds, Stop::Moves, Stop::Patience, Stop::Target];
+    const ALL: [Stop; 5] = [Stop::Rounds, Stop::Moves, Stop::Patience, Stop::Target, Stop::Proved];
 
     /// As written in results.
     pub fn key(self) -> &'static str {
@@ -70,6 +72,7 @@ impl Stop {
             Stop::Moves => "moves",
             Stop::Patience => "no improvement",
             Stop::Target => "target",
+            Stop::Proved => "proved",
         }
     }
 
@@ -111,6 +114,14 @@ pub struct State {
 }
 
 impl State {
+    /// Ends the search: what is best has been proved elsewhere.
+    pub fn conclude(&mut self) {
+        for restart in std::mem::take(&mut self.restarts) {
+            self.work += restart.work;
+        }
+        self.stop = Some(Stop::Proved);
+    }
+
     /// Before the first round.
     pub(super) fn new(working: Vec<usize>) -> Self {
         Self {
@@ -241,6 +252,11 @@ impl Optimisation {
             self.end_round();
         }
         self.state.stop.is_none()
+    }
+
+    /// Ends the search: what is best has been proved elsewhere.
+    pub fn conclude(&mut self) {
+        self.state.conclude();
     }
 
     /// Judges what the restarts of an unfinished round have found so far. For the last answer of a search that is

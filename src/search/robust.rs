@@ -39,6 +39,9 @@ pub trait Rounds {
     /// Judges what the restarts of an unfinished round have found so far; save the state before.
     fn gather(&mut self);
 
+    /// Ends the search, because what is best has been proved.
+    fn conclude(&mut self);
+
     fn state(&self) -> &State;
 
     fn plan(&self) -> &Plan;
@@ -61,6 +64,10 @@ impl Rounds for Optimisation {
 
     fn gather(&mut self) {
         Optimisation::gather(self);
+    }
+
+    fn conclude(&mut self) {
+        Optimisation::conclude(self);
     }
 
     fn state(&self) -> &State {
@@ -291,6 +298,10 @@ impl Rounds for RobustSearch {
             }
         }
         self.state.stop.is_none()
+    }
+
+    fn conclude(&mut self) {
+        self.state.conclude();
     }
 
     fn gather(&mut self) {

@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use super::exact::orders::MOST_LAYERS;
+use super::exact::{Improvement, Task, improve};
 use super::guaranteed::{GuaranteedError, UnitStep};
 use super::objective::Objective;
 use super::optimise::Found;
@@ -57,6 +59,19 @@ pub struct Bench<'a> {
 /// Classics in the order in which one is named where several are equally good.
 const PREFERENCE: [Classic; 7] =
     [Classic::Qua, Classic::Oct, Classic::Hex, Classic::Dip, Classic::SymText, Classic::Sym, Classic::Zyl];
+
+/// Below this there is nothing to improve that the annealer would not find.
+const FEWEST_LAYERS: usize = 4;
+
+/// Up to here, with equal layers, the best permutation is proved within [`PROVING_NODES`]: seconds.
+const PROVABLE_LAYERS: usize = 16;
+const PROVING_NODES: u64 = 1 << 24;
+
+/// What is spent on a better pattern where no proof can be expected.
+const IMPROVING_NODES: u64 = 1 << 18;
+
+/// Patterns that the improvement begins with, besides the best.
+const MOST_STARTS: usize = 6;
 
 /// Relative difference below which two patterns count as equally good.
 pub const EQUALLY_GOOD: f64 = 1e-9;
@@ -130,6 +145,48 @@ impl Bench<'_> {
             .filter_map(|classic| Some((classic.key().to_owned(), classic.pattern(layers).ok()?)))
             .collect();
         self.judge_all(&fitting)
+    }
+
+    /// Whether [`Bench::improved`] can be expected to prove what is best, so that a search may try it early.
+    pub fn is_provable(&self, class: WindabilityClass) -> bool {
+        let layers = self.model.coil.layers();
+        let lengths_m = self.model.coil.layer_lengths_m();
+        let has_equal_layers = lengths_m.iter().all(|l| *l == lengths_m[0]);
+        self.can_improve(class) && has_equal_layers && layers <= PROVABLE_LAYERS
+    }
+
+    fn can_improve(&self, class: WindabilityClass) -> bool {
+        let is_of_worst = matches!(self.objective, Objective::WorstRate | Objective::WorstPhase);
+        is_of_worst
+            && class != WindabilityClass::Standard
+            && (FEWEST_LAYERS..=MOST_LAYERS).contains(&self.model.coil.layers())
+    }
+
+    /// What a short search by bounds makes of the best pattern and what else was found, and whether that is proved to be
+    /// the best of the class. Only for classes of permutations and the objectives that proofs are about. The same
+    /// patterns give the same answer.
+    ///
+    /// # Errors
+    /// None that a model which could be solved would cause.
+    pub fn improved(
+        &self,
+        class: WindabilityClass,
+        best: Judged,
+        found: &[Found],
+    ) -> Result<(Judged, bool), JudgeError> {
+        if !self.can_improve(class) {
+            return Ok((best, false));
+        }
+        let others = found.iter().take(MOST_STARTS);
+        let others = others.map(|f| Pattern::new(f.segments.clone()).expect("a walk visits permutations only"));
+        let starts: Vec<Pattern> = std::iter::once(best.pattern.clone()).chain(others).collect();
+        let most_nodes = if self.is_provable(class) { PROVING_NODES } else { IMPROVING_NODES };
+        let task = Task { model: self.model, solved: self.solved, class };
+        let Improvement { pattern, is_optimal } = improve(&task, &starts, most_nodes)?;
+        if pattern == best.pattern {
+            return Ok((best, is_optimal));
+        }
+        Ok((self.judge(&format!("searched-{}", pattern.layers()), &pattern)?, is_optimal))
     }
 
     /// The best of what was found and of the baselines of the class, by the reference.

@@ -5,6 +5,7 @@ mod commands;
 mod compare;
 mod compensate;
 mod diagnose;
+mod exact;
 mod examples;
 mod experiment;
 mod extend;

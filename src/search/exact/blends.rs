@@ -22,11 +22,12 @@ use super::game;
 use super::orders::{Node, Orders, Places};
 use super::rows::Row;
 
-/// Nodes of a level from which the next level's are made while learning.
-const BREADTH: usize = 96;
+/// Nodes of a level from which the next level's are made while learning, times the square of the layers.
+const BREADTH_TIMES_LAYERS_SQUARED: usize = 128 * 16 * 16;
+const MOST_BREADTH: usize = 128;
 
 /// Blends that are kept for a level: those that refuted most nodes.
-const MOST_BLENDS: usize = 96;
+const MOST_BLENDS: usize = 64;
 
 /// Cutting planes and samples that one node may ask for.
 const MOST_STEPS: usize = 60;
@@ -90,6 +91,7 @@ impl<'a> Blender<'a> {
 
     /// Gives every level of a search the bounds that refute most.
     pub fn teach(&self, orders: &mut Orders, limit_rad_per_s: f64, mirrored: bool) -> Lesson {
+        let breadth = (BREADTH_TIMES_LAYERS_SQUARED / self.layers.pow(2)).clamp(1, MOST_BREADTH);
         let mut used = vec![false; self.rows.len()];
         let mut places = Places::default();
         let mut frontier: Vec<(Node, Weights)> = vec![(orders.root(), Vec::new())];
@@ -127,7 +129,7 @@ impl<'a> Blender<'a> {
                     }
                 }
             }
-            let stride = next.len().div_ceil(BREADTH).max(1);
+            let stride = next.len().div_ceil(breadth).max(1);
             frontier = next.into_iter().step_by(stride).collect();
         }
         Lesson {

@@ -8,7 +8,7 @@ use super::{Outcome, Watch};
 use crate::coil::Coil;
 use crate::pattern::Pattern;
 use crate::rate::{CoilModel, LayerWeights, RateError, RateModel};
-use crate::search::columns::BLOCK;
+use crate::search::columns::{BLOCK, Norm};
 use crate::search::samples::{SampleMatrix, any_rate_model};
 use crate::search::worst_case::{SearchError, SolvedProfiles};
 use crate::thermal::Instant;
@@ -49,6 +49,10 @@ pub enum Finding {
 
 /// Instants of one profile closer than this share of its duration are one sample.
 const SAME_INSTANT: f64 = 1e-7;
+
+/// A profile whose samples all stay below this share of another's refined worst rate is not refined: a peak between
+/// samples exceeds them by a few per cent only, as the reference takes it too.
+const PEAK_OVER_SAMPLES: f64 = 0.9;
 
 /// Every sample of the solved profiles, and the reference behind them.
 #[derive(Debug)]
@@ -98,26 +102,20 @@ impl<'a> Judge<'a> {
         layout.halves_alike && !layout.axial && self.matrix.columns.constant().iter().all(|c| *c == 0.0)
     }
 
-    /// The worst rate by the reference.
+    /// The worst rate by the reference, and when it occurs.
     ///
     /// # Errors
     /// A pattern of another layer count.
-    pub fn candidate(&self, pattern: &Pattern) -> Result<Candidate, SearchError> {
-        Ok(self.candidate_and_peak(pattern)?.0)
-    }
-
-    fn candidate_and_peak(&self, pattern: &Pattern) -> Result<(Candidate, Peak), SearchError> {
+    pub fn candidate_and_peak(&self, pattern: &Pattern) -> Result<(Candidate, Peak), SearchError> {
         let worst = self.solved.worst_case(self.model, pattern)?;
         let candidate = Candidate { rate_rad_per_s: worst.rate_rad_per_s.abs(), segments: pattern.segments().to_vec() };
         Ok((candidate, Peak { profile: worst.profile_index, time_s: worst.time_s }))
     }
 
-    /// The times at which given patterns are worst.
-    ///
-    /// # Errors
-    /// A pattern of another layer count.
-    pub fn peaks_of(&self, patterns: &[Pattern]) -> Result<Vec<Peak>, SearchError> {
-        patterns.iter().map(|pattern| Ok(self.candidate_and_peak(pattern)?.1)).collect()
+    /// The largest |Ω| over the samples.
+    pub fn sampled_worst_rad_per_s(&self, segments: &[usize]) -> f64 {
+        let pattern = Pattern::new(segments.to_vec()).expect("a search makes permutations only");
+        Norm::Largest.of(&self.matrix.columns.values(&self.coefficients(&pattern)))
     }
 
     /// Makes samples of instants; false if none of them is new.
@@ -169,14 +167,12 @@ impl<'a> Judge<'a> {
                 return Finding::Refuted { sample: self.order[from + at] };
             }
         }
-        if let Some(peak) = self.peak_above(&pattern, limit_rad_per_s) {
-            return Finding::RefutedBetween(peak);
-        }
-        Finding::Better(self.candidate(&pattern).expect("a search makes patterns of the coil's layers"))
+        self.refined(&pattern, limit_rad_per_s)
     }
 
-    /// A time at which a pattern is not below the limit; profiles are looked at in the order of their worst samples.
-    fn peak_above(&self, pattern: &Pattern, limit_rad_per_s: f64) -> Option<Peak> {
+    /// The worst rate refined in time, over the profiles in the order of their worst samples, until one is not below the
+    /// limit or none that is left can be worse.
+    fn refined(&self, pattern: &Pattern, limit_rad_per_s: f64) -> Finding {
         let rate_model =
             RateModel::new(self.model, pattern, &[]).expect("a search makes patterns of the coil's layers");
         let values = self.matrix.columns.values(&self.coefficients(pattern));
@@ -186,10 +182,18 @@ impl<'a> Judge<'a> {
         }
         let mut profiles: Vec<usize> = (0..largest.len()).collect();
         profiles.sort_by(|&a, &b| largest[b].total_cmp(&largest[a]).then(a.cmp(&b)));
-        profiles.into_iter().find_map(|profile| {
+        let mut worst_rad_per_s = 0.0_f64;
+        for profile in profiles {
+            if largest[profile] < PEAK_OVER_SAMPLES * worst_rad_per_s {
+                break;
+            }
             let (rate_rad_per_s, time_s) = self.solved.profiles()[profile].worst(&rate_model);
-            (rate_rad_per_s.abs() >= limit_rad_per_s).then_some(Peak { profile, time_s })
-        })
+            worst_rad_per_s = worst_rad_per_s.max(rate_rad_per_s.abs());
+            if worst_rad_per_s >= limit_rad_per_s {
+                return Finding::RefutedBetween(Peak { profile, time_s });
+            }
+        }
+        Finding::Better(Candidate { rate_rad_per_s: worst_rad_per_s, segments: pattern.segments().to_vec() })
     }
 
     fn coefficients(&self, pattern: &Pattern) -> Vec<f64> {

@@ -177,23 +177,7 @@ pub const RELATIVE_TOLERANCE: f64 = 1e-9;
 /// A model that cannot be solved, a start that does not fit it; more than [`orders::MOST_LAYERS`] layers, or none
 /// of the class among the starts.
 pub fn prove(task: &Task, starts: &[Pattern], watcher: Watcher) -> Result<Certificate, SearchError> {
-    let layers = task.model.coil.layers();
-    if layers > orders::MOST_LAYERS {
-        return Err(SearchError::TooManyLayers { found: layers, most: orders::MOST_LAYERS });
-    }
-    let mut judge = Judge::new(task.model, task.solved)?;
-    let mut best: Option<Candidate> = None;
-    for start in starts.iter().filter(|p| task.class.admits(p)) {
-        let candidate = judge.candidate(start)?;
-        // Of starts that are equally good, the first: it may be one that has a name.
-        let is_better = |b: &Candidate| candidate.rate_rad_per_s < b.rate_rad_per_s * (1.0 - RELATIVE_TOLERANCE);
-        if best.as_ref().is_none_or(is_better) {
-            best = Some(candidate);
-        }
-    }
-    let mut best = best.ok_or(SearchError::NoStart { class: task.class })?;
-    judge.add_peaks(&judge.peaks_of(starts)?);
-    let mut proof = Proof::new(task.class, &mut judge, starts, &mut best);
+    let Begun { mut judge, mut best, mut proof } = begin(task, starts)?;
     let mut lower_bound_rad_per_s = 0.0;
     let mut closed = best.rate_rad_per_s == 0.0;
     let (mut nodes, mut judged) = (0, 0);
@@ -241,6 +225,64 @@ pub fn prove(task: &Task, starts: &[Pattern], watcher: Watcher) -> Result<Certif
         judged,
         rows: proof.rows(&judge),
     })
+}
+
+/// A search that has not made a pass yet.
+struct Begun<'a> {
+    judge: Judge<'a>,
+    best: Candidate,
+    proof: Proof,
+}
+
+fn begin<'a>(task: &Task<'a>, starts: &[Pattern]) -> Result<Begun<'a>, SearchError> {
+    let layers = task.model.coil.layers();
+    if layers > orders::MOST_LAYERS {
+        return Err(SearchError::TooManyLayers { found: layers, most: orders::MOST_LAYERS });
+    }
+    let mut judge = Judge::new(task.model, task.solved)?;
+    let mut best: Option<Candidate> = None;
+    let mut peaks = Vec::new();
+    for start in starts.iter().filter(|p| task.class.admits(p)) {
+        let (candidate, peak) = judge.candidate_and_peak(start)?;
+        peaks.push(peak);
+        // Of starts that are equally good, the first: it may be one that has a name.
+        let is_better = |b: &Candidate| candidate.rate_rad_per_s < b.rate_rad_per_s * (1.0 - RELATIVE_TOLERANCE);
+        if best.as_ref().is_none_or(is_better) {
+            best = Some(candidate);
+        }
+    }
+    let mut best = best.ok_or(SearchError::NoStart { class: task.class })?;
+    judge.add_peaks(&peaks);
+    let proof = Proof::new(task.class, &mut judge, starts, &mut best);
+    Ok(Begun { judge, best, proof })
+}
+
+/// What a short search by bounds made of its starts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Improvement {
+    /// At worst the best start.
+    pub pattern: Pattern,
+    /// No pattern of the class is better.
+    pub is_optimal: bool,
+}
+
+/// The best pattern that a short search by bounds comes upon: what an annealer needs to end on the very best of many
+/// patterns that are nearly alike. Its effort is counted in nodes, so that the same starts give the same pattern.
+///
+/// # Errors
+/// As [`prove`].
+pub fn improve(task: &Task, starts: &[Pattern], most_nodes: u64) -> Result<Improvement, SearchError> {
+    let Begun { mut judge, best, mut proof } = begin(task, starts)?;
+    let rate_rad_per_s = best.rate_rad_per_s;
+    let stop = AtomicBool::new(false);
+    let at = Progress { best_rad_per_s: rate_rad_per_s, lower_bound_rad_per_s: 0.0, pass: 1.0, share_done: 0.0 };
+    let go_on = |_: Progress| ControlFlow::Continue(());
+    let mut watch = Watch { stop: &stop, watcher: &go_on, at, most_nodes, may_overflow: true };
+    let limit = rate_rad_per_s * (1.0 - RELATIVE_TOLERANCE);
+    let outcome = proof.pass(&mut judge, limit, rate_rad_per_s, &mut watch);
+    let best = outcome.best.map_or(best.clone(), |candidate| best.better(candidate));
+    let pattern = Pattern::new(best.segments).expect("a search makes permutations only");
+    Ok(Improvement { pattern, is_optimal: outcome.complete })
 }
 
 /// What a pass, or a piece of one, found.

@@ -73,7 +73,11 @@ impl Proof {
     fn follow(&mut self, judge: &mut Judge, best: &mut Candidate, mut open: Vec<Vec<usize>>) {
         for _ in 0..LESSONS {
             let mut outcome = Outcome::default();
-            open.iter().for_each(|segments| outcome.consider(judge, segments, best.rate_rad_per_s));
+            // The most promising first, so that few are judged by the reference.
+            let mut sorted: Vec<(f64, Vec<usize>)> =
+                open.into_iter().map(|segments| (judge.sampled_worst_rad_per_s(&segments), segments)).collect();
+            sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
+            sorted.iter().for_each(|(_, segments)| outcome.consider(judge, segments, best.rate_rad_per_s));
             let is_better = outcome.best.is_some();
             if let Some(candidate) = outcome.best.take() {
                 *best = candidate;

@@ -1,0 +1,60 @@
+//! `exact`: the answer for the paper's coil, its certificate, and the table of samples for other solvers.
+//!
+//! Reference: HiGHS 1.15.1 finds the same least worst rate, 0.366631 °/h, over the table's samples
+//! (`benches/peers/exact_highs.py`, recorded in `results/exact`).
+
+use super::{code, folder_with, json, root, run_in, stderr, stdout};
+
+const MODEL: &str = "examples/paper-200m.toml";
+const LEAST_DEG_PER_H: f64 = 0.366_631_159;
+
+#[test]
+fn the_best_of_all_permutations_of_the_papers_coil_is_proved_and_given_with_its_samples() {
+    let (folder, samples) = folder_with("samples.csv", "");
+    let table = samples.to_str().expect("a temporary path is text");
+    let best_file = folder.path().join("best.toml");
+    let best_path = best_file.to_str().expect("a temporary path is text");
+    let body = json(&["exact", MODEL, "--windability", "any", "--samples", table, "-o", best_path]);
+    let worst = body["best"]["worst_rate_deg_per_h"].as_f64().expect("a rate");
+    assert!((worst / LEAST_DEG_PER_H - 1.0).abs() < 1e-8, "{worst}");
+    assert_eq!(body["proof"]["status"], "optimal");
+    let bound = body["proof"]["lower_bound_deg_per_h"].as_f64().expect("a bound");
+    assert!(bound <= worst && bound > worst * (1.0 - 1e-8), "{bound} {worst}");
+    assert!(body["nodes"].as_u64().expect("a count") < 100_000, "{body}");
+    let segments: Vec<f64> =
+        body["best"]["segments"].as_array().expect("segments").iter().filter_map(|s| s.as_f64()).collect();
+    assert_eq!(segments.len(), 12);
+
+    let text = std::fs::read_to_string(&samples).expect("the table was written");
+    let mut lines = text.lines();
+    assert!(lines.next().expect("a header").starts_with("constant,layer_1,"), "{text}");
+    let mut rows = 0;
+    for line in lines {
+        let values: Vec<f64> = line.split(',').map(|v| v.parse().expect("a number")).collect();
+        let rate = values[0] + values[1..].iter().zip(&segments).map(|(a, p)| a * (2.0 * p - 13.0)).sum::<f64>();
+        assert!(rate.abs() <= worst * (1.0 + 1e-9), "{line}");
+        rows += 1;
+    }
+    assert_eq!(rows, body["rows"].as_u64().expect("a count"));
+
+    let evaluated = run_in(root(), &["evaluate", MODEL, "-p", best_path]);
+    assert_eq!(code(&evaluated), 0, "{}", stderr(&evaluated));
+    assert!(stdout(&evaluated).contains("0.3666"), "{}", stdout(&evaluated));
+}
+
+#[test]
+fn optimise_ends_as_soon_as_the_best_permutation_is_proved() {
+    let body = json(&["optimise", MODEL, "--windability", "any", "--seed", "5"]);
+    assert_eq!(body["stopped_by"], "proved");
+    let worst = body["best"]["worst_rate_deg_per_h"].as_f64().expect("a rate");
+    assert!((worst / LEAST_DEG_PER_H - 1.0).abs() < 1e-8, "{worst}");
+}
+
+#[test]
+fn a_proof_without_time_claims_no_more_than_a_lower_bound_and_keeps_the_best_known() {
+    let body = json(&["exact", MODEL, "--windability", "any", "--budget", "1ms"]);
+    let status = body["proof"]["status"].as_str().expect("a status");
+    assert!(["gap", "none"].contains(&status), "{status}");
+    let worst = body["best"]["worst_rate_deg_per_h"].as_f64().expect("a rate");
+    assert!(worst >= LEAST_DEG_PER_H * (1.0 - 1e-8), "{worst}");
+}
