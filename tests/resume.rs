@@ -8,6 +8,8 @@ use std::time::Duration;
 
 const REQUEST: [&str; 6] = ["--windability", "any", "--checkpoint-every", "20ms", "--patience", "6"];
 const SHORT: [&str; 4] = ["--rounds", "6", "--seed", "5"];
+/// Of an objective that is not proved, so that all rounds are searched.
+const UNPROVED: [&str; 2] = ["--objective", "rms"];
 const OTHER_SEED: [&str; 4] = ["--rounds", "6", "--seed", "6"];
 
 fn optimise(folder: &Path, length: [&str; 4], more: &[&str]) -> Command {
@@ -36,37 +38,47 @@ fn one_and_two_threads_write_the_same_bytes() {
 
 #[test]
 fn a_search_that_is_killed_again_and_again_ends_as_the_unbroken_one() {
-    let root = tempfile::tempdir().unwrap();
-    let (unbroken, broken) = (root.path().join("unbroken"), root.path().join("broken"));
-    assert!(optimise(&unbroken, SHORT, &[]).status().unwrap().success());
-    for after_ms in [30, 300, 110, 450, 200] {
-        let mut child = optimise(&broken, SHORT, &["--resume"]).spawn().unwrap();
-        std::thread::sleep(Duration::from_millis(after_ms));
-        child.kill().unwrap();
-        child.wait().unwrap();
+    for objective in [&UNPROVED[..], &[]] {
+        let root = tempfile::tempdir().unwrap();
+        let (unbroken, broken) = (root.path().join("unbroken"), root.path().join("broken"));
+        assert!(optimise(&unbroken, SHORT, objective).status().unwrap().success());
+        let resuming = [objective, &["--resume"]].concat();
+        for after_ms in [30, 300, 110, 450, 200] {
+            let mut child = optimise(&broken, SHORT, &resuming).spawn().unwrap();
+            std::thread::sleep(Duration::from_millis(after_ms));
+            child.kill().unwrap();
+            child.wait().unwrap();
+        }
+        assert!(optimise(&broken, SHORT, &resuming).status().unwrap().success());
+        let mut found = files(&broken);
+        // What a killed process was just writing under a temporary name may be left behind.
+        found.retain(|name, _| !name.starts_with(".coilwright-"));
+        assert_eq!(found, files(&unbroken));
     }
-    assert!(optimise(&broken, SHORT, &["--resume"]).status().unwrap().success());
-    let mut found = files(&broken);
-    // What a killed process was just writing under a temporary name may be left behind.
-    found.retain(|name, _| !name.starts_with(".coilwright-"));
-    assert_eq!(found, files(&unbroken));
 }
 
 #[test]
 fn an_unfinished_run_is_not_written_over_unasked_and_a_spoilt_checkpoint_is_refused() {
     let root = tempfile::tempdir().unwrap();
     let folder = root.path().join("run");
-    let mut child = optimise(&folder, SHORT, &[]).spawn().unwrap();
+    let mut child = optimise(&folder, SHORT, &UNPROVED).spawn().unwrap();
     while !folder.join("checkpoint.json").exists() && child.try_wait().unwrap().is_none() {
         std::thread::sleep(Duration::from_millis(10));
     }
     child.kill().unwrap();
     child.wait().unwrap();
-    assert_eq!(optimise(&folder, SHORT, &[]).status().unwrap().code(), Some(2));
-    assert_eq!(optimise(&folder, OTHER_SEED, &["--resume"]).status().unwrap().code(), Some(2));
+    assert_eq!(optimise(&folder, SHORT, &UNPROVED).status().unwrap().code(), Some(2));
+    assert_eq!(
+        optimise(&folder, OTHER_SEED, &[&UNPROVED[..], &["--resume"]].concat()).status().unwrap().code(),
+        Some(2)
+    );
     for spoilt in ["", "{", "{\"schema_version\": 1}", "\u{0}\u{1}"] {
         std::fs::write(folder.join("checkpoint.json"), spoilt).unwrap();
-        assert_eq!(optimise(&folder, SHORT, &["--resume"]).status().unwrap().code(), Some(2), "{spoilt:?}");
+        assert_eq!(
+            optimise(&folder, SHORT, &[&UNPROVED[..], &["--resume"]].concat()).status().unwrap().code(),
+            Some(2),
+            "{spoilt:?}"
+        );
     }
-    assert!(optimise(&folder, SHORT, &["--fresh"]).status().unwrap().success());
+    assert!(optimise(&folder, SHORT, &[&UNPROVED[..], &["--fresh"]].concat()).status().unwrap().success());
 }
