@@ -32,12 +32,16 @@ fn pages(folder: &Path) -> Vec<PathBuf> {
     let (compared, measured) = (folder.join("compared"), folder.join("measured"));
     let [model, record] = ["coil.toml", "validation.csv"].map(|name| format!("tests/data/records/c-spool/{name}"));
     coilwright(&["compare", &model, &record, "-q", "-o", compared.to_str().unwrap()]);
+    let (coil, day) = ("examples/chamber-coil.toml", "examples/chamber-day-1.csv");
+    let diagnosed = folder.join("diagnosed");
+    coilwright(&["diagnose", coil, day, "-q", "-o", diagnosed.to_str().unwrap()]);
     coilwright(&["metrics", &record, "-q", "-o", measured.to_str().unwrap()]);
     vec![
         schedule.join("traveller.html"),
         run.join("report.html"),
         compared.join("report.html"),
         measured.join("report.html"),
+        diagnosed.join("report.html"),
     ]
 }
 
