@@ -279,6 +279,17 @@ fn settle_equivalents(
     }
     let least = rivals.iter().map(|r| r.0).fold(f64::INFINITY, f64::min);
     rivals.retain(|(value, _)| *value < least + EQUAL * variance);
+    // The closest make the set; within it a physical effect goes before an empirical one.
+    rivals.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut closest: Vec<String> = Vec::new();
+    rivals.retain(|(_, h)| {
+        let kind = trial.candidates[h.members[place].candidate].kind();
+        let new = closest.len() <= MAX_EQUIVALENTS && !closest.contains(&kind);
+        if new {
+            closest.push(kind);
+        }
+        new
+    });
     let empirical = |h: &Hypothesis| trial.candidates[h.members[place].candidate].is_empirical();
     rivals.sort_by(|a, b| empirical(&a.1).cmp(&empirical(&b.1)).then(a.0.total_cmp(&b.0)));
     let mut rivals = rivals.into_iter();
