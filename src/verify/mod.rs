@@ -5,7 +5,7 @@
 //!
 //! What is compared how closely: lengths, radii and turns to the last printed digit; words and counts exactly; the
 //! worst rate error within 1 % (in a half space 0.1 %) of this module's own heat and optics over all profiles, give or
-//! take what two discretisations leave where a pattern cancels nearly everything ([`rate`]), and to its last printed digit at the stated profile and time, where the temperatures are the program's and the optics
+//! take what two discretisations leave where a pattern cancels nearly everything (`rate`), and to its last printed digit at the stated profile and time, where the temperatures are the program's and the optics
 //! this module's. Shared with what emits schedules are the model as it was read, the profiles, the parser of a user's
 //! formula, and those temperatures.
 

@@ -10,7 +10,7 @@
 //! the open places in any proportions (the permutahedron), so the best blend's bound is the linear relaxation's, without
 //! a linear programme at the nodes of the search.
 //!
-//! The best y of a node is found by cutting planes: a [`game`](super::game) between the samples in use and the
+//! The best y of a node is found by cutting planes: a `game` between the samples in use and the
 //! arrangements met so far gives y, sorting gives the arrangement that is smallest under it, and samples that the mixture
 //! of arrangements violates join. Blends that refuted nodes are tried on the next ones first. They are learnt once, on
 //! a sample of the nodes of each level, before the search; what they are decides only how fast it is.
