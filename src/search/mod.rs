@@ -5,6 +5,7 @@ pub mod builds;
 pub mod columns;
 pub mod exact;
 pub mod guaranteed;
+pub mod limits;
 pub mod objective;
 pub mod optimise;
 pub mod pareto;

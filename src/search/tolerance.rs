@@ -24,6 +24,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
+use statrs::statistics::Statistics;
 use thiserror::Error;
 
 use super::guaranteed::{GuaranteedError, UnitStep};
@@ -287,7 +288,7 @@ pub fn study(
             worst_rad_per_s.sort_by(f64::total_cmp);
             let within = |limit: f64| worst_rad_per_s.iter().filter(|w| **w <= limit).count();
             let yield_share = spec.limit_rad_per_s.map(|l| within(l) as f64 / worst_rad_per_s.len() as f64);
-            let variances: Vec<f64> = alone.iter().map(|coils| variance(coils.iter().map(|c| c[p]))).collect();
+            let variances: Vec<f64> = alone.iter().map(|coils| coils.iter().map(|c| c[p]).variance()).collect();
             let sum: f64 = variances.iter().sum();
             let mut variance_shares: Vec<(Spread, f64)> = active
                 .iter()
@@ -411,12 +412,6 @@ fn change_effect(model: &mut CoilModel, kind: &str, neutral: f64, change: impl F
         }
         None => model.effects.extend(DeclaredEffect::new(spec, values, vec![0; spec.choices.len()])),
     }
-}
-
-fn variance(values: impl Iterator<Item = f64> + Clone) -> f64 {
-    let count = values.clone().count() as f64;
-    let mean = values.clone().sum::<f64>() / count;
-    values.map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0)
 }
 
 impl From<CoilError> for ToleranceError {

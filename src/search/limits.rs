@@ -1,0 +1,99 @@
+//! What the winding shop puts up with, and steps between patterns that stay within it.
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::Rng;
+
+use super::signs::{segments_of_signs, signs_of_segments};
+use super::walk::{most_captive, pick};
+use crate::pattern::windability::WindabilityClass;
+
+/// What the winding shop puts up with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    pub class: WindabilityClass,
+    /// No crossover may climb more layers.
+    pub most_climb: Option<usize>,
+}
+
+impl From<WindabilityClass> for Limits {
+    fn from(class: WindabilityClass) -> Self {
+        Self { class, most_climb: None }
+    }
+}
+
+impl Limits {
+    pub fn admits(self, segments: &[usize]) -> bool {
+        let in_class = match self.class {
+            WindabilityClass::Standard => signs_of_segments(segments).is_some(),
+            WindabilityClass::Captive(most) => most_captive(segments) <= most,
+            WindabilityClass::Any => true,
+        };
+        in_class && self.most_climb.is_none_or(|most| largest_climb(segments) <= most)
+    }
+}
+
+/// Layers between the two ends of the longest crossover.
+fn largest_climb(segments: &[usize]) -> usize {
+    let mut layers = vec![0; segments.len()];
+    for (layer, &segment) in segments.iter().enumerate() {
+        layers[segment - 1] = layer;
+    }
+    layers.windows(2).map(|pair| pair[0].abs_diff(pair[1])).max().unwrap_or(0)
+}
+
+/// A pattern within the limits drawn at random; `captive:K` starts from a standard one, and where climbs are limited a
+/// random walk starts from the cylindrical winding, which climbs least.
+pub fn draw(limits: impl Into<Limits>, layers: usize, random: &mut ChaCha8Rng) -> Vec<usize> {
+    let limits: Limits = limits.into();
+    if limits.most_climb.is_some() {
+        let mut segments: Vec<usize> = (1..=layers).collect();
+        for _ in 0..STEPS_A_LAYER * layers {
+            if let Some(next) = neighbour(limits, &segments, random) {
+                segments = next;
+            }
+        }
+        return segments;
+    }
+    match limits.class {
+        WindabilityClass::Any => {
+            let mut segments: Vec<usize> = (1..=layers).collect();
+            for i in (1..layers).rev() {
+                segments.swap(i, pick(random, i + 1));
+            }
+            segments
+        }
+        _ => segments_of_signs(&(1..layers).map(|_| random.next_u32() & 1 == 1).collect::<Vec<bool>>()),
+    }
+}
+
+/// Steps of a random walk that draws a pattern.
+const STEPS_A_LAYER: usize = 32;
+
+/// One end or two of a standard pattern; three swaps to one insertion elsewhere. `None` if it would leave the limits.
+pub fn neighbour(limits: Limits, segments: &[usize], random: &mut ChaCha8Rng) -> Option<Vec<usize>> {
+    let layers = segments.len();
+    let is_within = |candidate: &Vec<usize>| limits.admits(candidate);
+    if limits.class == WindabilityClass::Standard {
+        let mut high = signs_of_segments(segments)?;
+        let first = pick(random, high.len());
+        high[first] = !high[first];
+        if high.len() > 1 && random.next_u32() & 1 == 1 {
+            let second = pick(random, high.len() - 1);
+            let second = if second >= first { second + 1 } else { second };
+            high[second] = !high[second];
+        }
+        return Some(segments_of_signs(&high)).filter(is_within);
+    }
+    let from = pick(random, layers);
+    let other = pick(random, layers - 1);
+    let to = if other >= from { other + 1 } else { other };
+    let mut candidate = segments.to_vec();
+    if layers == 2 || random.next_u32() & 3 != 0 {
+        candidate.swap(from, to);
+    } else if from < to {
+        candidate[from..=to].rotate_left(1);
+    } else {
+        candidate[to..=from].rotate_right(1);
+    }
+    Some(candidate).filter(is_within)
+}

@@ -1,0 +1,83 @@
+//! What a field answers: the instants at which it is asked, and the temperatures and rates in every layer there.
+
+/// From which side a time is approached: rates jump where the drive's rate does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    Before,
+    After,
+}
+
+/// A time at which a field is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Instant {
+    pub time_s: f64,
+    pub side: Side,
+}
+
+impl Instant {
+    pub fn after(time_s: f64) -> Self {
+        Self { time_s, side: Side::After }
+    }
+
+    pub fn before(time_s: f64) -> Self {
+        Self { time_s, side: Side::Before }
+    }
+}
+
+/// Temperatures and their rates in every layer at a sequence of times.
+///
+/// # Shapes
+/// Row-major, one row a time, `layers` columns, innermost layer first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ThermalHistory {
+    pub layers: usize,
+    pub times_s: Vec<f64>,
+    pub temperature_k: Vec<f64>,
+    pub rate_k_per_s: Vec<f64>,
+    /// ∫ Ṫ ζ dζ over −½ ≤ ζ ≤ ½, ζ the axial coordinate over the height, growing away from the first flange; empty
+    /// where nothing varies along the axis.
+    pub axial_moment_k_per_s: Vec<f64>,
+    /// ∫ T ζ dζ; empty where nothing varies along the axis.
+    pub axial_moment_k: Vec<f64>,
+    pub ambient_k: Vec<f64>,
+    pub ambient_rate_k_per_s: Vec<f64>,
+}
+
+impl ThermalHistory {
+    pub fn with_capacity(layers: usize, times: usize) -> Self {
+        Self {
+            layers,
+            times_s: Vec::with_capacity(times),
+            temperature_k: Vec::with_capacity(times * layers),
+            rate_k_per_s: Vec::with_capacity(times * layers),
+            axial_moment_k_per_s: Vec::new(),
+            axial_moment_k: Vec::new(),
+            ambient_k: Vec::with_capacity(times),
+            ambient_rate_k_per_s: Vec::with_capacity(times),
+        }
+    }
+
+    pub fn len(&self) -> usize {
+        self.times_s.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.times_s.is_empty()
+    }
+
+    pub fn temperatures_k(&self, row: usize) -> &[f64] {
+        &self.temperature_k[row * self.layers..(row + 1) * self.layers]
+    }
+
+    pub fn rates_k_per_s(&self, row: usize) -> &[f64] {
+        &self.rate_k_per_s[row * self.layers..(row + 1) * self.layers]
+    }
+
+    pub fn axial_moments_k_per_s(&self, row: usize) -> &[f64] {
+        if self.axial_moment_k_per_s.is_empty() {
+            &[]
+        } else {
+            &self.axial_moment_k_per_s[row * self.layers..(row + 1) * self.layers]
+        }
+    }
+}
