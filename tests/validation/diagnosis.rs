@@ -1,5 +1,5 @@
 //! Reference: two of the seven records of [`crate::records`], whose hidden effects their simulator states (`truth.json` of
-//! the set; the sizes are repeated here). All seven and 97 others: `results/independent-trials`.
+//! the set; the sizes are repeated here). All seven and 96 others: `results/independent-trials`.
 //! Tolerance: the effects themselves or a set of at most three that holds them, hold-out error within 10 % of the noise
 //! floor, parameters within three of their standard errors.
 
