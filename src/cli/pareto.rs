@@ -13,6 +13,7 @@ use crate::io::model_file::{ModelFile, NamedPattern, read_model};
 use crate::io::pareto_json::{ParetoJson, PointJson, front_csv};
 use crate::io::pattern_file::print_pattern;
 use crate::pattern::Pattern;
+use crate::pattern::classic::Classic;
 use crate::pattern::windability::WindabilityClass;
 use crate::report::plot::{Axis, Chart, Series};
 use crate::search::builds::Builds;
@@ -230,8 +231,14 @@ fn chart(
     captive.dedup();
     for count in captive {
         let of_count = points.iter().filter(|p| p.pattern.windability.captive == count);
-        let place = |p: &PointJson| Some((p.pattern.windability.max_climb as f64, error_deg_per_h(&p.pattern)?));
-        chart = chart.with(Series::points(format!("{count} captive"), of_count.filter_map(place).collect()));
+        let place = |p: &PointJson| {
+            let at = (p.pattern.windability.max_climb as f64, error_deg_per_h(&p.pattern)?);
+            // The classics are what a reader knows: they bear their names.
+            let classic = Classic::ALL.iter().any(|c| c.key() == p.pattern.name);
+            Some((at, if classic { p.pattern.name.clone() } else { String::new() }))
+        };
+        let (places, labels) = of_count.filter_map(place).unzip();
+        chart = chart.with(Series::points(format!("{count} captive"), places).labelled(labels));
     }
     chart.svg()
 }

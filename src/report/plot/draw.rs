@@ -274,7 +274,10 @@ fn draw_series(
                     let wide = text_width_px(label);
                     let fits = x as i32 + 7 + wide < layout.right;
                     let (x, h) = if fits { (x as i32 + 7, HPos::Left) } else { (x as i32 - 7, HPos::Right) };
-                    root.draw(&text(label, x, y as i32 - 3, h, VPos::Bottom))?;
+                    // Below the point where there is no room above it.
+                    let above = y as i32 - 18 >= layout.top;
+                    let (y, v) = if above { (y as i32 - 3, VPos::Bottom) } else { (y as i32 + 5, VPos::Top) };
+                    root.draw(&text(label, x, y, h, v))?;
                 }
             }
         }
