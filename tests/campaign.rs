@@ -112,4 +112,24 @@ fn every_point_of_the_front_is_a_pattern_that_schedule_takes_and_none_is_beaten_
     for file in ["pareto.csv", "pareto.svg", "pareto-p95.svg"] {
         assert!(folder.join(file).exists(), "{file}");
     }
+
+    // Taken up again: parts that are there stay as they are, the others are searched, and the front is the same.
+    let parts = folder.join("parts");
+    let count = std::fs::read_dir(&parts).unwrap().count();
+    let before = std::fs::read(folder.join("pareto.csv")).unwrap();
+    let written =
+        |number: usize| std::fs::metadata(parts.join(format!("{number:03}.json"))).unwrap().modified().unwrap();
+    let first = written(1);
+    for number in count / 2..=count {
+        std::fs::remove_file(parts.join(format!("{number:03}.json"))).unwrap();
+    }
+    std::fs::remove_file(folder.join("pareto.csv")).unwrap();
+    let again = ["pareto", &model, "-o", &shown, "--rounds", "1", "--most-captive", "1", "--quiet"];
+    assert!(coilwright(&again).status.success());
+    assert_eq!(std::fs::read(folder.join("pareto.csv")).unwrap(), before);
+    assert_eq!(std::fs::read_dir(&parts).unwrap().count(), count);
+    assert_eq!(written(1), first, "a part that was there was searched again");
+    // A part of another request is not taken for one of this.
+    assert!(coilwright(&[&again[..], &["--seed", "9"]].concat()).status.success());
+    assert_ne!(written(1), first, "a part of another seed was taken");
 }

@@ -11,6 +11,7 @@ use crate::io::files::write_atomically;
 use crate::io::json::PatternJson;
 use crate::io::model_file::{ModelFile, NamedPattern, read_model};
 use crate::io::pareto_json::{ParetoJson, PointJson, front_csv};
+use crate::io::pareto_parts::Front;
 use crate::io::pattern_file::print_pattern;
 use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
@@ -19,7 +20,7 @@ use crate::report::plot::{Axis, Chart, Series};
 use crate::search::builds::Builds;
 use crate::search::limits::Limits;
 use crate::search::objective::Objective;
-use crate::search::optimise::{DEFAULT_RESTARTS_PER_ROUND, Plan, Rules, default_moves_per_restart};
+use crate::search::optimise::{DEFAULT_RESTARTS_PER_ROUND, Found, Plan, Rules, default_moves_per_restart};
 use crate::search::pareto::{Point, front};
 use crate::search::robust::{RobustSearch, Rounds, Whose};
 use crate::search::tolerance::Coils;
@@ -32,7 +33,7 @@ use crate::search::worst_case::SolvedProfiles;
     after_help = "Weighed are the worst rate, captive reels, largest climb, crossovers over other layers and, where the model has a\n\
     [tolerance] table, the 95 % quantile over built coils. Searched are all classes and, within each, climbs of up to 2, 3, 4,\n\
     5, 6, 8 and any number of layers, for the worst rate and for the quantile. Every point is a pattern file that schedule\n\
-    takes.\n\n\
+    takes. With -o what is done is kept in parts/, so the same command goes on after an interruption.\n\n\
     Example:\n  coilwright pareto examples/paper-200m.toml -o results/paper-200m-front"
 )]
 pub struct Arguments {
@@ -69,27 +70,31 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     if file.tolerance.is_some() {
         whose.push(bench.builds(Whose::Built, WindabilityClass::Any, seed)?);
     }
-    let progress = screen.progress("pareto", Some((classes.len() * (climbs.len() + 1)) as u64));
-    let mut done = 0;
-    for &class in &classes {
-        match candidates(&bench, &file, class, seed, arguments.rounds, &stop)? {
-            Some(found) => judged.extend(found),
-            None => return Ok(Ending::Interrupted),
-        }
-        done += 1;
-        progress.at(done, &class.to_string());
-        for &most_climb in &climbs {
-            let limits = Limits { class, most_climb };
-            for builds in &whose {
-                match limited(&bench, builds, limits, seed, &stop)? {
-                    Some(found) => judged.extend(found),
-                    None => return Ok(Ending::Interrupted),
+    let kept = arguments.output.as_deref().map(|folder| Front { folder, file: &file, seed, rounds: arguments.rounds });
+    let parts = parts(&classes, &climbs, whose.len());
+    let progress = screen.progress("pareto", Some(parts.len() as u64));
+    for (number, part) in parts.iter().enumerate() {
+        let words = part.words();
+        let found = match kept.as_ref().and_then(|front| front.read_part(number + 1, &words)) {
+            Some(found) => found,
+            None => {
+                let searched = match part.climb {
+                    Climb::Unlimited => candidates(&bench, &file, part.class, seed, arguments.rounds, &stop)?,
+                    Climb::Within { most_climb, builds } => {
+                        let limits = Limits { class: part.class, most_climb };
+                        limited(&bench, &whose[builds], limits, seed, &stop)?
+                    }
+                };
+                let Some(found) = searched else { return Ok(interrupted(&arguments.output, screen)) };
+                if let Some(front) = &kept {
+                    front.write_part(number + 1, &words, &found)?;
                 }
+                found
             }
-            done += 1;
-            let climb = most_climb.map_or_else(String::new, |most| format!(", climbs up to {most}"));
-            progress.at(done, &format!("{class}{climb}"));
-        }
+        };
+        let name = part.class.to_string().replace(':', "-");
+        judged.extend(bench.judge_all(&found.into_iter().map(|pattern| (name.clone(), pattern)).collect::<Vec<_>>())?);
+        progress.at(number as u64 + 1, &words);
     }
     progress.finish();
     let points = front(&with_spreads(&file, judged)?);
@@ -130,7 +135,53 @@ const CLIMBS: [usize; 6] = [2, 3, 4, 5, 6, 8];
 
 const LIMITED_RESTARTS: usize = 8;
 
-/// What a search of a class found, judged by the reference; none if a signal came first.
+/// One search of many: a class, and within it a limit of the climb.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    class: WindabilityClass,
+    climb: Climb,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Climb {
+    /// By the annealer over all samples.
+    Unlimited,
+    /// Over one of the sets of coils.
+    Within { most_climb: Option<usize>, builds: usize },
+}
+
+impl Part {
+    fn words(self) -> String {
+        match self.climb {
+            Climb::Unlimited => self.class.to_string(),
+            Climb::Within { most_climb, builds } => {
+                let climb = most_climb.map_or_else(|| "any climb".to_owned(), |most| format!("climbs up to {most}"));
+                let whose = if builds == 0 { "as declared" } else { "as built" };
+                format!("{}, {climb}, {whose}", self.class)
+            }
+        }
+    }
+}
+
+fn parts(classes: &[WindabilityClass], climbs: &[Option<usize>], sets: usize) -> Vec<Part> {
+    let of_class = |&class| {
+        let within = climbs.iter().flat_map(move |&most_climb| {
+            (0..sets).map(move |builds| Part { class, climb: Climb::Within { most_climb, builds } })
+        });
+        std::iter::once(Part { class, climb: Climb::Unlimited }).chain(within)
+    };
+    classes.iter().flat_map(of_class).collect()
+}
+
+fn interrupted(output: &Option<PathBuf>, screen: &Screen) -> Ending {
+    screen.note(match output {
+        Some(_) => "interrupted: the same command goes on from the parts that are done",
+        None => "interrupted: with -o DIR the parts that are done would have been kept",
+    });
+    Ending::Interrupted
+}
+
+/// What a search of a class found; none if a signal came first.
 fn candidates(
     bench: &Bench,
     file: &ModelFile,
@@ -138,7 +189,7 @@ fn candidates(
     seed: u64,
     rounds: u64,
     stop: &StopFlag,
-) -> Result<Option<Vec<Judged>>, CliError> {
+) -> Result<Option<Vec<Pattern>>, CliError> {
     let layers = file.model.coil.layers();
     let plan = Plan {
         seed,
@@ -154,21 +205,17 @@ fn candidates(
             return Ok(None);
         }
     }
-    let judge = |found: &crate::search::optimise::Found| {
-        let pattern = Pattern::new(found.segments.clone()).expect("a walk visits permutations only");
-        bench.judge(&class.to_string().replace(':', "-"), &pattern)
-    };
-    Ok(Some(search.state().found.iter().map(judge).collect::<Result<_, _>>()?))
+    Ok(Some(patterns(&search.state().found)))
 }
 
-/// What a search within limits found, judged by the reference; none if a signal came first.
+/// What a search within limits found; none if a signal came first.
 fn limited(
     bench: &Bench,
     builds: &Builds,
     limits: Limits,
     seed: u64,
     stop: &StopFlag,
-) -> Result<Option<Vec<Judged>>, CliError> {
+) -> Result<Option<Vec<Pattern>>, CliError> {
     let layers = bench.model.coil.layers();
     let plan = Plan {
         seed,
@@ -184,11 +231,13 @@ fn limited(
             return Ok(None);
         }
     }
-    let found = search.state().found.iter().take(LIMITED_RESTARTS / 2);
-    let name = limits.class.to_string().replace(':', "-");
-    let named: Vec<(String, Pattern)> =
-        found.filter_map(|f| Some((name.clone(), Pattern::new(f.segments.clone()).ok()?))).collect();
-    Ok(Some(bench.judge_all(&named)?))
+    let found = &search.state().found;
+    Ok(Some(patterns(&found[..found.len().min(LIMITED_RESTARTS / 2)])))
+}
+
+fn patterns(found: &[Found]) -> Vec<Pattern> {
+    let walked = |f: &Found| Pattern::new(f.segments.clone()).expect("a walk visits permutations only");
+    found.iter().map(walked).collect()
 }
 
 /// The points with their 95 % quantiles, where the model states tolerances.

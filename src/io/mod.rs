@@ -20,6 +20,7 @@ pub mod model_edit;
 pub mod model_file;
 mod page_reader;
 pub mod pareto_json;
+pub mod pareto_parts;
 pub mod pattern_file;
 mod production_table;
 pub mod profile_file;
