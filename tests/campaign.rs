@@ -69,7 +69,7 @@ fn a_campaign_file_with_faults_names_them_all() {
     let output = coilwright(&["campaign", &path.display().to_string(), "-o", &root.path().display().to_string()]);
     assert_eq!(output.status.code(), Some(2));
     let words = String::from_utf8_lossy(&output.stderr);
-    for part in ["an array of model files", "classes[1]", "speed", "seed"] {
+    for part in ["an array of model files", "classes[1]", "speed", "unknown key seed: did you mean seeds?"] {
         assert!(words.contains(part), "{part}: {words}");
     }
 }

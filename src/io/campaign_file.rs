@@ -82,10 +82,11 @@ pub fn read_campaign(path: &Path) -> Result<CampaignFile, Faults> {
     let mut root = r.root(&document);
     let name = root.needed_text(r, "name", "a string").map(str::to_owned);
     let models = root.needed_texts(r, "models", "an array of model files");
-    let classes = if root.has("classes") { root.needed_texts(r, "classes", ARRAY_OF_STRINGS) } else { None };
-    let objectives = if root.has("objectives") { root.needed_texts(r, "objectives", ARRAY_OF_STRINGS) } else { None };
-    let layers = if root.has("layers") { root.needed_integers(r, "layers") } else { None };
-    let seeds = if root.has("seeds") { root.needed_integers(r, "seeds") } else { None };
+    let classes = if root.states("classes") { root.needed_texts(r, "classes", ARRAY_OF_STRINGS) } else { None };
+    let objectives =
+        if root.states("objectives") { root.needed_texts(r, "objectives", ARRAY_OF_STRINGS) } else { None };
+    let layers = if root.states("layers") { root.needed_integers(r, "layers") } else { None };
+    let seeds = if root.states("seeds") { root.needed_integers(r, "seeds") } else { None };
     let rounds = root.integer(r, "rounds", 1, 1_000_000);
     let moves_per_restart = root.integer(r, "moves_per_restart", 1, 1_000_000_000);
     let classes = match classes {

@@ -141,6 +141,12 @@ impl<'d> TableReader<'d> {
         self.table.is_some_and(|t| t.contains_key(key))
     }
 
+    /// Whether an optional key stands here; it is then known, so that a misspelling of it is recognised.
+    pub fn states(&mut self, key: &'static str) -> bool {
+        self.known.push(key);
+        self.has(key)
+    }
+
     pub fn keys(&self) -> Vec<String> {
         self.table.map(|t| t.iter().map(|(k, _)| k.to_owned()).collect()).unwrap_or_default()
     }
