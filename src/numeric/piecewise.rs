@@ -56,31 +56,6 @@ impl PiecewiseLinear {
         self.values[0]
     }
 
-    /// The same function with as few of its knots as keep every one of them within `tolerance`; first and last stay.
-    pub fn simplified(&self, tolerance: f64) -> Self {
-        let last = self.knots.len() - 1;
-        let mut kept = vec![0];
-        // Slopes from the knot kept last that pass all knots since by no more than the tolerance.
-        let (mut least, mut most) = (f64::NEG_INFINITY, f64::INFINITY);
-        for i in 1..=last {
-            let from = kept[kept.len() - 1];
-            let slope_to = |value: f64, from: usize| (value - self.values[from]) / (self.knots[i] - self.knots[from]);
-            let slope = slope_to(self.values[i], from);
-            if slope < least || slope > most {
-                kept.push(i - 1);
-                (least, most) = (f64::NEG_INFINITY, f64::INFINITY);
-            }
-            let from = kept[kept.len() - 1];
-            least = least.max(slope_to(self.values[i] - tolerance, from));
-            most = most.min(slope_to(self.values[i] + tolerance, from));
-        }
-        if last > 0 {
-            kept.push(last);
-        }
-        let of = |all: &[f64]| kept.iter().map(|&i| all[i]).collect();
-        Self { knots: of(&self.knots), values: of(&self.values) }
-    }
-
     /// The index of the last knot at or before `x`, if there is one.
     fn piece(&self, x: f64) -> Option<usize> {
         self.knots.partition_point(|&k| k <= x).checked_sub(1)
@@ -126,18 +101,6 @@ mod tests {
         assert_eq!((f.value(-1.0), f.value(1.0), f.value(9.0)), (1.0, 3.0, 5.0));
         assert_eq!((f.slope_before(0.0), f.slope_after(0.0)), (0.0, 2.0));
         assert_eq!((f.slope_before(2.0), f.slope_after(2.0), f.slope_after(5.0)), (2.0, 0.0, 0.0));
-    }
-
-    #[test]
-    fn a_simplified_function_keeps_its_corners_and_stays_within_the_tolerance() {
-        let knots: Vec<f64> = (0..400).map(f64::from).collect();
-        let shape = |x: f64| if x < 100.0 { 0.0 } else { 3.0 * (1.0 - (-(x - 100.0) / 40.0).exp()) };
-        let f = PiecewiseLinear::new(knots.clone(), knots.iter().map(|&x| shape(x)).collect()).unwrap();
-        let simple = f.simplified(0.01);
-        let farthest = knots.iter().map(|&x| (simple.value(x) - f.value(x)).abs()).fold(0.0, f64::max);
-        println!("{} of 400 knots, {farthest:.4} off", simple.knots().len());
-        assert!(farthest <= 0.01 && simple.knots().len() < 25 && simple.knots().contains(&100.0));
-        assert_eq!(PiecewiseLinear::constant(2.0).simplified(0.1), PiecewiseLinear::constant(2.0));
     }
 
     #[test]

@@ -4,22 +4,26 @@
 //! gives a [`Field`], which can be asked for any instants. The field does not depend on the winding pattern.
 
 mod course;
+mod driven;
 pub mod half_space;
 mod half_space_memory;
 mod history;
 mod modal;
 mod network;
 pub mod pack;
+mod slope;
 mod stepped;
 
 use thiserror::Error;
 
 use crate::coil::Coil;
 use crate::numeric::piecewise::PiecewiseLinear;
+pub use driven::{Driven, Memory};
 use half_space::HalfSpaceField;
 pub use history::{Instant, Side, ThermalHistory};
 use modal::PackField;
 use pack::Pack;
+pub use slope::{SlopeTerm, slope_series};
 use stepped::SteppedField;
 
 /// What the pack is made of, thermally.
@@ -275,19 +279,11 @@ pub enum Field {
 /// # Errors
 /// A heat path whose parts contradict each other or lack a material property.
 pub fn solve(path: &HeatPath, drive: &Drive) -> Result<Field, ThermalError> {
-    solve_within(path, drive, stepped::TOLERANCE_SHARE)
-}
-
-/// As [`solve`], but a nonlinear field only to `tolerance_share` of the span of the drive's temperatures in each step.
-///
-/// # Errors
-/// As [`solve`].
-pub fn solve_within(path: &HeatPath, drive: &Drive, tolerance_share: f64) -> Result<Field, ThermalError> {
     check(path)?;
     Ok(match path.extent {
         Extent::HalfSpace => Field::HalfSpace(HalfSpaceField::new(half_space::HalfSpace::new(path), drive)),
         Extent::Pack if path.conductivity_slope_per_k != 0.0 => {
-            Field::Stepped(Box::new(SteppedField::new(path, drive, tolerance_share)?))
+            Field::Stepped(Box::new(SteppedField::new(path, drive, stepped::TOLERANCE_SHARE)?))
         }
         Extent::Pack => Field::Pack(Box::new(PackField::new(Pack::new(path)?, drive))),
     })
@@ -372,24 +368,10 @@ impl Field {
     /// A layer's mean rate over a window is exactly its change of temperature over the window; its temperature is
     /// taken as the mean of both ends. The same holds for axial moments. A window of zero gives the instants themselves.
     pub fn means(&self, ends_s: &[f64], window_s: f64) -> ThermalHistory {
+        let (instants, places) = window_instants(ends_s, window_s);
         if window_s <= 0.0 {
-            return self.at(&ends_s.iter().map(|&t| Instant::after(t)).collect::<Vec<_>>());
+            return self.at(&instants);
         }
-        // Where a window begins at the end of the one before, one instant serves both.
-        let joined = |row: usize| row > 0 && (ends_s[row] - window_s - ends_s[row - 1]).abs() <= 1e-9 * window_s;
-        let mut instants = Vec::with_capacity(2 * ends_s.len());
-        let places: Vec<usize> = ends_s
-            .iter()
-            .enumerate()
-            .map(|(row, &end_s)| {
-                if !joined(row) {
-                    // Temperatures are continuous; just before a knot the fast modes are over.
-                    instants.push(Instant::before(end_s - window_s));
-                }
-                instants.push(Instant::before(end_s));
-                instants.len() - 1
-            })
-            .collect();
         let at = self.sample(&instants, Wanted::Temperatures);
         let over = |values: &[f64], columns: usize, f: fn(f64, f64) -> f64| -> Vec<f64> {
             if values.is_empty() {
@@ -419,6 +401,30 @@ impl Field {
             ambient_rate_k_per_s: change(&at.ambient_k, 1),
         }
     }
+}
+
+/// The instants between which windows lie, and of each window the place of its end; a beginning stands before its end.
+/// A window of zero is one instant.
+fn window_instants(ends_s: &[f64], window_s: f64) -> (Vec<Instant>, Vec<usize>) {
+    if window_s <= 0.0 {
+        return (ends_s.iter().map(|&t| Instant::after(t)).collect(), (0..ends_s.len()).collect());
+    }
+    // Where a window begins at the end of the one before, one instant serves both.
+    let joined = |row: usize| row > 0 && (ends_s[row] - window_s - ends_s[row - 1]).abs() <= 1e-9 * window_s;
+    let mut instants = Vec::with_capacity(2 * ends_s.len());
+    let places = ends_s
+        .iter()
+        .enumerate()
+        .map(|(row, &end_s)| {
+            if !joined(row) {
+                // Temperatures are continuous; just before a knot the fast modes are over.
+                instants.push(Instant::before(end_s - window_s));
+            }
+            instants.push(Instant::before(end_s));
+            instants.len() - 1
+        })
+        .collect();
+    (instants, places)
 }
 
 fn push_ambient(history: &mut ThermalHistory, drive: &Drive, instant: Instant) {

@@ -51,7 +51,7 @@ const BATCH: usize = 256;
 const FORGOTTEN: f64 = 100.0;
 
 /// e^{−λ_i t} for a time that is often the same as the last one.
-struct Decay<'a> {
+pub(super) struct Decay<'a> {
     decay_per_s: &'a [f64],
     elapsed_s: f64,
     left: Vec<f64>,
@@ -60,7 +60,7 @@ struct Decay<'a> {
 }
 
 impl<'a> Decay<'a> {
-    fn new(decay_per_s: &'a [f64]) -> Self {
+    pub fn new(decay_per_s: &'a [f64]) -> Self {
         Self { decay_per_s, elapsed_s: 0.0, left: vec![1.0; decay_per_s.len()], remembered: decay_per_s.len() }
     }
 
@@ -81,15 +81,28 @@ impl<'a> Decay<'a> {
 
 /// The contents of the modes that one piecewise-linear input excites, at each of its knots.
 #[derive(Debug, Clone)]
-struct Track {
+pub(super) struct Contents {
     input: PiecewiseLinear,
-    response: Response,
     /// Row-major knots × modes, just after each knot: Σ_q Δk_q e^{−λ_i (t−t_q)}.
     content: Vec<f64>,
 }
 
+/// One input and how it acts.
+#[derive(Debug, Clone)]
+struct Track {
+    contents: Contents,
+    response: Response,
+}
+
 impl Track {
     fn new(input: &PiecewiseLinear, response: Response, decay_per_s: &[f64]) -> Self {
+        Self { contents: Contents::new(input, decay_per_s), response }
+    }
+}
+
+impl Contents {
+    /// For modes of ascending decays.
+    pub fn new(input: &PiecewiseLinear, decay_per_s: &[f64]) -> Self {
         let knots = input.knots();
         let mut content = Vec::with_capacity(knots.len() * decay_per_s.len());
         let mut state = vec![0.0; decay_per_s.len()];
@@ -104,11 +117,11 @@ impl Track {
             }
             content.extend_from_slice(&state);
         }
-        Self { input: input.clone(), response, content }
+        Self { input: input.clone(), content }
     }
 
     /// Writes the modes' contents at an instant; returns the input's value and slope there.
-    fn at(&self, instant: Instant, decay: &mut Decay, state: &mut [f64]) -> (f64, f64) {
+    pub fn at(&self, instant: Instant, decay: &mut Decay, state: &mut [f64]) -> (f64, f64) {
         let modes = state.len();
         let knots = self.input.knots();
         let past = match instant.side {
@@ -183,7 +196,7 @@ impl PackField {
             for ((&instant, column), input) in
                 batch.iter().zip(state.as_mut_slice().chunks_exact_mut(modes)).zip(&mut inputs)
             {
-                *input = track.at(instant, &mut decay, column);
+                *input = track.contents.at(instant, &mut decay, column);
                 remembered = remembered.max(decay.remembered);
             }
             let response = &track.response;
@@ -206,7 +219,9 @@ impl PackField {
             let mut warming = DMatrix::zeros(modes, batch.len());
             for (c, instant) in batch.iter().enumerate() {
                 for (i, &l) in self.decay_per_s.iter().enumerate() {
-                    (state[(i, c)], warming[(i, c)]) = heated_mode(heat, l, instant.time_s - self.drive.start_s());
+                    let since_s = instant.time_s - self.drive.start_s();
+                    let (left, building) = ((-l * since_s).exp(), (-since_s / heat.time_constant_s).exp());
+                    (state[(i, c)], warming[(i, c)]) = heated_mode(heat, l, since_s, left, building);
                 }
             }
             if let Some(temperature) = &mut temperature {
@@ -227,13 +242,12 @@ impl PackField {
     }
 }
 
-/// c and dc/dt of c' = −λ c + q∞ (1 − e^{−t/τ}), c(0) = 0.
-fn heated_mode(heat: &BoreHeat, decay_per_s: f64, time_s: f64) -> (f64, f64) {
+/// c and dc/dt of c' = −λ c + q∞ (1 − e^{−t/τ}), c(0) = 0, from e^{−λt} and e^{−t/τ}.
+pub(super) fn heated_mode(heat: &BoreHeat, decay_per_s: f64, time_s: f64, el: f64, em: f64) -> (f64, f64) {
     if time_s <= 0.0 {
         return (0.0, 0.0);
     }
     let (l, m) = (decay_per_s, 1.0 / heat.time_constant_s);
-    let (el, em) = ((-l * time_s).exp(), (-m * time_s).exp());
     // (e^{−mt} − e^{−lt})/(l − m) without cancellation where l ≈ m.
     let difference = if ((l - m) * time_s).abs() < 1e-8 {
         time_s * em

@@ -37,6 +37,13 @@ impl Link {
     pub fn conductance(&self, conductivity_w_per_m_k: f64) -> f64 {
         1.0 / (1.0 / (self.shape * conductivity_w_per_m_k) + self.rest)
     }
+
+    /// First and second derivative of the conductance with respect to the material's conductivity.
+    pub fn derivatives(&self, conductivity_w_per_m_k: f64) -> (f64, f64) {
+        let held = 1.0 + self.shape * conductivity_w_per_m_k * self.rest;
+        let first = self.shape / (held * held);
+        (first, -2.0 * first * self.shape * self.rest / held)
+    }
 }
 
 /// The radial network, for one slice of the axis.

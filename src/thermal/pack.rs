@@ -63,10 +63,13 @@ struct AxialModes {
     /// Mode content per unit of the flange's air [1/m²], and the mode's first moment; both empty without a flange.
     flange_per_m2: Vec<f64>,
     moment: Vec<f64>,
+    /// Of the pack's material.
+    diffusivity_m2_per_s: f64,
 }
 
 impl AxialModes {
     fn new(path: &HeatPath, network: &Network) -> Result<Self, ThermalError> {
+        let diffusivity_m2_per_s = path.material.diffusivity_m2_per_s();
         let Some(flange) = path.flange else {
             return Ok(Self {
                 decay_per_m2: vec![0.0],
@@ -74,6 +77,7 @@ impl AxialModes {
                 uniform: vec![1.0],
                 flange_per_m2: Vec::new(),
                 moment: Vec::new(),
+                diffusivity_m2_per_s,
             });
         };
         let slices = Slices::new(path, flange);
@@ -97,6 +101,7 @@ impl AxialModes {
             uniform: row(0),
             flange_per_m2: row(1),
             moment: row(2),
+            diffusivity_m2_per_s,
         })
     }
 
@@ -122,10 +127,15 @@ impl Pack {
         let axial = AxialModes::new(path, &network)?;
         let layers = network.layers;
         let outputs = layers * if axial.has_moments() { 2 } else { 1 };
-        let diffusivity = path.material.diffusivity_m2_per_s();
         let mut modes = Vec::with_capacity(network.nodes() * axial.mean.len());
+        // A spool does not conduct along the axis: only without one do all axial modes share their radial ones.
+        let shared = (network.spool_nodes == 0).then(|| radial(&network, &axial, 0.0)).transpose()?;
         for m in 0..axial.mean.len() {
-            modes.extend(radial_modes(&network, &axial, m, diffusivity)?);
+            let extra_per_s = axial.diffusivity_m2_per_s * axial.decay_per_m2[m];
+            match &shared {
+                Some(shared) => modes.extend(radial_modes(shared, extra_per_s, &network, &axial, m)),
+                None => modes.extend(radial_modes(&radial(&network, &axial, extra_per_s)?, 0.0, &network, &axial, m)),
+            }
         }
         if modes.iter().any(|mode| !(mode.decay_per_s > 0.0)) {
             return Err(ThermalError::Eigen);
@@ -212,15 +222,16 @@ impl Pack {
     }
 }
 
-/// The radial modes that belong to axial mode `m`.
-fn radial_modes(
-    network: &Network,
-    axial: &AxialModes,
-    m: usize,
-    diffusivity_m2_per_s: f64,
-) -> Result<Vec<Mode>, ThermalError> {
-    let (n, layers, solved) = (network.nodes(), network.layers, network.solved_layers());
-    let (mut decays, off) = network.symmetrised(diffusivity_m2_per_s * axial.decay_per_m2[m]);
+/// Radial modes: their decays, and what layers (rows) and inputs (the last rows) see of each.
+struct Radial {
+    decay_per_s: Vec<f64>,
+    rows: DMatrix<f64>,
+}
+
+/// With `extra_per_s` added to every cell's decay.
+fn radial(network: &Network, axial: &AxialModes, extra_per_s: f64) -> Result<Radial, ThermalError> {
+    let (n, solved) = (network.nodes(), network.solved_layers());
+    let (mut decay_per_s, off) = network.symmetrised(extra_per_s);
     let has_moments = axial.has_moments();
     let (boundary_row, mount_row, heat_row, flange_row) = (solved, solved + 1, solved + 2, solved + 3);
     let mut rows = DMatrix::zeros(solved + 3 + usize::from(has_moments), n);
@@ -237,29 +248,42 @@ fn radial_modes(
     rows[(heat_row, 0)] = network.heated / inner_root;
     if has_moments {
         for i in network.spool_nodes..n {
-            rows[(flange_row, i)] = network.capacity[i].sqrt() * diffusivity_m2_per_s;
+            rows[(flange_row, i)] = network.capacity[i].sqrt() * axial.diffusivity_m2_per_s;
         }
     }
-    diagonalise(&mut decays, &off, &mut rows).map_err(|_| ThermalError::Eigen)?;
-    Ok((0..n)
-        .map(|i| {
-            let mut seen = vec![0.0; layers * if has_moments { 2 } else { 1 }];
-            for layer in 0..solved {
-                seen[layer] = axial.mean[m] * rows[(layer, i)];
-                if has_moments {
-                    seen[layers + layer] = axial.moment[m] * rows[(layer, i)];
-                }
+    diagonalise(&mut decay_per_s, &off, &mut rows).map_err(|_| ThermalError::Eigen)?;
+    Ok(Radial { decay_per_s, rows })
+}
+
+/// The modes that belong to axial mode `m`, each decaying by `extra_per_s` faster than the radial one.
+fn radial_modes(
+    radial: &Radial,
+    extra_per_s: f64,
+    network: &Network,
+    axial: &AxialModes,
+    m: usize,
+) -> impl Iterator<Item = Mode> {
+    let (n, layers, solved) = (network.nodes(), network.layers, network.solved_layers());
+    let has_moments = axial.has_moments();
+    let (boundary_row, mount_row, heat_row, flange_row) = (solved, solved + 1, solved + 2, solved + 3);
+    let rows = &radial.rows;
+    (0..n).map(move |i| {
+        let mut seen = vec![0.0; layers * if has_moments { 2 } else { 1 }];
+        for layer in 0..solved {
+            seen[layer] = axial.mean[m] * rows[(layer, i)];
+            if has_moments {
+                seen[layers + layer] = axial.moment[m] * rows[(layer, i)];
             }
-            let from_flange = if has_moments { axial.flange_per_m2[m] * rows[(flange_row, i)] } else { 0.0 };
-            Mode {
-                decay_per_s: decays[i],
-                seen,
-                boundary: axial.uniform[m] * rows[(boundary_row, i)],
-                ambient: axial.uniform[m] * rows[(mount_row, i)] + from_flange,
-                heat: axial.uniform[m] * rows[(heat_row, i)],
-            }
-        })
-        .collect())
+        }
+        let from_flange = if has_moments { axial.flange_per_m2[m] * rows[(flange_row, i)] } else { 0.0 };
+        Mode {
+            decay_per_s: radial.decay_per_s[i] + extra_per_s,
+            seen,
+            boundary: axial.uniform[m] * rows[(boundary_row, i)],
+            ambient: axial.uniform[m] * rows[(mount_row, i)] + from_flange,
+            heat: axial.uniform[m] * rows[(heat_row, i)],
+        }
+    })
 }
 
 /// Keeps the modes that any output sees of any input; a flange makes many that none does.

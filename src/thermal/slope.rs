@@ -1,0 +1,259 @@
+//! A conductivity that depends weakly on temperature, as a series in its slope: no time steps.
+//!
+//! ```text
+//! T = T0 + a T1 + a² T2,   k = k0 (1 + a θ),   θ = T − 20 °C
+//! C dT_m/dt = −G T_m − div f_m
+//! f_1 = g' k0 θ0 ΔT0,   f_2 = g' k0 (θ0 ΔT1 + θ1 ΔT0) + ½ g'' k0² θ0² ΔT0      heat through one link, ΔT across it
+//! ```
+//!
+//! Every order is the linear network driven by what the orders before leave; each is solved by the modes of that network,
+//! exactly for heat flows that are linear between the drive's knots and the rows' instants.
+//!
+//! Holds for slopes that change the conductivity by some ten per cent (the next term is of third order). Leaves out
+//! flanges.
+//!
+//! # Source
+//! Regular perturbation of the network of [`super::network`]; a test compares it with the stepped solution.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::network::Network;
+use super::{Drive, Extent, HeatPath, ThermalError, check, window_instants};
+use crate::numeric::piecewise::PiecewiseLinear;
+use crate::numeric::tridiagonal::diagonalise;
+use crate::units::REFERENCE_TEMPERATURE_K;
+
+/// The layers' temperatures and rates over each row's window, per unit (or squared unit) of the slope.
+///
+/// # Shapes
+/// Row-major, one row a window, one column a layer.
+#[derive(Debug, Clone)]
+pub struct SlopeTerm {
+    pub temperature_k: Vec<f64>,
+    pub rate_k_per_s: Vec<f64>,
+}
+
+/// The network's modes, and the times at which everything is sampled.
+struct Modes {
+    network: Network,
+    decay_per_s: Vec<f64>,
+    /// Nodes × modes: C^{−1/2} V.
+    shape: DMatrix<f64>,
+    times_s: Vec<f64>,
+}
+
+/// T1 and T2 of a path, whatever slope it states itself.
+///
+/// # Errors
+/// A half space or a flange; values so extreme that the eigenvalues do not converge.
+pub fn slope_series(
+    path: &HeatPath,
+    drive: &Drive,
+    ends_s: &[f64],
+    window_s: f64,
+) -> Result<[SlopeTerm; 2], ThermalError> {
+    check(&HeatPath { conductivity_slope_per_k: 1.0, ..path.clone() })?;
+    if path.extent == Extent::HalfSpace || path.flange.is_some() {
+        return Err(ThermalError::Nonlinear { what: "conductivity_temperature beside axial_gradient" });
+    }
+    let (instants, places) = window_instants(ends_s, window_s);
+    let modes = Modes::new(path, |shortest_s| {
+        let mut times_s: Vec<f64> = instants.iter().map(|i| i.time_s.max(drive.start_s())).collect();
+        for input in [&drive.boundary_k, drive.ambient_k()] {
+            times_s.extend(input.knots());
+            times_s.extend(settling_times_s(input, shortest_s));
+        }
+        times_s.retain(|t| *t >= drive.start_s());
+        times_s.sort_by(f64::total_cmp);
+        times_s.dedup_by(|later, earlier| *later - *earlier < SAME_TIME_S);
+        times_s
+    })?;
+    let (network, count) = (&modes.network, modes.times_s.len());
+    let n = network.nodes();
+    let boundary_k: Vec<f64> = modes.times_s.iter().map(|&t| drive.boundary_k.value(t)).collect();
+
+    let to_boundary = network.to_boundary.conductance(network.conductivity_w_per_m_k);
+    let mut into = DMatrix::zeros(n, count);
+    for (t, &time_s) in modes.times_s.iter().enumerate() {
+        let heat = path
+            .bore_heat
+            .map_or(0.0, |heat| heat.power_w_per_m2 * -(-(time_s - drive.start_s()) / heat.time_constant_s).exp_m1());
+        into[(0, t)] += network.mount * drive.ambient_k().value(time_s) + network.heated * heat;
+        into[(n - 1, t)] += to_boundary * boundary_k[t];
+    }
+    let zeroth = modes.solve(&into).0;
+    let links = modes.derivatives();
+    let first_flows = modes.flows(|t, i| {
+        let (across, above) = modes.across(&zeroth, i, t, boundary_k[t], REFERENCE_TEMPERATURE_K);
+        links[i].0 * above * across
+    });
+    let (first, first_rate) = modes.solve(&first_flows);
+    let second_flows = modes.flows(|t, i| {
+        let (across, above) = modes.across(&zeroth, i, t, boundary_k[t], REFERENCE_TEMPERATURE_K);
+        let (across_1, above_1) = modes.across(&first, i, t, 0.0, 0.0);
+        links[i].0 * (above * across_1 + above_1 * across) + 0.5 * links[i].1 * above * above * across
+    });
+    let (second, second_rate) = modes.solve(&second_flows);
+
+    let place_of = |time_s: f64| {
+        let after = modes.times_s.partition_point(|t| *t < time_s - SAME_TIME_S);
+        after.min(count - 1)
+    };
+    let of = |value: &DMatrix<f64>, rate: &DMatrix<f64>| {
+        let (value, rate) = (modes.layers(value), modes.layers(rate));
+        let (mut temperature_k, mut rate_k_per_s) = (Vec::new(), Vec::new());
+        for &place in &places {
+            let end = value.column(place_of(instants[place].time_s));
+            if window_s > 0.0 {
+                let start = value.column(place_of(instants[place - 1].time_s.max(drive.start_s())));
+                temperature_k.extend(start.iter().zip(end.iter()).map(|(a, b)| 0.5 * (a + b)));
+                rate_k_per_s.extend(start.iter().zip(end.iter()).map(|(a, b)| (b - a) / window_s));
+            } else {
+                temperature_k.extend(end.iter());
+                rate_k_per_s.extend(rate.column(place_of(instants[place].time_s)).iter());
+            }
+        }
+        SlopeTerm { temperature_k, rate_k_per_s }
+    };
+    Ok([of(&first, &first_rate), of(&second, &second_rate)])
+}
+
+/// Two times closer than this are one [s].
+const SAME_TIME_S: f64 = 1e-6;
+/// Changes of the drive's rate beyond this share of its range make heat flows that are not linear for a while …
+const SUDDEN: f64 = 0.03;
+/// … this long at most, in units of the time from one knot to the next.
+const WHILE_KNOTS: f64 = 3.0;
+
+/// Times at which the heat flows after a sudden change of the drive's rate are sampled, ever further apart.
+fn settling_times_s(input: &PiecewiseLinear, shortest_s: f64) -> Vec<f64> {
+    let knots = input.knots();
+    let slopes: Vec<f64> = (0..knots.len()).map(|i| input.slope_of(i)).collect();
+    let largest = slopes.iter().fold(0.0_f64, |a, s| a.max(s.abs()));
+    let mut gaps: Vec<f64> = knots.windows(2).map(|w| w[1] - w[0]).collect();
+    gaps.sort_by(f64::total_cmp);
+    let longest_s = gaps.get(gaps.len() / 2).map_or(0.0, |gap| WHILE_KNOTS * gap);
+    let mut times_s = Vec::new();
+    for (i, &time_s) in knots.iter().enumerate() {
+        let before = if i > 0 { slopes[i - 1] } else { 0.0 };
+        if (slopes[i] - before).abs() > SUDDEN * largest {
+            let mut after_s = shortest_s;
+            while after_s < longest_s {
+                times_s.push(time_s + after_s);
+                after_s *= 1.5;
+            }
+        }
+    }
+    times_s
+}
+
+impl Modes {
+    /// Sampled at the times that `times_s` makes of the shortest time constant.
+    fn new(path: &HeatPath, times_s: impl FnOnce(f64) -> Vec<f64>) -> Result<Self, ThermalError> {
+        let network = Network::new(path);
+        let n = network.nodes();
+        let (mut decay_per_s, off) = network.symmetrised(0.0);
+        let mut shape = DMatrix::identity(n, n);
+        diagonalise(&mut decay_per_s, &off, &mut shape).map_err(|_| ThermalError::Eigen)?;
+        if decay_per_s.iter().any(|l| !(*l > 0.0)) {
+            return Err(ThermalError::Eigen);
+        }
+        for (mut row, capacity) in shape.row_iter_mut().zip(&network.capacity) {
+            row /= capacity.sqrt();
+        }
+        let shortest_s = decay_per_s.iter().fold(f64::INFINITY, |a, l| a.min(1.0 / l));
+        Ok(Self { network, decay_per_s, shape, times_s: times_s(shortest_s) })
+    }
+
+    /// Temperatures of the nodes and their rates under heat into each node, both nodes × times; steady before the first.
+    fn solve(&self, into: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+        let (n, count) = (self.decay_per_s.len(), self.times_s.len());
+        let driven = self.shape.transpose() * into;
+        let mut content = DMatrix::zeros(n, count);
+        let mut warming = DMatrix::zeros(n, count);
+        let mut state: DVector<f64> =
+            DVector::from_iterator(n, self.decay_per_s.iter().zip(driven.column(0).iter()).map(|(l, p)| p / l));
+        content.set_column(0, &state);
+        let mut step_s = f64::NAN;
+        let mut weights = vec![(0.0, 0.0, 0.0); n];
+        for t in 1..count {
+            let wide_s = self.times_s[t] - self.times_s[t - 1];
+            if wide_s != step_s {
+                step_s = wide_s;
+                weights = self.decay_per_s.iter().map(|l| linear_step(*l, step_s)).collect();
+            }
+            for (i, (left, from, to)) in weights.iter().enumerate() {
+                state[i] = left * state[i] + from * driven[(i, t - 1)] + to * driven[(i, t)];
+                warming[(i, t)] = driven[(i, t)] - self.decay_per_s[i] * state[i];
+            }
+            content.set_column(t, &state);
+        }
+        (&self.shape * content, &self.shape * warming)
+    }
+
+    /// k0 g' and k0² g'' of the link from each node outwards; the last leads to the drive.
+    fn derivatives(&self) -> Vec<(f64, f64)> {
+        let k = self.network.conductivity_w_per_m_k;
+        let links = self.network.links.iter().chain([&self.network.to_boundary]);
+        links.map(|link| link.derivatives(k)).map(|(first, second)| (k * first, k * k * second)).collect()
+    }
+
+    /// The difference of temperature across a link, and by how much its own is above `reference_k`; as the stepped
+    /// solution takes them.
+    fn across(&self, nodes_k: &DMatrix<f64>, link: usize, t: usize, boundary_k: f64, reference_k: f64) -> (f64, f64) {
+        let own_k = nodes_k[(link, t)];
+        let last = link + 1 == self.network.nodes();
+        let next_k = if last { boundary_k } else { nodes_k[(link + 1, t)] };
+        let link_k = if link < self.network.spool_nodes {
+            next_k
+        } else if last && !self.network.outermost_is_drive {
+            own_k
+        } else {
+            0.5 * (own_k + next_k)
+        };
+        (own_k - next_k, link_k - reference_k)
+    }
+
+    /// Heat into each node at each time, from what flows outwards through each link.
+    fn flows(&self, outwards: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
+        let (n, count) = (self.network.nodes(), self.times_s.len());
+        let mut into = DMatrix::zeros(n, count);
+        for t in 0..count {
+            for i in 0..n {
+                let flow = outwards(t, i);
+                into[(i, t)] -= flow;
+                if i + 1 < n {
+                    into[(i + 1, t)] += flow;
+                }
+            }
+        }
+        into
+    }
+
+    /// Layer means, layers × times; what the drive imposes has no terms.
+    fn layers(&self, nodes: &DMatrix<f64>) -> DMatrix<f64> {
+        let network = &self.network;
+        let mut means = DMatrix::zeros(network.layers, nodes.ncols());
+        for layer in 0..network.solved_layers() {
+            let capacity = network.layer_capacity(layer);
+            for i in network.nodes_of(layer) {
+                let share = network.capacity[i] / capacity;
+                for t in 0..nodes.ncols() {
+                    means[(layer, t)] += share * nodes[(i, t)];
+                }
+            }
+        }
+        means
+    }
+}
+
+/// What is left of a mode after a step, and the weights of its drive at the step's beginning and end.
+fn linear_step(decay_per_s: f64, step_s: f64) -> (f64, f64, f64) {
+    let z = decay_per_s * step_s;
+    let (whole, late) = if z < 1e-3 {
+        (1.0 - z / 2.0 + z * z / 6.0, 0.5 - z / 6.0 + z * z / 24.0)
+    } else {
+        (-(-z).exp_m1() / z, (z + (-z).exp_m1()) / (z * z))
+    };
+    ((-z).exp(), step_s * (whole - late), step_s * late)
+}
