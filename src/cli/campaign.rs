@@ -133,7 +133,7 @@ fn search(
     let baselines = bench.baselines()?;
     let found = &optimisation.state().found;
     let best = match bench.best(cell.class, found, &baselines)? {
-        Some(best) => Some(bench.improved(cell.class, best, found)?.0),
+        Some(best) => Some(bench.improved(cell.class, best, found, None)?.0),
         None => None,
     };
     Ok(best.map(|best| CellJson {

@@ -15,7 +15,7 @@ use crate::io::files::write_atomically;
 use crate::io::json::{PatternJson, ProofJson};
 use crate::io::model_file::{ModelFile, NamedPattern, read_model};
 use crate::io::pattern_file::resolve_pattern;
-use crate::io::run_directory::{OptimiseJson, Request, write_request, write_results};
+use crate::io::run_directory::{BestFoundJson, OptimiseJson, Request, write_request, write_results};
 use crate::pattern::windability::WindabilityClass;
 use crate::search::guaranteed::UnitStep;
 use crate::search::objective::Objective;
@@ -92,7 +92,7 @@ pub struct SearchOptions {
     /// Ends after so many rounds without a better pattern
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub patience: Option<u64>,
-    /// Ends when the objective is this small
+    /// Ends when the objective is this small; a proof is not begun or not finished then
     #[arg(long, value_name = "DEG_PER_H")]
     pub target: Option<f64>,
     /// Restarts in a round
@@ -219,28 +219,41 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         fingerprint: request.fingerprint(),
         every: arguments.checkpoint_every,
     });
-    let mut proved = None;
-    let mut is_proved = |search: &dyn Rounds| -> Result<bool, CliError> {
-        if !bench.is_provable(class) {
-            return Ok(false);
-        }
-        let Some(best) = bench.best(class, &search.state().found, &baselines)? else { return Ok(false) };
-        let (best, is_optimal) = bench.improved(class, best, &search.state().found)?;
-        proved = is_optimal.then_some(best);
-        Ok(is_optimal)
+    let target = plan.rules.target;
+    let is_good_enough = |judged: &Judged| target.is_some_and(|target| judged.objective_rad_per_s <= target);
+    let mut concluded = None;
+    let mut conclusion = |search: &dyn Rounds| -> Result<Option<Stop>, CliError> {
+        let found = &search.state().found;
+        let Some(best) = bench.best(class, found, &baselines)?.filter(|_| bench.is_provable(class)) else {
+            return Ok(None);
+        };
+        let (best, is_optimal) = bench.improved(class, best, found, target)?;
+        let stop = if is_optimal { Some(Stop::Proved) } else { is_good_enough(&best).then_some(Stop::Target) };
+        concluded = stop.map(|_| best);
+        Ok(stop)
     };
-    let ended = anneal(search.as_mut(), &mut is_proved, budget, started, &stop, checkpoint, screen)?;
-    let seconds = started.elapsed().as_secs_f64();
+    let (ended, found_s) = anneal(search.as_mut(), &mut conclusion, budget, started, &stop, checkpoint, screen)?;
 
     let Some(best) = bench.best(class, &search.state().found, &baselines)? else {
         screen.note("interrupted before anything was found");
         return Ok(Ending::Interrupted);
     };
-    let is_unhurried = ended == Ended::Rule && search.state().stop != Some(Stop::Target);
-    let best = match proved {
-        Some(proved) => proved,
-        None if is_unhurried => bench.improved(class, best, &search.state().found)?.0,
+    // A target may have been reached at the samples and not between them.
+    let is_unhurried = ended == Ended::Rule && !is_good_enough(&best);
+    let annealed = best.pattern.clone();
+    let best = match concluded {
+        Some(concluded) => concluded,
+        None if is_unhurried => bench.improved(class, best, &search.state().found, target)?.0,
         None => best,
+    };
+    let seconds = started.elapsed().as_secs_f64();
+    let best_found = if best.pattern != annealed {
+        BestFoundJson { by: "bounds", evaluations: search.evaluations(), seconds: Some(seconds) }
+    } else if baselines.iter().any(|b| b.pattern == best.pattern) {
+        BestFoundJson { by: "classic", evaluations: 0, seconds: Some(0.0) }
+    } else {
+        let evaluations = search.state().first_with_best().map_or(0, |record| record.evaluations);
+        BestFoundJson { by: "annealing", evaluations, seconds: Some(found_s) }
     };
     let nothing_proved = (ProofJson::none(), false);
     let (best, (proof, proof_cut_short)) = match arguments.prove.filter(|_| ended != Ended::Signal) {
@@ -265,6 +278,8 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         proof,
         evaluations: search.evaluations(),
         evaluations_per_s: Some(judged_now / seconds),
+        seconds: Some(seconds),
+        best_found,
         rounds: search.state().round,
         stopped_by: ended.words(search.as_ref()).to_owned(),
         reproducible: ended == Ended::Rule && !proof_cut_short,
@@ -347,27 +362,35 @@ struct Checkpointing<'a> {
     every: Duration,
 }
 
-/// Advances a search to its end, writing checkpoints and showing progress. After its first round `is_proved` is asked
-/// whether what was found is the best there is.
+/// Advances a search to its end, writing checkpoints and showing progress. After its first round `conclusion` is asked
+/// whether what was found can be made good enough or the best there is. Also answers the seconds until the best was found.
 fn anneal(
     search: &mut dyn Rounds,
-    is_proved: &mut impl FnMut(&dyn Rounds) -> Result<bool, CliError>,
+    conclusion: &mut impl FnMut(&dyn Rounds) -> Result<Option<Stop>, CliError>,
     budget: Option<Duration>,
     started: Instant,
     stop: &StopFlag,
     checkpoint: Option<Checkpointing>,
     screen: &Screen,
-) -> Result<Ended, CliError> {
+) -> Result<(Ended, f64), CliError> {
     let total = search.plan().rules.moves;
     let progress = screen.progress("optimise", total);
     let mut last_checkpoint = Instant::now();
     let mut asked = false;
+    let (mut best_cost, mut found_s) = (f64::INFINITY, 0.0);
     let ended = loop {
-        if !search.advance() {
+        let goes_on = search.advance();
+        if let Some(best) = search.best().filter(|best| best.cost < best_cost) {
+            (best_cost, found_s) = (best.cost, started.elapsed().as_secs_f64());
+        }
+        if !goes_on {
             break Ended::Rule;
         }
-        if search.state().round == 1 && !std::mem::replace(&mut asked, true) && is_proved(search)? {
-            search.conclude();
+        if search.state().round == 1
+            && !std::mem::replace(&mut asked, true)
+            && let Some(stop) = conclusion(search)?
+        {
+            search.conclude(stop);
             break Ended::Rule;
         }
         if let Some(Checkpointing { folder, fingerprint, every }) = &checkpoint
@@ -391,7 +414,7 @@ fn anneal(
         write_checkpoint(folder, fingerprint, search.state())?;
     }
     search.gather();
-    Ok(ended)
+    Ok((ended, found_s))
 }
 
 fn write_folder(

@@ -48,11 +48,27 @@ pub struct OptimiseJson {
     /// On the screen only: files don't depend on the clock.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub evaluations_per_s: Option<f64>,
+    /// On the screen only: the whole search, without reading the model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seconds: Option<f64>,
+    pub best_found: BestFoundJson,
     pub rounds: u64,
-    /// "no improvement", "rounds", "moves", "target", "clock" or "interrupted".
+    /// "proved", "no improvement", "rounds", "moves", "target", "clock" or "interrupted".
     pub stopped_by: String,
     /// False where the clock or a signal ended the search: the same request may then end elsewhere.
     pub reproducible: bool,
+}
+
+/// When the best pattern was come upon.
+#[derive(Debug, Clone, Serialize)]
+pub struct BestFoundJson {
+    /// "classic", "annealing", or "bounds" where the search by bounds at the end found better.
+    pub by: &'static str,
+    /// Moves judged by then.
+    pub evaluations: u64,
+    /// On the screen only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seconds: Option<f64>,
 }
 
 /// A former pattern under the model of this search.
@@ -150,7 +166,8 @@ pub fn write_results(folder: &Path, answer: &OptimiseJson, best: &Judged, state:
     write_atomically(&folder.join("best.toml"), print_pattern(&named, &comments).as_bytes())?;
     write_atomically(&folder.join("baselines.csv"), &baselines_csv(&answer.baselines, &answer.best))?;
     write_atomically(&folder.join("history.csv"), &history_csv(&state.history))?;
-    let summary = OptimiseJson { evaluations_per_s: None, ..answer.clone() };
+    let best_found = BestFoundJson { seconds: None, ..answer.best_found.clone() };
+    let summary = OptimiseJson { evaluations_per_s: None, seconds: None, best_found, ..answer.clone() };
     let json = serde_json::to_string_pretty(&Document::new(summary)).expect("the answer's numbers are finite");
     write_atomically(&folder.join("summary.json"), (json + "\n").as_bytes())
 }

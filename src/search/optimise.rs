@@ -114,12 +114,12 @@ pub struct State {
 }
 
 impl State {
-    /// Ends the search: what is best has been proved elsewhere.
-    pub fn conclude(&mut self) {
+    /// Ends the search for a reason from outside: what is best was proved, or what is good enough was found, elsewhere.
+    pub fn conclude(&mut self, stop: Stop) {
         for restart in std::mem::take(&mut self.restarts) {
             self.work += restart.work;
         }
-        self.stop = Some(Stop::Proved);
+        self.stop = Some(stop);
     }
 
     /// Before the first round.
@@ -134,6 +134,12 @@ impl State {
             history: Vec::new(),
             stop: None,
         }
+    }
+
+    /// The first round after which the best was known; none if it was given.
+    pub fn first_with_best(&self) -> Option<&RoundRecord> {
+        let best_cost = self.found.first()?.cost;
+        self.history.iter().find(|record| record.best_cost <= best_cost)
     }
 
     /// Puts a pattern in its place among the best.
@@ -248,15 +254,23 @@ impl Optimisation {
         self.state.restarts.par_iter_mut().filter(|r| !r.is_done(cooling)).for_each(|restart| {
             restart.advance(space, norm, cooling);
         });
-        if self.state.restarts.iter().all(|r| r.is_done(&self.cooling)) {
+        if self.state.restarts.iter().all(|r| r.is_done(&self.cooling)) || self.has_reached_target() {
             self.end_round();
         }
         self.state.stop.is_none()
     }
 
-    /// Ends the search: what is best has been proved elsewhere.
-    pub fn conclude(&mut self) {
-        self.state.conclude();
+    /// Whether a restart has come upon something that is good enough on all samples: its round then ends early.
+    fn has_reached_target(&self) -> bool {
+        self.plan.rules.target.is_some_and(|target| {
+            let promising = self.state.restarts.iter().filter(|r| r.best_cost <= target);
+            promising.map(|r| self.plan.norm.of(&values_of(&self.full, &r.best_segments))).any(|cost| cost <= target)
+        })
+    }
+
+    /// Ends the search for a reason from outside.
+    pub fn conclude(&mut self, stop: Stop) {
+        self.state.conclude(stop);
     }
 
     /// Judges what the restarts of an unfinished round have found so far. For the last answer of a search that is
@@ -434,6 +448,28 @@ mod tests {
         assert_eq!(search.state().stop, Some(Stop::Rounds));
         let samples_a_move = search.state().work.samples as f64 / search.evaluations() as f64;
         assert!(samples_a_move < 200.0, "{samples_a_move}");
+    }
+
+    #[test]
+    fn a_round_ends_with_the_slice_in_which_a_restart_reaches_the_target() {
+        let model = model(8, LayerLength::Equal, &[]);
+        let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
+        let (matrix, _) = SampleMatrix::of_profiles(&model, &solved).unwrap();
+        let search = |target: Option<f64>| {
+            let mut plan = plan(Norm::Largest, 1);
+            plan.moves_per_restart = 4 * crate::search::anneal::SLICE_MOVES;
+            plan.rules = Rules { rounds: 1, patience: 9, moves: None, target };
+            let mut search = Optimisation::new(matrix.clone(), WindabilityClass::Any, plan);
+            while search.advance() {}
+            search
+        };
+        let best_cost = search(None).best().unwrap().cost;
+        let reached = search(Some(3.0 * best_cost));
+        assert_eq!(reached.state().stop, Some(Stop::Target));
+        assert_eq!(reached.evaluations(), 4 * crate::search::anneal::SLICE_MOVES);
+        assert!(reached.best().unwrap().cost <= 3.0 * best_cost);
+        assert_eq!(reached.state().first_with_best().unwrap().evaluations, reached.evaluations());
+        assert_eq!(search(Some(0.5 * best_cost)).state().stop, Some(Stop::Rounds));
     }
 
     #[test]

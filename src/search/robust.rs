@@ -21,7 +21,7 @@ use super::columns::Work;
 use super::guaranteed::UnitStep;
 use super::limits::{Limits, draw, neighbour};
 use super::objective::Objective;
-use super::optimise::{Found, Optimisation, Plan, Rules, State};
+use super::optimise::{Found, Optimisation, Plan, Rules, State, Stop};
 use super::tolerance::Measure;
 use super::verdict::{Bench, JudgeError};
 use super::walk::uniform;
@@ -37,8 +37,8 @@ pub trait Rounds {
     /// Judges what the restarts of an unfinished round have found so far; save the state before.
     fn gather(&mut self);
 
-    /// Ends the search, because what is best has been proved.
-    fn conclude(&mut self);
+    /// Ends the search for a reason from outside.
+    fn conclude(&mut self, stop: Stop);
 
     fn state(&self) -> &State;
 
@@ -64,8 +64,8 @@ impl Rounds for Optimisation {
         Optimisation::gather(self);
     }
 
-    fn conclude(&mut self) {
-        Optimisation::conclude(self);
+    fn conclude(&mut self, stop: Stop) {
+        Optimisation::conclude(self, stop);
     }
 
     fn state(&self) -> &State {
@@ -250,7 +250,9 @@ impl Rounds for RobustSearch {
         let (builds, limits, cooling) = (&self.builds, self.limits, &self.cooling);
         let unfinished = self.state.restarts.par_iter_mut().filter(|r| !r.is_done(cooling));
         unfinished.for_each(|restart| advance(restart, builds, limits, cooling));
-        if self.state.restarts.iter().all(|r| r.is_done(&self.cooling)) {
+        let is_good_enough = |r: &Restart| self.plan.rules.target.is_some_and(|target| r.best_cost <= target);
+        let restarts = &self.state.restarts;
+        if restarts.iter().all(|r| r.is_done(&self.cooling)) || restarts.iter().any(is_good_enough) {
             let before = self.best().map_or(f64::INFINITY, |f| f.cost);
             for restart in std::mem::take(&mut self.state.restarts) {
                 self.state.work += restart.work;
@@ -264,8 +266,8 @@ impl Rounds for RobustSearch {
         self.state.stop.is_none()
     }
 
-    fn conclude(&mut self) {
-        self.state.conclude();
+    fn conclude(&mut self, stop: Stop) {
+        self.state.conclude(stop);
     }
 
     fn gather(&mut self) {

@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use super::exact::orders::MOST_LAYERS;
-use super::exact::{Improvement, Task, improve};
+use super::exact::{Effort, Improvement, Task, improve};
 use super::guaranteed::{GuaranteedError, UnitStep};
 use super::objective::Objective;
 use super::optimise::Found;
@@ -69,6 +69,9 @@ const PROVING_NODES: u64 = 1 << 24;
 
 /// What is spent on a better pattern where no proof can be expected.
 const IMPROVING_NODES: u64 = 1 << 18;
+
+/// Nodes of a level that the last look for something better keeps: a second or a few.
+const BEAM_WIDTH: usize = 1 << 14;
 
 /// Patterns that the improvement begins with, besides the best.
 const MOST_STARTS: usize = 6;
@@ -173,6 +176,7 @@ impl Bench<'_> {
         class: WindabilityClass,
         best: Judged,
         found: &[Found],
+        good_enough_rad_per_s: Option<f64>,
     ) -> Result<(Judged, bool), JudgeError> {
         if !self.can_improve(class) {
             return Ok((best, false));
@@ -182,7 +186,10 @@ impl Bench<'_> {
         let starts: Vec<Pattern> = std::iter::once(best.pattern.clone()).chain(others).collect();
         let most_nodes = if self.is_provable(class) { PROVING_NODES } else { IMPROVING_NODES };
         let task = Task { model: self.model, solved: self.solved, class };
-        let Improvement { pattern, is_optimal } = improve(&task, &starts, most_nodes)?;
+        let beam_width = if self.model.coil.layers() > PROVABLE_LAYERS { BEAM_WIDTH } else { 0 };
+        let good_enough_rad_per_s = good_enough_rad_per_s.unwrap_or(0.0);
+        let effort = Effort { most_nodes, beam_width, good_enough_rad_per_s };
+        let Improvement { pattern, is_optimal } = improve(&task, &starts, effort)?;
         if pattern == best.pattern {
             return Ok((best, is_optimal));
         }

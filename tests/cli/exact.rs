@@ -51,6 +51,23 @@ fn optimise_ends_as_soon_as_the_best_permutation_is_proved() {
 }
 
 #[test]
+fn a_search_ends_at_its_target_before_it_proves_that_nothing_is_better_and_says_when_it_found_it() {
+    let search = |target: f64| {
+        let target = target.to_string();
+        json(&["optimise", MODEL, "--windability", "any", "--seed", "5", "--target", &target])
+    };
+    let body = search(LEAST_DEG_PER_H * (1.0 + 1e-8));
+    assert_eq!(body["stopped_by"], "target");
+    assert_eq!(body["best_found"]["by"], "bounds");
+    assert_eq!(body["best_found"]["evaluations"], body["evaluations"]);
+    assert!(body["best_found"]["seconds"].as_f64().expect("seconds") <= body["seconds"].as_f64().expect("seconds"));
+    let worst = body["best"]["worst_rate_deg_per_h"].as_f64().expect("a rate");
+    assert!((worst / LEAST_DEG_PER_H - 1.0).abs() < 1e-8, "{worst}");
+
+    assert_eq!(search(0.9 * LEAST_DEG_PER_H)["stopped_by"], "proved");
+}
+
+#[test]
 fn a_proof_without_time_claims_no_more_than_a_lower_bound_and_keeps_the_best_known() {
     let body = json(&["exact", MODEL, "--windability", "any", "--budget", "1ms"]);
     let status = body["proof"]["status"].as_str().expect("a status");

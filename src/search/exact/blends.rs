@@ -255,6 +255,7 @@ fn add(sum: &mut [f64], factors: &[f64], by: f64) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::beam::promising;
     use super::*;
     use crate::pattern::windability::WindabilityClass;
 
@@ -317,6 +318,15 @@ mod tests {
         let (nodes, leaves) = open(best * (1.0 + 1e-4));
         assert_eq!(leaves, 1, "{nodes}");
         assert!(nodes < 100, "{nodes}");
+        // A beam of 48 of the 6! / 2 patterns leads to the best one.
+        let mut orders = Orders::new(&lengths_m, WindabilityClass::Any, false, None);
+        let limit = 1.05 * best;
+        blender.teach(&mut orders, limit, true);
+        let found = promising(&orders, limit, true, 48);
+        let weight = |p: usize| 2.0 * p as f64 - 1.0 - LAYERS as f64;
+        let value = |row: &Row| (0..LAYERS).map(|j| row.mean[j] * weight(found[0][j])).sum::<f64>().abs();
+        let worst = rows.iter().map(value).fold(0.0, f64::max);
+        assert!(found.len() <= 48 && (worst / best - 1.0).abs() < 1e-6, "{worst} {best}");
         assert_eq!(open(0.9 * best).1, 0);
     }
 }

@@ -70,7 +70,8 @@ pub fn search(orders: &Orders, judge: &Judge, limit_rad_per_s: f64, mirrored: bo
             })
             .collect();
         found.into_iter().for_each(|o| outcome.absorb(o));
-        if outcome.overflowed || watch.is_stopped() || outcome.nodes > watch.most_nodes {
+        let is_enough = outcome.best.as_ref().is_some_and(|best| best.rate_rad_per_s <= watch.good_enough_rad_per_s);
+        if outcome.overflowed || is_enough || watch.is_stopped() || outcome.nodes > watch.most_nodes {
             outcome.complete &= done.load(Ordering::Relaxed) == shares.len();
             break;
         }

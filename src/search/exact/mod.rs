@@ -24,6 +24,7 @@
 //!
 //! Holds for the worst rate (and so the worst phase, a fixed multiple of it). Leaves out the rms objective.
 
+pub mod beam;
 pub mod blends;
 pub mod descent;
 pub mod ends;
@@ -135,11 +136,11 @@ struct Pass {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 struct Passes {
     index: usize,
-    effort: Effort,
+    spend: Spend,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-enum Effort {
+enum Spend {
     #[default]
     Cheap,
     Dear,
@@ -149,20 +150,20 @@ enum Effort {
 impl Passes {
     fn next(&self) -> Pass {
         let last = LIMITS[LIMITS.len() - 1];
-        match self.effort {
-            Effort::Cheap if self.index + 1 < LIMITS.len() => {
+        match self.spend {
+            Spend::Cheap if self.index + 1 < LIMITS.len() => {
                 Pass { over_best: LIMITS[self.index], most_nodes: CHEAP_NODES }
             }
-            Effort::Cheap | Effort::Dear => Pass { over_best: last, most_nodes: DEAR_NODES },
-            Effort::Unlimited => Pass { over_best: LIMITS[self.index], most_nodes: u64::MAX },
+            Spend::Cheap | Spend::Dear => Pass { over_best: last, most_nodes: DEAR_NODES },
+            Spend::Unlimited => Pass { over_best: LIMITS[self.index], most_nodes: u64::MAX },
         }
     }
 
     fn advance(&mut self, complete: bool) {
         let tried_last = self.next().over_best == 1.0;
-        match self.effort {
-            Effort::Cheap | Effort::Dear if tried_last => self.effort = Effort::Unlimited,
-            Effort::Cheap if !complete => self.effort = Effort::Dear,
+        match self.spend {
+            Spend::Cheap | Spend::Dear if tried_last => self.spend = Spend::Unlimited,
+            Spend::Cheap if !complete => self.spend = Spend::Dear,
             _ => self.index = (self.index + 1).min(LIMITS.len() - 1),
         }
     }
@@ -177,7 +178,7 @@ pub const RELATIVE_TOLERANCE: f64 = 1e-9;
 /// A model that cannot be solved, a start that does not fit it; more than [`orders::MOST_LAYERS`] layers, or none
 /// of the class among the starts.
 pub fn prove(task: &Task, starts: &[Pattern], watcher: Watcher) -> Result<Certificate, SearchError> {
-    let Begun { mut judge, mut best, mut proof } = begin(task, starts)?;
+    let Begun { mut judge, mut best, mut proof } = begin(task, starts, 0.0)?;
     let mut lower_bound_rad_per_s = 0.0;
     let mut closed = best.rate_rad_per_s == 0.0;
     let (mut nodes, mut judged) = (0, 0);
@@ -187,7 +188,7 @@ pub fn prove(task: &Task, starts: &[Pattern], watcher: Watcher) -> Result<Certif
         let Pass { over_best, most_nodes } = passes.next();
         let at =
             Progress { best_rad_per_s: best.rate_rad_per_s, lower_bound_rad_per_s, pass: over_best, share_done: 0.0 };
-        let mut watch = Watch { stop: &stop, watcher, at, most_nodes, may_overflow: true };
+        let mut watch = Watch { stop: &stop, watcher, at, most_nodes, good_enough_rad_per_s: 0.0, may_overflow: true };
         let limit = best.rate_rad_per_s * over_best * (1.0 - RELATIVE_TOLERANCE);
         let outcome = proof.pass(&mut judge, limit, best.rate_rad_per_s, &mut watch);
         nodes += outcome.nodes;
@@ -197,7 +198,7 @@ pub fn prove(task: &Task, starts: &[Pattern], watcher: Watcher) -> Result<Certif
             // Everything below the limit was judged: the best of it is the best of all.
             closed = outcome.complete;
             if !closed {
-                proof.renew(&mut judge, &mut best);
+                proof.renew(&mut judge, &mut best, 0.0);
             }
         } else if outcome.complete {
             lower_bound_rad_per_s = limit;
@@ -234,7 +235,7 @@ struct Begun<'a> {
     proof: Proof,
 }
 
-fn begin<'a>(task: &Task<'a>, starts: &[Pattern]) -> Result<Begun<'a>, SearchError> {
+fn begin<'a>(task: &Task<'a>, starts: &[Pattern], good_enough_rad_per_s: f64) -> Result<Begun<'a>, SearchError> {
     let layers = task.model.coil.layers();
     if layers > orders::MOST_LAYERS {
         return Err(SearchError::TooManyLayers { found: layers, most: orders::MOST_LAYERS });
@@ -253,7 +254,7 @@ fn begin<'a>(task: &Task<'a>, starts: &[Pattern]) -> Result<Begun<'a>, SearchErr
     }
     let mut best = best.ok_or(SearchError::NoStart { class: task.class })?;
     judge.add_peaks(&peaks);
-    let proof = Proof::new(task.class, &mut judge, starts, &mut best);
+    let proof = Proof::new(task.class, &mut judge, starts, &mut best, good_enough_rad_per_s);
     Ok(Begun { judge, best, proof })
 }
 
@@ -266,23 +267,48 @@ pub struct Improvement {
     pub is_optimal: bool,
 }
 
+/// How much a short search by bounds may do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Effort {
+    pub most_nodes: u64,
+    /// Nodes of a level that a last look ahead keeps ([`beam`]); zero for none.
+    pub beam_width: usize,
+    /// A worst rate at which it ends, proved or not; zero for none.
+    pub good_enough_rad_per_s: f64,
+}
+
 /// The best pattern that a short search by bounds comes upon: what an annealer needs to end on the very best of many
 /// patterns that are nearly alike. Its effort is counted in nodes, so that the same starts give the same pattern.
 ///
 /// # Errors
 /// As [`prove`].
-pub fn improve(task: &Task, starts: &[Pattern], most_nodes: u64) -> Result<Improvement, SearchError> {
-    let Begun { mut judge, best, mut proof } = begin(task, starts)?;
-    let rate_rad_per_s = best.rate_rad_per_s;
+pub fn improve(task: &Task, starts: &[Pattern], effort: Effort) -> Result<Improvement, SearchError> {
+    let Effort { most_nodes, beam_width, good_enough_rad_per_s } = effort;
+    let Begun { mut judge, mut best, mut proof } = begin(task, starts, good_enough_rad_per_s)?;
     let stop = AtomicBool::new(false);
-    let at = Progress { best_rad_per_s: rate_rad_per_s, lower_bound_rad_per_s: 0.0, pass: 1.0, share_done: 0.0 };
     let go_on = |_: Progress| ControlFlow::Continue(());
-    let mut watch = Watch { stop: &stop, watcher: &go_on, at, most_nodes, may_overflow: true };
-    let limit = rate_rad_per_s * (1.0 - RELATIVE_TOLERANCE);
-    let outcome = proof.pass(&mut judge, limit, rate_rad_per_s, &mut watch);
-    let best = outcome.best.map_or(best.clone(), |candidate| best.better(candidate));
+    let (mut nodes, mut is_optimal) = (0, false);
+    while !is_optimal && nodes < most_nodes && best.rate_rad_per_s > good_enough_rad_per_s {
+        let rate_rad_per_s = best.rate_rad_per_s;
+        let at = Progress { best_rad_per_s: rate_rad_per_s, lower_bound_rad_per_s: 0.0, pass: 1.0, share_done: 0.0 };
+        let most_nodes = most_nodes - nodes;
+        let mut watch =
+            Watch { stop: &stop, watcher: &go_on, at, most_nodes, good_enough_rad_per_s, may_overflow: true };
+        let limit = rate_rad_per_s * (1.0 - RELATIVE_TOLERANCE);
+        let outcome = proof.pass(&mut judge, limit, rate_rad_per_s, &mut watch);
+        nodes += outcome.nodes;
+        is_optimal = outcome.complete;
+        let Some(candidate) = outcome.best else { break };
+        best = best.better(candidate);
+        if !is_optimal {
+            proof.renew(&mut judge, &mut best, good_enough_rad_per_s);
+        }
+    }
+    if !is_optimal && beam_width > 0 {
+        proof.look_ahead(&mut judge, &mut best, beam_width, good_enough_rad_per_s);
+    }
     let pattern = Pattern::new(best.segments).expect("a search makes permutations only");
-    Ok(Improvement { pattern, is_optimal: outcome.complete })
+    Ok(Improvement { pattern, is_optimal })
 }
 
 /// What a pass, or a piece of one, found.
@@ -338,6 +364,8 @@ pub struct Watch<'a> {
     at: Progress,
     /// The pass ends incomplete beyond so many.
     pub most_nodes: u64,
+    /// The pass ends with a rate that is good enough; zero for none.
+    pub good_enough_rad_per_s: f64,
     /// A piece of work gives up where too much is left to be judged in full, so that samples can be added.
     pub may_overflow: bool,
 }

@@ -283,6 +283,13 @@ impl Orders {
         blocks.iter().all(|block| self.excess(block, places, limit).iter().all(|e| !(*e >= 0.0)))
     }
 
+    /// By how much the largest bound below the node exceeds the limit; minus infinity where there is no bound.
+    pub fn largest_excess(&self, node: &Node, limit: f32, places: &mut Places) -> f32 {
+        self.set_places(node, places);
+        let blocks = self.levels[node.open_count()].blocks().iter();
+        blocks.flat_map(|block| self.excess(block, places, limit)).fold(f32::NEG_INFINITY, f32::max)
+    }
+
     /// The first bound of the level that refutes a node whose places are set.
     pub fn refuting_bound(&self, node: &Node, limit: f32, places: &Places) -> Option<usize> {
         self.levels[node.open_count()].blocks().iter().enumerate().find_map(|(b, block)| {

@@ -4,13 +4,14 @@
 //! joins them, and blends of them are learnt ([`blends`](super::blends)). Where a pass leaves too much to be judged in
 //! full, the samples that refuted it join and the pass is repeated.
 
+use super::beam::promising;
 use super::blends::{Blender, Lesson};
 use super::descent::search;
 use super::ends::Ends;
 use super::judge::{Candidate, Judge};
 use super::orders::Orders;
 use super::rows::Row;
-use super::{Outcome, Watch};
+use super::{Outcome, RELATIVE_TOLERANCE, Watch};
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::search::signs::{segments_of_signs, signs_of_segments};
@@ -29,6 +30,9 @@ const NEIGHBOURS: usize = 512;
 
 /// Lessons that learn from the last one's open patterns.
 const LESSONS: usize = 24;
+
+/// Nodes of a level that the look ahead of every proof keeps.
+const NARROW: usize = 1 << 8;
 
 #[derive(Debug)]
 enum Engine {
@@ -49,7 +53,14 @@ pub struct Proof {
 }
 
 impl Proof {
-    pub fn new(class: WindabilityClass, judge: &mut Judge, starts: &[Pattern], best: &mut Candidate) -> Self {
+    /// Learning ends with a rate that is good enough; zero for none.
+    pub fn new(
+        class: WindabilityClass,
+        judge: &mut Judge,
+        starts: &[Pattern],
+        best: &mut Candidate,
+        good_enough_rad_per_s: f64,
+    ) -> Self {
         let mirrored = judge.is_mirror_symmetric();
         let near = neighbours(class, starts);
         let samples = if class == WindabilityClass::Standard {
@@ -65,12 +76,38 @@ impl Proof {
         judge.try_first(&samples);
         let (engine, lesson) = engine(class, judge, &samples, mirrored, best.rate_rad_per_s);
         let mut proof = Self { class, mirrored, samples, used: lesson.used, engine };
-        proof.follow(judge, best, lesson.open);
+        proof.follow(judge, best, lesson.open, good_enough_rad_per_s);
+        proof.look_ahead(judge, best, NARROW, good_enough_rad_per_s);
         proof
     }
 
+    /// Looks for a better pattern where the bounds promise one, for as long as that comes of it; `width` nodes of a level
+    /// are kept.
+    pub fn look_ahead(&mut self, judge: &mut Judge, best: &mut Candidate, width: usize, good_enough_rad_per_s: f64) {
+        while best.rate_rad_per_s > good_enough_rad_per_s {
+            let Engine::Orders(directions) = &self.engine else { break };
+            let limit_rad_per_s = best.rate_rad_per_s * (1.0 - RELATIVE_TOLERANCE);
+            let mut outcome = Outcome::default();
+            for orders in directions {
+                let found = promising(orders, limit_rad_per_s, self.mirrored, width);
+                found.iter().for_each(|segments| outcome.consider(judge, segments, limit_rad_per_s));
+            }
+            let Some(candidate) = outcome.best.take() else { break };
+            *best = candidate;
+            self.join(judge, &outcome);
+            let open = self.make_engine(judge, best.rate_rad_per_s);
+            self.follow(judge, best, open, good_enough_rad_per_s);
+        }
+    }
+
     /// Learns from patterns that were left open, until nothing comes of it: better ones, and samples that refute them.
-    fn follow(&mut self, judge: &mut Judge, best: &mut Candidate, mut open: Vec<Vec<usize>>) {
+    fn follow(
+        &mut self,
+        judge: &mut Judge,
+        best: &mut Candidate,
+        mut open: Vec<Vec<usize>>,
+        good_enough_rad_per_s: f64,
+    ) {
         for _ in 0..LESSONS {
             let mut outcome = Outcome::default();
             // The most promising first, so that few are judged by the reference.
@@ -82,6 +119,9 @@ impl Proof {
             if let Some(candidate) = outcome.best.take() {
                 *best = candidate;
             }
+            if best.rate_rad_per_s <= good_enough_rad_per_s {
+                break;
+            }
             let has_joined = self.join(judge, &outcome);
             if !is_better && !has_joined {
                 break;
@@ -91,9 +131,9 @@ impl Proof {
     }
 
     /// Makes use of a better rate than the engine was made for.
-    pub fn renew(&mut self, judge: &mut Judge, best: &mut Candidate) {
+    pub fn renew(&mut self, judge: &mut Judge, best: &mut Candidate, good_enough_rad_per_s: f64) {
         let open = self.make_engine(judge, best.rate_rad_per_s);
-        self.follow(judge, best, open);
+        self.follow(judge, best, open, good_enough_rad_per_s);
     }
 
     /// Answers the patterns left open.
