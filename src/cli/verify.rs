@@ -14,7 +14,7 @@ use crate::verify::{RateCheck, Truth, verify};
 /// Checks an emitted file against the coil with code of its own: all violations at once
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example:\n  coilwright verify examples/paper-200m.toml results/paper-200m/schedule.csv\n\nExit code 1 if anything is violated."
+    after_help = "Example:\n  coilwright verify examples/paper-200m.toml results/paper-200m/schedule.csv\n\nThe answer ends with what was worked out again and what was taken as given. Exit code 1 if anything is violated."
 )]
 pub struct Arguments {
     /// The model file
@@ -34,20 +34,27 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     };
     let found = verify(&truth, &claim);
     let clean = found.violations.is_empty();
+    let deg_per_h = deg_per_h_from_rad_per_s;
+    let (rate_check, worst, tolerance, finer, profiles) = match found.rate_check {
+        RateCheck::None => ("not claimed or not possible", None, None, None, 0),
+        RateCheck::Independent { worst_rad_per_s, tolerance_rad_per_s, finer_rad_per_s, profiles } => (
+            "independent solution",
+            Some(deg_per_h(worst_rad_per_s)),
+            Some(deg_per_h(tolerance_rad_per_s)),
+            finer_rad_per_s.map(deg_per_h),
+            profiles,
+        ),
+    };
     let body = VerifyJson {
         model: arguments.model.display().to_string(),
         schedule: arguments.schedule.display().to_string(),
         checks: found.checks,
-        rate_check: match found.rate_check {
-            RateCheck::None => "not claimed or not possible",
-            RateCheck::Independent { .. } => "independent solution",
-            RateCheck::ReferenceOnly => "at the stated profile and time only",
-        }
-        .to_owned(),
-        independent_worst_rate_deg_per_h: match found.rate_check {
-            RateCheck::Independent { worst_rad_per_s } => Some(deg_per_h_from_rad_per_s(worst_rad_per_s)),
-            _ => None,
-        },
+        rate_check: rate_check.to_owned(),
+        independent_worst_rate_deg_per_h: worst,
+        rate_tolerance_deg_per_h: tolerance,
+        finer_worst_rate_deg_per_h: finer,
+        recomputed: found.recomputed,
+        taken_as_given: found.taken_as_given,
         violations: found
             .violations
             .iter()
@@ -73,6 +80,16 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
             n => format!("{n} violations"),
         };
         text.push_str(&format!("{}: {count} in {} checks{rate}\n", body.schedule, body.checks));
+        let listed = |items: &[&str]| items.iter().map(|item| format!("  {item}\n")).collect::<String>();
+        text.push_str(&format!("worked out again:\n{}", listed(&body.recomputed)));
+        if let Some(tolerance) = body.rate_tolerance_deg_per_h {
+            let of_profiles = if profiles == 1 { "1 profile".to_owned() } else { format!("{profiles} profiles") };
+            let finer = body.finer_worst_rate_deg_per_h.map_or(String::new(), |finer| {
+                format!("; a finer heat network gives {finer:.4} °/h for the same winding")
+            });
+            text.push_str(&format!("  (over {of_profiles}, compared to ±{tolerance:.1e} °/h{finer})\n"));
+        }
+        text.push_str(&format!("taken as given:\n{}", listed(&body.taken_as_given)));
         text
     })?;
     Ok(if clean { Ending::Done } else { Ending::No })

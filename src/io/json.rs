@@ -176,7 +176,13 @@ pub struct VerifyJson {
     pub schedule: String,
     pub checks: usize,
     pub rate_check: String,
+    /// The worst over all profiles and times, worked out again, and how closely the claim must agree with it.
     pub independent_worst_rate_deg_per_h: Option<f64>,
+    pub rate_tolerance_deg_per_h: Option<f64>,
+    /// The same on a finer heat network; null in a half space, which has a closed form.
+    pub finer_worst_rate_deg_per_h: Option<f64>,
+    pub recomputed: Vec<&'static str>,
+    pub taken_as_given: Vec<&'static str>,
     pub violations: Vec<ViolationJson>,
 }
 

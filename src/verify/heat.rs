@@ -6,20 +6,23 @@
 //! bore:        adiabatic, or heated by q, or in contact with a spool;   boundary: T given, or behind a film
 //! ```
 //!
-//! The pack is solved on a grid of its own ([`super::grid`]). What is linear in the drive is solved once, for a unit ramp, and superposed; a pack whose conductivity depends on
-//! temperature is stepped through every profile.
+//! What is linear in the drive is superposed from the response to a unit ramp, in closed form or by inverting its
+//! Laplace transform ([`super::laplace`]), at any time and without a step. A pack whose conductivity depends on
+//! temperature is stepped through every profile ([`super::stepping`]).
 
-use super::grid::{Drive, Grid};
+use super::laplace::Response;
+use super::network::{Cut, Network};
 use super::physics::{BoreHeat, Physics};
+use super::stepping::Drive;
 use crate::profile::Profile;
 use crate::rate::CoilModel;
 
-/// Times of the response to a unit ramp, spaced geometrically.
-const RESPONSE_TIMES: usize = 700;
-/// Times a piece of a profile, where each profile is stepped.
-const PIECE_TIMES: usize = 240;
-/// Even times a piece at which a superposition is looked at, besides every second one of the response.
-const EVEN_TIMES: usize = 100;
+/// Times a piece of a profile, where each profile is stepped, and so many times more for one stated moment …
+const STEPS: usize = 240;
+const CLOSER: usize = 5;
+/// … and where it is superposed: closer to its start, and evenly.
+const SPACED_TIMES: usize = 90;
+const EVEN_TIMES: usize = 40;
 
 /// The pack at one time, relative to where the profile starts.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -33,164 +36,219 @@ pub(super) struct State {
     pub ambient_rate_k_per_s: f64,
 }
 
+/// A time, and whether a change of ramp at that very time has happened yet.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Moment {
+    pub time_s: f64,
+    pub after: bool,
+}
+
 fn heat_at(heat: Option<BoreHeat>, time_s: f64) -> f64 {
     heat.map_or(0.0, |h| h.power_w_per_m2 * -(-time_s.max(0.0) / h.time_constant_s).exp_m1())
 }
 
+/// What solves the pack.
+#[derive(Debug)]
+enum Solution {
+    HalfSpace { depths_m: Vec<f64>, diffusivity_m2_per_s: f64 },
+    Linear(Response),
+    Stepped { network: Network, heat: Option<BoreHeat> },
+}
+
 /// The pack's temperatures under any of a model's profiles.
 #[derive(Debug)]
-pub(super) enum Heat {
-    /// After a unit ramp began, and of the bore's heat alone.
-    Linear {
-        ramp: Vec<State>,
-        heated: Option<Vec<State>>,
-    },
-    Stepped {
-        grid: Box<Grid>,
-        heat: Option<BoreHeat>,
-        first_s: f64,
-    },
+pub(super) struct Heat {
+    layers: usize,
+    has_heat: bool,
+    /// Whether anything depends on more than the rates; temperatures stay zero otherwise.
+    wants_rise: bool,
+    solution: Solution,
+    /// A layer's own time.
+    first_s: f64,
 }
 
 impl Heat {
-    /// Whether the temperatures can be worked out here: not those of a pack with a heated flange whose conductivity
-    /// depends on temperature, where the factorised steps would have to be too many.
-    pub fn knows(physics: &Physics) -> bool {
-        physics.flange.is_none() || physics.conductivity_slope_per_k == 0.0
-    }
-
-    pub fn new(model: &CoilModel, physics: &Physics, height_m: f64, longest_s: f64) -> Self {
+    /// `cuts`: one, or two of which the second is twice as fine, to be extrapolated where the pack is linear.
+    pub fn new(model: &CoilModel, physics: &Physics, height_m: f64, longest_s: f64, cuts: &[Cut]) -> Self {
         let coil = &model.coil;
         let (layers, pitch_m) = (coil.layers(), coil.radial_pitch_m());
-        let diffusivity = physics.diffusivity_m2_per_s();
-        let first_s = 0.02 * pitch_m * pitch_m / (4.0 * diffusivity);
-        let times_s = geometric(first_s, longest_s, RESPONSE_TIMES);
-        let unit = |t: f64| Drive { rise_k: t, rate_k_per_s: 1.0, heat_w_per_m2: 0.0 };
-        if !physics.is_pack {
-            let depths_m: Vec<f64> = (0..layers).map(|j| (layers - 1 - j) as f64 * pitch_m).collect();
-            let ramp = times_s.iter().map(|&t| half_space(&depths_m, diffusivity, t)).collect();
-            return Heat::Linear { ramp, heated: None };
-        }
-        let grid = Grid::new(model, physics, height_m);
-        if physics.conductivity_slope_per_k != 0.0 {
-            return Heat::Stepped { grid: Box::new(grid), heat: physics.bore_heat, first_s };
-        }
-        let heated = physics
-            .bore_heat
-            .map(|heat| grid.march(&times_s, &|t| Drive { heat_w_per_m2: heat_at(Some(heat), t), ..Drive::default() }));
-        Heat::Linear { ramp: grid.march(&times_s, &unit), heated }
+        let diffusivity_m2_per_s = physics.diffusivity_m2_per_s();
+        let heat = physics.bore_heat;
+        let solution = if !physics.is_pack {
+            let depths_m = (0..layers).map(|j| (layers - 1 - j) as f64 * pitch_m).collect();
+            Solution::HalfSpace { depths_m, diffusivity_m2_per_s }
+        } else if physics.conductivity_slope_per_k != 0.0 {
+            let finest = cuts[cuts.len() - 1];
+            Solution::Stepped { network: Network::new(model, physics, height_m, finest), heat }
+        } else {
+            let mut responses =
+                cuts.iter().map(|cut| Response::new(&Network::new(model, physics, height_m, *cut), heat, longest_s));
+            let first = responses.next().expect("at least one cut");
+            Solution::Linear(match responses.next() {
+                None => first,
+                Some(finer) => Response::extrapolated(finer, &first),
+            })
+        };
+        let first_s = 0.02 * pitch_m * pitch_m / (4.0 * diffusivity_m2_per_s);
+        Self { layers, has_heat: heat.is_some(), wants_rise: physics.depends_on_temperature(), solution, first_s }
     }
 
-    /// The states that a profile leads through, both one-sided limits at its break points included.
-    pub fn states(&self, profile: &Profile) -> Vec<State> {
-        match self {
-            Heat::Linear { ramp, heated } => superposed(profile, ramp, heated.as_deref()),
-            Heat::Stepped { grid, heat, first_s } => stepped(profile, grid, *heat, *first_s),
+    /// Whether any time can be asked for, free of steps.
+    pub fn is_exact_in_time(&self) -> bool {
+        !matches!(self.solution, Solution::Stepped { .. })
+    }
+
+    /// The state at a moment of a profile, where [`Heat::is_exact_in_time`]; by steps otherwise.
+    pub fn at(&self, profile: &Profile, moment: Moment) -> State {
+        if let Solution::Stepped { network, heat } = &self.solution {
+            return self.stepped(profile, network, *heat, Some(moment)).pop().unwrap_or_default();
         }
+        let solved = if self.wants_rise { self.layers } else { 0 };
+        let mut state = State {
+            time_s: moment.time_s,
+            rise_k: vec![0.0; solved],
+            rate_k_per_s: vec![0.0; self.layers],
+            ..State::default()
+        };
+        let (mut start_s, mut rate) = (0.0, 0.0);
+        let ends = profile.pieces().iter().map(|piece| (piece.rate_k_per_s, piece.duration_s));
+        for (next_rate, duration_s) in ends.chain([(0.0, 0.0)]) {
+            let lasted_s = moment.time_s - start_s;
+            if lasted_s < 0.0 || (lasted_s == 0.0 && !moment.after) {
+                break;
+            }
+            self.add(&mut state, next_rate - rate, lasted_s);
+            (start_s, rate) = (start_s + duration_s, next_rate);
+        }
+        if let (Solution::Linear(response), true) = (&self.solution, self.has_heat) {
+            let State { rise_k, rate_k_per_s, moment_k_per_s, .. } = &mut state;
+            response.add_heat(moment.time_s, rate_k_per_s, rise_k, moment_k_per_s);
+        }
+        state.rise_k.resize(self.layers, 0.0);
+        state
+    }
+
+    fn add(&self, state: &mut State, change: f64, lasted_s: f64) {
+        let State { rise_k, rate_k_per_s, moment_k_per_s, .. } = state;
+        match &self.solution {
+            Solution::HalfSpace { depths_m, diffusivity_m2_per_s } => {
+                for (j, depth_m) in depths_m.iter().enumerate() {
+                    let (rate, rise_s) = half_space(*depth_m, *diffusivity_m2_per_s, lasted_s);
+                    rate_k_per_s[j] += change * rate;
+                    if let Some(rise_k) = rise_k.get_mut(j) {
+                        *rise_k += change * rise_s;
+                    }
+                }
+            }
+            Solution::Linear(response) => {
+                moment_k_per_s.resize(if response.has_moments() { self.layers } else { 0 }, 0.0);
+                response.add_ramp(change, lasted_s, rate_k_per_s, rise_k, moment_k_per_s);
+            }
+            Solution::Stepped { .. } => {}
+        }
+        state.ambient_rise_k += change * lasted_s;
+        state.ambient_rate_k_per_s += change;
+    }
+
+    /// The moments at which a piece is looked at: both its ends, close after its start, and evenly.
+    fn moments(&self, start_s: f64, duration_s: f64) -> Vec<Moment> {
+        let spaced = geometric(self.first_s.min(0.01 * duration_s), duration_s, SPACED_TIMES);
+        let even = (1..EVEN_TIMES).map(|i| duration_s * i as f64 / EVEN_TIMES as f64);
+        let mut times_s: Vec<f64> = spaced.into_iter().chain(even).filter(|t| *t < duration_s).collect();
+        times_s.sort_by(f64::total_cmp);
+        let inside = times_s.into_iter().map(|t| Moment { time_s: start_s + t, after: true });
+        inside.chain([Moment { time_s: start_s + duration_s, after: false }]).collect()
+    }
+
+    /// The states that a profile leads through, a list a piece; both one-sided limits at its break points are among them.
+    pub fn pieces(&self, profile: &Profile) -> Vec<Vec<State>> {
+        if let Solution::Stepped { network, heat } = &self.solution {
+            return vec![self.stepped(profile, network, *heat, None)];
+        }
+        let mut start_s = 0.0;
+        let mut pieces = Vec::new();
+        for piece in profile.pieces() {
+            let moments = self.moments(start_s, piece.duration_s);
+            pieces.push(moments.into_iter().map(|moment| self.at(profile, moment)).collect());
+            start_s += piece.duration_s;
+        }
+        pieces.push(vec![self.at(profile, Moment { time_s: start_s, after: true })]);
+        pieces
+    }
+
+    /// All states up to a moment, or to the profile's end.
+    fn stepped(
+        &self,
+        profile: &Profile,
+        network: &Network,
+        heat: Option<BoreHeat>,
+        until: Option<Moment>,
+    ) -> Vec<State> {
+        let closer = if until.is_some() { CLOSER } else { 1 };
+        let until = until.unwrap_or(Moment { time_s: f64::INFINITY, after: true });
+        let mut states = Vec::new();
+        let mut nodes = network.still();
+        let (mut start_s, mut start_k) = (0.0, 0.0);
+        let mut last = Drive { heat_w_per_m2: heat_at(heat, 0.0), ..Drive::default() };
+        let state = |nodes: &[f64], time_s: f64, drive: Drive| {
+            let (rise_k, rate_k_per_s, moment_k_per_s) = network.means(nodes, drive);
+            State {
+                time_s,
+                rise_k,
+                rate_k_per_s,
+                moment_k_per_s,
+                ambient_rise_k: drive.rise_k,
+                ambient_rate_k_per_s: drive.rate_k_per_s,
+            }
+        };
+        if until.time_s == 0.0 && !until.after {
+            return vec![state(&nodes, 0.0, last)];
+        }
+        for piece in profile.pieces() {
+            let drive = move |t: f64| Drive {
+                rise_k: start_k + piece.rate_k_per_s * (t - start_s),
+                rate_k_per_s: piece.rate_k_per_s,
+                heat_w_per_m2: heat_at(heat, t),
+            };
+            let end_s = piece.duration_s.min(until.time_s - start_s);
+            let first_s = self.first_s.min(0.1 * piece.duration_s);
+            let mut times_s = geometric(first_s, piece.duration_s, STEPS * closer);
+            times_s.retain(|t| *t < end_s);
+            times_s.push(end_s.max(0.0));
+            states.push(state(&nodes, start_s, drive(start_s)));
+            for times in times_s.windows(2).filter(|times| times[1] > times[0]) {
+                network.advance(&mut nodes, start_s + times[0], start_s + times[1], closer, &drive);
+                states.push(state(&nodes, start_s + times[1], drive(start_s + times[1])));
+            }
+            start_k += piece.rate_k_per_s * piece.duration_s;
+            start_s += piece.duration_s;
+            last = Drive { rate_k_per_s: 0.0, ..drive(start_s) };
+            if until.time_s < start_s || (until.time_s == start_s && !until.after) {
+                return states;
+            }
+        }
+        states.push(state(&nodes, start_s, Drive { rise_k: start_k, ..last }));
+        states
     }
 }
 
+/// From 0, then spaced geometrically from the first to the last.
 fn geometric(first_s: f64, last_s: f64, count: usize) -> Vec<f64> {
     let ratio = (last_s / first_s).max(2.0).powf(1.0 / (count - 1) as f64);
     std::iter::once(0.0).chain((0..count).map(|i| first_s * ratio.powi(i as i32))).collect()
 }
 
-/// A ramp that has lasted for a while, at depths below the boundary of a half space.
-fn half_space(depths_m: &[f64], diffusivity: f64, time_s: f64) -> State {
-    let eta = |x: f64| x / (2.0 * (diffusivity * time_s).sqrt());
-    let rate = |x: f64| match (x, time_s) {
-        (0.0, _) => 1.0,
-        (_, 0.0) => 0.0,
-        (x, _) => libm::erfc(eta(x)),
-    };
-    // The integral of the rate over time.
-    let rise = |x: f64| match (x, time_s) {
-        (_, 0.0) => 0.0,
-        (0.0, t) => t,
-        (x, t) => {
-            let e = eta(x);
-            t * ((1.0 + 2.0 * e * e) * libm::erfc(e) - std::f64::consts::FRAC_2_SQRT_PI * e * (-e * e).exp())
-        }
-    };
-    State {
-        time_s,
-        rise_k: depths_m.iter().map(|x| rise(*x)).collect(),
-        rate_k_per_s: depths_m.iter().map(|x| rate(*x)).collect(),
-        moment_k_per_s: Vec::new(),
-        ambient_rise_k: time_s,
-        ambient_rate_k_per_s: 1.0,
+/// Rate, and its integral over time, at a depth below the boundary of a half space after a unit ramp began.
+fn half_space(depth_m: f64, diffusivity: f64, lasted_s: f64) -> (f64, f64) {
+    if depth_m == 0.0 {
+        return (1.0, lasted_s);
     }
-}
-
-impl State {
-    /// Adds `factor` times what lies between two neighbours of a list of states, at a time.
-    fn add(&mut self, factor: f64, states: &[State], at_s: f64) {
-        let after = states.partition_point(|s| s.time_s <= at_s).clamp(1, states.len() - 1);
-        let (a, b) = (&states[after - 1], &states[after]);
-        let share = ((at_s - a.time_s) / (b.time_s - a.time_s)).min(1.0);
-        let mix = |into: &mut Vec<f64>, a: &[f64], b: &[f64]| {
-            into.resize(a.len(), 0.0);
-            for ((sum, a), b) in into.iter_mut().zip(a).zip(b) {
-                *sum += factor * (a + (b - a) * share);
-            }
-        };
-        mix(&mut self.rise_k, &a.rise_k, &b.rise_k);
-        mix(&mut self.rate_k_per_s, &a.rate_k_per_s, &b.rate_k_per_s);
-        mix(&mut self.moment_k_per_s, &a.moment_k_per_s, &b.moment_k_per_s);
-        self.ambient_rise_k += factor * (a.ambient_rise_k + (b.ambient_rise_k - a.ambient_rise_k) * share);
-        self.ambient_rate_k_per_s += factor * a.ambient_rate_k_per_s;
+    if lasted_s == 0.0 {
+        return (0.0, 0.0);
     }
-}
-
-fn superposed(profile: &Profile, ramp: &[State], heated: Option<&[State]>) -> Vec<State> {
-    let mut states = Vec::new();
-    let mut changes: Vec<(f64, f64)> = Vec::new();
-    let state_at = |changes: &[(f64, f64)], time_s: f64| {
-        let mut state = State { time_s, ..State::default() };
-        for (from_s, change) in changes {
-            state.add(*change, ramp, time_s - from_s);
-        }
-        if let Some(heated) = heated {
-            state.add(1.0, heated, time_s);
-        }
-        state
-    };
-    let (mut start_s, mut rate) = (0.0, 0.0);
-    for piece in profile.pieces() {
-        let end_s = start_s + piece.duration_s;
-        changes.push((start_s, piece.rate_k_per_s - rate));
-        rate = piece.rate_k_per_s;
-        let spaced = ramp.iter().step_by(2).map(|s| start_s + s.time_s).take_while(|t| *t < end_s);
-        let even = (1..=EVEN_TIMES).map(|i| start_s + piece.duration_s * i as f64 / EVEN_TIMES as f64);
-        states.extend(spaced.chain(even).map(|t| state_at(&changes, t)));
-        start_s = end_s;
-    }
-    changes.push((start_s, -rate));
-    states.push(state_at(&changes, start_s));
-    states
-}
-
-fn stepped(profile: &Profile, grid: &Grid, heat: Option<BoreHeat>, first_s: f64) -> Vec<State> {
-    let mut states = Vec::new();
-    let mut nodes = grid.still();
-    let (mut start_s, mut start_k) = (0.0, 0.0);
-    let mut last = Drive::default();
-    for piece in profile.pieces() {
-        let drive = move |t: f64| Drive {
-            rise_k: start_k + piece.rate_k_per_s * (t - start_s),
-            rate_k_per_s: piece.rate_k_per_s,
-            heat_w_per_m2: heat_at(heat, t),
-        };
-        let times_s = geometric(first_s.min(0.1 * piece.duration_s), piece.duration_s, PIECE_TIMES);
-        states.push(grid.state(&nodes, start_s, drive(start_s)));
-        for times in times_s.windows(2) {
-            grid.advance(&mut nodes, start_s + times[0], start_s + times[1], &drive);
-            states.push(grid.state(&nodes, start_s + times[1], drive(start_s + times[1])));
-        }
-        start_k += piece.rate_k_per_s * piece.duration_s;
-        start_s += piece.duration_s;
-        last = Drive { rate_k_per_s: 0.0, ..drive(start_s) };
-    }
-    states.push(grid.state(&nodes, start_s, Drive { rise_k: start_k, ..last }));
-    states
+    let eta = depth_m / (2.0 * (diffusivity * lasted_s).sqrt());
+    let rate = libm::erfc(eta);
+    let rise_s =
+        lasted_s * ((1.0 + 2.0 * eta * eta) * rate - std::f64::consts::FRAC_2_SQRT_PI * eta * (-eta * eta).exp());
+    (rate, rise_s)
 }

@@ -4,18 +4,20 @@
 //! raw coil and the declared effects. All violations come at once, each with its row and what to do.
 //!
 //! What is compared how closely: lengths, radii and turns to the last printed digit; words and counts exactly; the
-//! worst rate error within 1 % (in a half space 0.1 %) of this module's own heat and optics over all profiles, give or
-//! take what two discretisations leave where a pattern cancels nearly everything (`rate`), and to its last printed digit at the stated profile and time, where the temperatures are the program's and the optics
-//! this module's. Shared with what emits schedules are the model as it was read, the profiles, the parser of a user's
-//! formula, and those temperatures.
+//! rate error at the stated profile and time, and as the worst over all profiles and times, to its last printed digit
+//! (where the conductivity depends on temperature, within a tolerance that is stated). Shared with what emits schedules
+//! are the model as it was read, the profiles, and the parser of a user's formula; [`Verification::taken_as_given`]
+//! says so of each file.
 
 mod expected;
-mod grid;
 mod heat;
+mod laplace;
+mod network;
 mod optics;
 mod page;
 mod physics;
 mod rate;
+mod stepping;
 
 use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;
@@ -137,18 +139,28 @@ pub struct Verification {
     /// Comparisons made.
     pub checks: usize,
     pub rate_check: RateCheck,
+    /// What was worked out again by code of this module's own.
+    pub recomputed: Vec<&'static str>,
+    /// What was not.
+    pub taken_as_given: Vec<&'static str>,
 }
 
 /// How far the claimed rate error could be checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RateCheck {
-    /// Not claimed, or the rows are no winding.
+    /// Not claimed, or not to be worked out: the rows are no winding, or an effect is not known (a violation says so).
     None,
-    /// Against an independent solution, which found this worst rate error.
-    Independent { worst_rad_per_s: f64 },
-    /// At the stated profile and time only: the model declares what only the program's own temperatures or reference
-    /// model know.
-    ReferenceOnly,
+    /// Against a solution of this module's own.
+    Independent {
+        /// The worst over all profiles and times.
+        worst_rad_per_s: f64,
+        /// How closely the claim was compared with it.
+        tolerance_rad_per_s: f64,
+        /// The same on a finer network; none in a half space, which has a closed form.
+        finer_rad_per_s: Option<f64>,
+        /// How many profiles were gone through.
+        profiles: usize,
+    },
 }
 
 const EMIT_AGAIN: &str = "emit the schedule again from the model, do not edit it";
@@ -250,9 +262,46 @@ pub fn verify(truth: &Truth, claim: &Claim) -> Verification {
     }
     let segments = expected::permutation(truth, claim, &mut findings);
     let mut rate_check = RateCheck::None;
-    if let Some(segments) = segments {
-        expected::check(truth, claim, &segments, &mut findings);
-        rate_check = rate::check(truth, claim, &segments, &mut findings);
+    if let Some(segments) = &segments {
+        expected::check(truth, claim, segments, &mut findings);
+        rate_check = rate::check(truth, claim, segments, &mut findings);
     }
-    Verification { violations: findings.violations, checks: findings.checks, rate_check }
+    let (recomputed, taken_as_given) = scope(truth, claim, segments.is_some(), rate_check);
+    let Findings { violations, checks } = findings;
+    Verification { violations, checks, rate_check, recomputed, taken_as_given }
+}
+
+/// What was worked out again, and what was taken as the program's other parts gave it.
+fn scope(
+    truth: &Truth,
+    claim: &Claim,
+    is_winding: bool,
+    rate_check: RateCheck,
+) -> (Vec<&'static str>, Vec<&'static str>) {
+    let (mut again, mut given) = (vec!["that every segment is wound once"], vec!["the model as its file was read"]);
+    if is_winding {
+        again.push("turns, lengths, radii, directions and crossovers of every layer");
+        again.push("which reel feeds which layer, what it holds and what was drawn from it");
+    }
+    if is_winding && (claim.class.is_some() || claim.captive.is_some()) {
+        again.push("the class of windability");
+    }
+    if claim.page.is_some() {
+        again.push("every word that the page shows");
+    }
+    match rate_check {
+        RateCheck::None => given.push("the rate error"),
+        RateCheck::Independent { .. } => {
+            again.push("temperatures and rate error at the stated profile and time");
+            again.push("the worst rate error over all profiles and times");
+            given.push("the profiles that the model's seed draws");
+            if truth.model.effects.iter().any(|e| matches!(e.subject(), crate::effect::Subject::Formula(_))) {
+                given.push("how a user's formula is read");
+            }
+        }
+    }
+    if claim.pattern.is_some() {
+        given.push("the pattern's name, where it is not a classic winding's");
+    }
+    (again, given)
 }

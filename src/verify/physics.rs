@@ -1,8 +1,7 @@
 //! The declared physics as plain numbers, read without the code that lets effects act.
 //!
 //! One match over the effects' names stands here on purpose: it is the second reading of `effect`'s catalogue. An
-//! effect that it does not know makes [`Physics::read`] say so, and the claim is then compared with the reference
-//! model only.
+//! effect that it does not know makes [`Physics::read`] say so, and the rate error then counts as not verified.
 
 use crate::effect::Subject;
 use crate::effect::custom::Formula;
@@ -79,8 +78,9 @@ pub(super) enum Bias {
 }
 
 impl Physics {
-    /// None where an effect is declared that is not known here.
-    pub fn read(model: &CoilModel) -> Option<Self> {
+    /// # Errors
+    /// The name of an effect that is not known here.
+    pub fn read(model: &CoilModel) -> Result<Self, &'static str> {
         let (conductivity, heat_capacity) = match model.material {
             Material::Conductivity { w_per_m_k, heat_capacity_j_per_m3_k } => (w_per_m_k, heat_capacity_j_per_m3_k),
             // Nothing but the ratio can matter then.
@@ -152,10 +152,18 @@ impl Physics {
                 (_, "bias_gradient_rate", &[gain_rad_per_k]) => p.biases.push(Bias::GradientRate { gain_rad_per_k }),
                 (_, "diffusivity", &[factor]) => p.conductivity_w_per_m_k *= factor,
                 (_, "thermo_optic", &[factor]) => p.path_factor *= factor,
-                _ => return None,
+                (_, kind, _) => return Err(kind),
             }
         }
-        Some(p)
+        Ok(p)
+    }
+
+    /// Whether a rate error depends on temperatures themselves, not only on their rates.
+    pub fn depends_on_temperature(&self) -> bool {
+        let of_bias = |b: &Bias| matches!(b, Bias::Temperature { .. } | Bias::Formula { .. });
+        !self.path_slopes_per_k.is_empty()
+            || self.mismatches.iter().any(|m| m.below.is_some())
+            || self.biases.iter().any(of_bias)
     }
 
     pub fn diffusivity_m2_per_s(&self) -> f64 {
