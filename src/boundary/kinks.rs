@@ -47,18 +47,7 @@ pub(super) fn search(scene: &mut Scene) -> Result<Air, BoundaryError> {
     for _ in 0..MAX_PASSES {
         air.kinks.clear();
         air.jerk_noise_k2_per_s7 = FIRST_JERK_NOISE_K2_PER_S7;
-        for _ in 0..MAX_ROUNDS {
-            let added = significant_shocks(scene, &air)?;
-            if added.is_empty() || air.kinks.len() >= MAX_KINKS {
-                break;
-            }
-            air.kinks.extend(added.into_iter().map(|time_s| Kink { time_s, slope_change_k_per_s: 0.0 }));
-            air.kinks.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
-            place_kinks(scene, &mut air, NEWTON_STEPS)?;
-            ascend_film(scene, &mut air, 0.3, 2, 0)?;
-            ascend_jerk_noise(scene, &mut air, 2.0, 2)?;
-            place_kinks(scene, &mut air, NEWTON_STEPS)?;
-        }
+        grow(scene, &mut air)?;
         air = refine(scene, air)?;
         let merit = merit_of(scene, &air)?;
         if best.as_ref().is_some_and(|(b, _)| merit < b + 1.0) {
@@ -69,13 +58,49 @@ pub(super) fn search(scene: &mut Scene) -> Result<Air, BoundaryError> {
     Ok(best.expect("at least one pass was made").1)
 }
 
-/// Improves a model that is nearly right.
-pub(super) fn refine(scene: &mut Scene, mut air: Air) -> Result<Air, BoundaryError> {
+/// Adds kinks while any would be significant, everything else following.
+fn grow(scene: &Scene, air: &mut Air) -> Result<(), BoundaryError> {
+    for _ in 0..MAX_ROUNDS {
+        let added = significant_shocks(scene, air)?;
+        if added.is_empty() || air.kinks.len() >= MAX_KINKS {
+            break;
+        }
+        air.kinks.extend(added.into_iter().map(|time_s| Kink { time_s, slope_change_k_per_s: 0.0 }));
+        air.kinks.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+        place_kinks(scene, air, NEWTON_STEPS)?;
+        ascend_film(scene, air, 0.3, 2, 0)?;
+        ascend_jerk_noise(scene, air, 2.0, 2)?;
+        place_kinks(scene, air, NEWTON_STEPS)?;
+    }
+    Ok(())
+}
+
+/// Finds the air's model beginning with what was found for another heat path or sensor.
+///
+/// The noise begins anew: what the other model could not follow is no noise of the sensor's, and under it no kink would
+/// stand out.
+pub(super) fn adapt(scene: &mut Scene, known: Air) -> Result<Air, BoundaryError> {
+    let mut air = known;
+    air.noise_k = reading_noise_k(&scene.temperature_k);
+    air.jerk_noise_k2_per_s7 = air.jerk_noise_k2_per_s7.min(FIRST_JERK_NOISE_K2_PER_S7);
+    connect(scene, &mut air);
+    place_kinks(scene, &mut air, NEWTON_STEPS)?;
+    ascend_film(scene, &mut air, 0.3, 2, 0)?;
+    grow(scene, &mut air)?;
+    refine(scene, air)
+}
+
+/// A film where there is one to be estimated, none elsewhere.
+fn connect(scene: &Scene, air: &mut Air) {
     if scene.location == Location::Ambient {
         air.film_w_per_m2_k = None;
     } else if air.film_w_per_m2_k.is_none() {
         air.film_w_per_m2_k = Some(FIRST_FILM_W_PER_M2_K);
     }
+}
+
+/// Improves a model that is nearly right.
+fn refine(scene: &mut Scene, mut air: Air) -> Result<Air, BoundaryError> {
     place_kinks(scene, &mut air, NEWTON_STEPS)?;
     drop_idle_kinks(scene, &mut air)?;
     merge_close_kinks(scene, &mut air)?;

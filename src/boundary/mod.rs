@@ -117,7 +117,7 @@ pub fn estimate(observation: &Observation) -> Result<Boundary, BoundaryError> {
 pub fn refine(observation: &Observation, known: &Air) -> Result<Boundary, BoundaryError> {
     check(observation)?;
     let mut scene = Scene::new(observation)?;
-    let air = kinks::refine(&mut scene, known.clone())?;
+    let air = kinks::adapt(&mut scene, known.clone())?;
     Boundary::new(scene, air)
 }
 
@@ -347,5 +347,41 @@ mod tests {
         })
         .unwrap_err();
         assert_eq!(error, BoundaryError::Constant { range_k: 0.0 });
+    }
+    #[test]
+    fn an_estimate_that_begins_with_a_bad_one_finds_kinks_and_noise_again() {
+        let (times_s, outer_k, readings, kinks_s) = record();
+        let path = path();
+        let observation = Observation {
+            times_s: &times_s,
+            temperature_k: &readings,
+            path: &path,
+            lag_s: 0.0,
+            layer_gain_rad_per_k: &[0.0; 24],
+            rate_mean_s: 10.0,
+        };
+        // As left behind by a heat path that could not follow the readings.
+        let bad = Air {
+            film_w_per_m2_k: Some(70.0),
+            jerk_noise_k2_per_s7: 1e-16,
+            kinks: vec![Kink { time_s: 900.0, slope_change_k_per_s: 0.01 }],
+            noise_k: 20.0 * NOISE_K,
+        };
+        let found = refine(&observation, &bad).unwrap();
+        let air = found.air();
+        let error_k = (outer_k.iter().zip(&times_s).map(|(t, s)| (found.outer_k().value(*s) - t).powi(2)).sum::<f64>()
+            / 900.0)
+            .sqrt();
+        println!(
+            "film {:?}, {} kinks, noise {:.5} K, {error_k:.5} K rms",
+            air.film_w_per_m2_k,
+            air.kinks.len(),
+            air.noise_k
+        );
+        assert!((air.film_w_per_m2_k.unwrap() / FILM_W_PER_M2_K - 1.0).abs() < 0.02);
+        assert!((air.noise_k / NOISE_K - 1.0).abs() < 0.1 && error_k < 0.25 * NOISE_K);
+        for at_s in kinks_s {
+            assert!(air.kinks.iter().any(|k| (k.time_s - at_s).abs() < 2.0));
+        }
     }
 }
