@@ -135,8 +135,7 @@ pub fn predict_from(
     record: &Record,
     boundary: &Boundary,
 ) -> Result<Prediction, PredictError> {
-    let path = model.heat_path()?;
-    let mut drive = boundary.drive(path.location);
+    let (path, mut drive) = boundary.driving(&model.heat_path()?, 0.0);
     if let Some(ambient_k) = measured_ambient(record) {
         drive.ambient_k = Some(ambient_k);
     }

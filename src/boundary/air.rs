@@ -14,6 +14,8 @@ use crate::thermal::{self, BoreHeat, Drive, Extent, HeatPath, Instant, Location,
 /// Modes faster than this share of the sampling interval follow without delay.
 const FASTEST_MODE_PER_INTERVAL: f64 = 0.1;
 const MAX_MODES: usize = 8;
+/// What the largest amplitude of a mode must be to count, if there are more than those along the radius.
+const LEAST_AMPLITUDE: f64 = 1e-3;
 /// Where only K = k/ρc is known, the film is stated for this heat capacity [J/(m³ K)]; nothing else depends on it.
 const NOMINAL_HEAT_CAPACITY_J_PER_M3_K: f64 = 1.7e6;
 /// Prior variance of a kink [(K/s)²]: wider than any chamber's ramp.
@@ -100,7 +102,6 @@ impl Scene {
         path.extent = Extent::Pack;
         path.location = Location::Ambient;
         let bore_heat = path.bore_heat.take().filter(|_| location == Location::OuterLayer);
-        path.flange = None;
         path.conductivity_slope_per_k = 0.0;
         if let Material::Diffusivity { m2_per_s } = path.material {
             path.material = Material::Conductivity {
@@ -158,7 +159,11 @@ impl Scene {
         }
         let pack = Pack::new(&path)?;
         let warmed_k = self.warmed_k(&path)?;
-        let mut order: Vec<usize> = (0..pack.decays_per_s().len()).collect();
+        let layers = path.shape.layers;
+        let largest = |mode: usize| (0..layers).map(|layer| pack.amplitude(layer, mode).abs()).fold(0.0, f64::max);
+        // A flange makes many modes that hardly any layer's mean sees.
+        let least = if path.flange.is_some() { LEAST_AMPLITUDE } else { 0.0 };
+        let mut order: Vec<usize> = (0..pack.decays_per_s().len()).filter(|&mode| largest(mode) >= least).collect();
         order.sort_by(|&a, &b| pack.decays_per_s()[a].total_cmp(&pack.decays_per_s()[b]));
         let fastest_per_s = 1.0 / (FASTEST_MODE_PER_INTERVAL * self.interval_s);
         let kept = order.iter().take_while(|&&m| pack.decays_per_s()[m] < fastest_per_s).count().clamp(1, MAX_MODES);

@@ -24,7 +24,7 @@
 //!
 //! What heat from the bore adds to the outermost layer is taken from the readings first, and put back.
 //!
-//! Leaves out: heat from the flanges and a conductivity that depends on temperature, which the estimated air absorbs; a half space is estimated as if the pack ended at its bore.
+//! Leaves out: a conductivity that depends on temperature, which the estimated air absorbs; a half space is estimated as if the pack ended at its bore.
 //!
 //! # Source
 //! Structural time-series models: Harvey, Forecasting, Structural Time Series Models and the Kalman Filter (1989),
@@ -180,6 +180,18 @@ impl Boundary {
         Drive { boundary_k, ambient_k: Some(self.air_k.clone()) }
     }
 
+    /// The heat path as this boundary drives it, and the drive: a pack with a flange by the air, for the outermost layer is
+    /// not of one temperature along the axis then.
+    pub fn driving(&self, path: &HeatPath, further_lag_s: f64) -> (HeatPath, Drive) {
+        match self.air.film_w_per_m2_k {
+            Some(film) if path.flange.is_some() && path.location == Location::OuterLayer => {
+                let driven = HeatPath { location: Location::Ambient, film_w_per_m2_k: Some(film), ..path.clone() };
+                (driven, self.delayed_drive(Location::Ambient, further_lag_s))
+            }
+            _ => (path.clone(), self.delayed_drive(path.location, further_lag_s)),
+        }
+    }
+
     /// The drive if the sensor lagged by `further_lag_s` more than was taken into account: T + Δτ dT_s/dt, T_s being what
     /// the sensor shows.
     pub fn delayed_drive(&self, location: Location, further_lag_s: f64) -> Drive {
@@ -241,7 +253,7 @@ impl RateWhitener {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::thermal::{self, BoreHeat, Extent, Instant, Material, PackShape};
+    use crate::thermal::{self, BoreHeat, Extent, Flange, FlangeFilm, Instant, Material, PackShape};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use statrs::distribution::{ContinuousCDF, Normal};
@@ -300,6 +312,44 @@ mod tests {
         }
         assert!(error_k < 0.25 * NOISE_K);
         assert!((found.air().noise_k / NOISE_K - 1.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn a_flange_in_the_air_is_not_taken_for_a_better_film() {
+        let (times_s, _, _, kinks_s) = record();
+        let flange = FlangeFilm { flange: Flange::First, film_w_per_m2_k: 40.0 };
+        let path = HeatPath { flange: Some(flange), ..path() };
+        let in_air = HeatPath { location: Location::Ambient, film_w_per_m2_k: Some(FILM_W_PER_M2_K), ..path.clone() };
+        let breaks_s = vec![0.0, kinks_s[0], kinks_s[1], kinks_s[2], kinks_s[3], 9000.0];
+        let air = PiecewiseLinear::new(breaks_s, vec![293.0, 293.0, 322.9, 322.9, 286.3, 286.3]).unwrap();
+        let instants: Vec<Instant> = times_s.iter().map(|&t| Instant::after(t)).collect();
+        let field = thermal::solve(&in_air, &Drive::boundary(air)).unwrap();
+        let at_stamps = field.at(&instants);
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let normal = Normal::new(0.0, NOISE_K).unwrap();
+        let readings: Vec<f64> = (0..900)
+            .map(|row| at_stamps.temperatures_k(row)[23] + normal.inverse_cdf(random.random::<f64>()))
+            .collect();
+        let found = estimate(&Observation {
+            times_s: &times_s,
+            temperature_k: &readings,
+            path: &path,
+            lag_s: 0.0,
+            layer_gain_rad_per_k: &[0.0; 24],
+            rate_mean_s: 10.0,
+        })
+        .unwrap();
+        let film = found.air().film_w_per_m2_k.unwrap();
+        let (driven, drive) = found.driving(&path, 0.0);
+        let again = thermal::solve(&driven, &drive).unwrap().means(&times_s, 10.0);
+        let truth = field.means(&times_s, 10.0);
+        let rms = |values: &[f64]| (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt();
+        let differences: Vec<f64> =
+            again.axial_moment_k_per_s.iter().zip(&truth.axial_moment_k_per_s).map(|(a, b)| a - b).collect();
+        let error = rms(&differences) / rms(&truth.axial_moment_k_per_s);
+        println!("film {film:.3} of {FILM_W_PER_M2_K}, axial moments' rates off by {error:.4} of them");
+        assert!((film / FILM_W_PER_M2_K - 1.0).abs() < 0.03);
+        assert!(error < 0.05);
     }
 
     #[test]

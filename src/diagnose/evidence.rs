@@ -5,8 +5,10 @@ use std::sync::{Arc, Mutex, OnceLock};
 use rayon::prelude::*;
 
 use super::DiagnoseError;
+use super::anchor::{
+    Anchor, BRACKET_SHARE, Bracket, CENTRAL, LEAST_BRACKET_S, difference, heat_values, is_near, moves_sensor, way_of,
+};
 use super::conductivity::SlopeResponse;
-use crate::boundary::{Boundary, RateWhitener};
 use crate::pattern::Pattern;
 use crate::predict::{estimate_boundary, noise_floor_rad_per_s, rates_rad_per_s, refine_boundary};
 use crate::rate::CoilModel;
@@ -34,8 +36,8 @@ pub(super) struct Case {
     /// Rows left out because of a gross error.
     pub outliers: usize,
     anchors: Vec<Anchor>,
-    /// Three of the anchors, between which the pack is interpolated.
-    bracket: Option<Bracket>,
+    /// Anchors in threes, between which the pack is interpolated.
+    brackets: Vec<Bracket>,
     /// Solved when it is first asked for, under the first boundary: what a slope does to the pack hardly depends on how the
     /// sensor is connected to it. None where it cannot be solved.
     slope_response: OnceLock<Option<SlopeResponse>>,
@@ -43,50 +45,6 @@ pub(super) struct Case {
     pinned: Mutex<Vec<Arc<Solved>>>,
     recent: Mutex<Vec<Arc<Solved>>>,
 }
-
-/// A boundary estimated for one way in which the sensor may be connected to the pack.
-struct Anchor {
-    location: Location,
-    lag_s: f64,
-    boundary: Boundary,
-    /// Under which it was estimated.
-    path: HeatPath,
-    whitener: RateWhitener,
-    /// The measured rates and a constant of one noise, whitened; the latter of unit length.
-    measured: Vec<f64>,
-    one: Vec<f64>,
-}
-
-/// Three estimates for one sensor: at a lag, and at a shorter and a longer one.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Bracket {
-    location: Location,
-    middle_s: f64,
-    half_width_s: f64,
-}
-
-impl Bracket {
-    fn lags_s(&self) -> [f64; 3] {
-        [self.middle_s - self.half_width_s, self.middle_s, self.middle_s + self.half_width_s]
-    }
-
-    fn holds(&self, location: Location, lag_s: f64) -> bool {
-        location == self.location && (lag_s - self.middle_s).abs() <= self.half_width_s
-    }
-
-    /// Of the three estimates, at a lag between the outer two: those of the parabola through them.
-    fn weights(&self, lag_s: f64) -> [f64; 3] {
-        let x = (lag_s - self.middle_s) / self.half_width_s;
-        [0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0)]
-    }
-}
-
-/// Half width of a bracket, as a share of the lag, and the least \[s\]: much more than a standard error, and so little
-/// that no kink moves by more than a reading.
-const BRACKET_SHARE: f64 = 0.04;
-const LEAST_BRACKET_S: f64 = 1.0;
-/// Share of the half width within which a fit has found the middle.
-const CENTRAL: f64 = 0.4;
 
 /// A field that was solved lately.
 struct Solved {
@@ -138,7 +96,7 @@ impl<'a> Evidence<'a> {
         Ok(evidence)
     }
 
-    /// Estimates every record's boundary under a model; replaces an estimate for the same sensor.
+    /// Estimates every record's boundary under a model; replaces an estimate for the same sensor and the same effects.
     ///
     /// # Errors
     /// As [`Evidence::new`].
@@ -150,11 +108,16 @@ impl<'a> Evidence<'a> {
             .map(|case| case.estimate(model, pattern, begin))
             .collect::<Result<Vec<_>, DiagnoseError>>()?;
         for (case, anchor) in self.cases.iter_mut().zip(anchors) {
-            case.anchors.retain(|a| a.location != anchor.location || a.lag_s != anchor.lag_s);
-            case.anchors.push(anchor);
-            (case.recent, case.pinned) = Default::default();
+            case.take_in(anchor);
         }
         Ok(())
+    }
+
+    /// Whether boundaries were estimated for just the effects of a model and nearly their values.
+    pub fn is_anchored(&self, model: &CoilModel) -> bool {
+        let way = way_of(model);
+        let near = |case: &Case| case.anchors.iter().any(|a| a.way == way && is_near(&a.values, model));
+        self.cases.iter().all(near) && (!moves_sensor(model) || self.is_bracketed(model))
     }
 
     /// Estimates every record's boundary under a model and for a lag a little shorter and longer, so that between them
@@ -176,13 +139,20 @@ impl<'a> Evidence<'a> {
             })
             .collect::<Result<Vec<_>, DiagnoseError>>()?;
         for (case, sides) in self.cases.iter_mut().zip(sides) {
-            let new = Bracket { location: sides[0].location, middle_s: lag_s, half_width_s };
-            if let Some(old) = case.bracket.replace(new).filter(|b| b.location == new.location) {
-                case.anchors
-                    .retain(|a| a.location != old.location || a.lag_s == lag_s || !old.lags_s().contains(&a.lag_s));
+            let (location, way) = (sides[0].location, sides[0].way.clone());
+            let new = Bracket { location, way, middle_s: lag_s, half_width_s };
+            if let Some(place) = case.brackets.iter().position(|b| b.location == location && b.way == new.way) {
+                let old = case.brackets.remove(place);
+                let outdated = |a: &Anchor| {
+                    a.location == location && a.way == old.way && a.lag_s != lag_s && old.lags_s().contains(&a.lag_s)
+                };
+                case.anchors.retain(|a| !outdated(a));
+                (case.recent, case.pinned) = Default::default();
             }
-            case.anchors.extend(sides);
-            (case.recent, case.pinned) = Default::default();
+            case.brackets.push(new);
+            for side in sides {
+                case.take_in(side);
+            }
         }
         Ok(())
     }
@@ -199,11 +169,8 @@ impl<'a> Evidence<'a> {
 
     fn bracketed_within(&self, model: &CoilModel, share: f64) -> bool {
         let Ok(path) = model.heat_path() else { return false };
-        let lag_s = model.sensor_lag_s();
-        self.cases.iter().all(|case| {
-            case.bracket
-                .is_some_and(|b| b.location == path.location && (lag_s - b.middle_s).abs() <= share * b.half_width_s)
-        })
+        let (way, lag_s) = (way_of(model), model.sensor_lag_s());
+        self.cases.iter().all(|case| case.brackets.iter().any(|b| b.holds(path.location, &way, lag_s, share)))
     }
 
     /// Number of rows in the records of a role.
@@ -255,7 +222,7 @@ impl Case {
             noise_rad_per_s,
             outliers,
             anchors: Vec::new(),
-            bracket: None,
+            brackets: Vec::new(),
             slope_response: OnceLock::new(),
             pinned: Mutex::default(),
             recent: Mutex::default(),
@@ -291,8 +258,14 @@ impl Case {
         begin: Begin,
         lag_s: f64,
     ) -> Result<Anchor, DiagnoseError> {
-        let known = (begin == Begin::Nearby)
-            .then(|| self.anchors.iter().min_by(|a, b| (a.lag_s - lag_s).abs().total_cmp(&(b.lag_s - lag_s).abs())));
+        let way = way_of(model);
+        let far = |a: &Anchor| (difference(&a.way, &way), (a.lag_s - lag_s).abs());
+        let known = (begin == Begin::Nearby).then(|| {
+            self.anchors.iter().min_by(|a, b| {
+                let (a, b) = (far(a), far(b));
+                a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+            })
+        });
         let boundary = match known.flatten() {
             Some(near) => refine_boundary(model, pattern, &self.record, lag_s, near.boundary.air()),
             None => estimate_boundary(model, pattern, &self.record),
@@ -311,30 +284,55 @@ impl Case {
         one.iter_mut().for_each(|v| *v /= length);
         let path = model.heat_path()?;
         let location = path.location;
-        Ok(Anchor { location, lag_s, boundary, path, whitener, measured, one })
+        let values = heat_values(model);
+        Ok(Anchor {
+            location,
+            way,
+            values,
+            lag_s,
+            boundary,
+            path,
+            whitener,
+            measured,
+            one,
+            flange_response: OnceLock::new(),
+        })
     }
 
-    /// The anchor for a sensor: that of its place whose lag is nearest.
-    fn anchor_for(&self, location: Location, lag_s: f64) -> Option<usize> {
-        (0..self.anchors.len())
-            .filter(|&i| self.anchors[i].location == location)
-            .min_by(|&a, &b| (self.anchors[a].lag_s - lag_s).abs().total_cmp(&(self.anchors[b].lag_s - lag_s).abs()))
+    /// Keeps an anchor in the place of one for the same sensor and the same effects.
+    fn take_in(&mut self, anchor: Anchor) {
+        let same = |a: &Anchor| a.location == anchor.location && a.way == anchor.way && a.lag_s == anchor.lag_s;
+        match self.anchors.iter().position(same) {
+            Some(place) => self.anchors[place] = anchor,
+            None => self.anchors.push(anchor),
+        }
+        (self.recent, self.pinned) = Default::default();
+    }
+
+    /// The anchor for a sensor: that of its place which was estimated for the most nearly same effects, and then for the
+    /// nearest lag.
+    fn anchor_for(&self, location: Location, way: &[String], lag_s: f64) -> Option<usize> {
+        let far = |i: usize| (difference(&self.anchors[i].way, way), (self.anchors[i].lag_s - lag_s).abs());
+        (0..self.anchors.len()).filter(|&i| self.anchors[i].location == location).min_by(|&a, &b| {
+            let (a, b) = (far(a), far(b));
+            a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+        })
     }
 
     /// The pack over each averaging interval under a model.
     fn solved(&self, model: &CoilModel, keep: Keep) -> Option<Arc<Solved>> {
         let path = model.heat_path().ok()?;
-        let lag_s = model.sensor_lag_s();
-        if let Some(bracket) = self.bracket.filter(|b| b.holds(path.location, lag_s)) {
+        let (way, lag_s) = (way_of(model), model.sensor_lag_s());
+        if let Some(bracket) = self.brackets.iter().find(|b| b.holds(path.location, &way, lag_s, 1.0)) {
             let anchors = bracket.lags_s().map(|at_s| {
-                let nearest = self.anchor_for(path.location, at_s)?;
+                let nearest = self.anchor_for(path.location, &way, at_s)?;
                 self.solved_at(path.clone(), nearest, self.anchors[nearest].lag_s, model.rate_mean_s, Keep::Recent)
             });
             let [Some(shorter), Some(middle), Some(longer)] = anchors else { return None };
             let history = mixed([&shorter.history, &middle.history, &longer.history], bracket.weights(lag_s));
             return Some(Arc::new(Solved { path, anchor: middle.anchor, lag_s, history }));
         }
-        let anchor = self.anchor_for(path.location, lag_s)?;
+        let anchor = self.anchor_for(path.location, &way, lag_s)?;
         self.solved_at(path, anchor, lag_s, model.rate_mean_s, keep)
     }
 
@@ -359,7 +357,12 @@ impl Case {
         if let Some(measured) = crate::predict::measured_ambient(&self.record) {
             drive.ambient_k = Some(measured);
         }
-        let history = self.history(&path, &drive, rate_mean_s)?;
+        let mut history = self.history(&path, &drive, rate_mean_s)?;
+        if path.flange.is_some()
+            && let Some(response) = from.flange_response.get_or_init(|| self.flange_response(from, rate_mean_s))
+        {
+            history = mixed([&history, &response[0], &response[1]], [1.0, 1.0, -1.0]);
+        }
         let solved = Arc::new(Solved { path, anchor, lag_s, history });
         if keep == Keep::Pinned
             && let Ok(mut pinned) = self.pinned.lock()
@@ -374,6 +377,23 @@ impl Case {
             recent.push(solved.clone());
         }
         Some(solved)
+    }
+
+    /// The pack of an anchor that has a flange, driven by the air, and by the outermost layer. The second is what is solved
+    /// for other values, so that they too agree with the sensor; the difference is what it leaves out.
+    fn flange_response(&self, anchor: &Anchor, rate_mean_s: f64) -> Option<[ThermalHistory; 2]> {
+        let path = HeatPath { conductivity_slope_per_k: 0.0, ..anchor.path.clone() };
+        path.flange.filter(|_| path.location == Location::OuterLayer)?;
+        let (driven, mut by_air) = anchor.boundary.driving(&path, 0.0);
+        let mut by_layer = anchor.boundary.drive(path.location);
+        if let Some(measured) = crate::predict::measured_ambient(&self.record) {
+            by_air.ambient_k = Some(measured.clone());
+            by_layer.ambient_k = Some(measured);
+        }
+        let means = |path: &HeatPath, drive: &Drive| {
+            Some(thermal::solve(path, drive).ok()?.means(self.record.times_s(), rate_mean_s))
+        };
+        Some([means(&driven, &by_air)?, means(&path, &by_layer)?])
     }
 
     /// The pack under a drive; the effect of a conductivity's slope is taken from two solutions made before.
@@ -410,7 +430,8 @@ impl Case {
 
     /// Columns over the rows, whitened under the boundary for a model and with the offset taken out.
     pub fn whiten_columns(&self, model: &CoilModel, columns: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
-        let anchor = &self.anchors[self.anchor_for(model.heat_path().ok()?.location, model.sensor_lag_s())?];
+        let location = model.heat_path().ok()?.location;
+        let anchor = &self.anchors[self.anchor_for(location, &way_of(model), model.sensor_lag_s())?];
         Some(
             columns
                 .iter()

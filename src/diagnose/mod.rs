@@ -15,6 +15,7 @@
 //! Schwarz, Ann. Stat. 6 (1978) 461 (the criterion); Golub and Pereyra, Inverse Problems 19 (2003) R1 (linear parameters
 //! projected out); Bartlett, J. R. Stat. Soc. Suppl. 8 (1946) 27 (standard errors under autocorrelation).
 
+mod anchor;
 mod candidate;
 mod conductivity;
 mod confirm;

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::DiagnoseError;
+use super::anchor::way_of;
 use super::candidate::Candidate;
 use super::evidence::{Begin, Evidence, Role};
 use super::hypothesis::{Hypothesis, Response, Trial, pairs};
@@ -40,6 +41,14 @@ const WORTH_BESIDE: f64 = 0.5;
 const WORTH_BESIDE_THE_BEST: f64 = 0.1;
 /// Starts from which a candidate is fitted alone.
 const STARTS_TRIED: usize = 2;
+/// A set contends with the best one of its size if it lowers χ² by this share of what that does …
+const CONTENDS: f64 = 0.8;
+/// … and so many sets are given boundaries of their own at once.
+const CONTENDERS: usize = 6;
+/// Times that a boundary is estimated for a heat path and the heat path fitted again …
+const HEAT_ROUNDS: usize = 3;
+/// … unless χ² changed by less than this.
+const SETTLED: f64 = 1.0;
 /// Times that a bracket of lags is moved to where the fit wants it.
 const SENSOR_ROUNDS: usize = 3;
 
@@ -70,7 +79,9 @@ pub(super) fn search(
     let mut twos = Vec::new();
     if best_single > noise_only {
         twos = fit_pairs(&trial, &base, best_single);
+        settle_contenders(evidence, model, candidates, &base, &mut twos)?;
     }
+    let trial = Trial { evidence, model, candidates };
     let mut variance = noise_variance(&base, singles.iter().chain(&twos), rows);
     let mut best = base.clone();
     for step in [least(&singles, variance), least(&twos, variance)].into_iter().flatten() {
@@ -80,14 +91,10 @@ pub(super) fn search(
         }
     }
     progress(0.8);
-    let mut anchored = Vec::new();
     while !best.members.is_empty() && best.members.len() < MAX_EFFECTS {
-        // The boundary was estimated with the heat path as declared: what a wrong path leaves there would be taken for a
-        // further effect.
-        let moved = moving(candidates, &best);
-        if moved != anchored && best.chi_square > noise_only {
-            best = settle_sensor(evidence, model, candidates, best)?;
-            anchored = moved;
+        // What a wrong heat path leaves in the boundary would be taken for a further effect.
+        if best.chi_square > noise_only {
+            best = settled(evidence, model, candidates, best)?;
         }
         let trial = Trial { evidence, model, candidates };
         let mut further = fit_forward(&trial, &best);
@@ -95,6 +102,8 @@ pub(super) fn search(
         if best.members.len() > 1 {
             further.extend(fit_swaps(&trial, &best));
         }
+        settle_contenders(evidence, model, candidates, &best, &mut further)?;
+        let trial = Trial { evidence, model, candidates };
         variance = noise_variance(&best, &further, rows).min(variance);
         let Some(next) = least(&further, variance) else { break };
         let grows = next.members.len() > best.members.len();
@@ -109,12 +118,6 @@ pub(super) fn search(
     best = step_back(&trial, best, rows, variance);
     singles.sort_by(|a, b| a.merit(rows, variance).total_cmp(&b.merit(rows, variance)));
     Ok(Found { base, singles, best, variance })
-}
-
-/// The members that the boundary's estimate depends on.
-pub(super) fn moving(candidates: &[Candidate], of: &Hypothesis) -> Vec<String> {
-    let members = of.members.iter().map(|m| &candidates[m.candidate]);
-    members.filter(|c| c.moves_heat() || c.moves_sensor()).map(Candidate::kind).collect()
 }
 
 /// Each candidate alone; boundaries for other sensors are added to the evidence.
@@ -139,9 +142,10 @@ pub(super) fn all_singles(
         let gain = base.chi_square - single.chi_square;
         let moves_sensor = candidates[single.members[0].candidate].moves_sensor();
         if moves_sensor && gain > MARGIN.max(WORTH_A_BOUNDARY * best) {
-            *single = settle_sensor(evidence, model, candidates, single.clone())?;
+            *single = settled(evidence, model, candidates, single.clone())?;
         }
     }
+    settle_contenders(evidence, model, candidates, base, &mut singles)?;
     Ok(singles)
 }
 
@@ -270,11 +274,51 @@ pub(super) fn without(trial: &Trial, from: &Hypothesis, out: usize) -> Option<Hy
     trial.fit(&rest, Effort::QUICK)
 }
 
+/// Estimates boundaries for the sets that do nearly as well as the best one of a list and that move heat otherwise than any
+/// boundary was estimated for: they cannot be ranked on a boundary of another's.
+pub(super) fn settle_contenders(
+    evidence: &mut Evidence,
+    model: &CoilModel,
+    candidates: &[Candidate],
+    from: &Hypothesis,
+    list: &mut [Hypothesis],
+) -> Result<(), DiagnoseError> {
+    let gain = |h: &Hypothesis| from.chi_square - h.chi_square;
+    let least = MARGIN.max(CONTENDS * list.iter().map(gain).fold(0.0, f64::max));
+    let mut order: Vec<usize> = (0..list.len()).filter(|&i| gain(&list[i]) > least).collect();
+    order.sort_by(|&a, &b| list[a].chi_square.total_cmp(&list[b].chi_square));
+    let mut ways = Vec::new();
+    for place in order {
+        let trial = Trial { evidence, model, candidates };
+        let Some(with) = trial.model_of(&list[place].members) else { continue };
+        let way = way_of(&with);
+        if ways.contains(&way) {
+            list[place] = trial.fit(&list[place].members, Effort::QUICK).unwrap_or_else(|| list[place].clone());
+        } else if !evidence.is_anchored(&with) && ways.len() < CONTENDERS {
+            list[place] = settled(evidence, model, candidates, list[place].clone())?;
+            ways.push(way);
+        }
+    }
+    Ok(())
+}
+
+/// Settles a set, unless a boundary was estimated for its effects before.
+pub(super) fn settled(
+    evidence: &mut Evidence,
+    model: &CoilModel,
+    candidates: &[Candidate],
+    hypothesis: Hypothesis,
+) -> Result<Hypothesis, DiagnoseError> {
+    let with = (Trial { evidence, model, candidates }).model_of(&hypothesis.members);
+    let known = with.is_none_or(|with| evidence.is_anchored(&with));
+    if known { Ok(hypothesis) } else { settle(evidence, model, candidates, hypothesis) }
+}
+
 /// Estimates the boundary anew under what a hypothesis found, and fits again.
 ///
 /// A boundary that was estimated for one lag is only extrapolated to another: the minimum over estimates made for each lag
 /// is where the middle of a bracket and the fit agree.
-pub(super) fn settle_sensor(
+pub(super) fn settle(
     evidence: &mut Evidence,
     model: &CoilModel,
     candidates: &[Candidate],
@@ -287,8 +331,16 @@ pub(super) fn settle_sensor(
     let Some(found) = with(evidence, &hypothesis) else { return Ok(hypothesis) };
     let lags = hypothesis.members.iter().any(|m| candidates[m.candidate].moves_sensor());
     if !lags {
-        evidence.anchor(&found, Begin::Anew)?;
-        return Ok(fit(evidence, &hypothesis));
+        for _ in 0..HEAT_ROUNDS {
+            let Some(found) = with(evidence, &hypothesis) else { break };
+            evidence.anchor(&found, Begin::Nearby)?;
+            let before = hypothesis.total();
+            hypothesis = fit(evidence, &hypothesis);
+            if (hypothesis.total() - before).abs() < SETTLED {
+                break;
+            }
+        }
+        return Ok(hypothesis);
     }
     let mut begin = Begin::Nearby;
     if !evidence.is_bracketed(&found) {

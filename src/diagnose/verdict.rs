@@ -2,10 +2,10 @@
 
 use super::candidate::{Candidate, is_declared_number};
 use super::confirm::confirmation;
-use super::evidence::{Begin, Evidence, Role, dot, sum_of_squares};
+use super::evidence::{Evidence, Role, dot, sum_of_squares};
 use super::hypothesis::{Hypothesis, Trial};
 use super::plain::{Plain, best_gain, compete};
-use super::search::{Found, all_singles, fit_swap, moving, settle_sensor, without};
+use super::search::{Found, all_singles, fit_swap, settle, settle_contenders, settled, without};
 use super::stranger::{other_winding, strangers};
 use super::{
     Caution, Contender, DiagnoseError, Diagnosis, Equivalent, Extension, Finding, FittedParameter, Refusal, Rung,
@@ -50,19 +50,12 @@ pub(super) fn judge(
     let freedom = |h: &Hypothesis| (rows as f64 - h.parameters as f64 - 1.0).max(1.0);
     let excess = |h: &Hypothesis| h.chi_square - freedom(h);
     let tolerated = TOLERATED_EXCESS + 3.0 * (2.0 / rows as f64).sqrt();
-    let mut anchored = Vec::new();
     for _ in 0..MOST_ROUNDS {
-        let moved = moving(candidates, &best);
-        if moved.is_empty() && !anchored.is_empty() {
-            evidence.anchor(model, Begin::Anew)?;
-            best = (Trial { evidence, model, candidates }).fit(&best.members, Effort::QUICK).unwrap_or(best);
-        } else if moved != anchored {
-            best = settle_sensor(evidence, model, candidates, best)?;
-        }
-        anchored = moved;
+        best = settled(evidence, model, candidates, best)?;
         let trial = Trial { evidence, model, candidates };
+        let members = best.members.len();
         best = prune(&trial, best, &base, variance, tolerated, &mut cautions);
-        if moving(candidates, &best) == anchored {
+        if best.members.len() == members {
             break;
         }
     }
@@ -74,10 +67,11 @@ pub(super) fn judge(
     let mut reasons = Vec::new();
     let mut effects = Vec::new();
     for place in 0..best.members.len() {
-        let (main, equivalents) = settle_equivalents(&trial, best, place, rows, variance);
+        let (main, equivalents) = settle_equivalents(evidence, model, candidates, best, place, variance)?;
         best = main;
         reasons.push(equivalents);
     }
+    let trial = Trial { evidence, model, candidates };
     let errors = trial.fit(&best.members, Effort { standard_errors: true, ..Effort::QUICK });
     if let Some(with_errors) = errors {
         best = with_errors;
@@ -154,7 +148,7 @@ pub(super) fn settle_one(
     let Some(mut best) = least else { return Ok(None) };
     let candidate = &candidates[best.members[0].candidate];
     if candidate.moves_heat() || candidate.moves_sensor() {
-        best = settle_sensor(evidence, model, candidates, best)?;
+        best = settle(evidence, model, candidates, best)?;
     }
     let trial = Trial { evidence, model, candidates };
     let Some(best) = trial.fit(&best.members, Effort { standard_errors: true, ..Effort::QUICK }) else {
@@ -265,20 +259,26 @@ fn refusal(
 
 /// What else would do in one member's place; a physical effect is preferred to an empirical one that does as well.
 fn settle_equivalents(
-    trial: &Trial,
+    evidence: &mut Evidence,
+    model: &CoilModel,
+    candidates: &[Candidate],
     best: Hypothesis,
     place: usize,
-    rows: usize,
     variance: f64,
-) -> (Hypothesis, Vec<Equivalent>) {
-    let Some(rest) = without(trial, &best, place) else { return (best, Vec::new()) };
+) -> Result<(Hypothesis, Vec<Equivalent>), DiagnoseError> {
+    let trial = Trial { evidence, model, candidates };
+    let Some(rest) = without(&trial, &best, place) else { return Ok((best, Vec::new())) };
+    let rows = evidence.rows(Role::Fit);
+    let mut others = fit_swap(&trial, &best, place, RIVALS);
+    settle_contenders(evidence, model, candidates, &rest, &mut others)?;
+    let trial = Trial { evidence, model, candidates };
     let total = |h: &Hypothesis| h.total() + h.parameters as f64 * (rows as f64).ln() * variance;
-    let mut rivals = vec![(total(&best), best)];
-    for rival in fit_swap(trial, &rivals[0].1, place, RIVALS) {
-        rivals.push((total(&rival), rival));
-    }
+    let mut rivals: Vec<(f64, Hypothesis)> =
+        std::iter::once(best).chain(others).map(|rival| (total(&rival), rival)).collect();
     let least = rivals.iter().map(|r| r.0).fold(f64::INFINITY, f64::min);
-    rivals.retain(|(value, _)| *value < least + EQUAL * variance);
+    let explained = rest.total() - rivals.iter().map(|r| r.1.total()).fold(f64::INFINITY, f64::min);
+    let equal = (EQUAL * variance).max(LEAST_SHARE_OF_SIGNAL.powi(2) * explained);
+    rivals.retain(|(value, _)| *value < least + equal);
     // The closest make the set; within it a physical effect goes before an empirical one.
     rivals.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut closest: Vec<String> = Vec::new();
@@ -293,7 +293,7 @@ fn settle_equivalents(
     let empirical = |h: &Hypothesis| trial.candidates[h.members[place].candidate].is_empirical();
     rivals.sort_by(|a, b| empirical(&a.1).cmp(&empirical(&b.1)).then(a.0.total_cmp(&b.0)));
     let mut rivals = rivals.into_iter();
-    let Some((value, main)) = rivals.next() else { return (rest, Vec::new()) };
+    let Some((value, main)) = rivals.next() else { return Ok((rest, Vec::new())) };
     let response =
         |h: &Hypothesis| -> Vec<f64> { rest.residuals.iter().zip(&h.residuals).map(|(a, b)| a - b).collect() };
     let own = response(&main);
@@ -313,7 +313,7 @@ fn settle_equivalents(
             dot(&own, &theirs) / (sum_of_squares(&own) * sum_of_squares(&theirs)).sqrt().max(f64::MIN_POSITIVE);
         equivalents.push(Equivalent { effect, chi_square_more: other - value, correlation, extended });
     }
-    (main, equivalents)
+    Ok((main, equivalents))
 }
 
 /// By how much standard errors grow: residuals beyond the noise, and their autocorrelation.
