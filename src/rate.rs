@@ -27,7 +27,7 @@ use crate::coil::{Coil, CoilError};
 use crate::effect::{DeclaredEffect, Effect, FibrePlace, Lead, PackState, SurplusFibre};
 use crate::pattern::{Half, Pattern};
 use crate::thermal::{Extent, HeatPath, Location, Material, PackShape, ThermalHistory};
-use crate::units::LIGHT_SPEED_M_PER_S;
+use crate::units::{LIGHT_SPEED_M_PER_S, REFERENCE_TEMPERATURE_K};
 
 /// A coil, how it is heated, and which physics is taken into account; everything but the pattern.
 #[derive(Debug, Clone)]
@@ -179,6 +179,17 @@ pub struct RateModel {
     weights: LayerWeights,
     effects: Vec<Box<dyn Effect>>,
     surplus: Vec<SurplusFibre>,
+    /// Empty where κ depends on temperature.
+    steady: Vec<SteadyLayer>,
+}
+
+/// What of a layer does not depend on the pack's state.
+#[derive(Debug, Clone, Copy)]
+struct SteadyLayer {
+    /// κ_A w_A + κ_B w_B [m²/K].
+    weighted_m2_per_k: f64,
+    /// (κ_A + κ_B)/2 [1/K].
+    path_per_k: f64,
 }
 
 impl RateModel {
@@ -191,7 +202,25 @@ impl RateModel {
         let weights = LayerWeights::new(&coil, pattern)?;
         let effects = model.bind_all(&coil, channels);
         let surplus = effects.iter().filter_map(|e| e.surplus_fibre()).collect();
-        Ok(Self { coil, weights, effects, surplus })
+        let mut rate = Self { coil, weights, effects, surplus, steady: Vec::new() };
+        if rate.effects.iter().all(|e| !e.path_depends_on_temperature()) {
+            rate.steady = (0..rate.coil.layers()).map(|layer| rate.layer_at(layer, REFERENCE_TEMPERATURE_K)).collect();
+        }
+        Ok(rate)
+    }
+
+    fn layer_at(&self, layer: usize, temperature_k: f64) -> SteadyLayer {
+        let kappa_a = self.path_per_k(layer, Half::A, temperature_k);
+        let kappa_b = self.path_per_k(layer, Half::B, temperature_k);
+        SteadyLayer {
+            weighted_m2_per_k: kappa_a * self.weights.half_a_m2[layer] + kappa_b * self.weights.half_b_m2[layer],
+            path_per_k: 0.5 * (kappa_a + kappa_b),
+        }
+    }
+
+    /// A layer's response at its temperature.
+    fn layer(&self, layer: usize, temperature_k: f64) -> SteadyLayer {
+        self.steady.get(layer).copied().unwrap_or_else(|| self.layer_at(layer, temperature_k))
     }
 
     pub fn coil(&self) -> &Coil {
@@ -218,11 +247,10 @@ impl RateModel {
         let scale = self.scale_per_m2();
         let mut coil_sum = 0.0;
         for (layer, (&rate, &temperature_k)) in state.rates_k_per_s.iter().zip(state.temperatures_k).enumerate() {
-            let kappa_a = self.path_per_k(layer, Half::A, temperature_k);
-            let kappa_b = self.path_per_k(layer, Half::B, temperature_k);
-            coil_sum += (kappa_a * self.weights.half_a_m2[layer] + kappa_b * self.weights.half_b_m2[layer]) * rate;
+            let here = self.layer(layer, temperature_k);
+            coil_sum += here.weighted_m2_per_k * rate;
             if let Some(moment) = state.axial_moments_k_per_s.get(layer) {
-                coil_sum += 0.5 * (kappa_a + kappa_b) * self.weights.axial_m2[layer] * moment;
+                coil_sum += here.path_per_k * self.weights.axial_m2[layer] * moment;
             }
         }
         let gain: f64 = self.effects.iter().map(|e| e.coil_gain(state)).product();
@@ -264,9 +292,7 @@ impl RateModel {
             .zip(self.coil.layer_lengths_m())
             .enumerate()
             .map(|(layer, ((rate, &temperature_k), length_m))| {
-                let kappa = 0.5
-                    * (self.path_per_k(layer, Half::A, temperature_k) + self.path_per_k(layer, Half::B, temperature_k));
-                kappa * rate * length_m
+                self.layer(layer, temperature_k).path_per_k * rate * length_m
             })
             .sum();
         let lead = self.coil.fibre().path_per_k() * lead_rate * self.coil.length_m();

@@ -3,12 +3,14 @@
 use std::path::Path;
 
 use coilwright::coil::{Coil, CoilSpec, Fibre, LayerLength};
+use coilwright::effect::{CATALOGUE, DeclaredEffect, FibrePlace};
 use coilwright::io::model_file::{NamedPattern, parse_model};
 use coilwright::io::pattern_file::{parse_pattern, print_pattern};
-use coilwright::pattern::Pattern;
 use coilwright::pattern::windability::{WindabilityClass, WindingGraph};
+use coilwright::pattern::{Half, Pattern};
 use coilwright::profile::{Piece, Profile, ProfileSpec};
 use coilwright::rate::{CoilModel, RateModel};
+use coilwright::reproduce::yan1998::model_of_layers;
 use coilwright::search::guaranteed::UnitStep;
 use coilwright::search::worst_case::SolvedProfiles;
 use coilwright::thermal::{Extent, Location, Material, ThermalHistory};
@@ -87,6 +89,21 @@ fn cases(halves: std::ops::RangeInclusive<usize>) -> impl Strategy<Value = Case>
             rates_k_per_s,
         })
     })
+}
+
+#[test]
+fn effects_whose_path_depends_on_temperature_say_so() {
+    let model = model_of_layers(200.0, 8).unwrap();
+    let mut depending = Vec::new();
+    for spec in CATALOGUE {
+        let effect = DeclaredEffect::at_start(spec).bind(&model.coil, &[]);
+        let at = |temperature_k| effect.path_factor(&FibrePlace { layer: 3, half: Half::A, temperature_k });
+        if (0..100).any(|i| at(250.0 + f64::from(i)) != at(250.0)) {
+            assert!(effect.path_depends_on_temperature(), "{}", spec.kind);
+            depending.push(spec.kind);
+        }
+    }
+    assert_eq!(depending, ["glass_transition", "thermo_optic_temperature"]);
 }
 
 proptest! {

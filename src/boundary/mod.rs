@@ -199,24 +199,34 @@ impl Boundary {
         if further_lag_s == 0.0 {
             return drive;
         }
+        let slope = self.sensor_slope_k_per_s(location);
+        let values = drive.boundary_k.values().iter().zip(slope.values()).map(|(v, s)| v + further_lag_s * s).collect();
+        let boundary_k = PiecewiseLinear::new(slope.knots().to_vec(), values).expect("the knots are the boundary's");
+        Drive { boundary_k, ..drive }
+    }
+
+    /// dT_s/dt of what the sensor shows of the drive at a location [K/s].
+    pub fn sensor_slope_k_per_s(&self, location: Location) -> PiecewiseLinear {
+        let course = match location {
+            Location::OuterLayer => &self.outer_k,
+            Location::Ambient => &self.air_k,
+        };
         let lag_s = self.scene.lag_s();
-        let knots = drive.boundary_k.knots();
+        let knots = course.knots();
         let mut sensor_slope = 0.0;
         let values = (0..knots.len())
             .map(|i| {
                 if lag_s > 0.0 && i > 0 {
                     // The sensor's slope follows the boundary's through the lag.
                     let left = (-(knots[i] - knots[i - 1]) / lag_s).exp();
-                    sensor_slope = sensor_slope * left + drive.boundary_k.slope_of(i - 1) * (1.0 - left);
+                    sensor_slope = sensor_slope * left + course.slope_of(i - 1) * (1.0 - left);
                 } else if lag_s == 0.0 {
-                    sensor_slope =
-                        0.5 * (drive.boundary_k.slope_before(knots[i]) + drive.boundary_k.slope_after(knots[i]));
+                    sensor_slope = 0.5 * (course.slope_before(knots[i]) + course.slope_after(knots[i]));
                 }
-                drive.boundary_k.values()[i] + further_lag_s * sensor_slope
+                sensor_slope
             })
             .collect();
-        let boundary_k = PiecewiseLinear::new(knots.to_vec(), values).expect("the knots are those of the boundary");
-        Drive { boundary_k, ..drive }
+        PiecewiseLinear::new(knots.to_vec(), values).expect("the knots are those of the boundary")
     }
 
     /// The whitening of rate residuals whose covariance is that of white noise plus that of the boundary's error.

@@ -13,7 +13,7 @@ use crate::pattern::Pattern;
 use crate::predict::{estimate_boundary, noise_floor_rad_per_s, rates_rad_per_s, refine_boundary};
 use crate::rate::CoilModel;
 use crate::record::Record;
-use crate::thermal::{self, Drive, HeatPath, Location, ThermalHistory};
+use crate::thermal::{self, Drive, Driven, HeatPath, Location, Memory, ThermalHistory};
 
 /// What a record is used for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,6 +44,16 @@ pub(super) struct Case {
     /// Fields that are asked for again and again, and those asked for lately.
     pinned: Mutex<Vec<Arc<Solved>>>,
     recent: Mutex<Vec<Arc<Solved>>>,
+    /// What the drives of anchors leave behind, those asked for lately.
+    driven: Mutex<Vec<Arc<DrivenAnchor>>>,
+}
+
+/// The drive of an anchor, ready for any heat path.
+struct DrivenAnchor {
+    anchor: usize,
+    driven: Driven,
+    /// Of the slope of what the sensor shows.
+    sensor: OnceLock<Memory>,
 }
 
 /// A field that was solved lately.
@@ -58,6 +68,9 @@ struct Solved {
 const KEPT_FIELDS: usize = 8;
 /// … and for the starts of the candidates.
 const PINNED_FIELDS: usize = 64;
+
+/// Drives kept ready: a bracket's three and a few more.
+const KEPT_DRIVES: usize = 6;
 
 /// How long a field is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -147,7 +160,7 @@ impl<'a> Evidence<'a> {
                     a.location == location && a.way == old.way && a.lag_s != lag_s && old.lags_s().contains(&a.lag_s)
                 };
                 case.anchors.retain(|a| !outdated(a));
-                (case.recent, case.pinned) = Default::default();
+                (case.recent, case.pinned, case.driven) = Default::default();
             }
             case.brackets.push(new);
             for side in sides {
@@ -226,6 +239,7 @@ impl Case {
             slope_response: OnceLock::new(),
             pinned: Mutex::default(),
             recent: Mutex::default(),
+            driven: Mutex::default(),
         }
     }
 
@@ -306,7 +320,7 @@ impl Case {
             Some(place) => self.anchors[place] = anchor,
             None => self.anchors.push(anchor),
         }
-        (self.recent, self.pinned) = Default::default();
+        (self.recent, self.pinned, self.driven) = Default::default();
     }
 
     /// The anchor for a sensor: that of its place which was estimated for the most nearly same effects, and then for the
@@ -353,11 +367,16 @@ impl Case {
             }
         }
         let from = &self.anchors[anchor];
-        let mut drive = from.boundary.delayed_drive(path.location, lag_s - from.lag_s);
-        if let Some(measured) = crate::predict::measured_ambient(&self.record) {
-            drive.ambient_k = Some(measured);
-        }
-        let mut history = self.history(&path, &drive, rate_mean_s)?;
+        let kept = self.driven(anchor, rate_mean_s);
+        let further_lag_s = lag_s - from.lag_s;
+        let mut history = if further_lag_s == 0.0 {
+            self.history(&path, &kept.driven)?
+        } else {
+            let sensor =
+                kept.sensor.get_or_init(|| kept.driven.memory_of(&from.boundary.sensor_slope_k_per_s(from.location)));
+            let drive = self.drive(from.boundary.delayed_drive(from.location, further_lag_s));
+            self.history(&path, &kept.driven.with(further_lag_s, sensor, drive))?
+        };
         if path.flange.is_some()
             && let Some(response) = from.flange_response.get_or_init(|| self.flange_response(from, rate_mean_s))
         {
@@ -384,29 +403,53 @@ impl Case {
     fn flange_response(&self, anchor: &Anchor, rate_mean_s: f64) -> Option<[ThermalHistory; 2]> {
         let path = HeatPath { conductivity_slope_per_k: 0.0, ..anchor.path.clone() };
         path.flange.filter(|_| path.location == Location::OuterLayer)?;
-        let (driven, mut by_air) = anchor.boundary.driving(&path, 0.0);
-        let mut by_layer = anchor.boundary.drive(path.location);
-        if let Some(measured) = crate::predict::measured_ambient(&self.record) {
-            by_air.ambient_k = Some(measured.clone());
-            by_layer.ambient_k = Some(measured);
-        }
-        let means = |path: &HeatPath, drive: &Drive| {
-            Some(thermal::solve(path, drive).ok()?.means(self.record.times_s(), rate_mean_s))
+        let (driven, by_air) = anchor.boundary.driving(&path, 0.0);
+        let by_layer = anchor.boundary.drive(path.location);
+        let means = |path: &HeatPath, drive: Drive| {
+            Driven::new(self.drive(drive), self.record.times_s(), rate_mean_s).means(path).ok()
         };
-        Some([means(&driven, &by_air)?, means(&path, &by_layer)?])
+        Some([means(&driven, by_air)?, means(&path, by_layer)?])
     }
 
-    /// The pack under a drive; the effect of a conductivity's slope is taken from two solutions made before.
-    fn history(&self, path: &HeatPath, drive: &Drive, rate_mean_s: f64) -> Option<ThermalHistory> {
-        let times_s = self.record.times_s();
+    /// With the measured ambient, if there is one.
+    fn drive(&self, drive: Drive) -> Drive {
+        Drive { ambient_k: crate::predict::measured_ambient(&self.record).or(drive.ambient_k), ..drive }
+    }
+
+    /// An anchor's drive, remembered if it was asked for lately.
+    fn driven(&self, anchor: usize, rate_mean_s: f64) -> Arc<DrivenAnchor> {
+        let found = |kept: &[Arc<DrivenAnchor>]| kept.iter().find(|d| d.anchor == anchor).cloned();
+        if let Ok(kept) = self.driven.lock()
+            && let Some(known) = found(&kept)
+        {
+            return known;
+        }
+        let from = &self.anchors[anchor];
+        let driven = Driven::new(self.drive(from.boundary.drive(from.location)), self.record.times_s(), rate_mean_s);
+        let new = Arc::new(DrivenAnchor { anchor, driven, sensor: OnceLock::new() });
+        if let Ok(mut kept) = self.driven.lock() {
+            if let Some(known) = found(&kept) {
+                return known;
+            }
+            if kept.len() >= KEPT_DRIVES {
+                kept.remove(0);
+            }
+            kept.push(new.clone());
+        }
+        new
+    }
+
+    /// The pack under a drive; the effect of a conductivity's slope is taken from a series worked out before.
+    fn history(&self, path: &HeatPath, driven: &Driven) -> Option<ThermalHistory> {
         let slope_per_k = path.conductivity_slope_per_k;
         let linear = HeatPath { conductivity_slope_per_k: 0.0, ..path.clone() };
-        let mut history = thermal::solve(&linear, drive).ok()?.means(times_s, rate_mean_s);
+        let mut history = driven.means(&linear).ok()?;
         if slope_per_k != 0.0 {
             thermal::check(path).ok()?;
             let response = self.slope_response.get_or_init(|| {
                 let first = self.anchors.first()?;
-                SlopeResponse::new(&first.path, &first.boundary.drive(first.location), times_s, rate_mean_s)
+                let drive = first.boundary.drive(first.location);
+                SlopeResponse::new(&first.path, &drive, self.record.times_s(), driven.window_s())
             });
             response.as_ref()?.add_to(&mut history, slope_per_k);
         }

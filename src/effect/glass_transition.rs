@@ -66,6 +66,10 @@ impl Effect for GlassTransition {
         false
     }
 
+    fn path_depends_on_temperature(&self) -> bool {
+        true
+    }
+
     fn path_factor(&self, place: &FibrePlace) -> f64 {
         let glassy = 1.0 / (1.0 + ((place.temperature_k - self.transition_k) / self.width_k).exp());
         match place.half {

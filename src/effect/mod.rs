@@ -86,6 +86,11 @@ pub trait Effect: std::fmt::Debug + Send + Sync {
         1.0
     }
 
+    /// Whether [`Effect::path_factor`] depends on the place's temperature.
+    fn path_depends_on_temperature(&self) -> bool {
+        false
+    }
+
     /// Factor on the coil's rate error; those of several effects multiply.
     fn coil_gain(&self, _state: &PackState) -> f64 {
         1.0

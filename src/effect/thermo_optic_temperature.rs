@@ -42,6 +42,10 @@ impl Effect for ThermoOpticTemperature {
         false
     }
 
+    fn path_depends_on_temperature(&self) -> bool {
+        true
+    }
+
     fn path_factor(&self, place: &FibrePlace) -> f64 {
         1.0 + self.slope_per_k * (place.temperature_k - REFERENCE_TEMPERATURE_K)
     }

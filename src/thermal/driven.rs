@@ -19,7 +19,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::modal::{Contents, Decay, Response, heated_mode};
 use super::pack::Pack;
-use super::{BoreHeat, Drive, Extent, HeatPath, Instant, ThermalError, ThermalHistory, check, solve};
+use super::{BoreHeat, Drive, Extent, HeatPath, Instant, Side, ThermalError, ThermalHistory, check, solve};
 use crate::numeric::piecewise::PiecewiseLinear;
 
 /// Slower than this [1/s] is not distinguished from it; faster than the last node (100/s) is over at once.
@@ -36,7 +36,8 @@ pub struct Driven {
     drive: Drive,
     rows: Arc<Rows>,
     boundary: Arc<Memory>,
-    ambient: Option<Arc<Memory>>,
+    /// Made when a path first asks for it.
+    ambient: Option<Arc<OnceLock<Memory>>>,
     ambient_k: Arc<Vec<f64>>,
     ambient_rate_k_per_s: Arc<Vec<f64>>,
     /// e^{−Λ_n (t − t_0)} at each instant, for what begins with the drive; made when it is first asked for.
@@ -86,6 +87,19 @@ impl Rows {
         }
         (mean, change)
     }
+
+    /// An input over each row's window, and its change there.
+    fn inputs(&self, input: &PiecewiseLinear) -> (Vec<f64>, Vec<f64>) {
+        let count = self.instants.len();
+        let value = DMatrix::from_fn(1, count, |_, i| input.value(self.instants[i].time_s));
+        let (value, per_s) = self.over(&value, || {
+            DMatrix::from_fn(1, count, |_, i| match self.instants[i].side {
+                Side::Before => input.slope_before(self.instants[i].time_s),
+                Side::After => input.slope_after(self.instants[i].time_s),
+            })
+        });
+        (value.data.into(), per_s.data.into())
+    }
 }
 
 impl Memory {
@@ -95,21 +109,19 @@ impl Memory {
         let count = rows.instants.len();
         let mut decay = Decay::new(&decay_per_s);
         let mut content = DMatrix::zeros(NODES, count);
-        let (mut value, mut slope) = (DMatrix::zeros(1, count), DMatrix::zeros(1, count));
-        for ((&instant, column), i) in rows.instants.iter().zip(content.as_mut_slice().chunks_exact_mut(NODES)).zip(0..)
-        {
-            (value[i], slope[i]) = contents.at(instant, &mut decay, column);
+        let mut slopes = Vec::with_capacity(count);
+        for (&instant, column) in rows.instants.iter().zip(content.as_mut_slice().chunks_exact_mut(NODES)) {
+            slopes.push(contents.at(instant, &mut decay, column).1);
         }
         let mut memory = content.clone();
-        for (column, slope) in memory.as_mut_slice().chunks_exact_mut(NODES).zip(slope.iter()) {
+        for (column, slope) in memory.as_mut_slice().chunks_exact_mut(NODES).zip(&slopes) {
             for (m, l) in column.iter_mut().zip(&decay_per_s) {
                 *m = (slope - *m) / l;
             }
         }
         let (memory, memory_per_s) = rows.over(&memory, || content);
-        let (value, value_per_s) = rows.over(&value, || slope);
-        let column = |row: DMatrix<f64>| DVector::from_column_slice(row.as_slice());
-        Self { value: column(value), value_per_s: column(value_per_s), memory, memory_per_s }
+        let (value, value_per_s) = rows.inputs(input);
+        Self { value: value.into(), value_per_s: value_per_s.into(), memory, memory_per_s }
     }
 
     /// self + factor · other.
@@ -143,9 +155,8 @@ impl Driven {
     pub fn new(drive: Drive, times_s: &[f64], window_s: f64) -> Self {
         let rows = Rows::new(times_s, window_s);
         let boundary = Arc::new(Memory::new(&drive.boundary_k, &rows));
-        let ambient = drive.ambient_k.as_ref().map(|a| Arc::new(Memory::new(a, &rows)));
-        let of = ambient.as_ref().unwrap_or(&boundary);
-        let (ambient_k, ambient_rate_k_per_s) = (of.value.as_slice().to_vec(), of.value_per_s.as_slice().to_vec());
+        let ambient = drive.ambient_k.as_ref().map(|_| Arc::default());
+        let (ambient_k, ambient_rate_k_per_s) = rows.inputs(drive.ambient_k());
         Self {
             drive,
             rows: Arc::new(rows),
@@ -157,8 +168,8 @@ impl Driven {
         }
     }
 
-    pub fn drive(&self) -> &Drive {
-        &self.drive
+    pub fn window_s(&self) -> f64 {
+        self.rows.window_s
     }
 
     /// What the same rows remember of another input.
@@ -194,6 +205,7 @@ impl Driven {
         let mut columns = [DMatrix::zeros(pack.outputs, rows), DMatrix::zeros(pack.outputs, rows)];
         match (&pack.ambient, &self.ambient) {
             (Some(response), Some(ambient)) => {
+                let ambient = ambient.get_or_init(|| Memory::new(self.drive.ambient_k(), &self.rows));
                 self.boundary.add_to(&pack.boundary, decay_per_s, self.rows.window_s, &mut columns);
                 ambient.add_to(response, decay_per_s, self.rows.window_s, &mut columns);
             }
