@@ -46,6 +46,8 @@ pub(super) struct Scene {
     path: HeatPath,
     /// Into the bore, where it warms what the sensor is attached to.
     bore_heat: Option<BoreHeat>,
+    /// What a conductivity that depends on temperature does to the outermost layer.
+    pub bent_k: Option<PiecewiseLinear>,
     lag_s: f64,
     layer_gain_rad_per_k: Vec<f64>,
     rate_mean_s: f64,
@@ -62,8 +64,8 @@ pub(super) struct AirSpace {
     pub rate_places: Vec<usize>,
     stage_times_s: Vec<f64>,
     outer: Vec<f64>,
-    /// By how much the bore's heat warms the outermost layer.
-    warmed_k: Option<PiecewiseLinear>,
+    /// By how much heat from the bore and a conductivity's slope warm the outermost layer.
+    added_k: Option<PiecewiseLinear>,
     /// Change of the rate functional over the window, per window.
     rate_row: Vec<f64>,
     dynamics: DMatrix<f64>,
@@ -120,6 +122,7 @@ impl Scene {
             location,
             path,
             bore_heat,
+            bent_k: None,
             lag_s,
             layer_gain_rad_per_k: observation.layer_gain_rad_per_k.to_vec(),
             rate_mean_s: observation.rate_mean_s,
@@ -140,6 +143,14 @@ impl Scene {
         self.build(air, Rates::Measured { noise_rad_per_s })
     }
 
+    /// What the linear path to the air leaves out of the outermost layer's temperature.
+    fn added_k(&self, path: &HeatPath) -> Result<Option<PiecewiseLinear>, BoundaryError> {
+        let Some(bent_k) = &self.bent_k else { return self.warmed_k(path) };
+        let Some(warmed_k) = self.warmed_k(path)? else { return Ok(Some(bent_k.clone())) };
+        let sums = self.times_s.iter().map(|&t| bent_k.value(t) + warmed_k.value(t)).collect();
+        Ok(Some(PiecewiseLinear::new(self.times_s.clone(), sums).expect("readings are in order")))
+    }
+
     /// What the bore's heat adds to the outermost layer behind a film, the air standing still.
     fn warmed_k(&self, path: &HeatPath) -> Result<Option<PiecewiseLinear>, BoundaryError> {
         let Some(heat) = self.bore_heat else { return Ok(None) };
@@ -158,7 +169,7 @@ impl Scene {
             path.film_w_per_m2_k = air.film_w_per_m2_k;
         }
         let pack = Pack::new(&path)?;
-        let warmed_k = self.warmed_k(&path)?;
+        let added_k = self.added_k(&path)?;
         let layers = path.shape.layers;
         let largest = |mode: usize| (0..layers).map(|layer| pack.amplitude(layer, mode).abs()).fold(0.0, f64::max);
         // A flange makes many modes that hardly any layer's mean sees.
@@ -251,11 +262,11 @@ impl Scene {
                 Event::Reading(reading) => {
                     reading_stages[reading] = index;
                     // Warming takes far longer than the sensor's lag.
-                    let warmed_k =
-                        warmed_k.as_ref().map_or(0.0, |w| w.value(time_s) - self.lag_s * w.slope_before(time_s));
+                    let added_k =
+                        added_k.as_ref().map_or(0.0, |w| w.value(time_s) - self.lag_s * w.slope_before(time_s));
                     measurements.push(Measurement {
                         row: 0,
-                        value: self.temperature_k[reading] - warmed_k,
+                        value: self.temperature_k[reading] - added_k,
                         variance: air.noise_k * air.noise_k,
                     });
                     taken += 1;
@@ -327,7 +338,7 @@ impl Scene {
             kink_stages,
             reading_stages,
             rate_places,
-            warmed_k,
+            added_k,
             stage_times_s: events.iter().map(|e| e.0).collect(),
             outer,
             rate_row,
@@ -373,8 +384,8 @@ impl Scene {
         let mut push = |time_s: f64, state: &[f64]| {
             if knots_s.last().is_none_or(|&last: &f64| time_s > last + 1e3 * SAME_TIME_S) {
                 knots_s.push(time_s);
-                let warmed_k = built.warmed_k.as_ref().map_or(0.0, |w| w.value(time_s));
-                outer_k.push(warmed_k + state.iter().zip(&built.outer).map(|(x, o)| x * o).sum::<f64>());
+                let added_k = built.added_k.as_ref().map_or(0.0, |w| w.value(time_s));
+                outer_k.push(added_k + state.iter().zip(&built.outer).map(|(x, o)| x * o).sum::<f64>());
                 air_k.push(state[layout.temperature()]);
             }
         };

@@ -184,7 +184,7 @@ impl Trial<'_> {
         let candidate = &self.candidates[member.candidate];
         let Some(&first) = candidate.free.first() else { return false };
         let declared = &candidate.effect.parameters()[first];
-        matches!(candidate.effect.spec().acts, Acts::Outside | Acts::Response)
+        matches!(candidate.effect.spec().acts, Acts::Outside | Acts::Response | Acts::HeatPath)
             && declared.lower < 0.0
             && declared.upper > 0.0
     }
