@@ -274,7 +274,7 @@ fn a_page_whose_visible_table_was_altered_is_caught_though_its_data_are_right() 
         ("<td>12.500</td>", "<td>12.600</td>", "length_m on the page"),
         ("first → second", "second → first", "direction on the page"),
         ("UV acrylate", "epoxy", "Adhesive on the page"),
-        ("0.120", "0.150", "tension_n on the page"),
+        ("0.120 (", "0.150 (", "tension_n on the page"),
         ("half A</text>", "half B</text>", "a heading on the page"),
     ] {
         assert!(page.contains(seen), "{seen}");

@@ -4,11 +4,14 @@ use clap::ValueEnum;
 
 use super::screen::Screen;
 use super::{CliError, Ending};
+use crate::io::further_schemas::{campaign_schema, compensation_schema};
 use crate::io::schema::{model_schema, pattern_schema, record_schema, schedule_schema};
 
 /// The JSON Schema of a file format, for editors
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  coilwright schema model > coilwright-model.schema.json")]
+#[command(
+    after_help = "Examples:\n  coilwright schema model > coilwright-model.schema.json\n  coilwright schema campaign"
+)]
 pub struct Arguments {
     /// Which files it is about
     #[arg(value_enum)]
@@ -22,6 +25,9 @@ enum Kind {
     Record,
     /// Schedule, traveller and winder's program as JSON
     Schedule,
+    Campaign,
+    /// The compensator that `compensate --export` writes
+    Compensation,
 }
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
@@ -30,6 +36,8 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         Kind::Pattern => pattern_schema(),
         Kind::Record => record_schema(),
         Kind::Schedule => schedule_schema(),
+        Kind::Campaign => campaign_schema(),
+        Kind::Compensation => compensation_schema(),
     };
     screen.write(&format!("{schema:#}\n"))?;
     Ok(Ending::Done)

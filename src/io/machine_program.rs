@@ -46,6 +46,8 @@ pub fn machine_program(
         row.rotation = Some(rotation_word(step.rotation).to_owned());
         row.axial_pitch_mm = Some(rounded(mm_from_m(axial_pitch_m), MM_DECIMALS));
         row.tension_n = Some(rounded(production.tension_n_at(step.layer), TURNS_DECIMALS));
+        let limits_n = production.tension_limits_n_at(step.layer).map(|n| rounded(n, TURNS_DECIMALS));
+        [row.tension_min_n, row.tension_max_n] = limits_n.map(Some);
         row.turns_per_min = Some(rounded(production.winding_speed_turns_per_min, TURNS_DECIMALS));
         row.reel_change = Some(previous != Some(step.supply_reel));
         row.potting = Some(production.pots_after(step.layer, layers));
@@ -86,9 +88,10 @@ pub fn gcode(document: &ScheduleJson) -> String {
         let sign = if step.rotation.as_deref() == Some("cw") { "" } else { "-" };
         // What the words below say is left out of the comment.
         out.push_str(&format!(
-            "; layer {} step {} half {} segment {} from {} to {} length {} radius {} climb {} cumulative {} pitch {} tension {}\n",
+            "; layer {} step {} half {} segment {} from {} to {} length {} radius {} climb {} cumulative {} pitch {} tension {} least {} most {}\n",
             step.layer, step.step, step.half, step.segment, step.fibre_from_m, step.fibre_to_m, step.length_m,
             step.radius_mm, step.climb, step.cumulative_m, pitch_mm, step.tension_n.unwrap_or(0.0),
+            step.tension_min_n.unwrap_or(0.0), step.tension_max_n.unwrap_or(0.0),
         ));
         out.push_str(&format!("; crossover {}\n", step.crossover.as_deref().unwrap_or("")));
         let change = if step.reel_change == Some(true) { " M6" } else { "" };
@@ -161,7 +164,21 @@ pub fn parse_gcode(file: &str, text: &str) -> Result<ScheduleJson, Faults> {
 
 fn step_of_comment(words: &str) -> Option<StepJson> {
     let words: Vec<&str> = words.split_whitespace().collect();
-    let keys = ["step", "half", "segment", "from", "to", "length", "radius", "climb", "cumulative", "pitch", "tension"];
+    let keys = [
+        "step",
+        "half",
+        "segment",
+        "from",
+        "to",
+        "length",
+        "radius",
+        "climb",
+        "cumulative",
+        "pitch",
+        "tension",
+        "least",
+        "most",
+    ];
     if words.len() != 1 + 2 * keys.len() || !keys.iter().enumerate().all(|(i, key)| words[1 + 2 * i] == *key) {
         return None;
     }
@@ -187,6 +204,8 @@ fn step_of_comment(words: &str) -> Option<StepJson> {
         rotation: None,
         axial_pitch_mm: Some(number("pitch")?),
         tension_n: Some(number("tension")?),
+        tension_min_n: Some(number("least")?),
+        tension_max_n: Some(number("most")?),
         turns_per_min: None,
         reel_change: Some(false),
         potting: Some(false),

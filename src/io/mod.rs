@@ -11,6 +11,7 @@ mod effect_tables;
 pub mod effects_json;
 pub mod fault;
 pub mod files;
+pub mod further_schemas;
 pub mod inputs_json;
 pub mod json;
 pub mod machine_program;

@@ -13,6 +13,7 @@ pub(super) fn read_production(r: &mut TomlReader, table: &mut TableReader) -> Pr
     let (adhesive, cure) = (text(r, "adhesive"), text(r, "cure"));
     let tension_n = table.number(r, "tension_n", Limits::between(1e-4, 100.0));
     let taper_percent = table.number(r, "tension_taper_percent_per_layer", Limits::between(0.0, 50.0));
+    let limit_percent = table.number(r, "tension_limit_percent", Limits::between(0.0, 100.0));
     let allowance_m = table.number(r, "allowance_m", Limits::between(0.0, 1e4));
     let potting_every_layers = table.integer(r, "potting_every_layers", 0, 10_000);
     let speed = table.number(r, "winding_speed_turns_per_min", Limits::between(1e-2, 1e5));
@@ -24,6 +25,7 @@ pub(super) fn read_production(r: &mut TomlReader, table: &mut TableReader) -> Pr
         tension_taper_per_layer: fraction_from_percent(
             taper_percent.unwrap_or(percent_from_fraction(default.tension_taper_per_layer)),
         ),
+        tension_limit: limit_percent.map_or(default.tension_limit, fraction_from_percent),
         allowance_m: allowance_m.unwrap_or(default.allowance_m),
         adhesive,
         potting_every_layers: potting_every_layers.map_or(default.potting_every_layers, |n| n as usize),

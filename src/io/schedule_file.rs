@@ -7,13 +7,14 @@
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use crate::coil::Fibre;
 use crate::pattern::Half;
 use crate::pattern::windability::WindingGraph;
 use crate::schedule::production::Production;
 use crate::schedule::{Rotation, Schedule, Step};
 use crate::search::worst_case::WorstCase;
 use crate::thermal::Flange;
-use crate::units::{deg_per_h_from_rad_per_s, mm_from_m, percent_from_fraction};
+use crate::units::{deg_per_h_from_rad_per_s, mm_from_m, nm_from_m, percent_from_fraction, um_from_m};
 
 use super::json::SCHEMA_VERSION;
 use super::model_file::{ModelFile, NamedPattern};
@@ -39,7 +40,15 @@ pub struct ScheduleJson {
     pub worst_rate_deg_per_h: f64,
     pub worst_profile: String,
     pub worst_time_s: f64,
+    /// The fibre in words.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fibre: Option<String>,
     pub length_m: f64,
+    /// The fibre's middle: arclength from end A, and the layer (counted from 1) in which it lies, the inner one of two.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub midpoint_m: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub midpoint_layer: Option<i64>,
     pub start_mark_m: f64,
     pub expected_trim_m: f64,
     pub reels: Vec<ReelJson>,
@@ -80,6 +89,7 @@ pub struct ProductionJson {
     pub spool: String,
     pub tension_n: f64,
     pub tension_taper_percent_per_layer: f64,
+    pub tension_limit_percent: f64,
     pub allowance_m: f64,
     pub adhesive: String,
     pub potting_every_layers: i64,
@@ -113,6 +123,10 @@ pub struct StepJson {
     pub axial_pitch_mm: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tension_n: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tension_min_n: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tension_max_n: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub turns_per_min: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -178,7 +192,10 @@ impl ScheduleJson {
             worst_rate_deg_per_h: rounded(deg_per_h_from_rad_per_s(worst.rate_rad_per_s.abs()), RATE_DECIMALS),
             worst_profile: worst.profile.clone(),
             worst_time_s: rounded(worst.time_s, LENGTH_DECIMALS),
+            fibre: Some(fibre_words(file.model.coil.fibre())),
             length_m: length(schedule.length_m()),
+            midpoint_m: Some(length(0.5 * schedule.length_m())),
+            midpoint_layer: Some(schedule.midpoint_layer() as i64),
             start_mark_m: length(schedule.start_mark_m()),
             expected_trim_m: length(schedule.expected_trim_m()),
             reels: schedule
@@ -256,6 +273,8 @@ impl StepJson {
             rotation: None,
             axial_pitch_mm: None,
             tension_n: None,
+            tension_min_n: None,
+            tension_max_n: None,
             turns_per_min: None,
             reel_change: None,
             potting: None,
@@ -263,6 +282,12 @@ impl StepJson {
             checked_by: None,
         }
     }
+}
+
+/// What the header says of the fibre: `250.0 µm over the coating, n 1.447 at 1300 nm`.
+fn fibre_words(fibre: &Fibre) -> String {
+    let (diameter_um, wavelength_nm) = (um_from_m(fibre.outer_diameter_m), nm_from_m(fibre.wavelength_m));
+    format!("{diameter_um:.1} µm over the coating, n {} at {wavelength_nm:.0} nm", fibre.refractive_index)
 }
 
 /// What the operator reads about the crossovers that a step completes: `second flange, from layer 3, 2 layers`.
@@ -293,6 +318,7 @@ impl ProductionJson {
             spool: production.spool.clone(),
             tension_n: production.tension_n,
             tension_taper_percent_per_layer: percent_from_fraction(production.tension_taper_per_layer),
+            tension_limit_percent: percent_from_fraction(production.tension_limit),
             allowance_m: production.allowance_m,
             adhesive: production.adhesive.clone(),
             potting_every_layers: production.potting_every_layers as i64,

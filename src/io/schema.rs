@@ -12,7 +12,7 @@ use super::json::SCHEMA_VERSION;
 
 const DIALECT: &str = "https://json-schema.org/draft/2020-12/schema";
 
-fn table(title: &str, needed: &[&str], properties: Value) -> Value {
+pub(super) fn table(title: &str, needed: &[&str], properties: Value) -> Value {
     json!({
         "title": title,
         "type": "object",
@@ -22,11 +22,11 @@ fn table(title: &str, needed: &[&str], properties: Value) -> Value {
     })
 }
 
-fn described(kind: &str, description: &str) -> Value {
+pub(super) fn described(kind: &str, description: &str) -> Value {
     json!({ "type": kind, "description": description })
 }
 
-fn with_dialect(mut schema: Value) -> Value {
+pub(super) fn with_dialect(mut schema: Value) -> Value {
     if let Value::Object(map) = &mut schema {
         map.insert("$schema".to_owned(), DIALECT.into());
     }
@@ -123,6 +123,7 @@ fn production() -> Value {
             "cure": { "type": "string" },
             "tension_n": described("number", "tension set-point of the first layer"),
             "tension_taper_percent_per_layer": described("number", "how much less each further layer gets"),
+            "tension_limit_percent": described("number", "how far the tension may be from its set-point"),
             "allowance_m": described("number", "fibre on each reel beyond what is wound"),
             "potting_every_layers": { "type": "integer", "minimum": 0 },
             "winding_speed_turns_per_min": { "type": "number" },
@@ -265,6 +266,7 @@ pub fn schedule_schema() -> Value {
             "part_number": word(""), "revision": word(""), "spool": word(""), "adhesive": word(""), "cure": word(""),
             "tension_n": number("on the first layer"),
             "tension_taper_percent_per_layer": number("of the first layer's"),
+            "tension_limit_percent": number("of the set-point"),
             "allowance_m": number("on each reel with an end of the fibre"),
             "potting_every_layers": whole("0: only after the last layer"),
             "winding_speed_turns_per_min": number(""),
@@ -306,6 +308,8 @@ pub fn schedule_schema() -> Value {
             "rotation": { "enum": ["cw", "ccw"] },
             "axial_pitch_mm": number("from turn to turn"),
             "tension_n": number("set-point"),
+            "tension_min_n": number("least allowed"),
+            "tension_max_n": number("largest allowed"),
             "turns_per_min": number("winding speed"),
             "reel_change": flag("another reel than for the layer before"),
             "potting": flag("adhesive is applied after the layer"),
@@ -345,7 +349,10 @@ pub fn schedule_schema() -> Value {
             "worst_rate_deg_per_h": number("over the model's profiles and all times"),
             "worst_profile": word("under which it occurs"),
             "worst_time_s": number("at which it occurs"),
+            "fibre": word("the fibre in words"),
             "length_m": number("of the fibre"),
+            "midpoint_m": number("the fibre's middle, arclength from end A"),
+            "midpoint_layer": whole("the layer in which it lies"),
             "start_mark_m": number("fixed at the first flange before layer 1"),
             "expected_trim_m": number("from end A; below 0 from end B"),
             "reels": { "type": "array", "items": reel },

@@ -61,6 +61,7 @@ figure svg{max-width:100%;height:auto;display:block}
 .zoom.open svg{max-width:none;width:100%;height:100%;transform-origin:0 0}
 .fill{min-width:5rem}.long{min-width:10.5rem}.keep{white-space:nowrap}
 .a{color:var(--a)}.b{color:var(--b)}
+td code{display:inline-block;min-width:12rem}
 code,pre{font-family:ui-monospace,'DejaVu Sans Mono',monospace;font-size:.86em;overflow-wrap:anywhere;white-space:pre-wrap}
 @media screen and (max-width:40rem){figure .zoom:not(.open){overflow-x:auto}figure .zoom:not(.open) svg{max-width:none;width:560px}body{font-size:15px}dl.facts{grid-template-columns:1fr}dl.facts dt{margin-top:.3rem}}
 @page{margin:14mm 12mm 16mm;@bottom-right{content:'page ' counter(page) ' of ' counter(pages);font:9pt sans-serif}}
@@ -69,7 +70,8 @@ code,pre{font-family:ui-monospace,'DejaVu Sans Mono',monospace;font-size:.86em;o
 body{font-size:10pt}main{max-width:none;padding:0}
 h1{font-size:15pt}h2{font-size:12pt;break-after:avoid}
 table{font-size:7.6pt;width:100%}th,td{padding:1.5pt 3pt}thead{display:table-header-group}tr{break-inside:avoid}
-figure{break-inside:avoid}figure svg{max-height:225mm}.scroll{overflow:visible;padding-right:1.5pt}.fill{min-width:0}.long{min-width:26mm}.screen{display:none}
+figure{break-inside:avoid}figure svg{max-height:225mm}.scroll{overflow:visible;padding-right:1.5pt}.fill{min-width:0}.long{min-width:26mm}.screen{display:none}td code{min-width:0}
+details::details-content{content-visibility:visible;block-size:auto}summary{list-style:none}
 }
 ";
 

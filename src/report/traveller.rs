@@ -4,7 +4,7 @@ use maud::{Markup, PreEscaped, html};
 
 use super::cross_section::cross_section;
 use super::page::{figure, page};
-use crate::io::schedule_file::ScheduleJson;
+use crate::io::schedule_file::{ScheduleJson, StepJson};
 use crate::io::schedule_reader::DATA_ELEMENT;
 use crate::pattern::Pattern;
 
@@ -60,7 +60,16 @@ fn head(document: &ScheduleJson) -> Markup {
                 document.windability.class, document.windability.reels, document.windability.max_climb
             ),
         ),
+        ("Fibre", document.fibre.clone().unwrap_or_default()),
         ("Fibre length", metres(document.length_m)),
+        (
+            "Fibre's middle",
+            format!(
+                "{} from end A, in layer {}",
+                metres(document.midpoint_m.unwrap_or(0.0)),
+                document.midpoint_layer.unwrap_or(0)
+            ),
+        ),
         (
             "Predicted worst rate error",
             format!("{:.4} °/h (profile {})", document.worst_rate_deg_per_h, document.worst_profile),
@@ -113,13 +122,22 @@ fn steps(document: &ScheduleJson) -> Markup {
                 td { (format!("{:.3}", row.cumulative_m)) }
                 td { (format!("{:.3}", row.balance_m.unwrap_or(0.0)).replace('-', "−")) }
                 td { (format!("{:.4}", row.radius_mm)) }
-                td { (row.tension_n.map_or(String::new(), |t| format!("{t:.3}"))) }
+                td { (tension(row)) }
                 td.word { (row.crossover.as_deref().unwrap_or("")) }
                 td.word { @if row.potting == Some(true) { "apply adhesive" } }
                 td.fill {}
                 td { "☐" }
             } } }
         } }
+    }
+}
+
+/// Set-point and limits.
+fn tension(row: &StepJson) -> String {
+    match (row.tension_n, row.tension_min_n, row.tension_max_n) {
+        (Some(set), Some(least), Some(most)) => format!("{set:.3} ({least:.3}–{most:.3})"),
+        (Some(set), ..) => format!("{set:.3}"),
+        _ => String::new(),
     }
 }
 

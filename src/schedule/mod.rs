@@ -193,6 +193,14 @@ impl Schedule {
         self.length_m
     }
 
+    /// The layer (counted from 1) in which the fibre's middle lies; the inner one where it lies between two.
+    pub fn midpoint_layer(&self) -> usize {
+        let middle_m = 0.5 * self.length_m;
+        let rounding_m = 1e-10 * self.length_m;
+        let holds = |s: &&Step| s.fibre_from_m <= middle_m + rounding_m && s.fibre_to_m >= middle_m - rounding_m;
+        self.steps.iter().find(holds).map_or(1, |s| s.layer)
+    }
+
     /// The place of the fibre that is fixed at the first flange before layer 1: the midpoint, for most windings.
     pub fn start_mark_m(&self) -> f64 {
         self.start_mark_m

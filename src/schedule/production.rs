@@ -10,6 +10,8 @@ pub struct Production {
     pub tension_n: f64,
     /// The tension falls by this share of the first layer's from layer to layer.
     pub tension_taper_per_layer: f64,
+    /// How far the tension may be from its set-point, as a share of it.
+    pub tension_limit: f64,
     /// Surplus on each reel, for leads and splices.
     pub allowance_m: f64,
     pub adhesive: String,
@@ -28,6 +30,7 @@ impl Default for Production {
             spool: String::new(),
             tension_n: 0.1,
             tension_taper_per_layer: 0.0,
+            tension_limit: 0.1,
             allowance_m: 3.0,
             adhesive: String::new(),
             potting_every_layers: 1,
@@ -41,6 +44,12 @@ impl Production {
     /// Set-point for a layer, counted from 1.
     pub fn tension_n_at(&self, layer: usize) -> f64 {
         self.tension_n * (1.0 - self.tension_taper_per_layer * (layer.max(1) - 1) as f64).max(0.0)
+    }
+
+    /// The least and the largest tension at a layer, counted from 1.
+    pub fn tension_limits_n_at(&self, layer: usize) -> [f64; 2] {
+        let set_n = self.tension_n_at(layer);
+        [set_n * (1.0 - self.tension_limit), set_n * (1.0 + self.tension_limit)]
     }
 
     /// Whether adhesive is applied after a layer, counted from 1, of so many.

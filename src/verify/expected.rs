@@ -3,6 +3,7 @@
 use super::physics::wound_turns;
 use super::{Claim, Findings, Printed, Truth};
 use crate::coil::LayerLength;
+use crate::units::{nm_from_m, um_from_m};
 
 const COUNT_FROM_ONE: &str = "keep one row a layer, innermost first, numbered from 1";
 const WIND_ONCE: &str = "every segment is wound exactly once: correct the segment or the missing row";
@@ -243,6 +244,11 @@ pub(super) fn check(truth: &Truth, claim: &Claim, segments: &[usize], findings: 
         let shop = truth.shop;
         let tension_n = shop.tension_n * (1.0 - shop.tension_taper_per_layer * i as f64).max(0.0);
         findings.near_if(here, "tension_n", tension_n, row.tension_n, Printed::Plain);
+        for (field, sign, found) in
+            [("tension_min_n", -1.0, row.tension_min_n), ("tension_max_n", 1.0, row.tension_max_n)]
+        {
+            findings.near_if(here, field, tension_n * (1.0 + sign * shop.tension_limit), found, Printed::Plain);
+        }
         let speed = shop.winding_speed_turns_per_min;
         findings.near_if(here, "turns_per_min", speed, row.turns_per_min, Printed::Plain);
         let changed = i == 0 || fed_by[i] != fed_by[i - 1];
@@ -266,6 +272,19 @@ pub(super) fn check(truth: &Truth, claim: &Claim, segments: &[usize], findings: 
     check_whole(claim, &supply, max_climb, findings);
     check_reels(truth, claim, &supply, &starts_m, findings);
     findings.near_if(None, "length_m", starts_m[count], claim.length_m, Printed::Metres);
+    let fibre = coil.fibre();
+    let (coated_um, wave_nm) = (um_from_m(fibre.outer_diameter_m), nm_from_m(fibre.wavelength_m));
+    let fibre = format!("{coated_um:.1} µm over the coating, n {} at {wave_nm:.0} nm", fibre.refractive_index);
+    findings.same_if(None, "fibre", &fibre, claim.fibre.as_ref());
+    let middle_m = 0.5 * starts_m[count];
+    findings.near_if(None, "midpoint_m", middle_m, claim.midpoint_m, Printed::Metres);
+    // Exactly between two segments, up to rounding, the layer that is wound first.
+    let holds = |segment: usize| {
+        let slack_m = 1e-10 * starts_m[count];
+        (starts_m[segment - 1] - slack_m..=starts_m[segment] + slack_m).contains(&middle_m)
+    };
+    let of_middle = segments.iter().position(|&segment| holds(segment)).map_or(0, |layer| layer as i64 + 1);
+    findings.same_if(None, "midpoint_layer", &of_middle, claim.midpoint_layer.as_ref());
     let start = if begins_low(segments[0], count) { segments[0] - 1 } else { segments[0] };
     findings.near_if(None, "start_mark_m", starts_m[start], claim.start_mark_m, Printed::Metres);
     findings.near_if(None, "expected_trim_m", balance_m, claim.expected_trim_m, Printed::Metres);
@@ -310,6 +329,7 @@ fn check_shop(truth: &Truth, found: &super::Shop, findings: &mut Findings) {
     for (name, expected, found) in [
         ("tension_n", shop.tension_n, found.tension_n),
         ("tension_taper_percent_per_layer", shop.tension_taper_per_layer, found.tension_taper_per_layer),
+        ("tension_limit_percent", shop.tension_limit, found.tension_limit),
         ("allowance_m", shop.allowance_m, found.allowance_m),
         ("winding_speed_turns_per_min", shop.winding_speed_turns_per_min, found.winding_speed_turns_per_min),
     ] {

@@ -151,7 +151,10 @@ fn facts(page: &mut Page, claim: &Claim) {
             claim.max_climb.unwrap_or(0)
         ),
     );
+    page.fact("Fibre", claim.fibre.clone().unwrap_or_default());
     page.fact("Fibre length", metres(claim.length_m.unwrap_or(0.0)));
+    let (middle_m, layer) = (claim.midpoint_m.unwrap_or(0.0), claim.midpoint_layer.unwrap_or(0));
+    page.fact("Fibre's middle", format!("{} from end A, in layer {layer}", metres(middle_m)));
     let worst = deg_per_h_from_rad_per_s(claim.worst_rate_rad_per_s.unwrap_or(0.0));
     // As the data have it, without the last bits of the conversion.
     let worst: f64 = format!("{worst:.6}").parse().unwrap_or(worst);
@@ -198,7 +201,11 @@ fn step(page: &mut Page, number: usize, row: &Row) {
     put("cumulative_m", format!("{:.3}", row.cumulative_m));
     put("balance_m", format!("{:.3}", row.balance_m.unwrap_or(0.0)).replace('-', "−"));
     put("radius_mm", format!("{:.4}", mm_from_m(row.radius_m)));
-    put("tension_n", row.tension_n.map_or(String::new(), |t| format!("{t:.3}")));
+    let limits = match (row.tension_min_n, row.tension_max_n) {
+        (Some(least), Some(most)) => format!(" ({least:.3}–{most:.3})"),
+        _ => String::new(),
+    };
+    put("tension_n", row.tension_n.map_or(String::new(), |t| format!("{t:.3}{limits}")));
     put("crossover", row.crossover.clone().unwrap_or_default());
     put("potting", if row.potting == Some(true) { "apply adhesive".to_owned() } else { String::new() });
     put("check box", "☐".to_owned());

@@ -9,9 +9,12 @@ mod exact;
 mod examples;
 mod experiment;
 mod extend;
+mod help;
 mod metrics;
 mod readme;
 mod reproduce;
+mod schemas;
+mod terminal;
 
 use std::path::{Path, PathBuf};
 use std::process::Output;
