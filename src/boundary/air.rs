@@ -1,21 +1,17 @@
 //! The state-space model of air, film, pack and sensor.
 
 use std::collections::HashMap;
+use std::sync::{Arc, Mutex};
 
 use nalgebra::DMatrix;
 
+use super::filmed::{Filmed, transition};
 use super::layout::{Layout, Shock};
 use super::{Air, BoundaryError, Kink, Observation};
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::numeric::state_space::{Measurement, Smoothed, Stage, StateSpace};
-use crate::thermal::pack::Pack;
 use crate::thermal::{self, BoreHeat, Drive, Extent, HeatPath, Instant, Location, Material};
 
-/// Modes faster than this share of the sampling interval follow without delay.
-const FASTEST_MODE_PER_INTERVAL: f64 = 0.1;
-const MAX_MODES: usize = 8;
-/// What the largest amplitude of a mode must be to count, if there are more than those along the radius.
-const LEAST_AMPLITUDE: f64 = 1e-3;
 /// Where only K = k/ρc is known, the film is stated for this heat capacity [J/(m³ K)]; nothing else depends on it.
 const NOMINAL_HEAT_CAPACITY_J_PER_M3_K: f64 = 1.7e6;
 /// Prior variance of a kink [(K/s)²]: wider than any chamber's ramp.
@@ -34,7 +30,7 @@ const INSTANT_PER_INTERVAL: f64 = 0.1;
 /// Knots of the reconstructed boundary are no further apart than this share of the interval.
 const KNOT_PER_INTERVAL: f64 = 0.5;
 /// Two times closer than this are one [s].
-const SAME_TIME_S: f64 = 1e-6;
+pub(super) const SAME_TIME_S: f64 = 1e-6;
 
 /// What stays the same while a record's boundary is estimated.
 #[derive(Debug, Clone)]
@@ -47,10 +43,12 @@ pub(super) struct Scene {
     /// Into the bore, where it warms what the sensor is attached to.
     bore_heat: Option<BoreHeat>,
     /// What a conductivity that depends on temperature does to the outermost layer.
-    pub bent_k: Option<PiecewiseLinear>,
+    bent_k: Option<PiecewiseLinear>,
     lag_s: f64,
     layer_gain_rad_per_k: Vec<f64>,
     rate_mean_s: f64,
+    /// What the film asked for last makes of the pack.
+    last: Arc<Mutex<Option<Arc<Filmed>>>>,
 }
 
 /// A state-space model with what its states and stages mean.
@@ -126,7 +124,13 @@ impl Scene {
             lag_s,
             layer_gain_rad_per_k: observation.layer_gain_rad_per_k.to_vec(),
             rate_mean_s: observation.rate_mean_s,
+            last: Arc::default(),
         })
+    }
+
+    /// With what a conductivity's slope adds to the outermost layer.
+    pub fn bent(self, bent_k: PiecewiseLinear) -> Self {
+        Self { bent_k: Some(bent_k), last: Arc::default(), ..self }
     }
 
     pub fn lag_s(&self) -> f64 {
@@ -162,23 +166,29 @@ impl Scene {
         Ok(Some(PiecewiseLinear::new(self.times_s.clone(), outermost).expect("readings are in order")))
     }
 
+    /// The pack behind a film, kept until another film is asked for.
+    fn filmed(&self, film_w_per_m2_k: Option<f64>) -> Result<Arc<Filmed>, BoundaryError> {
+        if let Ok(last) = self.last.lock()
+            && let Some(known) = last.as_ref().filter(|l| l.film_w_per_m2_k == film_w_per_m2_k)
+        {
+            return Ok(known.clone());
+        }
+        let mut path = self.path.clone();
+        if film_w_per_m2_k.is_some() {
+            path.film_w_per_m2_k = film_w_per_m2_k;
+        }
+        let filmed = Arc::new(Filmed::new(film_w_per_m2_k, &path, self.added_k(&path)?, self.interval_s)?);
+        if let Ok(mut last) = self.last.lock() {
+            *last = Some(filmed.clone());
+        }
+        Ok(filmed)
+    }
+
     fn build(&self, air: &Air, rates: Rates) -> Result<AirSpace, BoundaryError> {
         let with_rate = rates != Rates::None;
-        let mut path = self.path.clone();
-        if air.film_w_per_m2_k.is_some() {
-            path.film_w_per_m2_k = air.film_w_per_m2_k;
-        }
-        let pack = Pack::new(&path)?;
-        let added_k = self.added_k(&path)?;
-        let layers = path.shape.layers;
-        let largest = |mode: usize| (0..layers).map(|layer| pack.amplitude(layer, mode).abs()).fold(0.0, f64::max);
-        // A flange makes many modes that hardly any layer's mean sees.
-        let least = if path.flange.is_some() { LEAST_AMPLITUDE } else { 0.0 };
-        let mut order: Vec<usize> = (0..pack.decays_per_s().len()).filter(|&mode| largest(mode) >= least).collect();
-        order.sort_by(|&a, &b| pack.decays_per_s()[a].total_cmp(&pack.decays_per_s()[b]));
-        let fastest_per_s = 1.0 / (FASTEST_MODE_PER_INTERVAL * self.interval_s);
-        let kept = order.iter().take_while(|&&m| pack.decays_per_s()[m] < fastest_per_s).count().clamp(1, MAX_MODES);
-        let kept = kept.min(order.len());
+        let filmed = self.filmed(air.film_w_per_m2_k)?;
+        let Filmed { pack, order, kept, added_k, .. } = &*filmed;
+        let kept = *kept;
         let layout = Layout { modes: kept, lagging: self.lag_s > 0.0, with_rate };
         let n = layout.size();
 
@@ -195,7 +205,7 @@ impl Scene {
             }
             row
         };
-        let outer = layer_row(path.shape.layers - 1);
+        let outer = layer_row(self.path.shape.layers - 1);
         let seen = match self.location {
             Location::OuterLayer => outer.clone(),
             Location::Ambient => {
@@ -289,7 +299,8 @@ impl Scene {
             disturbances.push((Shock::Jerk as usize, air.jerk_noise_k2_per_s7 * step_s));
             let key = ((step_s / SAME_TIME_S).round() as u64, begins_window);
             let transition = *known.entry(key).or_insert_with(|| {
-                transitions.push(transition(&dynamics, step_s, layout, begins_window.then_some(&functional[..])));
+                let exponential = filmed.exponential(&dynamics, step_s);
+                transitions.push(transition(&exponential, layout, begins_window.then_some(&functional[..])));
                 transitions.len() - 1
             });
             stages.push(Stage { measurements, disturbances, transition });
@@ -338,7 +349,7 @@ impl Scene {
             kink_stages,
             reading_stages,
             rate_places,
-            added_k,
+            added_k: added_k.clone(),
             stage_times_s: events.iter().map(|e| e.0).collect(),
             outer,
             rate_row,
@@ -406,9 +417,9 @@ impl Scene {
             }
             let step_s = (next_s - time_s) / pieces as f64;
             let key = (step_s / SAME_TIME_S).round() as u64;
-            let step = between
-                .entry(key)
-                .or_insert_with(|| transition(&built.dynamics, step_s, Layout { with_rate: false, ..layout }, None));
+            let step = between.entry(key).or_insert_with(|| {
+                transition(&(&built.dynamics * step_s).exp(), Layout { with_rate: false, ..layout }, None)
+            });
             for piece in 1..pieces {
                 from =
                     step.chunks_exact(layout.moving()).map(|r| r.iter().zip(&from).map(|(a, b)| a * b).sum()).collect();
@@ -472,25 +483,4 @@ impl AirSpace {
         let sizes = self.kink_sizes(smoothed);
         self.kink_stages.iter().zip(&air.kinks).zip(sizes).map(|(at, (size, _))| lead_s(at, size)).collect()
     }
-}
-
-/// e^{A dt}; where a window begins, the rate functional is copied before the state moves on.
-fn transition(dynamics: &DMatrix<f64>, step_s: f64, layout: Layout, copied: Option<&[f64]>) -> Vec<f64> {
-    let n = layout.size();
-    let moving = layout.moving();
-    let exponential = (dynamics * step_s).exp();
-    let mut matrix = vec![0.0; n * n];
-    for i in 0..moving {
-        for j in 0..moving {
-            matrix[i * n + j] = exponential[(i, j)];
-        }
-    }
-    if layout.with_rate {
-        let start = layout.window_start();
-        match copied {
-            Some(functional) => matrix[start * n..start * n + start].copy_from_slice(&functional[..start]),
-            None => matrix[start * n + start] = 1.0,
-        }
-    }
-    matrix
 }

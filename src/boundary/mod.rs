@@ -32,6 +32,7 @@
 //! chapters 2 and 7; shocks after de Jong and Penzer, J. Am. Stat. Assoc. 93 (1998) 796.
 
 mod air;
+mod filmed;
 mod kinks;
 mod layout;
 mod whitener;
@@ -175,8 +176,7 @@ impl Boundary {
                 })
                 .collect();
             let bent_k = PiecewiseLinear::new(observation.times_s.to_vec(), bent).expect("readings are in order");
-            let mut scene = found.scene;
-            scene.bent_k = Some(bent_k);
+            let mut scene = found.scene.bent(bent_k);
             let air = kinks::adapt(&mut scene, found.air)?;
             found = Self::new(scene, air)?;
         }

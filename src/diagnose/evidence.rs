@@ -9,11 +9,12 @@ use super::anchor::{
     Anchor, BRACKET_SHARE, Bracket, CENTRAL, LEAST_BRACKET_S, difference, heat_values, is_near, moves_sensor, way_of,
 };
 use super::conductivity::SlopeResponse;
+use super::field::{DrivenAnchor, Keep, Solved};
 use crate::pattern::Pattern;
 use crate::predict::{estimate_boundary, noise_floor_rad_per_s, rates_rad_per_s, refine_boundary};
 use crate::rate::CoilModel;
 use crate::record::Record;
-use crate::thermal::{self, Drive, Driven, HeatPath, Location, Memory, ThermalHistory};
+use crate::thermal::ThermalHistory;
 
 /// What a record is used for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,48 +36,17 @@ pub(super) struct Case {
     pub noise_rad_per_s: f64,
     /// Rows left out because of a gross error.
     pub outliers: usize,
-    anchors: Vec<Anchor>,
+    pub(super) anchors: Vec<Anchor>,
     /// Anchors in threes, between which the pack is interpolated.
-    brackets: Vec<Bracket>,
+    pub(super) brackets: Vec<Bracket>,
     /// Solved when it is first asked for, under the first boundary: what a slope does to the pack hardly depends on how the
     /// sensor is connected to it. None where it cannot be solved.
-    slope_response: OnceLock<Option<SlopeResponse>>,
+    pub(super) slope_response: OnceLock<Option<SlopeResponse>>,
     /// Fields that are asked for again and again, and those asked for lately.
-    pinned: Mutex<Vec<Arc<Solved>>>,
-    recent: Mutex<Vec<Arc<Solved>>>,
+    pub(super) pinned: Mutex<Vec<Arc<Solved>>>,
+    pub(super) recent: Mutex<Vec<Arc<Solved>>>,
     /// What the drives of anchors leave behind, those asked for lately.
-    driven: Mutex<Vec<Arc<DrivenAnchor>>>,
-}
-
-/// The drive of an anchor, ready for any heat path.
-struct DrivenAnchor {
-    anchor: usize,
-    driven: Driven,
-    /// Of the slope of what the sensor shows.
-    sensor: OnceLock<Memory>,
-}
-
-/// A field that was solved lately.
-struct Solved {
-    path: HeatPath,
-    anchor: usize,
-    lag_s: f64,
-    history: ThermalHistory,
-}
-
-/// Fields kept for models that differ only in what is done with them …
-const KEPT_FIELDS: usize = 8;
-/// … and for the starts of the candidates.
-const PINNED_FIELDS: usize = 64;
-
-/// Drives kept ready: a bracket's three and a few more.
-const KEPT_DRIVES: usize = 6;
-
-/// How long a field is kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Keep {
-    Recent,
-    Pinned,
+    pub(super) driven: Mutex<Vec<Arc<DrivenAnchor>>>,
 }
 
 /// How a boundary's estimate begins.
@@ -323,139 +293,6 @@ impl Case {
         (self.recent, self.pinned, self.driven) = Default::default();
     }
 
-    /// The anchor for a sensor: that of its place which was estimated for the most nearly same effects, and then for the
-    /// nearest lag.
-    fn anchor_for(&self, location: Location, way: &[String], lag_s: f64) -> Option<usize> {
-        let far = |i: usize| (difference(&self.anchors[i].way, way), (self.anchors[i].lag_s - lag_s).abs());
-        (0..self.anchors.len()).filter(|&i| self.anchors[i].location == location).min_by(|&a, &b| {
-            let (a, b) = (far(a), far(b));
-            a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
-        })
-    }
-
-    /// The pack over each averaging interval under a model.
-    fn solved(&self, model: &CoilModel, keep: Keep) -> Option<Arc<Solved>> {
-        let path = model.heat_path().ok()?;
-        let (way, lag_s) = (way_of(model), model.sensor_lag_s());
-        if let Some(bracket) = self.brackets.iter().find(|b| b.holds(path.location, &way, lag_s, 1.0)) {
-            let anchors = bracket.lags_s().map(|at_s| {
-                let nearest = self.anchor_for(path.location, &way, at_s)?;
-                self.solved_at(path.clone(), nearest, self.anchors[nearest].lag_s, model.rate_mean_s, Keep::Recent)
-            });
-            let [Some(shorter), Some(middle), Some(longer)] = anchors else { return None };
-            let history = mixed([&shorter.history, &middle.history, &longer.history], bracket.weights(lag_s));
-            return Some(Arc::new(Solved { path, anchor: middle.anchor, lag_s, history }));
-        }
-        let anchor = self.anchor_for(path.location, &way, lag_s)?;
-        self.solved_at(path, anchor, lag_s, model.rate_mean_s, keep)
-    }
-
-    /// The pack under one anchor's boundary, remembered if it was asked for lately.
-    fn solved_at(
-        &self,
-        path: HeatPath,
-        anchor: usize,
-        lag_s: f64,
-        rate_mean_s: f64,
-        keep: Keep,
-    ) -> Option<Arc<Solved>> {
-        for fields in [&self.pinned, &self.recent] {
-            if let Ok(fields) = fields.lock()
-                && let Some(known) = fields.iter().find(|s| s.anchor == anchor && s.lag_s == lag_s && s.path == path)
-            {
-                return Some(known.clone());
-            }
-        }
-        let from = &self.anchors[anchor];
-        let kept = self.driven(anchor, rate_mean_s);
-        let further_lag_s = lag_s - from.lag_s;
-        let mut history = if further_lag_s == 0.0 {
-            self.history(&path, &kept.driven)?
-        } else {
-            let sensor =
-                kept.sensor.get_or_init(|| kept.driven.memory_of(&from.boundary.sensor_slope_k_per_s(from.location)));
-            let drive = self.drive(from.boundary.delayed_drive(from.location, further_lag_s));
-            self.history(&path, &kept.driven.with(further_lag_s, sensor, drive))?
-        };
-        if path.flange.is_some()
-            && let Some(response) = from.flange_response.get_or_init(|| self.flange_response(from, rate_mean_s))
-        {
-            history = mixed([&history, &response[0], &response[1]], [1.0, 1.0, -1.0]);
-        }
-        let solved = Arc::new(Solved { path, anchor, lag_s, history });
-        if keep == Keep::Pinned
-            && let Ok(mut pinned) = self.pinned.lock()
-            && pinned.len() < PINNED_FIELDS
-        {
-            pinned.push(solved.clone());
-        } else if let Ok(mut recent) = self.recent.lock() {
-            if recent.len() >= KEPT_FIELDS {
-                // The first is that of the declared model, which is asked for most.
-                recent.remove(1);
-            }
-            recent.push(solved.clone());
-        }
-        Some(solved)
-    }
-
-    /// The pack of an anchor that has a flange, driven by the air, and by the outermost layer. The second is what is solved
-    /// for other values, so that they too agree with the sensor; the difference is what it leaves out.
-    fn flange_response(&self, anchor: &Anchor, rate_mean_s: f64) -> Option<[ThermalHistory; 2]> {
-        let path = HeatPath { conductivity_slope_per_k: 0.0, ..anchor.path.clone() };
-        path.flange.filter(|_| path.location == Location::OuterLayer)?;
-        let (driven, by_air) = anchor.boundary.driving(&path, 0.0);
-        let by_layer = anchor.boundary.drive(path.location);
-        let means = |path: &HeatPath, drive: Drive| {
-            Driven::new(self.drive(drive), self.record.times_s(), rate_mean_s).means(path).ok()
-        };
-        Some([means(&driven, by_air)?, means(&path, by_layer)?])
-    }
-
-    /// With the measured ambient, if there is one.
-    fn drive(&self, drive: Drive) -> Drive {
-        Drive { ambient_k: crate::predict::measured_ambient(&self.record).or(drive.ambient_k), ..drive }
-    }
-
-    /// An anchor's drive, remembered if it was asked for lately.
-    fn driven(&self, anchor: usize, rate_mean_s: f64) -> Arc<DrivenAnchor> {
-        let found = |kept: &[Arc<DrivenAnchor>]| kept.iter().find(|d| d.anchor == anchor).cloned();
-        if let Ok(kept) = self.driven.lock()
-            && let Some(known) = found(&kept)
-        {
-            return known;
-        }
-        let from = &self.anchors[anchor];
-        let driven = Driven::new(self.drive(from.boundary.drive(from.location)), self.record.times_s(), rate_mean_s);
-        let new = Arc::new(DrivenAnchor { anchor, driven, sensor: OnceLock::new() });
-        if let Ok(mut kept) = self.driven.lock() {
-            if let Some(known) = found(&kept) {
-                return known;
-            }
-            if kept.len() >= KEPT_DRIVES {
-                kept.remove(0);
-            }
-            kept.push(new.clone());
-        }
-        new
-    }
-
-    /// The pack under a drive; the effect of a conductivity's slope is taken from a series worked out before.
-    fn history(&self, path: &HeatPath, driven: &Driven) -> Option<ThermalHistory> {
-        let slope_per_k = path.conductivity_slope_per_k;
-        let linear = HeatPath { conductivity_slope_per_k: 0.0, ..path.clone() };
-        let mut history = driven.means(&linear).ok()?;
-        if slope_per_k != 0.0 {
-            thermal::check(path).ok()?;
-            let response = self.slope_response.get_or_init(|| {
-                let first = self.anchors.first()?;
-                let drive = first.boundary.drive(first.location);
-                SlopeResponse::new(&first.path, &drive, self.record.times_s(), driven.window_s())
-            });
-            response.as_ref()?.add_to(&mut history, slope_per_k);
-        }
-        Some(history)
-    }
-
     pub fn residuals(&self, model: &CoilModel, pattern: &Pattern, keep: Keep) -> Option<Vec<f64>> {
         let solved = self.solved(model, keep)?;
         let predicted = rates_rad_per_s(model, pattern, &self.record, &solved.history).ok()?;
@@ -504,24 +341,6 @@ impl Case {
         let mean = residuals.iter().sum::<f64>() / residuals.len() as f64;
         residuals.iter_mut().for_each(|r| *r -= mean);
         Some((residuals, solved.history.clone()))
-    }
-}
-
-/// Σ_i w_i H_i.
-fn mixed(histories: [&ThermalHistory; 3], weights: [f64; 3]) -> ThermalHistory {
-    let mix = |part: fn(&ThermalHistory) -> &Vec<f64>| -> Vec<f64> {
-        let [a, b, c] = histories.map(part);
-        a.iter().zip(b).zip(c).map(|((a, b), c)| weights[0] * a + weights[1] * b + weights[2] * c).collect()
-    };
-    ThermalHistory {
-        layers: histories[1].layers,
-        times_s: histories[1].times_s.clone(),
-        temperature_k: mix(|h| &h.temperature_k),
-        rate_k_per_s: mix(|h| &h.rate_k_per_s),
-        axial_moment_k: mix(|h| &h.axial_moment_k),
-        axial_moment_k_per_s: mix(|h| &h.axial_moment_k_per_s),
-        ambient_k: mix(|h| &h.ambient_k),
-        ambient_rate_k_per_s: mix(|h| &h.ambient_rate_k_per_s),
     }
 }
 

@@ -21,6 +21,7 @@ mod conductivity;
 mod confirm;
 mod evidence;
 pub mod experiment;
+mod field;
 mod hypothesis;
 pub mod plain;
 mod search;

@@ -1,7 +1,8 @@
 //! Whether a record belongs to the declared coil at all.
 
 use super::Caution;
-use super::evidence::{Case, Evidence, Keep, Role, sum_of_squares};
+use super::evidence::{Case, Evidence, Role, sum_of_squares};
+use super::field::Keep;
 use super::hypothesis::{Hypothesis, Trial};
 use crate::pattern::classic::Classic;
 use crate::rate::CoilModel;

@@ -2,6 +2,11 @@
 //!
 //! Transitions and measurement rows are mostly zero; only what is not zero is multiplied.
 
+// Loops over an index that the compiler knows the end of: iterators stay calls in functions as large as these.
+#![allow(clippy::needless_range_loop)]
+
+use pulp::{Arch, NullaryFnOnce};
+
 use super::state_space::{Smoothed, StateSpace};
 
 type Square<const N: usize> = [[f64; N]; N];
@@ -31,32 +36,39 @@ impl Sparse {
         Self::new(&turned, n)
     }
 
+    #[inline(always)]
     fn rows(&self) -> usize {
         self.starts.len() - 1
     }
 
-    #[inline]
+    #[inline(always)]
     fn row(&self, row: usize) -> &[(usize, f64)] {
         &self.entries[self.starts[row]..self.starts[row + 1]]
     }
 
     /// One row times a vector.
-    #[inline]
+    #[inline(always)]
     pub fn dot(&self, row: usize, vector: &[f64]) -> f64 {
-        self.row(row).iter().map(|&(k, v)| v * vector[k]).sum()
+        let mut sum = 0.0;
+        for &(k, v) in self.row(row) {
+            sum += v * vector[k];
+        }
+        sum
     }
 
     /// out = M x.
+    #[inline(always)]
     pub fn times(&self, vector: &[f64], out: &mut [f64]) {
-        for (row, value) in out.iter_mut().enumerate().take(self.rows()) {
-            *value = self.dot(row, vector);
+        for row in 0..self.rows() {
+            out[row] = self.dot(row, vector);
         }
     }
 
     /// out = M X.
+    #[inline(always)]
     fn times_square<const N: usize>(&self, x: &Square<N>, out: &mut Square<N>) {
-        for (row, line) in out.iter_mut().enumerate().take(self.rows()) {
-            *line = self.combine(row, x);
+        for row in 0..self.rows() {
+            out[row] = self.combine(row, x);
         }
     }
 
@@ -65,20 +77,31 @@ impl Sparse {
     fn combine<const N: usize>(&self, row: usize, x: &Square<N>) -> [f64; N] {
         let mut sum = [0.0; N];
         for &(k, v) in self.row(row) {
-            for (s, x) in sum.iter_mut().zip(&x[k]) {
-                *s += v * x;
+            let line = &x[k];
+            for j in 0..N {
+                sum[j] += v * line[j];
             }
         }
         sum
     }
 
     /// S ← M S Mᵀ for a symmetric S.
+    #[inline(always)]
     fn surround<const N: usize>(&self, square: &mut Square<N>) {
         let mut product = [[0.0; N]; N];
         self.times_square(square, &mut product);
-        let turned = std::array::from_fn(|i| std::array::from_fn(|j| product[j][i]));
+        let mut turned = [[0.0; N]; N];
+        for i in 0..N {
+            for j in 0..N {
+                turned[i][j] = product[j][i];
+            }
+        }
         self.times_square(&turned, &mut product);
-        *square = std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (product[i][j] + product[j][i])));
+        for i in 0..N {
+            for j in 0..N {
+                square[i][j] = 0.5 * (product[i][j] + product[j][i]);
+            }
+        }
     }
 }
 
@@ -119,14 +142,45 @@ macro_rules! dispatch {
         }
     };
 }
+
 /// The forward pass: the log-likelihood, Σ v²/f, and what is kept.
 pub(super) fn forward(model: &StateSpace, keep: Keep) -> (f64, f64, Trace) {
-    dispatch!(model.size, forward_of(model, keep))
+    Arch::new().dispatch(Forward { model, keep })
 }
 
 /// Both passes; states and the functional's variance only where a functional is given.
 pub(super) fn smooth(model: &StateSpace, functional: Option<&[f64]>) -> Smoothed {
-    dispatch!(model.size, smooth_of(model, functional))
+    Arch::new().dispatch(Smooth { model, functional })
+}
+
+/// The passes, compiled once for each width of the processor's registers. Nothing is summed in another order for it, so
+/// that the result is the same on all.
+struct Forward<'a> {
+    model: &'a StateSpace,
+    keep: Keep,
+}
+
+struct Smooth<'a> {
+    model: &'a StateSpace,
+    functional: Option<&'a [f64]>,
+}
+
+impl NullaryFnOnce for Forward<'_> {
+    type Output = (f64, f64, Trace);
+
+    #[inline(always)]
+    fn call(self) -> Self::Output {
+        dispatch!(self.model.size, forward_of(self.model, self.keep))
+    }
+}
+
+impl NullaryFnOnce for Smooth<'_> {
+    type Output = Smoothed;
+
+    #[inline(always)]
+    fn call(self) -> Self::Output {
+        dispatch!(self.model.size, smooth_of(self.model, self.functional))
+    }
 }
 
 const MOST_STATES: usize = 64;
@@ -143,6 +197,7 @@ fn sparse_rows(model: &StateSpace) -> Sparse {
     Sparse::new(&model.rows.concat(), model.size)
 }
 
+#[inline(always)]
 fn forward_of<const N: usize>(model: &StateSpace, keep: Keep) -> (f64, f64, Trace) {
     let n = model.size;
     let rows = sparse_rows(model);
@@ -194,6 +249,7 @@ fn forward_of<const N: usize>(model: &StateSpace, keep: Keep) -> (f64, f64, Trac
     (log_likelihood, squares, trace)
 }
 
+#[inline(always)]
 fn smooth_of<const N: usize>(model: &StateSpace, functional: Option<&[f64]>) -> Smoothed {
     let n = model.size;
     let keep = if functional.is_some() { Keep::States } else { Keep::Gains };
@@ -249,6 +305,7 @@ fn smooth_of<const N: usize>(model: &StateSpace, functional: Option<&[f64]>) -> 
 }
 
 /// r ← h v/f + (I − K h)ᵀ r and N ← h hᵀ/f + (I − K h)ᵀ N (I − K h).
+#[inline(always)]
 fn absorb<const N: usize>(
     row: &[f64; N],
     gain: &[f64; N],
@@ -268,16 +325,22 @@ fn absorb<const N: usize>(
 }
 
 /// S v for a symmetric S.
+#[inline(always)]
 fn combined<const N: usize>(vector: &[f64; N], square: &Square<N>) -> [f64; N] {
     let mut sum = [0.0; N];
-    for (v, line) in vector.iter().zip(square) {
-        for (s, x) in sum.iter_mut().zip(line) {
-            *s += v * x;
+    for i in 0..N {
+        for j in 0..N {
+            sum[j] += vector[i] * square[i][j];
         }
     }
     sum
 }
 
+#[inline(always)]
 fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+    let mut sum = 0.0;
+    for i in 0..N {
+        sum += a[i] * b[i];
+    }
+    sum
 }
