@@ -342,16 +342,13 @@ pub(super) fn settle(
         }
         return Ok(hypothesis);
     }
-    let mut begin = Begin::Nearby;
     if !evidence.is_bracketed(&found) {
-        evidence.anchor(&found, Begin::Anew)?;
+        evidence.anchor(&found, Begin::Nearby)?;
         hypothesis = fit(evidence, &hypothesis);
-        begin = Begin::Anew;
     }
     for _ in 0..SENSOR_ROUNDS {
         let Some(found) = with(evidence, &hypothesis) else { break };
-        evidence.bracket(&found, begin)?;
-        begin = Begin::Nearby;
+        evidence.bracket(&found, Begin::Nearby)?;
         hypothesis = fit(evidence, &hypothesis);
         if with(evidence, &hypothesis).is_some_and(|m| evidence.is_central(&m)) {
             break;

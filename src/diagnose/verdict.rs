@@ -4,7 +4,7 @@ use super::candidate::{Candidate, is_declared_number};
 use super::confirm::confirmation;
 use super::evidence::{Evidence, Role, dot, sum_of_squares};
 use super::hypothesis::{Hypothesis, Trial};
-use super::plain::{Plain, best_gain, compete};
+use super::plain::{Plain, compete};
 use super::search::{Found, all_singles, fit_swap, settle, settle_contenders, settled, without};
 use super::stranger::{other_winding, strangers};
 use super::{
@@ -207,9 +207,10 @@ fn prune(
             None => break,
         }
     }
-    if !best.members.is_empty()
-        && best_gain(trial.evidence, trial.model, base) > base.chi_square - best.chi_square - EQUAL
-    {
+    let plain = compete(trial.evidence, trial.model, &base.residuals);
+    let plain = plain.iter().map(|p| p.gain - p.parameters.saturating_sub(best.parameters) as f64 * (rows as f64).ln());
+    let plain_gain = plain.fold(0.0, f64::max);
+    if !best.members.is_empty() && plain_gain > base.chi_square - best.chi_square - EQUAL {
         let kinds = (0..best.members.len()).map(|place| kind(&best, place));
         cautions.extend(kinds.map(|kind| Caution::Refused { kind, reason: Refusal::Outdone }));
         return base.clone();
