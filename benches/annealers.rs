@@ -20,7 +20,7 @@ use coilwright::search::optimise::{Optimisation, Plan, Rules};
 use coilwright::search::samples::SampleMatrix;
 use coilwright::search::walk::Space;
 use coilwright::search::worst_case::SolvedProfiles;
-use coilwright::thermal::{Extent, Location, Material};
+use coilwright::thermal::{DEFAULT_CELLS_PER_LAYER, Extent, Location, Material};
 use coilwright::units::{deg_per_h_from_rad_per_s, k_per_s_from_c_per_h, percent_from_fraction};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -55,6 +55,7 @@ fn instance() -> SampleMatrix {
         material: Material::Diffusivity { m2_per_s: 2.7e-7 },
         location: Location::OuterLayer,
         rate_mean_s: 0.0,
+        cells_per_layer: DEFAULT_CELLS_PER_LAYER,
         effects: vec![],
     };
     let profiles = ProfileSpec {
@@ -172,6 +173,7 @@ fn main() {
         std::fs::File::create(path).and_then(|mut f| f.write_all(&bytes)).expect("the export can be written");
     }
 
+    say_limits();
     let (rate_as_shipped, best) = as_shipped(&space, moves);
     say("coilwright as shipped, one thread", moves, moves as f64 / rate_as_shipped, best);
 
@@ -235,6 +237,66 @@ fn as_shipped(space: &Space, moves: u64) -> (f64, f64) {
     say_work(search.state().work, seconds);
     let best = search.best().expect("rounds have ended").cost;
     (search.evaluations() as f64 / seconds, best)
+}
+
+/// What this machine can do of the arithmetic of a two-column move, as this program is compiled: over one block, which is in
+/// the first-level cache as the samples of a refused move are; over all columns and samples in turn; and without memory.
+fn say_limits() {
+    const BLOCK: usize = 64;
+    let stream = |samples: usize, columns: usize| {
+        let column = |k: usize| (0..samples).map(|s| ((s + k) as f64 * 0.37).sin()).collect::<Vec<f64>>();
+        let data: Vec<Vec<f64>> = (0..columns).map(column).collect();
+        let (mut now, mut next) = (column(columns), vec![0.0; samples]);
+        let passes = (1 << 28) / samples;
+        let (mut largest, started) = (0.0, processor_s());
+        for pass in 0..passes {
+            let (d, e) = (&data[pass % columns], &data[(pass * 7 + 1) % columns]);
+            let by = std::hint::black_box(0.01);
+            for from in (0..samples).step_by(BLOCK) {
+                let (now, next) = (&now[from..from + BLOCK], &mut next[from..from + BLOCK]);
+                let (d, e) = (&d[from..from + BLOCK], &e[from..from + BLOCK]);
+                for i in 0..BLOCK {
+                    next[i] = now[i] + (by * d[i] - by * e[i]);
+                }
+                largest = gather(largest, next);
+            }
+            std::mem::swap(&mut now, &mut next);
+        }
+        std::hint::black_box(largest);
+        (passes * samples) as f64 / (processor_s() - started)
+    };
+    for (name, samples, columns) in [
+        ("one block of 64 samples", BLOCK, 2),
+        ("8192 samples of two columns", SAMPLES, 2),
+        ("8192 samples of 24 columns", SAMPLES, LAYERS),
+    ] {
+        let rate = stream(samples, columns);
+        println!("  limit, {name:<28} {:>8.2} GB/s {:>8.2} Gflop/s", rate * 32.0 / 1e9, rate * 5.0 / 1e9);
+    }
+    // Sixteen chains of a product and a sum each, all in registers.
+    let mut chains = [[1.0_f64; 2]; 8];
+    let (factor, term) = (std::hint::black_box(0.999_999), std::hint::black_box(1e-6));
+    let (count, started) = (1u64 << 27, processor_s());
+    for _ in 0..count {
+        for chain in &mut chains {
+            for v in chain {
+                *v = *v * factor + term;
+            }
+        }
+    }
+    std::hint::black_box(chains);
+    println!("  limit, without memory {:>32.2} Gflop/s", count as f64 * 32.0 / (processor_s() - started) / 1e9);
+}
+
+fn gather(largest: f64, block: &[f64]) -> f64 {
+    let mut lanes = [0.0_f64; 8];
+    for chunk in block.chunks_exact(8) {
+        for (lane, v) in lanes.iter_mut().zip(chunk) {
+            let size = v.abs();
+            *lane = if size > *lane { size } else { *lane };
+        }
+    }
+    lanes.iter().fold(largest, |a, &b| if b > a { b } else { a })
 }
 
 fn say_work(work: Work, seconds: f64) {

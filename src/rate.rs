@@ -41,6 +41,8 @@ pub struct CoilModel {
     pub location: Location,
     /// Each recorded rate is the mean over this interval, which ends at its stamp; 0: instantaneous.
     pub rate_mean_s: f64,
+    /// Finite-volume cells across a layer of the pack: 1 or an even number.
+    pub cells_per_layer: usize,
     pub effects: Vec<DeclaredEffect>,
 }
 
@@ -72,6 +74,7 @@ impl CoilModel {
     pub fn heat_path(&self) -> Result<HeatPath, CoilError> {
         let coil = self.wound_coil()?;
         let mut path = HeatPath::new(PackShape::of(&coil), self.extent, self.material, self.location);
+        path.cells_per_layer = self.cells_per_layer;
         for effect in self.bind_all(&coil, &[]) {
             effect.change_heat_path(&mut path);
         }

@@ -13,7 +13,7 @@ use coilwright::rate::{CoilModel, RateModel};
 use coilwright::reproduce::yan1998::model_of_layers;
 use coilwright::search::guaranteed::UnitStep;
 use coilwright::search::worst_case::SolvedProfiles;
-use coilwright::thermal::{Extent, Location, Material, ThermalHistory};
+use coilwright::thermal::{DEFAULT_CELLS_PER_LAYER, Extent, Location, Material, ThermalHistory};
 use proptest::prelude::*;
 use proptest::sample::Index;
 
@@ -81,6 +81,7 @@ fn cases(halves: std::ops::RangeInclusive<usize>) -> impl Strategy<Value = Case>
             material: Material::Diffusivity { m2_per_s: 2.7e-7 },
             location: Location::OuterLayer,
             rate_mean_s: 0.0,
+            cells_per_layer: DEFAULT_CELLS_PER_LAYER,
             effects: vec![],
         };
         prop::collection::vec(-0.05..0.05, layers).prop_map(move |rates_k_per_s| Case {

@@ -15,7 +15,7 @@ use crate::io::files::write_atomically;
 use crate::io::json::{PatternJson, ProofJson};
 use crate::io::model_file::{ModelFile, NamedPattern, read_model};
 use crate::io::pattern_file::resolve_pattern;
-use crate::io::run_directory::{BestFoundJson, OptimiseJson, Request, write_request, write_results};
+use crate::io::run_directory::{BestFoundJson, GridCheckJson, OptimiseJson, Request, write_request, write_results};
 use crate::pattern::windability::WindabilityClass;
 use crate::search::guaranteed::UnitStep;
 use crate::search::objective::Objective;
@@ -263,6 +263,9 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
             (best, (proof, cut))
         }
     };
+    let grid_check = if ended == Ended::Signal { None } else { bench.grid_check(&best, &baselines)? };
+    let grid_check = grid_check.as_ref().map(GridCheckJson::of);
+    let caution = grid_check.as_ref().and_then(|check| check.caution.clone());
     let compared_with = former.map(|f| compare_with_former(&bench, class, &best, &f)).transpose()?;
     let judged_now = (search.evaluations() - evaluated_before) as f64;
     let answer = OptimiseJson {
@@ -273,7 +276,10 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         best: PatternJson::of(&best),
         baselines: baselines.iter().map(PatternJson::of).collect(),
         improvement_over_qua: improvement_over_qua(&best, &baselines),
-        statement: bench.statement(&best, &baselines, class) + &words(&proof),
+        statement: bench.statement(&best, &baselines, class)
+            + &words(&proof)
+            + &caution.map_or_else(String::new, |caution| format!(" {caution}")),
+        grid_check,
         compared_with,
         proof,
         evaluations: search.evaluations(),

@@ -13,7 +13,7 @@ use crate::rate::CoilModel;
 use crate::schedule::production::Production;
 use crate::search::objective::Objective;
 use crate::search::tolerance::ToleranceSpec;
-use crate::thermal::{self, Extent, Location, Material};
+use crate::thermal::{self, DEFAULT_CELLS_PER_LAYER, Extent, Location, Material};
 use crate::units::{m_from_mm, m_from_nm, m_from_um};
 
 use super::effect_tables::read_effects;
@@ -110,6 +110,7 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
     let pattern = read_pattern(r, &mut winding, layers, path);
     winding.finish(r);
     let thermal_parts = read_thermal(r, &mut thermal);
+    let cells = thermal.integer(r, "cells_per_layer", 1, MOST_CELLS_PER_LAYER);
     let thermal_span = thermal.span();
     thermal.finish(r);
     let location = match sensor.word(r, "location", &["outer_layer", "ambient"]) {
@@ -131,7 +132,17 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
 
     let whole = (|| {
         let (extent, material) = thermal_parts?;
-        Some(CoilModel { name: name?, coil: coil?, extent, material, location, rate_mean_s, effects: effects? })
+        let cells_per_layer = cells.map_or(DEFAULT_CELLS_PER_LAYER, |cells| cells as usize);
+        Some(CoilModel {
+            name: name?,
+            coil: coil?,
+            extent,
+            material,
+            location,
+            rate_mean_s,
+            cells_per_layer,
+            effects: effects?,
+        })
     })();
     if let Some(model) = &whole {
         check_whole(r, model, thermal_span);
@@ -296,6 +307,9 @@ fn read_pattern(
     }
 }
 
+/// Beyond this a grid only costs time.
+const MOST_CELLS_PER_LAYER: i64 = 32;
+
 fn read_thermal(r: &mut TomlReader, table: &mut TableReader) -> Option<(Extent, Material)> {
     let extent = table.needed_word(r, "model", &["pack", "half_space"]);
     let conductivity = table.number(r, "conductivity_w_per_m_k", Limits::between(1e-3, 1e3));
@@ -367,6 +381,10 @@ fn check_whole(r: &mut TomlReader, model: &CoilModel, thermal_span: Option<Range
     match model.heat_path() {
         Err(error) => r.fault(Fault::new(error.to_string(), thermal_span)),
         Ok(path) => {
+            if path.extent == Extent::HalfSpace && model.cells_per_layer != DEFAULT_CELLS_PER_LAYER {
+                let message = "thermal.cells_per_layer is of the grid of a pack: leave it out where thermal.model is \"half_space\"";
+                r.fault(Fault::new(message, thermal_span.clone()));
+            }
             if let Err(error) = thermal::check(&path) {
                 r.fault(Fault::new(error.to_string(), thermal_span));
             }

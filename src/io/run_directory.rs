@@ -15,8 +15,8 @@ use super::schedule_file::sha256_hex;
 use crate::pattern::windability::WindabilityClass;
 use crate::search::objective::Objective;
 use crate::search::optimise::{Plan, RoundRecord, State};
-use crate::search::verdict::Judged;
-use crate::units::deg_per_h_from_rad_per_s;
+use crate::search::verdict::{GridCheck, Judged};
+use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
 
 impl PatternJson {
     /// Of a pattern that was judged by the reference.
@@ -41,6 +41,8 @@ pub struct OptimiseJson {
     /// QUA's objective over the best pattern's; null where QUA does not fit the layer count.
     pub improvement_over_qua: Option<f64>,
     pub statement: String,
+    /// Null where the temperature has no grid or the search was interrupted.
+    pub grid_check: Option<GridCheckJson>,
     /// Null where no former pattern was stated.
     pub compared_with: Option<FormerJson>,
     pub proof: ProofJson,
@@ -57,6 +59,42 @@ pub struct OptimiseJson {
     pub stopped_by: String,
     /// False where the clock or a signal ended the search: the same request may then end elsewhere.
     pub reproducible: bool,
+}
+
+/// Worst rates on a grid twice as fine.
+#[derive(Debug, Clone, Serialize)]
+pub struct GridCheckJson {
+    pub cells_per_layer: usize,
+    pub finer_cells_per_layer: usize,
+    /// The best pattern, then QUA.
+    pub patterns: Vec<GridCheckedJson>,
+    /// Null where the grid changes little.
+    pub caution: Option<String>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct GridCheckedJson {
+    pub name: String,
+    pub worst_rate_deg_per_h: f64,
+    pub finer_worst_rate_deg_per_h: f64,
+    pub change_percent: f64,
+}
+
+impl GridCheckJson {
+    pub fn of(check: &GridCheck) -> Self {
+        let patterns = check.patterns.iter().map(|checked| GridCheckedJson {
+            name: checked.name.clone(),
+            worst_rate_deg_per_h: deg_per_h_from_rad_per_s(checked.rate_rad_per_s),
+            finer_worst_rate_deg_per_h: deg_per_h_from_rad_per_s(checked.finer_rad_per_s),
+            change_percent: percent_from_fraction(checked.change()),
+        });
+        Self {
+            cells_per_layer: check.cells_per_layer,
+            finer_cells_per_layer: check.finer_cells_per_layer,
+            patterns: patterns.collect(),
+            caution: check.caution(),
+        }
+    }
 }
 
 /// When the best pattern was come upon.

@@ -12,9 +12,9 @@ use super::worst_case::{SearchError, SolvedProfiles, WorstCase};
 use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
 use crate::pattern::windability::WindabilityClass;
-use crate::profile::ProfileSpec;
+use crate::profile::{Profile, ProfileSpec};
 use crate::rate::{CoilModel, RateModel};
-use crate::thermal::Location;
+use crate::thermal::{Extent, Location};
 use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
 
 #[derive(Debug, Error, Clone, PartialEq)]
@@ -75,6 +75,50 @@ const BEAM_WIDTH: usize = 1 << 14;
 
 /// Patterns that the improvement begins with, besides the best.
 const MOST_STARTS: usize = 6;
+
+/// A worst rate that a finer grid changes by more than this is not to be relied upon.
+const GRID_CAUTION: f64 = 0.005;
+
+/// A worst rate on the model's grid and on one twice as fine.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GridChecked {
+    pub name: String,
+    pub rate_rad_per_s: f64,
+    pub finer_rad_per_s: f64,
+}
+
+impl GridChecked {
+    /// By how much the finer grid changes the rate, over the rate.
+    pub fn change(&self) -> f64 {
+        if self.rate_rad_per_s == 0.0 { 0.0 } else { self.finer_rad_per_s / self.rate_rad_per_s - 1.0 }
+    }
+}
+
+/// The worst rates of a search's best pattern, first, and of QUA on two grids: a search makes use of whatever a coarse
+/// grid hides, so its best gains most from the grid's error.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GridCheck {
+    pub cells_per_layer: usize,
+    pub finer_cells_per_layer: usize,
+    pub patterns: Vec<GridChecked>,
+}
+
+impl GridCheck {
+    /// What to say where the grid matters.
+    pub fn caution(&self) -> Option<String> {
+        let best = self.patterns.first().filter(|best| best.change().abs() > GRID_CAUTION)?;
+        Some(format!(
+            "Caution: with {} instead of {} cells a layer its worst rate error is {:.4} °/h, {:.1} % {}. \
+             Set thermal.cells_per_layer = {} and search again.",
+            self.finer_cells_per_layer,
+            self.cells_per_layer,
+            deg_per_h_from_rad_per_s(best.finer_rad_per_s),
+            percent_from_fraction(best.change().abs()),
+            if best.change() > 0.0 { "more" } else { "less" },
+            self.finer_cells_per_layer,
+        ))
+    }
+}
 
 /// Relative difference below which two patterns count as equally good.
 pub const EQUALLY_GOOD: f64 = 1e-9;
@@ -148,6 +192,29 @@ impl Bench<'_> {
             .filter_map(|classic| Some((classic.key().to_owned(), classic.pattern(layers).ok()?)))
             .collect();
         self.judge_all(&fitting)
+    }
+
+    /// Judges the best pattern and QUA again on a grid twice as fine; `None` where there is no grid.
+    ///
+    /// # Errors
+    /// None that a model which could be solved would cause.
+    pub fn grid_check(&self, best: &Judged, baselines: &[Judged]) -> Result<Option<GridCheck>, SearchError> {
+        let path = self.model.heat_path()?;
+        if path.extent == Extent::HalfSpace {
+            return Ok(None);
+        }
+        let finer_cells_per_layer = 2 * path.cells_per_layer;
+        let finer = CoilModel { cells_per_layer: finer_cells_per_layer, ..self.model.clone() };
+        let profiles: Vec<Profile> = self.solved.profiles().iter().map(|p| p.profile.clone()).collect();
+        let solved = SolvedProfiles::new(&finer, &profiles)?;
+        let qua = baselines.iter().find(|b| b.name == Classic::Qua.key() && b.pattern != best.pattern);
+        let checked = |judged: &Judged| {
+            let finer_rad_per_s = solved.worst_case(&finer, &judged.pattern)?.rate_rad_per_s.abs();
+            let rate_rad_per_s = judged.worst.rate_rad_per_s.abs();
+            Ok(GridChecked { name: judged.name.clone(), rate_rad_per_s, finer_rad_per_s })
+        };
+        let patterns = std::iter::once(best).chain(qua).map(checked).collect::<Result<_, SearchError>>()?;
+        Ok(Some(GridCheck { cells_per_layer: path.cells_per_layer, finer_cells_per_layer, patterns }))
     }
 
     /// Whether [`Bench::improved`] can be expected to prove what is best, so that a search may try it early.
@@ -304,5 +371,52 @@ fn how_much_less(factor: f64) -> String {
         f if f >= 10.0 => format!("{f:.1} times less than"),
         f if f >= 2.0 => format!("{f:.2} times less than"),
         f => format!("{:.2} % less than", percent_from_fraction(1.0 - 1.0 / f)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coil::LayerLength;
+    use crate::search::samples::tests::{model, profiles};
+
+    #[test]
+    fn a_search_is_checked_on_a_grid_twice_as_fine_and_cautioned_where_that_changes_much() {
+        let declared = CoilModel { cells_per_layer: 1, ..model(8, LayerLength::Actual, &[]) };
+        let profiles = profiles();
+        let spec = ProfileSpec {
+            max_rate_k_per_s: 0.003,
+            count: 0,
+            segments: 1,
+            duration_s: 1.0,
+            seed: 1,
+            listed: profiles.clone(),
+        };
+        let solved = SolvedProfiles::new(&declared, &profiles).unwrap();
+        let objective = Objective::WorstRate;
+        let bench =
+            Bench { model: &declared, solved: &solved, objective, unit_step: None, profiles: &spec, tolerance: None };
+        let baselines = bench.baselines().unwrap();
+        let of = |name: &str| baselines.iter().find(|b| b.name == name).unwrap();
+        let check = bench.grid_check(of("dip"), &baselines).unwrap().unwrap();
+        assert_eq!((check.cells_per_layer, check.finer_cells_per_layer), (1, 2));
+        let finer = CoilModel { cells_per_layer: 2, ..declared.clone() };
+        let finer_solved = SolvedProfiles::new(&finer, &profiles).unwrap();
+        for (checked, name) in check.patterns.iter().zip(["dip", "qua"]) {
+            let expected = finer_solved.worst_case(&finer, &of(name).pattern).unwrap().rate_rad_per_s.abs();
+            assert_eq!((checked.name.as_str(), checked.finer_rad_per_s), (name, expected));
+            assert_eq!(checked.rate_rad_per_s, of(name).worst.rate_rad_per_s.abs());
+        }
+        assert_eq!(check.patterns.len(), 2);
+        let cautioned = |change: f64| {
+            let finer_rad_per_s = 1.0 + change;
+            let best = GridChecked { name: "searched-8".into(), rate_rad_per_s: 1.0, finer_rad_per_s };
+            GridCheck { patterns: vec![best], ..check.clone() }.caution().is_some()
+        };
+        assert_eq!([-0.006, -0.004, 0.004, 0.006].map(cautioned), [true, false, false, true]);
+
+        let half_space = CoilModel { extent: Extent::HalfSpace, ..declared.clone() };
+        let bench = Bench { model: &half_space, ..bench };
+        assert_eq!(bench.grid_check(of("dip"), &baselines).unwrap(), None);
     }
 }

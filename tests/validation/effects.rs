@@ -9,7 +9,9 @@ use coilwright::numeric::piecewise::PiecewiseLinear;
 use coilwright::pattern::Pattern;
 use coilwright::pattern::classic::Classic;
 use coilwright::rate::{CoilModel, RateModel};
-use coilwright::thermal::{Drive, Extent, Field, Instant, Location, Material, ThermalHistory, solve};
+use coilwright::thermal::{
+    DEFAULT_CELLS_PER_LAYER, Drive, Extent, Field, Instant, Location, Material, ThermalHistory, solve,
+};
 use coilwright::units::{REFERENCE_TEMPERATURE_K, kelvin_from_celsius, rad_per_s_from_deg_per_h};
 
 const LAYERS: usize = 16;
@@ -42,6 +44,7 @@ fn model(effects: Vec<DeclaredEffect>) -> CoilModel {
         material: Material::Conductivity { w_per_m_k: CONDUCTIVITY, heat_capacity_j_per_m3_k: HEAT_CAPACITY },
         location: Location::OuterLayer,
         rate_mean_s: 0.0,
+        cells_per_layer: DEFAULT_CELLS_PER_LAYER,
         effects,
     }
 }

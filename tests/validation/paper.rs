@@ -8,7 +8,9 @@ use coilwright::pattern::classic::Classic;
 use coilwright::profile::{Piece, Profile};
 use coilwright::rate::{CoilModel, RateModel};
 use coilwright::search::worst_case::SolvedProfiles;
-use coilwright::thermal::{Drive, Extent, Instant, Location, Material, StepResponse, ThermalHistory, solve};
+use coilwright::thermal::{
+    DEFAULT_CELLS_PER_LAYER, Drive, Extent, Instant, Location, Material, StepResponse, ThermalHistory, solve,
+};
 use coilwright::units::{deg_per_h_from_rad_per_s, k_per_s_from_c_per_h};
 
 pub fn paper_model(length_m: f64, diffusivity_m2_per_s: f64) -> CoilModel {
@@ -36,6 +38,7 @@ pub fn paper_model(length_m: f64, diffusivity_m2_per_s: f64) -> CoilModel {
         material: Material::Diffusivity { m2_per_s: diffusivity_m2_per_s },
         location: Location::OuterLayer,
         rate_mean_s: 0.0,
+        cells_per_layer: DEFAULT_CELLS_PER_LAYER,
         effects: vec![],
     }
 }

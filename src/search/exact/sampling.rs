@@ -31,8 +31,13 @@ const NEIGHBOURS: usize = 512;
 /// Lessons that learn from the last one's open patterns.
 const LESSONS: usize = 24;
 
-/// Nodes of a level that the look ahead of every proof keeps.
-const NARROW: usize = 1 << 8;
+/// Nodes of a level that the look ahead of every proof keeps, at most and times the square of the layers.
+const MOST_WIDTH: usize = 1 << 12;
+const WIDTH_TIMES_LAYERS_SQUARED: usize = MOST_WIDTH * 16 * 16;
+
+fn usual_width(layers: usize) -> usize {
+    (WIDTH_TIMES_LAYERS_SQUARED / layers.pow(2)).min(MOST_WIDTH)
+}
 
 #[derive(Debug)]
 enum Engine {
@@ -77,7 +82,7 @@ impl Proof {
         let (engine, lesson) = engine(class, judge, &samples, mirrored, best.rate_rad_per_s);
         let mut proof = Self { class, mirrored, samples, used: lesson.used, engine };
         proof.follow(judge, best, lesson.open, good_enough_rad_per_s);
-        proof.look_ahead(judge, best, NARROW, good_enough_rad_per_s);
+        proof.look_ahead(judge, best, usual_width(starts[0].layers()), good_enough_rad_per_s);
         proof
     }
 
