@@ -6,6 +6,11 @@
 #[path = "../examples/effect_signatures.rs"]
 mod effect_signatures;
 
+/// The example that draws the pictures of the chapter on the physics.
+#[allow(dead_code)]
+#[path = "../examples/physics_pictures.rs"]
+mod physics_pictures;
+
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -95,5 +100,54 @@ fn the_chapter_of_effects_and_its_pictures_are_what_their_example_writes() {
     for picture in std::fs::read_dir(folder.path().join("effects")).unwrap().map(|e| e.unwrap().path()) {
         let shipped = Path::new("docs/src/effects").join(picture.file_name().unwrap());
         compared(shipped.to_str().unwrap(), &read(picture), again);
+    }
+}
+
+#[test]
+fn the_pictures_of_the_physics_are_what_their_example_writes() {
+    let folder = tempfile::tempdir().unwrap();
+    physics_pictures::write_pictures(folder.path()).unwrap();
+    let chapter = std::fs::read_to_string("docs/src/physics.md").unwrap();
+    for picture in std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().path()) {
+        let name = picture.file_name().unwrap().to_str().unwrap().to_owned();
+        assert!(chapter.contains(&format!("(physics/{name})")), "{name} is not shown");
+        let shipped = format!("docs/src/physics/{name}");
+        let now = std::fs::read_to_string(&picture).unwrap();
+        compared(&shipped, &now, "cargo run --release --example physics_pictures");
+    }
+}
+
+/// The campaign file is read by `tests/cli/schemas.rs`; everything else in TOML is part of a model file.
+#[test]
+fn every_piece_of_a_model_file_in_the_book_is_understood() {
+    let coil = std::fs::read_to_string("examples/paper-200m.toml").unwrap();
+    let mut read = 0;
+    for entry in std::fs::read_dir("docs/src").unwrap().map(|e| e.unwrap().path()).filter(|p| p.is_file()) {
+        let text = std::fs::read_to_string(&entry).unwrap();
+        for block in text.split("```toml\n").skip(1).filter_map(|rest| rest.split("```").next()) {
+            if block.contains("models = ") {
+                continue;
+            }
+            let whole = format!("{coil}\n{block}");
+            if let Err(faults) = coilwright::io::model_file::parse_model(Path::new("examples/model.toml"), &whole) {
+                panic!("{}: {faults}\n{block}", entry.display());
+            }
+            read += 1;
+        }
+    }
+    assert!(read > 0);
+}
+
+#[test]
+fn every_chapter_is_in_the_summary_and_every_link_leads_somewhere() {
+    let summary = std::fs::read_to_string("docs/src/SUMMARY.md").unwrap();
+    for entry in std::fs::read_dir("docs/src").unwrap().map(|e| e.unwrap().path()).filter(|p| p.is_file()) {
+        let name = entry.file_name().unwrap().to_str().unwrap().to_owned();
+        assert!(name == "SUMMARY.md" || summary.contains(&format!("]({name})")), "{name} is not in the summary");
+        let text = std::fs::read_to_string(&entry).unwrap();
+        for target in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            let outside = target.starts_with("http") || target.starts_with('#');
+            assert!(outside || Path::new("docs/src").join(target).exists(), "{name} points to {target}");
+        }
     }
 }

@@ -111,6 +111,12 @@ fn shuffled(layers: usize, seed: u64) -> NamedPattern {
     NamedPattern { name: format!("shuffled-{seed}"), pattern: Pattern::new(segments).unwrap() }
 }
 
+/// A pattern of patterns/.
+fn shipped(name: &str) -> NamedPattern {
+    let text = std::fs::read_to_string(Path::new("patterns").join(name).with_extension("toml")).unwrap();
+    parse_pattern(name, &text).unwrap()
+}
+
 #[test]
 fn schedules_of_classic_and_arbitrary_windings_hold_in_every_form() {
     for text in [PAPER, LONG] {
@@ -232,6 +238,7 @@ fn of_a_thousand_changes_of_one_field_in_any_form_each_is_noticed_or_changes_not
         (PAPER, classic(Classic::Qua, 16).unwrap(), 75),
         (PAPER, shuffled(16, 3), 75),
         (LONG, classic(Classic::Oct, 40).unwrap(), 12),
+        (LONG, shipped("searched-standard-40"), 12),
     ] {
         let file = model(text);
         for (form, whole) in forms(&file, &named) {
@@ -295,10 +302,7 @@ fn schedules_of_the_shipped_coils_hold_in_every_form_for_classic_and_searched_wi
         let file = parse_model(&path, &std::fs::read_to_string(&path).unwrap()).unwrap();
         let layers = file.model.coil.layers();
         let classics = Classic::ALL.into_iter().filter_map(|c| classic(c, layers));
-        let searched = searched.iter().map(|name| {
-            let text = std::fs::read_to_string(Path::new("patterns").join(name).with_extension("toml")).unwrap();
-            parse_pattern(name, &text).unwrap()
-        });
+        let searched = searched.iter().map(|name| shipped(name));
         for named in classics.chain(searched) {
             let mut checks = 0;
             for (form, text) in forms(&file, &named) {
