@@ -145,6 +145,36 @@ fn a_damaged_schedule_is_refused_or_understood() {
     survives("schedule", 1500, |text| shown(parse_claim("schedule", text)));
 }
 
+/// The start of a text: whole lines, so many at most.
+fn head(text: &str, lines: usize) -> String {
+    text.lines().take(lines).map(|line| format!("{line}\n")).collect()
+}
+
+#[test]
+fn every_damaged_example_file_is_refused_or_understood() {
+    let mut random = ChaCha8Rng::seed_from_u64(11);
+    let mut files: Vec<PathBuf> = ["examples", "patterns"]
+        .iter()
+        .flat_map(|folder| std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()))
+        .collect();
+    files.sort();
+    let (mut seen, mut refused) = (0, 0);
+    for path in files {
+        let text = || std::fs::read_to_string(&path).unwrap();
+        let (seed, changes, parse): (String, usize, Parse) = match path.extension().and_then(|e| e.to_str()) {
+            Some("csv") => (head(&text(), 60), 300, |text| shown(parse_record("record.csv", text))),
+            Some("toml") if path.starts_with("patterns") => (text(), 30, |text| shown(parse_pattern("p.toml", text))),
+            Some("toml") => (text(), 300, |text| shown(parse_model(Path::new("examples/model.toml"), text))),
+            _ => continue,
+        };
+        assert!(parse(&seed), "{} is refused as it is", path.display());
+        refused += (0..changes).filter(|_| !parse(&mutate(&seed, &mut random))).count();
+        seen += 1;
+    }
+    println!("{seen} files, {refused} mutations refused");
+    assert!(seen > 60 && refused > 0);
+}
+
 #[test]
 fn a_damaged_formula_is_refused_or_can_be_evaluated() {
     survives("expression", 5000, |text| {

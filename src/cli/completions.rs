@@ -5,6 +5,7 @@ use clap_complete::Shell;
 
 use super::screen::Screen;
 use super::{Cli, CliError, Ending};
+use crate::io::json::CompletionsJson;
 
 /// Completions for a shell, on stdout
 #[derive(Debug, clap::Args)]
@@ -19,6 +20,8 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut Cli::command(), "coilwright", &mut script);
-    screen.write(&String::from_utf8_lossy(&script))?;
+    let script = String::from_utf8_lossy(&script).into_owned();
+    let shell = arguments.shell.to_string();
+    screen.answer(CompletionsJson { shell, script }, |body| body.script.clone())?;
     Ok(Ending::Done)
 }

@@ -8,6 +8,7 @@ use clap_mangen::Man;
 use super::screen::Screen;
 use super::{Cli, CliError, Ending};
 use crate::io::files::write_atomically;
+use crate::io::json::WrittenJson;
 
 /// Write the manual pages into a folder
 #[derive(Debug, clap::Args)]
@@ -21,7 +22,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let mut root = Cli::command();
     root.build();
-    let mut written = 0;
+    let mut files = Vec::new();
     for command in std::iter::once(&root).chain(root.get_subcommands()) {
         if command.is_hide_set() || command.get_name() == "help" {
             continue;
@@ -33,9 +34,11 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         };
         let mut page = Vec::new();
         Man::new(command.clone().display_name(title.clone())).render(&mut page).map_err(CliError::Stdout)?;
-        write_atomically(&arguments.output.join(format!("{title}.1")), &page)?;
-        written += 1;
+        let path = arguments.output.join(format!("{title}.1"));
+        write_atomically(&path, &page)?;
+        files.push(path.display().to_string());
     }
-    screen.note(&format!("wrote {written} pages to {}", arguments.output.display()));
+    screen.note(&format!("wrote {} pages to {}", files.len(), arguments.output.display()));
+    screen.answer(WrittenJson { files }, |_| String::new())?;
     Ok(Ending::Done)
 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::screen::Screen;
 use super::{CliError, Ending};
 use crate::io::files::write_atomically;
+use crate::io::json::WrittenJson;
 
 /// Write a commented model file to start from
 #[derive(Debug, clap::Args)]
@@ -28,5 +29,6 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let name = toml_edit::Value::from(coil).to_string();
     write_atomically(&path, TEMPLATE.replace("\"NAME\"", name.trim()).as_bytes())?;
     screen.note(&format!("wrote {}; next: coilwright check {0}", path.display()));
+    screen.answer(WrittenJson { files: vec![path.display().to_string()] }, |_| String::new())?;
     Ok(Ending::Done)
 }

@@ -5,6 +5,7 @@ use clap::ValueEnum;
 use super::screen::Screen;
 use super::{CliError, Ending};
 use crate::io::further_schemas::{campaign_schema, compensation_schema};
+use crate::io::json::SchemaJson;
 use crate::io::schema::{model_schema, pattern_schema, record_schema, schedule_schema};
 
 /// The JSON Schema of a file format, for editors
@@ -39,6 +40,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         Kind::Campaign => campaign_schema(),
         Kind::Compensation => compensation_schema(),
     };
-    screen.write(&format!("{schema:#}\n"))?;
+    let kind = arguments.kind.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
+    screen.answer(SchemaJson { kind, schema }, |body| format!("{:#}\n", body.schema))?;
     Ok(Ending::Done)
 }

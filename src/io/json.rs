@@ -186,6 +186,26 @@ pub struct VerifyJson {
     pub violations: Vec<ViolationJson>,
 }
 
+/// What a command wrote.
+#[derive(Debug, Serialize)]
+pub struct WrittenJson {
+    pub files: Vec<String>,
+}
+
+/// A script for a shell.
+#[derive(Debug, Serialize)]
+pub struct CompletionsJson {
+    pub shell: String,
+    pub script: String,
+}
+
+/// A JSON Schema with what it is of.
+#[derive(Debug, Serialize)]
+pub struct SchemaJson {
+    pub kind: String,
+    pub schema: serde_json::Value,
+}
+
 #[derive(Debug, Serialize)]
 pub struct ReportJson {
     pub report: String,

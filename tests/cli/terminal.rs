@@ -161,6 +161,26 @@ fn progress_comes_as_one_json_object_a_line_on_request_only_and_on_stderr_only()
 }
 
 #[test]
+fn commands_that_write_files_or_scripts_answer_with_a_document_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let inside = |name: &str| folder.path().join(name).display().to_string();
+    let (pages, coil) = (inside("pages"), inside("coil.toml"));
+    for (arguments, key) in [
+        (&["man", "-o", &pages][..], "files"),
+        (&["new", &coil], "files"),
+        (&["completions", "zsh"], "script"),
+        (&["schema", "pattern"], "schema"),
+        (&["effects"], "effects"),
+        (&["patterns", "--layers", "12"], "patterns"),
+        (&["check", COIL], "faults"),
+    ] {
+        let answer = super::json(arguments);
+        assert_eq!(answer["schema_version"], 1, "{arguments:?}");
+        assert!(answer.get(key).is_some(), "{arguments:?}");
+    }
+}
+
+#[test]
 fn exit_codes_are_the_documented_ones() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out").display().to_string();
