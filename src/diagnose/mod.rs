@@ -24,6 +24,7 @@ pub mod experiment;
 mod field;
 mod hypothesis;
 pub mod plain;
+mod prune;
 mod search;
 mod stranger;
 mod verdict;

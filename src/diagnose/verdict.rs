@@ -1,32 +1,27 @@
 //! From fitted sets of effects to an answer that can be defended.
 
-use super::candidate::{Candidate, is_declared_number};
+use super::candidate::Candidate;
 use super::confirm::confirmation;
 use super::evidence::{Evidence, Role, dot, sum_of_squares};
 use super::hypothesis::{Hypothesis, Trial};
 use super::plain::{Plain, compete};
-use super::search::{Found, all_singles, fit_swap, settle, settle_contenders, settled, without};
+use super::prune::{Bar, prune, settled_and_pruned};
+use super::search::{Found, all_singles, fit_swap, settle, settle_contenders, without};
 use super::stranger::{other_winding, strangers};
 use super::{
-    Caution, Contender, DiagnoseError, Diagnosis, Equivalent, Extension, Finding, FittedParameter, Refusal, Rung,
-    Unexplained, Verdict,
+    Caution, Contender, DiagnoseError, Diagnosis, Equivalent, Extension, Finding, FittedParameter, Rung, Unexplained,
+    Verdict,
 };
 use crate::fit::Effort;
 use crate::rate::CoilModel;
 
-/// An effect must lower χ² by this share of the rows: a root mean square of a tenth of the noise.
-const LEAST_SHARE_OF_ROWS: f64 = 0.01;
-/// … and have this share of the coil's own signal: no model is more accurate than that.
-const LEAST_SHARE_OF_SIGNAL: f64 = 0.01;
-/// A factor this close to one is the model's accuracy, not physics.
-const LEAST_FACTOR: f64 = 0.02;
-/// χ² of unseen data must fall by this.
-const CONFIRMED: f64 = 4.0;
+/// An effect must have this share of the coil's own signal: no model is more accurate than that.
+pub(super) const LEAST_SHARE_OF_SIGNAL: f64 = 0.01;
 /// Sets whose χ² differ by less explain the records equally well (odds of 400 at best).
-const EQUAL: f64 = 12.0;
+pub(super) const EQUAL: f64 = 12.0;
 const MAX_EQUIVALENTS: usize = 2;
 /// Times that boundaries are estimated again because an effect went that they depend on.
-const MOST_ROUNDS: usize = 3;
+pub(super) const MOST_ROUNDS: usize = 3;
 /// Kinds that are tried in the place of an accepted one.
 const RIVALS: usize = 6;
 /// Reduced χ² beyond 1 that noise floor and boundary may make, besides chance.
@@ -50,15 +45,8 @@ pub(super) fn judge(
     let freedom = |h: &Hypothesis| (rows as f64 - h.parameters as f64 - 1.0).max(1.0);
     let excess = |h: &Hypothesis| h.chi_square - freedom(h);
     let tolerated = TOLERATED_EXCESS + 3.0 * (2.0 / rows as f64).sqrt();
-    for _ in 0..MOST_ROUNDS {
-        best = settled(evidence, model, candidates, best)?;
-        let trial = Trial { evidence, model, candidates };
-        let members = best.members.len();
-        best = prune(&trial, best, &base, variance, tolerated, &mut cautions);
-        if best.members.len() == members {
-            break;
-        }
-    }
+    let bar = Bar { base: &base, variance, tolerated };
+    best = settled_and_pruned(evidence, model, candidates, best, &bar, &mut cautions)?;
     let trial = Trial { evidence, model, candidates };
     let stranger = other_winding(&trial, &base, &best, 1.0 + tolerated);
     if stranger.is_some() {
@@ -66,10 +54,21 @@ pub(super) fn judge(
     }
     let mut reasons = Vec::new();
     let mut effects = Vec::new();
-    for place in 0..best.members.len() {
-        let (main, equivalents) = settle_equivalents(evidence, model, candidates, best, place, variance)?;
-        best = main;
-        reasons.push(equivalents);
+    for _ in 0..MOST_ROUNDS {
+        reasons.clear();
+        for place in 0..best.members.len() {
+            let (main, equivalents) = settle_equivalents(evidence, model, candidates, best, place, variance)?;
+            best = main;
+            reasons.push(equivalents);
+        }
+        // On the boundaries that the last comparison led to, something may have become needless.
+        let trial = Trial { evidence, model, candidates };
+        let members = best.members.len();
+        best = prune(&trial, best, &bar, &mut cautions);
+        if best.members.len() == members {
+            break;
+        }
+        best = settled_and_pruned(evidence, model, candidates, best, &bar, &mut cautions)?;
     }
     let trial = Trial { evidence, model, candidates };
     let errors = trial.fit(&best.members, Effort { standard_errors: true, ..Effort::QUICK });
@@ -184,78 +183,6 @@ fn cautions_of(evidence: &Evidence) -> Vec<Caution> {
         cautions.push(Caution::NoHoldout);
     }
     cautions
-}
-
-/// What is not needed, not confirmed or not of a practical size goes, the least significant first; so does what explains
-/// less than what is left over, or than a plain function of time: it may be that thing's shadow.
-fn prune(
-    trial: &Trial,
-    mut best: Hypothesis,
-    base: &Hypothesis,
-    variance: f64,
-    tolerated: f64,
-    cautions: &mut Vec<Caution>,
-) -> Hypothesis {
-    let rows = trial.evidence.rows(Role::Fit);
-    let kind = |h: &Hypothesis, place: usize| trial.candidates[h.members[place].candidate].kind();
-    let signal =
-        trial.evidence.of(Role::Fit).map(|c| c.signal_square(trial.model, trial.evidence.pattern)).sum::<f64>();
-    while let Some((out, kind, reason)) = refusal(trial, &best, rows, variance, signal) {
-        cautions.push(Caution::Refused { kind, reason });
-        match without(trial, &best, out) {
-            Some(smaller) => best = smaller,
-            None => break,
-        }
-    }
-    let plain = compete(trial.evidence, trial.model, &base.residuals);
-    let plain = plain.iter().map(|p| p.gain - p.parameters.saturating_sub(best.parameters) as f64 * (rows as f64).ln());
-    let plain_gain = plain.fold(0.0, f64::max);
-    if !best.members.is_empty() && plain_gain > base.chi_square - best.chi_square - EQUAL {
-        let kinds = (0..best.members.len()).map(|place| kind(&best, place));
-        cautions.extend(kinds.map(|kind| Caution::Refused { kind, reason: Refusal::Outdone }));
-        return base.clone();
-    }
-    let excess = |h: &Hypothesis| h.chi_square - rows as f64;
-    while excess(&best) > tolerated * rows as f64 {
-        let rests = (0..best.members.len()).filter_map(|out| Some((out, without(trial, &best, out)?)));
-        let weakest = rests.min_by(|a, b| a.1.chi_square.total_cmp(&b.1.chi_square));
-        match weakest {
-            Some((out, rest)) if rest.chi_square - best.chi_square < excess(&best) => {
-                cautions.push(Caution::Refused { kind: kind(&best, out), reason: Refusal::Outdone });
-                best = rest;
-            }
-            _ => break,
-        }
-    }
-    best
-}
-
-/// The first member that cannot stay, and why; the least significant first.
-fn refusal(
-    trial: &Trial,
-    best: &Hypothesis,
-    rows: usize,
-    variance: f64,
-    signal: f64,
-) -> Option<(usize, String, Refusal)> {
-    let mut order: Vec<(usize, Hypothesis)> =
-        (0..best.members.len()).filter_map(|out| Some((out, without(trial, best, out)?))).collect();
-    order.sort_by(|a, b| a.1.chi_square.total_cmp(&b.1.chi_square));
-    let least = (LEAST_SHARE_OF_ROWS * rows as f64).max(LEAST_SHARE_OF_SIGNAL.powi(2) * signal);
-    order.into_iter().find_map(|(out, rest)| {
-        let member = &best.members[out];
-        let candidate = &trial.candidates[member.candidate];
-        let reason = if is_declared_number(&candidate.effect) && (member.values[0] - 1.0).abs() < LEAST_FACTOR {
-            Refusal::FactorNearOne
-        } else if rest.chi_square - best.chi_square < least * variance {
-            Refusal::Small
-        } else if confirmation(trial, best, &rest).is_none_or(|less| less < CONFIRMED * variance) {
-            Refusal::Unconfirmed
-        } else {
-            return None;
-        };
-        Some((out, candidate.kind(), reason))
-    })
 }
 
 /// What else would do in one member's place; a physical effect is preferred to an empirical one that does as well.
