@@ -97,3 +97,48 @@ pub(super) const CENTRAL: f64 = 0.4;
 
 /// Share by which a value may differ from that for which a boundary was estimated.
 const NEAR: f64 = 0.05;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bracket() -> Bracket {
+        Bracket {
+            location: Location::OuterLayer,
+            way: vec!["sensor_lag []".to_owned()],
+            middle_s: 40.0,
+            half_width_s: 2.0,
+        }
+    }
+
+    #[test]
+    fn a_parabola_is_the_same_between_the_three_lags_of_a_bracket() {
+        let bracket = bracket();
+        let parabola = |lag_s: f64| 3.0 - 0.7 * lag_s + 0.02 * lag_s * lag_s;
+        for lag_s in [38.0, 39.1, 40.0, 40.6, 42.0] {
+            let weights = bracket.weights(lag_s);
+            let between: f64 = bracket.lags_s().iter().zip(weights).map(|(at, w)| w * parabola(*at)).sum();
+            assert!((between - parabola(lag_s)).abs() < 1e-12);
+            assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn a_bracket_holds_for_its_own_sensor_and_effects_only() {
+        let bracket = bracket();
+        let way = bracket.way.clone();
+        assert!(bracket.holds(Location::OuterLayer, &way, 41.9, 1.0));
+        assert!(!bracket.holds(Location::OuterLayer, &way, 42.1, 1.0));
+        assert!(!bracket.holds(Location::OuterLayer, &way, 41.9, CENTRAL));
+        assert!(!bracket.holds(Location::Ambient, &way, 40.0, 1.0));
+        assert!(!bracket.holds(Location::OuterLayer, &[], 40.0, 1.0));
+    }
+
+    #[test]
+    fn effects_that_only_one_of_two_ways_has_are_counted() {
+        let way = |kinds: &[&str]| kinds.iter().map(|k| (*k).to_owned()).collect::<Vec<_>>();
+        assert_eq!(difference(&way(&["a", "b"]), &way(&["b"])), 1);
+        assert_eq!(difference(&way(&["a"]), &way(&["b"])), 2);
+        assert_eq!(difference(&way(&[]), &way(&[])), 0);
+    }
+}

@@ -3,7 +3,8 @@
 //! Tolerance: the effects themselves or a set of at most three that holds them, hold-out error within 10 % of the noise
 //! floor, parameters within three of their standard errors.
 
-use coilwright::diagnose::{Diagnosis, Request, Verdict, diagnose};
+use coilwright::diagnose::{Caution, Diagnosis, Request, Verdict, diagnose};
+use coilwright::pattern::classic::Classic;
 
 use crate::records::{model, record};
 
@@ -48,4 +49,17 @@ fn a_complete_model_of_a_cylindrical_coil_is_given_no_effect() {
 #[test]
 fn a_mismatch_of_the_halves_is_found_with_its_size() {
     assert_found("d-mismatch", &[("strain_mismatch", &[("mismatch", 0.004)])]);
+}
+
+#[test]
+fn a_model_file_that_declares_another_winding_is_told_which_one_explains_the_record() {
+    let file = model("a-control");
+    let declared = Classic::Qua.pattern(file.model.coil.layers()).unwrap();
+    let fitted = [record("a-control", "calibration.csv")];
+    let request = Request { model: &file.model, pattern: &declared, records: &fitted, holdout: &[] };
+    let found = diagnose(&request, &|_| ()).unwrap();
+    println!("{:?} {:?}", found.verdict, found.cautions);
+    assert!(found.cautions.contains(&Caution::OtherWinding { winding: "dip" }));
+    assert!(found.effects.is_empty());
+    assert_eq!(found.verdict, Verdict::Unexplained);
 }

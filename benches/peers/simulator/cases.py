@@ -1,4 +1,7 @@
-"""Writes the trial cases: `python cases.py DIR [NAME...]`. One folder a case: coil.toml, calibration.csv, validation.csv; truth.json beside them."""
+"""Writes the trial cases: `python cases.py DIR [NAME...]`, or drawn ones: `python cases.py DIR --fresh SEED COUNT`.
+
+One folder a case: coil.toml, calibration.csv, validation.csv; truth.json beside them.
+"""
 import json, os, sys
 import numpy as np
 from simulator import calibration_air, simulate, validation_air, write_record
@@ -128,6 +131,81 @@ CASES = [
 ]
 
 
+# What may be drawn: kinds, and a function from a random generator to what is hidden. Heat paths cannot be combined.
+def signed(rng, low, high):
+    return float(f"{rng.choice([-1, 1]) * rng.uniform(low, high):.3g}")
+
+
+def within(rng, low, high):
+    return float(f"{rng.uniform(low, high):.3g}")
+
+
+HEAT = {
+    "spool_mass": lambda r: dict(spool_capacity=within(r, 1500, 9000), spool_contact=within(r, 150, 700)),
+    "self_heating": lambda r: dict(heater_power=within(r, 40, 250), heater_tau=within(r, 300, 2000)),
+    "axial_gradient": lambda r: dict(flange_film=within(r, 10, 80), flange=str(r.choice(["first", "second"]))),
+    "conductivity_temperature": lambda r: dict(conductivity_slope=signed(r, 0.0015, 0.004)),
+    "diffusivity": lambda r: dict(conductivity_factor=float(r.choice([within(r, 0.7, 0.9), within(r, 1.1, 1.4)]))),
+    "finite_pack": lambda r: dict(declared_half=True),
+    "surface_film": lambda r: dict(sensor_in_air=True),
+}
+OTHER = {
+    "sensor_lag": lambda r: dict(sensor_lag=within(r, 8, 100)),
+    "stress_gradient": lambda r: dict(stress=signed(r, 0.01, 0.06)),
+    "strain_mismatch": lambda r: dict(mismatch=signed(r, 0.001, 0.008)),
+    "glass_transition": lambda r: dict(glass_mismatch=signed(r, 0.002, 0.007), glass_transition=within(r, 0, 45), glass_width=within(r, 3, 8)),
+    "thermo_optic_temperature": lambda r: dict(thermo_optic_slope=signed(r, 0.0015, 0.005)),
+    "midpoint_offset": lambda r: dict(lead_offset=signed(r, 0.2, 1.0), lead=str(r.choice(["isothermal", "ambient"]))),
+    "turn_mismatch": lambda r: dict(turn_mismatch=signed(r, 0.7, 2.5)),
+    "heating_cooling_asymmetry": lambda r: dict(asymmetry=signed(r, 0.015, 0.06)),
+    "bias_temperature": lambda r: dict(bias_per_K=signed(r, 0.0008, 0.005)),
+    "bias_temperature_rate": lambda r: dict(bias_rate=signed(r, 5, 20)),
+    "bias_gradient_rate": lambda r: dict(bias_gradient=signed(r, 20, 70)),
+    "thermo_optic": lambda r: dict(thermo_optic_factor=float(r.choice([within(r, 0.85, 0.95), within(r, 1.05, 1.15)]))),
+    "channel:supply_v": lambda r: dict(gain=within(r, 0.15, 0.5)),
+}
+OUTSIDE = {
+    "sinusoid": lambda r: dict(sine_amplitude=within(r, 0.06, 0.15), sine_period=within(r, 500, 9000)),
+    "square": lambda r: dict(square_amplitude=within(r, 0.05, 0.12), square_period=within(r, 1500, 4000)),
+    "exponential": lambda r: dict(ageing_amplitude=within(r, 0.2, 0.5), ageing_tau=within(r, 600, 5000)),
+    "hysteresis": lambda r: dict(hysteresis_gain=within(r, 0.015, 0.03), hysteresis_width=within(r, 8, 15)),
+    "etalon": lambda r: dict(temperature_sine=within(r, 0.05, 0.1), temperature_sine_period=within(r, 10, 20)),
+}
+
+
+def drawn(seed, count):
+    """Cases with coil, pattern, noise, columns and what is hidden all drawn."""
+    rng = np.random.default_rng(seed)
+    cases = []
+    for i in range(count):
+        coil = str(rng.choice(list(COILS)))
+        layers = COILS[coil][0]
+        pattern = str(rng.choice(["zyl", "dip", "sym"] + ["qua"] * (layers % 4 == 0) + ["oct"] * (layers % 8 == 0)))
+        kinds, outside, hidden, extra = [], None, {}, {}
+        what = rng.random()
+        if what < 0.15:
+            pass
+        elif what < 0.25:
+            outside = str(rng.choice(list(OUTSIDE)))
+            hidden = OUTSIDE[outside](rng)
+        elif what < 0.75:
+            kinds = [str(rng.choice(list(HEAT) + list(OTHER)))]
+        else:
+            second = str(rng.choice(list(OTHER)))
+            kinds = [str(rng.choice([k for k in list(HEAT) + list(OTHER) if k != second and {k, second} != {"surface_film", "sensor_lag"}])), second]
+        for kind in kinds:
+            hidden |= (HEAT | OTHER)[kind](rng)
+        channels = [dict(c) for c in (NOISE, WALK, WARM) if rng.random() < 0.25]
+        if "gain" in hidden:
+            channels.append(dict(SUPPLY, gain=hidden.pop("gain")))
+        if hidden.pop("declared_half", False):
+            extra["declared_half"] = True
+        noise = float(rng.choice([0.06, 0.12, 0.12, 0.24]))
+        name = f"fresh-{seed}-{i:02d}"
+        cases.append(case(name, coil, pattern, kinds, hidden, noise, channels, **extra, **({"outside": outside} if outside else {})))
+    return cases
+
+
 def declared_text(c, coil):
     layers, turns, bore, radial, axial, k, rc, n, dndt, wave = coil
     location = "ambient" if c.get("ambient") or c.get("ambient_film") else "outer_layer"
@@ -164,11 +242,13 @@ rate_mean_s = 10.0
 
 def main():
     import tomllib
-    root, wanted = sys.argv[1], sys.argv[2:]
+    root, wanted, first, cases = sys.argv[1], sys.argv[2:], 0, CASES
+    if wanted[:1] == ["--fresh"]:
+        first, cases, wanted = 100 * int(wanted[1]), drawn(int(wanted[1]), int(wanted[2])), []
     os.makedirs(root, exist_ok=True)
     file = f"{root}/truth.json"
     truth = json.load(open(file)) if os.path.exists(file) else {}
-    for number, c in enumerate(CASES):
+    for number, c in enumerate(cases, first):
         if wanted and c["name"] not in wanted:
             continue
         folder = f"{root}/{c['name']}"
