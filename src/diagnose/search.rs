@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::DiagnoseError;
-use super::anchor::way_of;
+use super::anchor::{moves_sensor, way_of};
 use super::candidate::Candidate;
 use super::evidence::{Begin, Evidence, Role};
 use super::hypothesis::{Hypothesis, Response, Trial, pairs};
@@ -292,7 +292,9 @@ pub(super) fn settle_contenders(
         let trial = Trial { evidence, model, candidates };
         let Some(with) = trial.model_of(&list[place].members) else { continue };
         let way = way_of(&with);
-        if ways.contains(&way) {
+        let seen = ways.contains(&way);
+        // With more or fewer free parameters the same effects may be found at other values; a lag's bracket is dearer.
+        if seen && (moves_sensor(&with) || evidence.is_anchored(&with)) {
             list[place] = trial.fit(&list[place].members, Effort::QUICK).unwrap_or_else(|| list[place].clone());
         } else if !evidence.is_anchored(&with) && ways.len() < CONTENDERS {
             list[place] = settled(evidence, model, candidates, list[place].clone())?;
