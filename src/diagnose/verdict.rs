@@ -52,7 +52,7 @@ pub(super) fn judge(
     if stranger.is_some() {
         best = base.clone();
     }
-    let mut reasons = Vec::new();
+    let mut reasons: Vec<Vec<Equivalent>> = Vec::new();
     let mut effects = Vec::new();
     for _ in 0..MOST_ROUNDS {
         reasons.clear();
@@ -69,6 +69,7 @@ pub(super) fn judge(
             break;
         }
         best = settled_and_pruned(evidence, model, candidates, best, &bar, &mut cautions)?;
+        reasons = vec![Vec::new(); best.members.len()];
     }
     let trial = Trial { evidence, model, candidates };
     let errors = trial.fit(&best.members, Effort { standard_errors: true, ..Effort::QUICK });
