@@ -15,24 +15,7 @@ use coilwright::report::plot::{Axis, Chart, Series};
 use coilwright::thermal::{Drive, Extent, Instant, ThermalHistory, solve};
 use coilwright::units::{REFERENCE_TEMPERATURE_K, deg_per_h_from_rad_per_s, k_per_s_from_c_per_min, s_from_min};
 
-const MODEL: &str = r#"
-name = "twelve layers"
-[fibre]
-refractive_index = 1.45
-thermo_optic_per_k = 1.0e-5
-wavelength_nm = 1550.0
-outer_diameter_um = 165.0
-[winding]
-layers = 12
-turns_per_layer = 50
-inner_diameter_mm = 80.0
-axial_pitch_um = 170.0
-layer_length = "actual"
-[thermal]
-model = "pack"
-conductivity_w_per_m_k = 0.35
-volumetric_heat_capacity_j_per_m3_k = 1.70e6
-"#;
+const MODEL: &str = include_str!("book/twelve-layers.toml");
 
 const LAYERS: usize = 12;
 const RAMP_MIN: f64 = 10.0;

@@ -314,19 +314,15 @@ mod tests {
         (times_s, outer_k, readings, KINKS_S[1..5].to_vec())
     }
 
+    fn observed<'a>(times_s: &'a [f64], temperature_k: &'a [f64], path: &'a HeatPath) -> Observation<'a> {
+        Observation { times_s, temperature_k, path, lag_s: 0.0, layer_gain_rad_per_k: &[0.0; 24], rate_mean_s: 10.0 }
+    }
+
     #[test]
     fn film_kinks_and_the_outer_layer_are_found_again_through_the_noise() {
         let (times_s, outer_k, readings, kinks_s) = record();
         let path = path();
-        let found = estimate(&Observation {
-            times_s: &times_s,
-            temperature_k: &readings,
-            path: &path,
-            lag_s: 0.0,
-            layer_gain_rad_per_k: &[0.0; 24],
-            rate_mean_s: 10.0,
-        })
-        .unwrap();
+        let found = estimate(&observed(&times_s, &readings, &path)).unwrap();
         let film = found.air().film_w_per_m2_k.unwrap();
         let times: Vec<f64> = found.air().kinks.iter().map(|k| k.time_s).collect();
         let error_k = (outer_k.iter().zip(&times_s).map(|(t, s)| (found.outer_k().value(*s) - t).powi(2)).sum::<f64>()
@@ -354,15 +350,7 @@ mod tests {
         let normal = Normal::new(0.0, NOISE_K).unwrap();
         let readings: Vec<f64> = outer_k.iter().map(|t| t + normal.inverse_cdf(random.random::<f64>())).collect();
         let error_k = |path: &HeatPath| {
-            let found = estimate(&Observation {
-                times_s: &times_s,
-                temperature_k: &readings,
-                path,
-                lag_s: 0.0,
-                layer_gain_rad_per_k: &[0.0; 24],
-                rate_mean_s: 10.0,
-            })
-            .unwrap();
+            let found = estimate(&observed(&times_s, &readings, path)).unwrap();
             let squares = outer_k.iter().zip(&times_s).map(|(t, s)| (found.outer_k().value(*s) - t).powi(2));
             (squares.sum::<f64>() / 900.0).sqrt()
         };
@@ -384,15 +372,7 @@ mod tests {
         let readings: Vec<f64> = (0..900)
             .map(|row| at_stamps.temperatures_k(row)[23] + normal.inverse_cdf(random.random::<f64>()))
             .collect();
-        let found = estimate(&Observation {
-            times_s: &times_s,
-            temperature_k: &readings,
-            path: &path,
-            lag_s: 0.0,
-            layer_gain_rad_per_k: &[0.0; 24],
-            rate_mean_s: 10.0,
-        })
-        .unwrap();
+        let found = estimate(&observed(&times_s, &readings, &path)).unwrap();
         let film = found.air().film_w_per_m2_k.unwrap();
         let (driven, drive) = found.driving(&path, 0.0);
         let again = thermal::solve(&driven, &drive).unwrap().means(&times_s, 10.0);
@@ -420,15 +400,7 @@ mod tests {
         let sum = |a: &[f64]| a.iter().zip(&warmed).map(|(a, b)| a + b).collect::<Vec<f64>>();
         let (outer_k, readings) = (sum(&outer_k), sum(&readings));
         let path = HeatPath { bore_heat: heated.bore_heat, ..path() };
-        let found = estimate(&Observation {
-            times_s: &times_s,
-            temperature_k: &readings,
-            path: &path,
-            lag_s: 0.0,
-            layer_gain_rad_per_k: &[0.0; 24],
-            rate_mean_s: 10.0,
-        })
-        .unwrap();
+        let found = estimate(&observed(&times_s, &readings, &path)).unwrap();
         let error_k = (outer_k.iter().zip(&times_s).map(|(t, s)| (found.outer_k().value(*s) - t).powi(2)).sum::<f64>()
             / 900.0)
             .sqrt();
@@ -456,14 +428,7 @@ mod tests {
     fn an_estimate_that_begins_with_a_bad_one_finds_kinks_and_noise_again() {
         let (times_s, outer_k, readings, kinks_s) = record();
         let path = path();
-        let observation = Observation {
-            times_s: &times_s,
-            temperature_k: &readings,
-            path: &path,
-            lag_s: 0.0,
-            layer_gain_rad_per_k: &[0.0; 24],
-            rate_mean_s: 10.0,
-        };
+        let observation = observed(&times_s, &readings, &path);
         // As left behind by a heat path that could not follow the readings.
         let bad = Air {
             film_w_per_m2_k: Some(70.0),

@@ -18,6 +18,23 @@ use super::schedule_file::{ProductionJson, ScheduleJson, StepJson};
 /// The element of a traveller's page that holds its data.
 pub const DATA_ELEMENT: &str = "<script type=\"application/json\" id=\"coilwright-data\">";
 
+/// What every form of a schedule says of a step; a table without one of these columns is no schedule.
+pub(super) const STEP_COLUMNS: [&str; 13] = [
+    "step",
+    "layer",
+    "half",
+    "segment",
+    "supply_reel",
+    "direction",
+    "turns",
+    "fibre_from_m",
+    "fibre_to_m",
+    "length_m",
+    "radius_mm",
+    "climb",
+    "cumulative_m",
+];
+
 /// Columns that hold whole numbers; the others with a unit in their name hold numbers, the rest words.
 const WHOLE: &[&str] = &["step", "layer", "segment", "climb"];
 const FLAGS: &[&str] = &["reel_change", "potting"];
@@ -102,23 +119,8 @@ fn parse_csv(file: &str, text: &str) -> Result<Claim, Faults> {
         Ok(header) => header.iter().map(|h| h.trim().trim_start_matches('\u{feff}').to_owned()).collect(),
         Err(error) => return Err(fault(format!("the header cannot be read: {error}"))),
     };
-    let needed = [
-        "step",
-        "layer",
-        "half",
-        "segment",
-        "supply_reel",
-        "direction",
-        "turns",
-        "fibre_from_m",
-        "fibre_to_m",
-        "length_m",
-        "radius_mm",
-        "climb",
-        "cumulative_m",
-    ];
     let mut faults: Vec<Fault> = Vec::new();
-    for missing in needed.iter().filter(|n| !header.iter().any(|h| h == *n)) {
+    for missing in STEP_COLUMNS.iter().filter(|n| !header.iter().any(|h| h == *n)) {
         faults.push(Fault::new(format!("missing column {missing}: is it a schedule?"), None));
     }
     for (i, name) in header.iter().enumerate() {

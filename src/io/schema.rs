@@ -9,6 +9,7 @@ use crate::pattern::classic::Classic;
 use crate::search::objective::Objective;
 
 use super::json::SCHEMA_VERSION;
+use super::schedule_reader::STEP_COLUMNS;
 
 const DIALECT: &str = "https://json-schema.org/draft/2020-12/schema";
 
@@ -276,21 +277,7 @@ pub fn schedule_schema() -> Value {
     );
     let step = table(
         "a step: one layer",
-        &[
-            "step",
-            "layer",
-            "half",
-            "segment",
-            "supply_reel",
-            "direction",
-            "turns",
-            "fibre_from_m",
-            "fibre_to_m",
-            "length_m",
-            "radius_mm",
-            "climb",
-            "cumulative_m",
-        ],
+        &STEP_COLUMNS,
         json!({
             "step": whole("counted from 1"),
             "layer": whole("counted from 1, innermost first"),

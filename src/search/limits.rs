@@ -4,7 +4,6 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::Rng;
 
 use super::signs::{segments_of_signs, signs_of_segments};
-use super::walk::{most_captive, pick};
 use crate::pattern::windability::WindabilityClass;
 
 /// What the winding shop puts up with.
@@ -41,6 +40,18 @@ fn largest_climb(segments: &[usize]) -> usize {
     layers.windows(2).map(|pair| pair[0].abs_diff(pair[1])).max().unwrap_or(0)
 }
 
+/// Most captive runs at any step: one less than the intervals that the wound segments form.
+pub(super) fn most_captive(segments: &[usize]) -> usize {
+    let mut wound = vec![false; segments.len() + 2];
+    let (mut intervals, mut most) = (0usize, 0);
+    for &segment in segments {
+        wound[segment] = true;
+        intervals = intervals + 1 - usize::from(wound[segment - 1]) - usize::from(wound[segment + 1]);
+        most = most.max(intervals);
+    }
+    most - 1
+}
+
 /// A pattern within the limits drawn at random; `captive:K` starts from a standard one, and where climbs are limited a
 /// random walk starts from the cylindrical winding, which climbs least.
 pub fn draw(limits: impl Into<Limits>, layers: usize, random: &mut ChaCha8Rng) -> Vec<usize> {
@@ -64,6 +75,11 @@ pub fn draw(limits: impl Into<Limits>, layers: usize, random: &mut ChaCha8Rng) -
         }
         _ => segments_of_signs(&(1..layers).map(|_| random.next_u32() & 1 == 1).collect::<Vec<bool>>()),
     }
+}
+
+/// A number below `count`, the same on every machine.
+pub(super) fn pick(random: &mut ChaCha8Rng, count: usize) -> usize {
+    ((u64::from(random.next_u32()) * count as u64) >> 32) as usize
 }
 
 /// Steps of a random walk that draws a pattern.

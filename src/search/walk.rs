@@ -13,16 +13,12 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::Rng;
 
 use super::columns::{Change, Columns};
+use super::limits::{Limits, draw, most_captive, pick};
 use super::samples::SampleMatrix;
 use super::signs::{segments_of_signs, sign_columns, sign_value, signs_of_segments};
 use crate::pattern::axial_direction;
 use crate::pattern::windability::WindabilityClass;
 use crate::rate::segment_weights_m2;
-
-/// A number below `count`, the same on every machine.
-pub(super) fn pick(random: &mut ChaCha8Rng, count: usize) -> usize {
-    ((u64::from(random.next_u32()) * count as u64) >> 32) as usize
-}
 
 /// Uniform in (0, 1].
 pub(super) fn uniform(random: &mut ChaCha8Rng) -> f64 {
@@ -84,26 +80,12 @@ impl Space {
 
     /// Whether the class admits P(j).
     pub fn admits(&self, segments: &[usize]) -> bool {
-        match self.class {
-            WindabilityClass::Standard => signs_of_segments(segments).is_some(),
-            WindabilityClass::Captive(most) => most_captive(segments) <= most,
-            WindabilityClass::Any => true,
-        }
+        Limits::from(self.class).admits(segments)
     }
 
     /// A pattern of the class drawn at random; `captive:K` starts from a standard one.
     pub fn draw(&self, random: &mut ChaCha8Rng) -> Vec<usize> {
-        let layers = self.layers();
-        match self.class {
-            WindabilityClass::Any => {
-                let mut segments: Vec<usize> = (1..=layers).collect();
-                for i in (1..layers).rev() {
-                    segments.swap(i, pick(random, i + 1));
-                }
-                segments
-            }
-            _ => segments_of_signs(&(1..layers).map(|_| random.next_u32() & 1 == 1).collect::<Vec<bool>>()),
-        }
+        draw(self.class, self.layers(), random)
     }
 
     /// A position at a pattern of the class.
@@ -131,18 +113,6 @@ fn invert(segments: &[usize]) -> Vec<usize> {
         layers[segment - 1] = layer;
     }
     layers
-}
-
-/// Most captive runs at any step: one less than the intervals that the wound segments form.
-pub(super) fn most_captive(segments: &[usize]) -> usize {
-    let mut wound = vec![false; segments.len() + 2];
-    let (mut intervals, mut most) = (0usize, 0);
-    for &segment in segments {
-        wound[segment] = true;
-        intervals = intervals + 1 - usize::from(wound[segment - 1]) - usize::from(wound[segment + 1]);
-        most = most.max(intervals);
-    }
-    most - 1
 }
 
 /// A pattern, its coefficients, and the proposal made last.
