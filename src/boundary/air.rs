@@ -95,20 +95,24 @@ pub(super) struct Reconstruction {
     pub log_likelihood: f64,
 }
 
+/// A path as a pack in the air, where a film stands in front of it.
+pub(super) fn behind_film(path: &HeatPath) -> HeatPath {
+    let mut path = HeatPath { extent: Extent::Pack, location: Location::Ambient, ..path.clone() };
+    if let Material::Diffusivity { m2_per_s } = path.material {
+        path.material = Material::Conductivity {
+            w_per_m_k: m2_per_s * NOMINAL_HEAT_CAPACITY_J_PER_M3_K,
+            heat_capacity_j_per_m3_k: NOMINAL_HEAT_CAPACITY_J_PER_M3_K,
+        };
+    }
+    path
+}
+
 impl Scene {
     pub fn new(observation: &Observation) -> Result<Self, BoundaryError> {
-        let mut path = observation.path.clone();
-        let location = path.location;
-        path.extent = Extent::Pack;
-        path.location = Location::Ambient;
+        let location = observation.path.location;
+        let mut path = behind_film(observation.path);
         let bore_heat = path.bore_heat.take().filter(|_| location == Location::OuterLayer);
         path.conductivity_slope_per_k = 0.0;
-        if let Material::Diffusivity { m2_per_s } = path.material {
-            path.material = Material::Conductivity {
-                w_per_m_k: m2_per_s * NOMINAL_HEAT_CAPACITY_J_PER_M3_K,
-                heat_capacity_j_per_m3_k: NOMINAL_HEAT_CAPACITY_J_PER_M3_K,
-            };
-        }
         let mut steps: Vec<f64> = observation.times_s.windows(2).map(|w| w[1] - w[0]).collect();
         steps.sort_by(f64::total_cmp);
         let interval_s = steps[steps.len() / 2];

@@ -35,6 +35,7 @@ mod air;
 mod filmed;
 mod kinks;
 mod layout;
+mod planned;
 mod whitener;
 
 use thiserror::Error;
@@ -43,6 +44,7 @@ use crate::numeric::piecewise::PiecewiseLinear;
 use crate::thermal::{self, Drive, Extent, HeatPath, Location, ThermalError};
 use air::Scene;
 
+pub use planned::{Exposure, expose, planned_whitener};
 pub use whitener::RateWhitener;
 
 /// Everything about a record and a model that the boundary depends on.
@@ -113,7 +115,7 @@ pub fn estimate(observation: &Observation) -> Result<Boundary, BoundaryError> {
     check(observation)?;
     let mut scene = Scene::new(observation)?;
     let air = kinks::search(&mut scene)?;
-    Boundary::new(scene, air)?.unbent(observation)
+    Boundary::new(scene, air)?.unbent(observation, kinks::adapt)
 }
 
 /// Estimates again, after the model changed a little, starting from what was found before.
@@ -124,7 +126,7 @@ pub fn refine(observation: &Observation, known: &Air) -> Result<Boundary, Bounda
     check(observation)?;
     let mut scene = Scene::new(observation)?;
     let air = kinks::adapt(&mut scene, known.clone())?;
-    Boundary::new(scene, air)?.unbent(observation)
+    Boundary::new(scene, air)?.unbent(observation, kinks::adapt)
 }
 
 fn check(observation: &Observation) -> Result<(), BoundaryError> {
@@ -154,8 +156,12 @@ impl Boundary {
     }
 
     /// Estimated again with what a conductivity that depends on temperature does to the outermost layer taken from the
-    /// readings, as it follows from the air that was found without.
-    fn unbent(self, observation: &Observation) -> Result<Self, BoundaryError> {
+    /// readings, as it follows from the air that was found without; `follow` adapts the air's model to that.
+    fn unbent(
+        self,
+        observation: &Observation,
+        follow: impl Fn(&mut Scene, Air) -> Result<Air, BoundaryError>,
+    ) -> Result<Self, BoundaryError> {
         let path = observation.path;
         let slope_per_k = path.conductivity_slope_per_k;
         if self.air.film_w_per_m2_k.is_none() || slope_per_k == 0.0 || path.extent == Extent::HalfSpace {
@@ -177,7 +183,7 @@ impl Boundary {
                 .collect();
             let bent_k = PiecewiseLinear::new(observation.times_s.to_vec(), bent).expect("readings are in order");
             let mut scene = found.scene.bent(bent_k);
-            let air = kinks::adapt(&mut scene, found.air)?;
+            let air = follow(&mut scene, found.air)?;
             found = Self::new(scene, air)?;
         }
         Ok(found)
@@ -270,8 +276,7 @@ impl Boundary {
     /// # Errors
     /// A heat path that cannot be solved.
     pub fn rate_whitener(&self, noise_rad_per_s: f64) -> Result<RateWhitener, BoundaryError> {
-        let space = self.scene.joint_space(&self.air, noise_rad_per_s)?;
-        Ok(RateWhitener { whitener: space.space.whitener(), rate_places: space.rate_places, noise_rad_per_s })
+        RateWhitener::new(&self.scene, &self.air, noise_rad_per_s)
     }
 }
 
