@@ -12,7 +12,7 @@
 
 use thiserror::Error;
 
-use crate::boundary::{self, Air, Boundary, BoundaryError, Observation};
+use crate::boundary::{self, Air, Boundary, BoundaryError, Observation, Start};
 use crate::coil::CoilError;
 use crate::numeric::noise::{WhiteNoise, white_noise};
 use crate::numeric::piecewise::PiecewiseLinear;
@@ -99,7 +99,7 @@ pub fn estimate_boundary(model: &CoilModel, pattern: &Pattern, record: &Record) 
     Ok(boundary::estimate(&observation(model, record, &path, &gains))?)
 }
 
-/// As [`estimate_boundary`] for a sensor of another lag, beginning with what was found under nearly the same model.
+/// As [`estimate_boundary`] for a sensor of another lag, beginning with what was found under another model.
 ///
 /// # Errors
 /// As [`predict`].
@@ -109,9 +109,10 @@ pub fn refine_boundary(
     record: &Record,
     lag_s: f64,
     known: &Air,
+    start: Start,
 ) -> Result<Boundary, PredictError> {
     let (path, gains) = (model.heat_path()?, layer_gains_rad_per_k(model, pattern)?);
-    Ok(boundary::refine(&Observation { lag_s, ..observation(model, record, &path, &gains) }, known)?)
+    Ok(boundary::refine(&Observation { lag_s, ..observation(model, record, &path, &gains) }, known, start)?)
 }
 
 fn observation<'a>(model: &CoilModel, record: &'a Record, path: &'a HeatPath, gains: &'a [f64]) -> Observation<'a> {

@@ -469,9 +469,7 @@ impl AirSpace {
             })
             .collect()
     }
-}
 
-impl AirSpace {
     /// By how much each kink comes earlier than assumed, all at once [s].
     pub fn kink_leads_s(&self, smoothed: &Smoothed, air: &Air) -> Vec<f64> {
         let lead_s = |(&stage, kink): (&usize, &Kink), size_k_per_s: f64| {
@@ -486,5 +484,17 @@ impl AirSpace {
         };
         let sizes = self.kink_sizes(smoothed);
         self.kink_stages.iter().zip(&air.kinks).zip(sizes).map(|(at, (size, _))| lead_s(at, size)).collect()
+    }
+
+    /// By how much the log-likelihood rises when all kinks move to where they should be, as far as it is a parabola.
+    pub fn gain_of_moving(&self, smoothed: &Smoothed) -> f64 {
+        self.kink_stages
+            .iter()
+            .map(|&stage| {
+                let score = smoothed.score[Shock::Earlier.place(stage)];
+                let prior = self.space.stages[stage].disturbances.iter().find(|d| d.0 == Shock::Earlier as usize);
+                0.5 * score * score * prior.map_or(0.0, |d| d.1)
+            })
+            .sum()
     }
 }

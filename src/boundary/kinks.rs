@@ -2,7 +2,7 @@
 
 use super::air::{AirSpace, Scene};
 use super::layout::Shock;
-use super::{Air, BoundaryError, Kink};
+use super::{Air, BoundaryError, Kink, Start};
 use crate::numeric::state_space::Smoothed;
 use crate::thermal::Location;
 
@@ -27,10 +27,14 @@ const KINK_COST: f64 = 4.0;
 const CLOSE_INTERVALS: f64 = 8.0;
 /// … also if that costs this much likelihood: it is gained back when the film is fitted again.
 const MERGE_SLACK: f64 = 6.0;
-/// Searches that begin anew with the film that the last one found.
+/// Searches, each with the film that the last one found.
 const MAX_PASSES: usize = 4;
 /// Newton steps for the kinks' times at most; they stop by themselves when nothing moves.
 const NEWTON_STEPS: usize = 6;
+/// Nothing is moved for less than this of the log-likelihood: it is a seventh of a standard deviation.
+const WORTH_A_STEP: f64 = 0.01;
+/// Times that kinks and film are placed in turn.
+const SETTLING_ROUNDS: usize = 3;
 /// No thermocouple is better [K].
 const LEAST_NOISE_K: f64 = 1e-5;
 
@@ -42,20 +46,19 @@ pub(super) fn search(scene: &mut Scene) -> Result<Air, BoundaryError> {
         kinks: Vec::new(),
         noise_k: reading_noise_k(&scene.temperature_k),
     };
-    // Kinks that were placed under the wrong film leave shadows beside them: begin again with the film that they led to.
-    let mut best: Option<(f64, Air)> = None;
-    for _ in 0..MAX_PASSES {
-        air.kinks.clear();
-        air.jerk_noise_k2_per_s7 = FIRST_JERK_NOISE_K2_PER_S7;
-        grow(scene, &mut air)?;
-        air = refine(scene, air)?;
-        let merit = merit_of(scene, &air)?;
-        if best.as_ref().is_some_and(|(b, _)| merit < b + 1.0) {
+    grow(scene, &mut air)?;
+    air = refine(scene, air)?;
+    // Kinks that were placed under the wrong film leave shadows beside them, and jerk in the place of others.
+    let mut merit = merit_of(scene, &air)?;
+    for _ in 1..MAX_PASSES {
+        let again = adapt(scene, air.clone(), Start::Elsewhere)?;
+        let found = merit_of(scene, &again)?;
+        if found < merit + 1.0 {
             break;
         }
-        best = Some((merit, air.clone()));
+        (merit, air) = (found, again);
     }
-    Ok(best.expect("at least one pass was made").1)
+    Ok(air)
 }
 
 /// Adds kinks while any would be significant, everything else following.
@@ -68,24 +71,29 @@ fn grow(scene: &Scene, air: &mut Air) -> Result<(), BoundaryError> {
         air.kinks.extend(added.into_iter().map(|time_s| Kink { time_s, slope_change_k_per_s: 0.0 }));
         air.kinks.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
         place_kinks(scene, air, NEWTON_STEPS)?;
-        ascend_film(scene, air, 0.3, 2, 0)?;
+        ascend_film(scene, air, 0.3, 2)?;
         ascend_jerk_noise(scene, air, 2.0, 2)?;
         place_kinks(scene, air, NEWTON_STEPS)?;
     }
     Ok(())
 }
 
-/// Finds the air's model beginning with what was found for another heat path or sensor.
-///
-/// The noise begins anew: what the other model could not follow is no noise of the sensor's, and under it no kink would
-/// stand out.
-pub(super) fn adapt(scene: &mut Scene, known: Air) -> Result<Air, BoundaryError> {
+/// Finds the air's model beginning with what was found before.
+pub(super) fn adapt(scene: &mut Scene, known: Air, start: Start) -> Result<Air, BoundaryError> {
     let mut air = known;
-    air.noise_k = reading_noise_k(&scene.temperature_k);
-    air.jerk_noise_k2_per_s7 = air.jerk_noise_k2_per_s7.min(FIRST_JERK_NOISE_K2_PER_S7);
     connect(scene, &mut air);
-    place_kinks(scene, &mut air, NEWTON_STEPS)?;
-    ascend_film(scene, &mut air, 0.3, 2, 0)?;
+    match start {
+        Start::Elsewhere => {
+            air.noise_k = reading_noise_k(&scene.temperature_k);
+            air.jerk_noise_k2_per_s7 = air.jerk_noise_k2_per_s7.min(FIRST_JERK_NOISE_K2_PER_S7);
+            place_kinks(scene, &mut air, NEWTON_STEPS)?;
+            ascend_film(scene, &mut air, 0.3, 2)?;
+        }
+        Start::Nearby | Start::Beside => settle(scene, &mut air)?,
+    }
+    if start == Start::Beside {
+        return Ok(air);
+    }
     grow(scene, &mut air)?;
     refine(scene, air)
 }
@@ -104,14 +112,26 @@ fn refine(scene: &mut Scene, mut air: Air) -> Result<Air, BoundaryError> {
     place_kinks(scene, &mut air, NEWTON_STEPS)?;
     drop_idle_kinks(scene, &mut air)?;
     merge_close_kinks(scene, &mut air)?;
-    ascend_film(scene, &mut air, 0.1, 3, 1)?;
+    ascend_film(scene, &mut air, 0.1, 3)?;
     ascend_jerk_noise(scene, &mut air, 1.0, 2)?;
-    ascend_film(scene, &mut air, 0.02, 2, 1)?;
-    place_kinks(scene, &mut air, NEWTON_STEPS)?;
-    let smoothed = smooth(scene, &air)?.1;
+    settle(scene, &mut air)?;
+    Ok(air)
+}
+
+/// Kinks and film in turn until neither moves, then the sensor's noise.
+fn settle(scene: &Scene, air: &mut Air) -> Result<(), BoundaryError> {
+    for _ in 0..SETTLING_ROUNDS {
+        place_kinks(scene, air, NEWTON_STEPS)?;
+        let before = air.film_w_per_m2_k;
+        ascend_film(scene, air, 0.02, 2)?;
+        if air.film_w_per_m2_k == before {
+            break;
+        }
+    }
+    let smoothed = smooth(scene, air)?.1;
     let ratio = smoothed.squared_innovations / smoothed.measurements as f64;
     air.noise_k = (air.noise_k * ratio.sqrt().clamp(0.5, 2.0)).max(LEAST_NOISE_K);
-    Ok(air)
+    Ok(())
 }
 
 /// Noise of one reading, from third differences: a median, so that kinks do not count.
@@ -170,6 +190,7 @@ fn place_kinks(scene: &Scene, air: &mut Air, steps: usize) -> Result<(), Boundar
         let (built, smoothed) = smooth(scene, air)?;
         let sizes = built.kink_sizes(&smoothed);
         let leads_s = built.kink_leads_s(&smoothed, air);
+        let expected = built.gain_of_moving(&smoothed);
         let mut farthest_s = 0.0_f64;
         for (i, kink) in air.kinks.iter_mut().enumerate() {
             kink.slope_change_k_per_s = sizes[i].0;
@@ -181,7 +202,7 @@ fn place_kinks(scene: &Scene, air: &mut Air, steps: usize) -> Result<(), Boundar
             }
         }
         air.kinks.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
-        if step < steps && farthest_s < 0.03 * scene.interval_s {
+        if step < steps && (farthest_s < 0.03 * scene.interval_s || expected < WORTH_A_STEP) {
             break;
         }
     }
@@ -225,7 +246,7 @@ fn merge_close_kinks(scene: &Scene, air: &mut Air) -> Result<(), BoundaryError> 
     if trial.kinks.len() < air.kinks.len() {
         place_kinks(scene, &mut trial, NEWTON_STEPS)?;
         ascend_jerk_noise(scene, &mut trial, 2.0, 2)?;
-        ascend_film(scene, &mut trial, 0.1, 1, 2)?;
+        ascend_film(scene, &mut trial, 0.1, 1)?;
         place_kinks(scene, &mut trial, NEWTON_STEPS)?;
         if merit_of(scene, &trial)? > merit {
             *air = trial;
@@ -265,15 +286,13 @@ fn merit_of(scene: &Scene, air: &Air) -> Result<f64, BoundaryError> {
     Ok(log_likelihood(scene, air)? - KINK_COST * air.kinks.len() as f64)
 }
 
-/// Climbs the likelihood along ln h; kinks follow by `following` Newton steps at each trial.
-fn ascend_film(scene: &Scene, air: &mut Air, step: f64, rounds: usize, following: usize) -> Result<(), BoundaryError> {
+/// Climbs the likelihood along ln h. What the kinks' times would do meanwhile is in the likelihood: small shifts of them
+/// are integrated out.
+fn ascend_film(scene: &Scene, air: &mut Air, step: f64, rounds: usize) -> Result<(), BoundaryError> {
     let Some(film) = air.film_w_per_m2_k else { return Ok(()) };
     let bounds = (FILM_BOUNDS_W_PER_M2_K.0.ln(), FILM_BOUNDS_W_PER_M2_K.1.ln());
     let at = |log_film: f64, from: &Air| -> Result<(f64, Air), BoundaryError> {
-        let mut trial = Air { film_w_per_m2_k: Some(log_film.exp()), ..from.clone() };
-        if following > 0 {
-            place_kinks(scene, &mut trial, following)?;
-        }
+        let trial = Air { film_w_per_m2_k: Some(log_film.exp()), ..from.clone() };
         Ok((log_likelihood(scene, &trial)?, trial))
     };
     *air = ascend(air.clone(), film.ln(), step, rounds, bounds, at)?;
@@ -313,6 +332,10 @@ fn ascend(
             3.0 * step * (above - below).signum()
         };
         let trial_x = (x + towards).clamp(low, high);
+        let expected = if curvature < 0.0 { (above - below).powi(2) / (-8.0 * curvature) } else { f64::INFINITY };
+        if (expected < WORTH_A_STEP && best >= below.max(above)) || trial_x == x {
+            break;
+        }
         let (trial, air_trial) = at(trial_x, &air)?;
         let candidates = [(trial, trial_x, air_trial), (below, left, air_below), (above, right, air_above)];
         for (value, place, candidate) in candidates {
@@ -320,7 +343,9 @@ fn ascend(
                 (best, x, air) = (value, place, candidate);
             }
         }
-        step = if towards.abs() >= 2.0 * step { 1.5 * step } else { (0.5 * towards.abs()).max(0.25 * step) };
+        // Three standard deviations, where there is a maximum: there a parabola is all that there is.
+        step =
+            if towards.abs() >= 2.0 * step { 1.5 * step } else { step * (3.0 / (-curvature).sqrt()).clamp(0.02, 1.0) };
     }
     Ok(air)
 }

@@ -115,18 +115,34 @@ pub fn estimate(observation: &Observation) -> Result<Boundary, BoundaryError> {
     check(observation)?;
     let mut scene = Scene::new(observation)?;
     let air = kinks::search(&mut scene)?;
-    Boundary::new(scene, air)?.unbent(observation, kinks::adapt)
+    Boundary::new(scene, air)?.unbent(observation, nearby)
 }
 
-/// Estimates again, after the model changed a little, starting from what was found before.
+/// How much of what was found before is still right.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Start {
+    /// It was found with another heat path or sensor. Its noise begins anew: what the other model could not follow is no
+    /// noise of the sensor's, and under it no kink would stand out.
+    Elsewhere,
+    /// With nearly the same one: a kink may come or go.
+    Nearby,
+    /// With one beside it: the same kinks, moved, behind another film.
+    Beside,
+}
+
+/// Estimates again, after the model changed, starting from what was found before.
 ///
 /// # Errors
 /// As [`estimate`].
-pub fn refine(observation: &Observation, known: &Air) -> Result<Boundary, BoundaryError> {
+pub fn refine(observation: &Observation, known: &Air, start: Start) -> Result<Boundary, BoundaryError> {
     check(observation)?;
     let mut scene = Scene::new(observation)?;
-    let air = kinks::adapt(&mut scene, known.clone())?;
-    Boundary::new(scene, air)?.unbent(observation, kinks::adapt)
+    let air = kinks::adapt(&mut scene, known.clone(), start)?;
+    Boundary::new(scene, air)?.unbent(observation, nearby)
+}
+
+fn nearby(scene: &mut Scene, air: Air) -> Result<Air, BoundaryError> {
+    kinks::adapt(scene, air, Start::Nearby)
 }
 
 fn check(observation: &Observation) -> Result<(), BoundaryError> {
@@ -416,6 +432,28 @@ mod tests {
     }
 
     #[test]
+    fn an_estimate_that_follows_a_heat_path_is_that_of_a_search_under_it() {
+        let (times_s, _, readings, _) = record();
+        let (path, mut other) = (path(), path());
+        other.material = Material::Conductivity { w_per_m_k: 0.38, heat_capacity_j_per_m3_k: 1.7e6 };
+        let elsewhere = estimate(&observed(&times_s, &readings, &other)).unwrap();
+        let observation = observed(&times_s, &readings, &path);
+        let searched = estimate(&observation).unwrap();
+        for start in [Start::Nearby, Start::Beside] {
+            let found = refine(&observation, elsewhere.air(), start).unwrap();
+            let film = found.air().film_w_per_m2_k.unwrap() / searched.air().film_w_per_m2_k.unwrap() - 1.0;
+            let apart_k = (times_s.iter().map(|t| (found.outer_k().value(*t) - searched.outer_k().value(*t)).powi(2)))
+                .sum::<f64>()
+                .sqrt()
+                / 30.0;
+            let less = searched.log_likelihood() - found.log_likelihood();
+            println!("{start:?}: film {film:.1e}, outer layer {apart_k:.1e} K apart, log-likelihood {less:.3} less");
+            assert!(less < 0.5 && film.abs() < 2e-3 && apart_k < 0.05 * NOISE_K);
+            assert_eq!(found.air().kinks.len(), searched.air().kinks.len());
+        }
+    }
+
+    #[test]
     fn a_record_at_one_temperature_is_refused() {
         let path = path();
         let error = estimate(&Observation {
@@ -441,7 +479,7 @@ mod tests {
             kinks: vec![Kink { time_s: 900.0, slope_change_k_per_s: 0.01 }],
             noise_k: 20.0 * NOISE_K,
         };
-        let found = refine(&observation, &bad).unwrap();
+        let found = refine(&observation, &bad, Start::Elsewhere).unwrap();
         let air = found.air();
         let error_k = (outer_k.iter().zip(&times_s).map(|(t, s)| (found.outer_k().value(*s) - t).powi(2)).sum::<f64>()
             / 900.0)

@@ -26,6 +26,16 @@ pub(super) struct Anchor {
     pub flange_response: OnceLock<Option<[ThermalHistory; 2]>>,
 }
 
+impl Anchor {
+    /// Whether it was estimated for the effects of a model at values, and for a lag, from which no kink is far.
+    pub fn is_nearly(&self, model: &CoilModel, lag_s: f64) -> bool {
+        let within = |a: f64, b: f64| (a - b).abs() <= NEARLY * a.abs().max(b.abs());
+        self.way == way_of(model)
+            && within(self.lag_s, lag_s)
+            && self.values.iter().zip(heat_values(model)).all(|(a, b)| within(*a, b))
+    }
+}
+
 /// The effects that move heat or the sensor: what a boundary's estimate depends on. Sorted.
 pub(super) fn way_of(model: &CoilModel) -> Vec<String> {
     moving(model).map(name_of).collect()
@@ -97,6 +107,8 @@ pub(super) const CENTRAL: f64 = 0.4;
 
 /// Share by which a value may differ from that for which a boundary was estimated.
 const NEAR: f64 = 0.05;
+/// … and for the estimate to begin with what was found then.
+const NEARLY: f64 = 0.25;
 
 #[cfg(test)]
 mod tests {

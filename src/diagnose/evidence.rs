@@ -10,6 +10,7 @@ use super::anchor::{
 };
 use super::conductivity::SlopeResponse;
 use super::field::{DrivenAnchor, Keep, Solved};
+use crate::boundary::Start;
 use crate::pattern::Pattern;
 use crate::predict::{estimate_boundary, noise_floor_rad_per_s, rates_rad_per_s, refine_boundary};
 use crate::rate::CoilModel;
@@ -55,6 +56,8 @@ pub(super) enum Begin {
     Anew,
     /// With what was found for the nearest sensor.
     Nearby,
+    /// … which is hardly another.
+    Beside,
 }
 
 impl<'a> Evidence<'a> {
@@ -117,8 +120,8 @@ impl<'a> Evidence<'a> {
             .cases
             .par_iter()
             .map(|case| {
-                let nearby = |lag_s: f64| case.estimate_at(model, pattern, Begin::Nearby, lag_s);
-                Ok([nearby(lag_s - half_width_s)?, nearby(lag_s + half_width_s)?])
+                let beside = |lag_s: f64| case.estimate_at(model, pattern, Begin::Beside, lag_s);
+                Ok([beside(lag_s - half_width_s)?, beside(lag_s + half_width_s)?])
             })
             .collect::<Result<Vec<_>, DiagnoseError>>()?;
         for (case, sides) in self.cases.iter_mut().zip(sides) {
@@ -244,14 +247,21 @@ impl Case {
     ) -> Result<Anchor, DiagnoseError> {
         let way = way_of(model);
         let far = |a: &Anchor| (difference(&a.way, &way), (a.lag_s - lag_s).abs());
-        let known = (begin == Begin::Nearby).then(|| {
+        let known = (begin != Begin::Anew).then(|| {
             self.anchors.iter().min_by(|a, b| {
                 let (a, b) = (far(a), far(b));
                 a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
             })
         });
         let boundary = match known.flatten() {
-            Some(near) => refine_boundary(model, pattern, &self.record, lag_s, near.boundary.air()),
+            Some(near) => {
+                let start = match begin {
+                    Begin::Beside => Start::Beside,
+                    _ if near.is_nearly(model, lag_s) => Start::Nearby,
+                    _ => Start::Elsewhere,
+                };
+                refine_boundary(model, pattern, &self.record, lag_s, near.boundary.air(), start)
+            }
             None => estimate_boundary(model, pattern, &self.record),
         };
         let boundary =

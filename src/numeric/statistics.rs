@@ -143,7 +143,9 @@ pub fn chi_square_tail(x: f64, degrees_of_freedom: f64) -> f64 {
 /// Values that stand alone: further from the median of their neighbourhood than `factor` times its robust deviation
 /// and than `floor`.
 ///
-/// A step or a corner of a signal is not flagged: the median of a neighbourhood follows it.
+/// A step or a corner of a signal is not flagged: the median of a neighbourhood follows it. Near the ends, where it cannot,
+/// a value must stand as far from each of its neighbours, and twice as far as these from each other: it may be where a
+/// signal sets out from.
 ///
 /// # Source
 /// Hampel, J. Am. Stat. Assoc. 69 (1974) 383; the running form after Pearson, IEEE Trans. Control Syst. 10 (2002) 55.
@@ -156,9 +158,18 @@ pub fn gross_errors(values: &[f64], half_width: usize, factor: f64, floor: f64) 
             window.clear();
             window.extend_from_slice(&values[from..to]);
             let centre = median_in_place(&mut window);
+            let at_an_end = i < half_width || i + half_width >= values.len();
             window.iter_mut().for_each(|v| *v = (*v - centre).abs());
             let spread = GAUSSIAN_PER_MAD * median_in_place(&mut window);
-            (values[i] - centre).abs() > (factor * spread).max(floor)
+            let least = (factor * spread).max(floor);
+            let alone = || {
+                let nearest =
+                    (from..to).filter(|&j| j != i).map(|j| (values[j] - values[i]).abs()).fold(f64::INFINITY, f64::min);
+                let others = (from + 1..to).filter(|&j| j != i && j != i + 1);
+                let step = others.map(|j| (values[j] - values[j - 1]).abs()).fold(0.0, f64::max);
+                nearest > least.max(2.0 * step)
+            };
+            (values[i] - centre).abs() > least && (!at_an_end || alone())
         })
         .collect()
 }
@@ -182,6 +193,23 @@ mod tests {
         assert_eq!(median(&[3.0, 1.0, 2.0]), 2.0);
         assert_eq!(median(&[4.0, 1.0, 3.0, 2.0]), 2.5);
         assert!(median(&[]).is_nan());
+    }
+
+    #[test]
+    fn at_an_end_a_spike_is_flagged_and_where_a_signal_sets_out_from_is_not() {
+        let quiet = |i: i32| 0.01 * f64::from(i * 7 % 5);
+        let sets_out: Vec<f64> = (0..40).map(|i| quiet(i) - 1.5 * (1.0 - (-0.5 * f64::from(i)).exp())).collect();
+        assert_eq!(gross_errors(&sets_out, 3, 6.0, 0.2), Vec::<usize>::new());
+        let returns: Vec<f64> = sets_out.iter().rev().copied().collect();
+        assert_eq!(gross_errors(&returns, 3, 6.0, 0.2), Vec::<usize>::new());
+        for at in [0, 1, 38, 39] {
+            let mut spoilt: Vec<f64> = (0..40).map(quiet).collect();
+            spoilt[at] += 4.0;
+            assert_eq!(gross_errors(&spoilt, 3, 6.0, 0.2), vec![at]);
+        }
+        let mut stepped: Vec<f64> = (0..40).map(quiet).collect();
+        stepped[..2].iter_mut().for_each(|v| *v -= 5.0);
+        assert_eq!(gross_errors(&stepped, 3, 6.0, 0.2), Vec::<usize>::new());
     }
 
     #[test]
