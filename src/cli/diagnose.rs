@@ -6,7 +6,7 @@ use super::report::{REPORT_FILE, write_report};
 use super::schedule::pattern_of;
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
-use crate::diagnose::experiment::{Chamber, design, rivals};
+use crate::diagnose::experiment::{Chamber, design};
 use crate::diagnose::{self, Diagnosis, Request};
 use crate::io::diagnosis_json::{DiagnosisJson, DiagnosisRow, FindingJson};
 use crate::io::files::write_atomically;
@@ -50,7 +50,8 @@ pub struct Arguments {
     /// Writes diagnosis.json, the ladder, the extended model, residuals before and after, and report.html into this folder
     #[arg(long, short, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Writes the profile that would tell the candidates apart, for `evaluate --profiles` and `temperatures --profiles`
+    /// Writes the course of the chamber's air that would tell the candidates apart, and says how surely; for `evaluate
+    /// --profiles` and `temperatures --profiles`
     #[arg(long, value_name = "FILE")]
     experiment: Option<PathBuf>,
     /// Seed of the profiles that the experiment is chosen from
@@ -81,7 +82,8 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let (records, holdout) = (read(&arguments.records)?, read(&arguments.holdout)?);
     let progress = screen.progress("diagnose", Some(PARTS as u64));
     let request = Request { model: &file.model, pattern: &pattern, records: &records, holdout: &holdout };
-    let diagnosis = diagnose::diagnose(&request, &|share| progress.at((share * PARTS) as u64, ""))?;
+    let (diagnosis, contest) =
+        diagnose::diagnose_with_contest(&request, &|share| progress.at((share * PARTS) as u64, ""))?;
     progress.finish();
     let mut inputs = Vec::new();
     for (paths, role) in [(&arguments.records, "fitted"), (&arguments.holdout, "held out")] {
@@ -91,16 +93,16 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     }
     let wanted = arguments.output.is_some() || arguments.experiment.is_some();
     let all: Vec<&Record> = records.iter().chain(&holdout).collect();
-    let experiment = Chamber::of(&all)
-        .filter(|_| wanted)
-        .and_then(|chamber| design(&rivals(&file.model, &diagnosis), &pattern, &chamber, arguments.seed));
+    let experiment =
+        Chamber::of(&all).filter(|_| wanted).and_then(|chamber| design(&contest, &pattern, &chamber, arguments.seed));
     let holdout_noise = (!holdout.is_empty()).then(|| noise_of(&holdout));
     let inputs = InputsJson::new(Some(&file), inputs);
     let body = DiagnosisJson::new(&file.model.name, &diagnosis, holdout_noise, experiment.as_ref(), inputs);
     if let Some(path) = &arguments.experiment {
         match (&experiment, &body.experiment) {
             (Some(found), Some(shown)) => {
-                let remarks = [format!("For {}: tells candidates apart.", file.model.name), shown.statement.clone()];
+                let mut remarks = vec![format!("For {}: the chamber's air.", file.model.name), shown.statement.clone()];
+                remarks.extend(shown.expectations.clone());
                 write_atomically(path, print_profile(&found.profile, &remarks).as_bytes())?;
                 screen.note(&format!("wrote {}", path.display()));
             }
@@ -203,6 +205,9 @@ fn text(body: &DiagnosisJson) -> String {
     }
     if let Some(experiment) = &body.experiment {
         text += &format!("{}\n", experiment.statement);
+        for pair in &experiment.expectations {
+            text += &format!("  {pair}\n");
+        }
     }
     for caution in &body.cautions {
         text += &format!("note: {caution}\n");

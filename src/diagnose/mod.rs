@@ -39,6 +39,8 @@ use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::units::Unit;
 
+use experiment::Contest;
+
 pub use candidate::{is_declared_number, is_empirical};
 pub use plain::{Plain, Shape};
 
@@ -276,6 +278,26 @@ fn check_lengths(request: &Request) -> Result<(), DiagnoseError> {
 /// # Errors
 /// No records, records that say nothing, a model that cannot be solved.
 pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Diagnosis, DiagnoseError> {
+    Ok(diagnose_and(request, progress, |_, _| ())?.0)
+}
+
+/// As [`diagnose`], and what is left to be told apart by an experiment.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn diagnose_with_contest(
+    request: &Request,
+    progress: &(dyn Fn(f64) + Sync),
+) -> Result<(Diagnosis, Contest), DiagnoseError> {
+    diagnose_and(request, progress, |evidence, found| Contest::new(evidence, request.model, found))
+}
+
+/// Also what else is made of the evidence.
+fn diagnose_and<T>(
+    request: &Request,
+    progress: &(dyn Fn(f64) + Sync),
+    further: impl FnOnce(&evidence::Evidence, &Diagnosis) -> T,
+) -> Result<(Diagnosis, T), DiagnoseError> {
     check_lengths(request)?;
     progress(0.0);
     let mut evidence = evidence::Evidence::new(request.model, request.pattern, request.records, request.holdout)?;
@@ -285,6 +307,7 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
     let found = search::search(&mut evidence, request.model, &candidates, progress)?;
     progress(0.9);
     let diagnosis = verdict::judge(&mut evidence, request.model, &candidates, found)?;
+    let further = further(&evidence, &diagnosis);
     progress(1.0);
-    Ok(diagnosis)
+    Ok((diagnosis, further))
 }

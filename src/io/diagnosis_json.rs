@@ -5,13 +5,14 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::comparison_json::CompareJson;
+use super::experiment_json::ExperimentJson;
 use super::inputs_json::InputsJson;
 use crate::diagnose::experiment::Experiment;
 use crate::diagnose::{
     Contender, Diagnosis, Equivalent, Finding, FittedParameter, Plain, Rung, Shape, Unexplained, Verdict,
 };
 use crate::effect::DeclaredEffect;
-use crate::units::{c_per_h_from_k_per_s, deg_per_h_from_rad_per_s, h_from_s};
+use crate::units::deg_per_h_from_rad_per_s;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DiagnosisJson {
@@ -40,33 +41,6 @@ pub struct DiagnosisRow {
     pub time_s: f64,
     pub residual_declared_deg_per_h: f64,
     pub residual_extended_deg_per_h: f64,
-}
-
-/// A profile, and how far apart the candidates' own models are under it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ExperimentJson {
-    pub profile: String,
-    pub pieces: Vec<PieceJson>,
-    pub duration_s: f64,
-    /// How many profiles it was chosen from.
-    pub profiles_tried: usize,
-    pub separations: Vec<SeparationJson>,
-    pub statement: String,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PieceJson {
-    pub rate_c_per_h: f64,
-    pub duration_s: f64,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SeparationJson {
-    pub first: String,
-    pub second: String,
-    /// Root mean square of the difference of the two predictions, their offsets taken out.
-    pub rms_deg_per_h: f64,
-    pub multiple_of_noise: f64,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -220,50 +194,6 @@ impl DiagnosisJson {
                 format!("{model} the error is {} on the fitted records{unseen}", error(rung.rmse_deg_per_h, false))
             })
             .collect()
-    }
-}
-
-impl ExperimentJson {
-    fn new(experiment: &Experiment, noise_rad_per_s: f64) -> Self {
-        let profile = &experiment.profile;
-        let separations: Vec<SeparationJson> = experiment
-            .separations
-            .iter()
-            .map(|s| SeparationJson {
-                first: experiment.rivals[s.first].clone(),
-                second: experiment.rivals[s.second].clone(),
-                rms_deg_per_h: deg_per_h_from_rad_per_s(s.rms_rad_per_s),
-                multiple_of_noise: s.rms_rad_per_s / noise_rad_per_s.max(f64::MIN_POSITIVE),
-            })
-            .collect();
-        let apart: Vec<String> = separations
-            .iter()
-            .map(|s| {
-                format!(
-                    "{} and {} would be {:.4} °/h rms apart, {:.2} times the noise of one row",
-                    s.first, s.second, s.rms_deg_per_h, s.multiple_of_noise
-                )
-            })
-            .collect();
-        Self {
-            profile: profile.name().to_owned(),
-            pieces: profile
-                .pieces()
-                .iter()
-                .map(|p| PieceJson { rate_c_per_h: c_per_h_from_k_per_s(p.rate_k_per_s), duration_s: p.duration_s })
-                .collect(),
-            duration_s: profile.duration_s(),
-            profiles_tried: experiment.tried,
-            statement: format!(
-                "under the profile {} ({} ramps and soaks from 20 °C, {:.1} h, at most {:.0} °C/h) {}",
-                profile.name(),
-                profile.pieces().len(),
-                h_from_s(profile.duration_s()),
-                c_per_h_from_k_per_s(profile.max_rate_k_per_s()),
-                apart.join("; ")
-            ),
-            separations,
-        }
     }
 }
 

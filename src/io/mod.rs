@@ -9,6 +9,7 @@ pub mod diagnosis_json;
 pub mod difference_equation;
 mod effect_tables;
 pub mod effects_json;
+pub mod experiment_json;
 pub mod fault;
 pub mod files;
 pub mod further_schemas;

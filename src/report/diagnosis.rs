@@ -5,7 +5,8 @@ use maud::{Markup, html};
 use super::ladder::ladder_chart;
 use super::page::figure;
 use super::plot::{Axis, Chart, Mark, Series};
-use crate::io::diagnosis_json::{DiagnosisJson, DiagnosisRow, ExperimentJson, FindingJson, ParameterJson};
+use crate::io::diagnosis_json::{DiagnosisJson, DiagnosisRow, FindingJson, ParameterJson};
+use crate::io::experiment_json::ExperimentJson;
 use crate::units::{h_from_s, min_from_s, percent_from_fraction};
 
 /// Candidates that the page lists.
@@ -163,6 +164,7 @@ fn effects(found: &[FindingJson]) -> Markup {
 fn experiment(found: &ExperimentJson) -> Markup {
     html! {
         p { "Of " (found.profiles_tried) " profiles within what the records show the chamber to be capable of, this one tells the candidates apart best: " (found.statement) "." }
+        ul { @for pair in &found.expectations { li { (pair) } } }
         (figure(&experiment_chart(found).svg(), &format!("The profile {}, {:.2} h, from a steady state at 20 °C.", found.profile, h_from_s(found.duration_s))))
         div.scroll { table {
             thead { tr { th { "Piece" } th { "Rate [°C/h]" } th { "Duration [s]" } } }
@@ -184,7 +186,7 @@ fn experiment_chart(found: &ExperimentJson) -> Chart {
     Chart::new("The experiment's profile")
         .size(860, 240)
         .x(Axis::linear("time [min]"))
-        .y(Axis::linear("sensor's temperature [°C]"))
+        .y(Axis::linear("air's temperature [°C]"))
         .with(Series::line("", points))
 }
 

@@ -32,6 +32,18 @@ fn a_diagnosis_leaves_its_ladder_its_page_the_extended_model_and_an_experiment_t
     let multiple = apart["rms_deg_per_h"].as_f64().unwrap() / answer["noise_floor_deg_per_h"].as_f64().unwrap();
     assert!((apart["multiple_of_noise"].as_f64().unwrap() / multiple - 1.0).abs() < 1e-9 && multiple > 10.0);
     assert!(experiment["statement"].as_str().unwrap().contains("°/h rms apart"));
+    let number = |key: &str| apart[key].as_f64().unwrap();
+    assert!(number("expected_chi_square_alone") > 100.0);
+    assert!(number("expected_chi_square_with_records") > number("expected_chi_square_alone"));
+    assert_eq!((apart["told_apart"].as_str(), apart["runs_needed"].as_u64()), (Some("yes"), Some(1)));
+    // The declared model is a special case of the extended one: nothing could speak against the latter.
+    let directions = apart["directions"].as_array().unwrap();
+    assert_eq!(directions.len(), 1);
+    assert_eq!(directions[0]["refused"].as_str(), Some("the declared model"));
+    assert!(directions[0]["needed_chi_square_alone"].as_f64().unwrap() < number("expected_chi_square_alone"));
+    let words = experiment["expectations"][0].as_str().unwrap();
+    assert!(words.starts_with("the declared model and finite_pack would be told apart (a χ² of "), "{words}");
+    assert!(page.contains(words) && std::fs::read_to_string(&next).unwrap().contains(words));
     let evaluated = json(&["evaluate", COIL, "--profiles", &next, "--pattern", "zyl", "-q"]);
     assert_eq!(evaluated["patterns"][0]["worst_profile"], experiment["profile"]);
     let layers = run(&["temperatures", COIL, "--profiles", &next, "--rows", "3", "-q"]);

@@ -1,0 +1,176 @@
+//! The next experiment as `diagnose` says it: the profile, and what is to be expected of it.
+
+use serde::{Deserialize, Serialize};
+
+use crate::diagnose::experiment::{Experiment, MOST_RUNS, Outcome, Promise, Separation};
+use crate::units::{c_per_h_from_k_per_s, deg_per_h_from_rad_per_s, h_from_s, percent_from_fraction};
+
+/// A profile of the chamber's air, and how surely it tells the candidates apart.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ExperimentJson {
+    pub profile: String,
+    pub pieces: Vec<PieceJson>,
+    pub duration_s: f64,
+    /// How many profiles it was chosen from.
+    pub profiles_tried: usize,
+    pub separations: Vec<SeparationJson>,
+    pub statement: String,
+    /// What is to be expected of each pair, in words.
+    pub expectations: Vec<String>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PieceJson {
+    pub rate_c_per_h: f64,
+    pub duration_s: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SeparationJson {
+    pub first: String,
+    pub second: String,
+    /// Root mean square of the difference of the two predictions as fitted to the records, their offsets taken out.
+    pub rms_deg_per_h: f64,
+    pub multiple_of_noise: f64,
+    /// By how much χ² one is expected to be refused if the other is true, after it is fitted again: to the experiment alone,
+    /// and to the records at hand too; the less of the two directions.
+    pub expected_chi_square_alone: f64,
+    pub expected_chi_square_with_records: f64,
+    /// `yes`, `perhaps` or `no`.
+    pub told_apart: String,
+    /// Whether a profile was found that tells the two apart, be it another one.
+    pub possible: bool,
+    /// Runs of the profile after which they are told apart; null if more than ten.
+    pub runs_needed: Option<usize>,
+    pub directions: Vec<DirectionJson>,
+}
+
+/// What is expected if one of two candidates is true.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DirectionJson {
+    pub truth: String,
+    pub refused: String,
+    pub expected_chi_square_alone: f64,
+    /// Of which the records have said `chi_square_of_records` already.
+    pub expected_chi_square_with_records: f64,
+    pub chi_square_of_records: f64,
+    /// From which on a diagnosis calls the two different.
+    pub needed_chi_square_alone: f64,
+    pub needed_chi_square_with_records: f64,
+    /// That what is found with the records is more than needed.
+    pub chance: f64,
+}
+
+impl ExperimentJson {
+    pub(super) fn new(experiment: &Experiment, noise_rad_per_s: f64) -> Self {
+        let profile = &experiment.profile;
+        let name = |rival: usize| experiment.rivals[rival].0.clone();
+        let separations: Vec<SeparationJson> =
+            experiment.separations.iter().map(|s| SeparationJson::new(s, name, noise_rad_per_s)).collect();
+        let pairs = experiment.separations.iter().zip(&separations);
+        let apart: Vec<String> = separations
+            .iter()
+            .map(|s| {
+                format!(
+                    "{} and {} would be {:.4} °/h rms apart, {:.2} times the noise of one row",
+                    s.first, s.second, s.rms_deg_per_h, s.multiple_of_noise
+                )
+            })
+            .collect();
+        Self {
+            profile: profile.name().to_owned(),
+            pieces: profile
+                .pieces()
+                .iter()
+                .map(|p| PieceJson { rate_c_per_h: c_per_h_from_k_per_s(p.rate_k_per_s), duration_s: p.duration_s })
+                .collect(),
+            duration_s: profile.duration_s(),
+            profiles_tried: experiment.tried,
+            statement: format!(
+                "with the chamber's air on the profile {} ({} ramps and soaks from 20 °C, {:.1} h, at most {:.0} °C/h) {}",
+                profile.name(),
+                profile.pieces().len(),
+                h_from_s(profile.duration_s()),
+                c_per_h_from_k_per_s(profile.max_rate_k_per_s()),
+                apart.join("; ")
+            ),
+            expectations: pairs.map(|(pair, shown)| expectation(experiment, pair, shown)).collect(),
+            separations,
+        }
+    }
+}
+
+impl SeparationJson {
+    fn new(separation: &Separation, name: impl Fn(usize) -> String, noise_rad_per_s: f64) -> Self {
+        let least = |of: fn(&Outcome) -> f64| separation.outcomes.iter().map(of).fold(f64::INFINITY, f64::min);
+        Self {
+            first: name(separation.first),
+            second: name(separation.second),
+            rms_deg_per_h: deg_per_h_from_rad_per_s(separation.rms_rad_per_s),
+            multiple_of_noise: separation.rms_rad_per_s / noise_rad_per_s.max(f64::MIN_POSITIVE),
+            expected_chi_square_alone: least(|o| o.refusal.chi_square_alone),
+            expected_chi_square_with_records: least(|o| o.refusal.chi_square_with_records),
+            told_apart: match separation.promise() {
+                Promise::ToldApart => "yes",
+                Promise::Perhaps => "perhaps",
+                Promise::NotToldApart => "no",
+            }
+            .to_owned(),
+            possible: separation.possible,
+            runs_needed: separation.outcomes.iter().map(|o| o.runs).try_fold(1, |most, runs| Some(most.max(runs?))),
+            directions: separation
+                .outcomes
+                .iter()
+                .map(|outcome| DirectionJson {
+                    truth: name(outcome.refusal.truth),
+                    refused: name(outcome.refusal.refused),
+                    expected_chi_square_alone: outcome.refusal.chi_square_alone,
+                    expected_chi_square_with_records: outcome.refusal.chi_square_with_records,
+                    chi_square_of_records: outcome.refusal.chi_square_of_records,
+                    needed_chi_square_alone: outcome.needed_alone,
+                    needed_chi_square_with_records: outcome.needed_with_records,
+                    chance: outcome.chance,
+                })
+                .collect(),
+        }
+    }
+}
+
+/// What is to be expected of a pair.
+fn expectation(experiment: &Experiment, pair: &Separation, shown: &SeparationJson) -> String {
+    let Some(least) = pair.least() else { return String::new() };
+    let (alone, together) = (number(least.refusal.chi_square_alone), number(least.refusal.chi_square_with_records));
+    let needed = number(least.needed_with_records);
+    let (first, second) = (&shown.first, &shown.second);
+    let size = format!("a χ² of {alone} alone and of {together} with the records, {needed} needed");
+    let runs = match shown.runs_needed {
+        Some(runs) if runs > 1 => format!("; {runs} runs of this profile should do"),
+        Some(_) => String::new(),
+        None => format!("; nor would {MOST_RUNS} runs of this profile"),
+    };
+    let otherwise = || {
+        let isolating = [pair.first, pair.second].map(|rival| &experiment.rivals[rival]);
+        let ways = isolating.iter().filter(|(_, ways)| !ways.is_empty());
+        ways.map(|(name, ways)| format!("for {name}: {}", ways.join("; "))).collect::<Vec<_>>().join("; ")
+    };
+    match pair.promise() {
+        Promise::ToldApart => format!("{first} and {second} would be told apart ({size})"),
+        Promise::Perhaps => {
+            let percent = percent_from_fraction(least.chance);
+            format!("{first} and {second} may be told apart, with a chance of {percent:.0} % ({size}){runs}")
+        }
+        Promise::NotToldApart if pair.possible || shown.runs_needed.is_some() => {
+            format!("{first} and {second} would not be told apart by one run ({size}){runs}")
+        }
+        Promise::NotToldApart => format!(
+            "no profile that this chamber can do tells {first} from {second} ({size}){runs}: use another experiment: {}",
+            otherwise()
+        ),
+    }
+}
+
+fn number(chi_square: f64) -> String {
+    // Rounding, and what a boundary made of readings leaves, may be below zero.
+    let chi_square = chi_square.max(0.0);
+    if chi_square < 10.0 { format!("{chi_square:.1}") } else { format!("{chi_square:.0}") }
+}
