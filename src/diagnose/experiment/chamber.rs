@@ -135,13 +135,16 @@ pub(super) fn profiles(chamber: &Chamber, choice: Choice, seed: u64) -> Vec<Prof
 /// A record that begins at rest says what rest is; then the legs as far as the duration goes; a last soak fills it.
 fn profile_of(name: &str, legs: &[Leg], chamber: &Chamber) -> Option<Profile> {
     let (mut at_k, mut left_s) = (REFERENCE_TEMPERATURE_K, chamber.duration_s);
-    let mut pieces = Vec::new();
+    let mut pieces: Vec<Piece> = Vec::new();
     let mut add = |rate_k_per_s: f64, wanted_s: f64| {
         // Whole seconds, which an operator can set.
         let duration_s = wanted_s.min(left_s).floor();
         if duration_s >= 1.0 {
             left_s -= duration_s;
-            pieces.push(Piece { rate_k_per_s, duration_s });
+            match pieces.last_mut().filter(|last| last.rate_k_per_s == rate_k_per_s) {
+                Some(last) => last.duration_s += duration_s,
+                None => pieces.push(Piece { rate_k_per_s, duration_s }),
+            }
         }
         duration_s.max(0.0)
     };
@@ -176,6 +179,7 @@ mod tests {
             assert!(course.values().iter().all(|t| (252.9..=333.1).contains(t)), "{}", profile.name());
             let (first, last) = (profile.pieces()[0], profile.pieces().len() - 1);
             assert!(first.rate_k_per_s == 0.0 && first.duration_s >= 600.0 && last <= 2 * MOST_LEGS);
+            assert!(profile.pieces().windows(2).all(|w| w[0].rate_k_per_s != w[1].rate_k_per_s));
             assert!(profile.max_rate_k_per_s() <= CHAMBER.rate_k_per_s * (1.0 + 1e-12));
             assert!((profile.duration_s() - CHAMBER.duration_s).abs() <= 1.0);
         }
