@@ -163,7 +163,8 @@ fn expectation(experiment: &Experiment, pair: &Separation, shown: &SeparationJso
             format!("{first} and {second} would not be told apart by one run ({size}){runs}")
         }
         Promise::NotToldApart => format!(
-            "no profile that this chamber can do tells {first} from {second} ({size}){runs}: use another experiment: {}",
+            "none of the {} profiles tried that this chamber can do tells {first} from {second} ({size}){runs}: use another experiment: {}",
+            experiment.tried,
             otherwise()
         ),
     }
@@ -173,4 +174,58 @@ fn number(chi_square: f64) -> String {
     // Rounding, and what a boundary made of readings leaves, may be below zero.
     let chi_square = chi_square.max(0.0);
     if chi_square < 10.0 { format!("{chi_square:.1}") } else { format!("{chi_square:.0}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::experiment::Refusal;
+    use crate::profile::{Piece, Profile};
+
+    /// Two rivals, each refused by as much if the other is true.
+    fn shown(chi_square: f64, chance: f64, runs: Option<usize>, possible: bool) -> ExperimentJson {
+        let outcome = |truth: usize, refused: usize| Outcome {
+            refusal: Refusal {
+                truth,
+                refused,
+                chi_square_alone: chi_square,
+                chi_square_with_records: chi_square + 2.0,
+                chi_square_of_records: 2.0,
+                explained_alone: 0.0,
+                explained_of_records: 0.0,
+            },
+            needed_alone: 12.0,
+            needed_with_records: 12.0,
+            chance,
+            runs,
+        };
+        let outcomes = vec![outcome(0, 1), outcome(1, 0)];
+        let profile = Profile::new("p", vec![Piece { rate_k_per_s: 0.01, duration_s: 3600.0 }]).unwrap();
+        let rivals = vec![("lead".to_owned(), vec!["heat it"]), ("bias".to_owned(), vec!["flip the coil"])];
+        let separations = vec![Separation { first: 0, second: 1, rms_rad_per_s: 1e-8, outcomes, possible }];
+        ExperimentJson::new(&Experiment { profile, rivals, separations, tried: 60 }, 2e-8)
+    }
+
+    #[test]
+    fn what_no_profile_can_do_is_said_and_the_experiments_that_can_are_named() {
+        let found = shown(0.4, 0.0, None, false);
+        assert_eq!(
+            found.expectations[0],
+            "none of the 60 profiles tried that this chamber can do tells lead from bias (a χ² of 0.4 alone and of 2.4 with the records, 12 needed); nor would 10 runs of this profile: use another experiment: for lead: heat it; for bias: flip the coil"
+        );
+        let pair = &found.separations[0];
+        assert_eq!((pair.told_apart.as_str(), pair.runs_needed, pair.directions.len()), ("no", None, 2));
+        assert_eq!((pair.expected_chi_square_alone, pair.expected_chi_square_with_records), (0.4, 2.4));
+    }
+
+    #[test]
+    fn what_several_runs_can_do_is_not_called_impossible() {
+        let found = shown(6.0, 0.04, Some(4), false);
+        assert!(found.expectations[0].ends_with("; 4 runs of this profile should do"), "{}", found.expectations[0]);
+        let found = shown(14.0, 0.6, Some(3), true);
+        assert!(found.expectations[0].starts_with("lead and bias may be told apart, with a chance of 60 %"));
+        assert_eq!(found.separations[0].told_apart, "perhaps");
+        let found = shown(90.0, 0.999, Some(1), true);
+        assert_eq!((found.separations[0].told_apart.as_str(), found.separations[0].runs_needed), ("yes", Some(1)));
+    }
 }

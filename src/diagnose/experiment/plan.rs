@@ -63,9 +63,9 @@ pub struct Refusal {
     pub chi_square_with_records: f64,
     /// The part that the records have said already.
     pub chi_square_of_records: f64,
-    /// What the candidates explain of the experiment, and of the records.
-    pub(super) explained_alone: f64,
-    pub(super) explained_of_records: f64,
+    /// χ² that the candidates explain of the experiment, and of the records.
+    pub explained_alone: f64,
+    pub explained_of_records: f64,
 }
 
 /// What is foreseen of one profile.
