@@ -2,6 +2,7 @@
 
 use std::sync::OnceLock;
 
+use super::tilt::Tilt;
 use crate::boundary::{Boundary, RateWhitener};
 use crate::effect::{Acts, DeclaredEffect};
 use crate::rate::CoilModel;
@@ -24,6 +25,18 @@ pub(super) struct Anchor {
     pub one: Vec<f64>,
     /// None without a flange.
     pub flange_response: OnceLock<Option<[ThermalHistory; 2]>>,
+    /// How it follows what moves heat, as far as that was asked.
+    pub tilts: Vec<Tilt>,
+}
+
+impl Anchor {
+    /// Whether it was estimated for the effects of a model at values, and for a lag, from which no kink is far.
+    pub fn is_nearly(&self, model: &CoilModel, lag_s: f64) -> bool {
+        let within = |a: f64, b: f64| (a - b).abs() <= NEARLY * a.abs().max(b.abs());
+        self.way == way_of(model)
+            && within(self.lag_s, lag_s)
+            && self.values.iter().zip(heat_values(model)).all(|(a, b)| within(*a, b))
+    }
 }
 
 impl Anchor {
@@ -41,7 +54,7 @@ pub(super) fn way_of(model: &CoilModel) -> Vec<String> {
     moving(model).map(name_of).collect()
 }
 
-fn name_of(effect: &DeclaredEffect) -> String {
+pub(super) fn name_of(effect: &DeclaredEffect) -> String {
     format!("{} {:?}", effect.kind(), effect.choices())
 }
 

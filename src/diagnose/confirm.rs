@@ -7,8 +7,6 @@ use super::hypothesis::{Hypothesis, Trial};
 
 /// Blocks in time, over all fitted rows, where no record was held out.
 const BLOCKS: usize = 6;
-/// Step of a derivative, as a share of the parameter's size.
-const STEP: f64 = 1e-4;
 
 /// By how much χ² of unseen data is smaller with a hypothesis than without one of its members.
 pub(super) fn confirmation(trial: &Trial, with: &Hypothesis, without: &Hypothesis) -> Option<f64> {
@@ -21,7 +19,7 @@ pub(super) fn confirmation(trial: &Trial, with: &Hypothesis, without: &Hypothesi
 
 /// Σ over blocks of the χ² of a block under the fit to all others, linear about the fit to all.
 fn left_out(trial: &Trial, hypothesis: &Hypothesis) -> Option<f64> {
-    let columns = derivatives(trial, hypothesis)?;
+    let columns = trial.derivatives(hypothesis)?;
     let rows = hypothesis.residuals.len();
     let mut total = 0.0;
     for block in 0..BLOCKS {
@@ -43,24 +41,4 @@ fn left_out(trial: &Trial, hypothesis: &Hypothesis) -> Option<f64> {
             .sum::<f64>();
     }
     Some(total)
-}
-
-/// ∂residuals/∂ of every free parameter, in units of the parameter's size.
-fn derivatives(trial: &Trial, hypothesis: &Hypothesis) -> Option<Vec<Vec<f64>>> {
-    let mut columns = Vec::new();
-    for (place, member) in hypothesis.members.iter().enumerate() {
-        let candidate = &trial.candidates[member.candidate];
-        let declared = candidate.effect.parameters();
-        for &i in &candidate.free {
-            let size = if member.values[i] != 0.0 { member.values[i].abs() } else { candidate.starts[0][i].abs() };
-            let step = if member.values[i] + STEP * size > declared[i].upper { -STEP * size } else { STEP * size };
-            let mut moved = hypothesis.members.clone();
-            moved[place].values[i] += step;
-            let model = trial.model_of(&moved)?;
-            let residuals = trial.evidence.residuals(&model, Role::Fit)?;
-            columns
-                .push(residuals.iter().zip(&hypothesis.residuals).map(|(a, b)| (a - b) / STEP).collect::<Vec<f64>>());
-        }
-    }
-    Some(columns)
 }

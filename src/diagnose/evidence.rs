@@ -10,7 +10,7 @@ use super::anchor::{
 };
 use super::conductivity::SlopeResponse;
 use super::field::{DrivenAnchor, Keep, Solved};
-use crate::boundary::Start;
+use crate::boundary::{Boundary, Start};
 use crate::pattern::Pattern;
 use crate::predict::{estimate_boundary, noise_floor_rad_per_s, rates_rad_per_s, refine_boundary};
 use crate::rate::CoilModel;
@@ -237,14 +237,14 @@ impl Case {
         self.estimate_at(model, pattern, begin, model.sensor_lag_s())
     }
 
-    /// As if the sensor lagged by `lag_s`.
-    fn estimate_at(
+    /// The boundary as if the sensor lagged by `lag_s`.
+    pub(super) fn boundary_at(
         &self,
         model: &CoilModel,
         pattern: &Pattern,
         begin: Begin,
         lag_s: f64,
-    ) -> Result<Anchor, DiagnoseError> {
+    ) -> Result<Boundary, DiagnoseError> {
         let way = way_of(model);
         let far = |a: &Anchor| (difference(&a.way, &way), (a.lag_s - lag_s).abs());
         let known = (begin != Begin::Anew).then(|| {
@@ -264,8 +264,18 @@ impl Case {
             }
             None => estimate_boundary(model, pattern, &self.record),
         };
-        let boundary =
-            boundary.map_err(|source| DiagnoseError::Record { record: self.record.name().to_owned(), source })?;
+        boundary.map_err(|source| DiagnoseError::Record { record: self.record.name().to_owned(), source })
+    }
+
+    /// As if the sensor lagged by `lag_s`.
+    fn estimate_at(
+        &self,
+        model: &CoilModel,
+        pattern: &Pattern,
+        begin: Begin,
+        lag_s: f64,
+    ) -> Result<Anchor, DiagnoseError> {
+        let boundary = self.boundary_at(model, pattern, begin, lag_s)?;
         if self.noise_rad_per_s <= 0.0 {
             return Err(DiagnoseError::NoNoise { record: self.record.name().to_owned() });
         }
@@ -281,7 +291,7 @@ impl Case {
         let values = heat_values(model);
         Ok(Anchor {
             location,
-            way,
+            way: way_of(model),
             values,
             lag_s,
             boundary,
@@ -290,6 +300,7 @@ impl Case {
             measured,
             one,
             flange_response: OnceLock::new(),
+            tilts: Vec::new(),
         })
     }
 

@@ -60,11 +60,18 @@ impl Case {
                 self.solved_at(path.clone(), nearest, self.anchors[nearest].lag_s, model.rate_mean_s, Keep::Recent)
             });
             let [Some(shorter), Some(middle), Some(longer)] = anchors else { return None };
-            let history = mixed([&shorter.history, &middle.history, &longer.history], bracket.weights(lag_s));
+            let mut history = mixed([&shorter.history, &middle.history, &longer.history], bracket.weights(lag_s));
+            self.follow(middle.anchor, model, &mut history);
             return Some(Arc::new(Solved { path, anchor: middle.anchor, lag_s, history }));
         }
         let anchor = self.anchor_for(path.location, &way, lag_s)?;
-        self.solved_at(path, anchor, lag_s, model.rate_mean_s, keep)
+        let solved = self.solved_at(path, anchor, lag_s, model.rate_mean_s, keep)?;
+        if self.anchors[anchor].tilts.is_empty() {
+            return Some(solved);
+        }
+        let mut history = solved.history.clone();
+        self.follow(anchor, model, &mut history);
+        Some(Arc::new(Solved { path: solved.path.clone(), anchor, lag_s, history }))
     }
 
     /// The pack under one anchor's boundary, remembered if it was asked for lately.
@@ -129,7 +136,7 @@ impl Case {
     }
 
     /// With the measured ambient, if there is one.
-    fn drive(&self, drive: Drive) -> Drive {
+    pub(super) fn drive(&self, drive: Drive) -> Drive {
         Drive { ambient_k: crate::predict::measured_ambient(&self.record).or(drive.ambient_k), ..drive }
     }
 
@@ -157,7 +164,7 @@ impl Case {
     }
 
     /// The pack under a drive; the effect of a conductivity's slope is taken from a series worked out before.
-    fn history(&self, path: &HeatPath, driven: &Driven) -> Option<ThermalHistory> {
+    pub(super) fn history(&self, path: &HeatPath, driven: &Driven) -> Option<ThermalHistory> {
         let slope_per_k = path.conductivity_slope_per_k;
         let linear = HeatPath { conductivity_slope_per_k: 0.0, ..path.clone() };
         let mut history = driven.means(&linear).ok()?;

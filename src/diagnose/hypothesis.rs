@@ -38,6 +38,13 @@ pub(super) struct Response {
     along: f64,
 }
 
+/// Responses beside a hypothesis.
+pub(super) struct Responses {
+    pub list: Vec<Response>,
+    /// χ² that the hypothesis's own parameters would leave.
+    pub chi_square: f64,
+}
+
 /// Everything that a fit needs.
 pub(super) struct Trial<'a> {
     pub evidence: &'a Evidence<'a>,
@@ -76,6 +83,13 @@ impl Trial<'_> {
     pub fn may_join(&self, candidate: usize, members: &[Member]) -> bool {
         let kind = self.candidates[candidate].kind();
         members.iter().all(|m| self.candidates[m.candidate].kind() != kind)
+    }
+
+    /// The fitted values of members that move heat: the effect's place in the model with them, and the parameter's in it.
+    pub fn heat_parameters(&self, members: &[Member]) -> Vec<(usize, usize)> {
+        let declared = self.model.effects.len();
+        let moving = members.iter().enumerate().filter(|(_, m)| self.candidates[m.candidate].moves_heat());
+        moving.flat_map(|(at, m)| self.candidates[m.candidate].free.iter().map(move |&i| (declared + at, i))).collect()
     }
 
     fn residuals(&self, members: &[Member]) -> Option<Vec<f64>> {
@@ -145,8 +159,30 @@ impl Trial<'_> {
         })
     }
 
-    /// The responses of all candidates that may join a hypothesis, at each of their starts.
-    pub fn responses(&self, hypothesis: &Hypothesis) -> Vec<Response> {
+    /// ∂residuals/∂ of every free parameter, in units of the parameter's size.
+    pub fn derivatives(&self, hypothesis: &Hypothesis) -> Option<Vec<Vec<f64>>> {
+        let mut columns = Vec::new();
+        for (place, member) in hypothesis.members.iter().enumerate() {
+            let candidate = &self.candidates[member.candidate];
+            let declared = candidate.effect.parameters();
+            for &i in &candidate.free {
+                let size = if member.values[i] != 0.0 { member.values[i].abs() } else { candidate.starts[0][i].abs() };
+                let step = if member.values[i] + STEP * size > declared[i].upper { -STEP * size } else { STEP * size };
+                let mut moved = hypothesis.members.clone();
+                moved[place].values[i] += step;
+                let residuals = self.residuals(&moved)?;
+                columns.push(residuals.iter().zip(&hypothesis.residuals).map(|(a, b)| (a - b) / STEP).collect());
+            }
+        }
+        Some(columns)
+    }
+
+    /// The responses of all candidates that may join a hypothesis, at each of their starts, and its residuals: of both only
+    /// what its own parameters cannot make up for. An effect that resembles one of its members changes the residuals by
+    /// little until both are fitted together.
+    pub fn responses(&self, hypothesis: &Hypothesis) -> Responses {
+        let own = Span::of(self.derivatives(hypothesis).unwrap_or_default());
+        let rest = own.complement(&hypothesis.residuals);
         let starts: Vec<Member> = (0..self.candidates.len())
             .filter(|&candidate| self.may_join(candidate, &hypothesis.members))
             .flat_map(|candidate| {
@@ -157,7 +193,7 @@ impl Trial<'_> {
         let moved =
             |m: &Member| self.candidates[m.candidate].moves_heat() || self.candidates[m.candidate].moves_sensor();
         let often = !hypothesis.members.iter().any(moved);
-        starts
+        let list = starts
             .into_par_iter()
             .filter_map(|member| {
                 let mut members = hypothesis.members.clone();
@@ -171,12 +207,15 @@ impl Trial<'_> {
                 if moved.len() != hypothesis.residuals.len() {
                     return None;
                 }
-                let column: Vec<f64> = hypothesis.residuals.iter().zip(&moved).map(|(a, b)| a - b).collect();
+                let whole: Vec<f64> = hypothesis.residuals.iter().zip(&moved).map(|(a, b)| a - b).collect();
+                let column = own.complement(&whole);
                 let square = sum_of_squares(&column);
-                let along = dot(&column, &hypothesis.residuals);
-                (square > LEAST_RESPONSE && square.is_finite()).then_some(Response { member, column, square, along })
+                let along = dot(&column, &rest);
+                let least = LEAST_RESPONSE.max(LEAST_OWN_SHARE * sum_of_squares(&whole));
+                (square > least && square.is_finite()).then_some(Response { member, column, square, along })
             })
-            .collect()
+            .collect();
+        Responses { list, chi_square: sum_of_squares(&rest) }
     }
 
     /// Whether a member's response is proportional to its first free parameter.
@@ -203,6 +242,43 @@ impl Trial<'_> {
 
 /// Responses below this sum of squares, at a start of visible size, are none.
 const LEAST_RESPONSE: f64 = 1e-9;
+/// Share of a response beyond which a hypothesis's own parameters cannot be told from it.
+const LEAST_OWN_SHARE: f64 = 1e-6;
+/// Step of a derivative, as a share of the parameter's size.
+const STEP: f64 = 1e-4;
+
+/// An orthonormal basis of a few columns.
+struct Span(Vec<Vec<f64>>);
+
+impl Span {
+    fn of(columns: Vec<Vec<f64>>) -> Self {
+        let mut span = Self(Vec::new());
+        for column in columns {
+            let length = sum_of_squares(&column).sqrt();
+            // Twice: once leaves what rounding takes from columns that are nearly parallel.
+            let mut rest = span.complement(&span.complement(&column));
+            let left = sum_of_squares(&rest).sqrt();
+            if left > DEPENDENT * length && left.is_finite() {
+                rest.iter_mut().for_each(|v| *v /= left);
+                span.0.push(rest);
+            }
+        }
+        span
+    }
+
+    /// What of a column no combination of the basis makes up for.
+    fn complement(&self, column: &[f64]) -> Vec<f64> {
+        let mut rest = column.to_vec();
+        for unit in &self.0 {
+            let along = dot(unit, &rest);
+            rest.iter_mut().zip(unit).for_each(|(r, u)| *r -= along * u);
+        }
+        rest
+    }
+}
+
+/// A column that others make up for but for this share of its length is theirs.
+const DEPENDENT: f64 = 1e-6;
 
 impl Response {
     /// By how much χ² falls with the best amplitude.

@@ -27,6 +27,7 @@ pub mod plain;
 mod prune;
 mod search;
 mod stranger;
+mod tilt;
 mod verdict;
 
 use thiserror::Error;

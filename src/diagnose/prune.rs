@@ -6,12 +6,15 @@ use super::evidence::{Evidence, Role};
 use super::hypothesis::{Hypothesis, Trial};
 use super::plain::compete;
 use super::search::{settled, without};
-use super::verdict::{EQUAL, LEAST_SHARE_OF_SIGNAL, MOST_ROUNDS};
+use super::verdict::{EQUAL, MOST_ROUNDS};
 use super::{Caution, DiagnoseError, Refusal};
 use crate::rate::CoilModel;
 
 /// An effect must lower χ² by this share of the rows: a root mean square of a tenth of the noise.
 const LEAST_SHARE_OF_ROWS: f64 = 0.01;
+/// … and by this share of the coil's own signal: no model is more accurate. (Complete models leave 0.05 % in records of an
+/// independent simulator; a real coil's numbers are not known as well.)
+const LEAST_SHARE_OF_SIGNAL: f64 = 0.003;
 /// A factor this close to one is the model's accuracy, not physics.
 const LEAST_FACTOR: f64 = 0.02;
 /// χ² of unseen data must fall by this.
@@ -24,8 +27,17 @@ pub(super) struct Bar<'a> {
     pub base: &'a Hypothesis,
     /// Of one whitened residual of a model that explains the records.
     pub variance: f64,
+    /// χ² of a constant in the place of what the declared model predicts, without noise.
+    pub signal: f64,
     /// Reduced χ² beyond 1 that is no excess.
     pub tolerated: f64,
+}
+
+impl Bar<'_> {
+    /// χ² that may be the model's own inaccuracy.
+    pub fn accuracy(&self) -> f64 {
+        LEAST_SHARE_OF_SIGNAL.powi(2) * self.signal
+    }
 }
 
 /// Boundaries for what is left, and what is left on them, until nothing goes any more.
@@ -51,12 +63,10 @@ pub(super) fn settled_and_pruned(
 /// What is not needed, not confirmed or not of a practical size goes, the least significant first; so does what explains
 /// less than what is left over, or than a plain function of time: it may be that thing's shadow.
 pub(super) fn prune(trial: &Trial, mut best: Hypothesis, bar: &Bar, cautions: &mut Vec<Caution>) -> Hypothesis {
-    let Bar { base, variance, tolerated } = *bar;
+    let Bar { base, tolerated, .. } = *bar;
     let rows = trial.evidence.rows(Role::Fit);
     let kind = |h: &Hypothesis, place: usize| trial.candidates[h.members[place].candidate].kind();
-    let signal =
-        trial.evidence.of(Role::Fit).map(|c| c.signal_square(trial.model, trial.evidence.pattern)).sum::<f64>();
-    while let Some((out, kind, reason)) = refusal(trial, &best, rows, variance, signal) {
+    while let Some((out, kind, reason)) = refusal(trial, &best, rows, bar) {
         cautions.push(Caution::Refused { kind, reason });
         match without(trial, &best, out) {
             Some(smaller) => best = smaller,
@@ -87,17 +97,12 @@ pub(super) fn prune(trial: &Trial, mut best: Hypothesis, bar: &Bar, cautions: &m
 }
 
 /// The first member that cannot stay, and why; the least significant first.
-fn refusal(
-    trial: &Trial,
-    best: &Hypothesis,
-    rows: usize,
-    variance: f64,
-    signal: f64,
-) -> Option<(usize, String, Refusal)> {
+fn refusal(trial: &Trial, best: &Hypothesis, rows: usize, bar: &Bar) -> Option<(usize, String, Refusal)> {
+    let Bar { variance, .. } = *bar;
     let mut order: Vec<(usize, Hypothesis)> =
         (0..best.members.len()).filter_map(|out| Some((out, without(trial, best, out)?))).collect();
     order.sort_by(|a, b| a.1.chi_square.total_cmp(&b.1.chi_square));
-    let least = (LEAST_SHARE_OF_ROWS * rows as f64).max(LEAST_SHARE_OF_SIGNAL.powi(2) * signal);
+    let least = (LEAST_SHARE_OF_ROWS * rows as f64).max(bar.accuracy());
     order.into_iter().find_map(|(out, rest)| {
         let member = &best.members[out];
         let candidate = &trial.candidates[member.candidate];

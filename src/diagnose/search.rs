@@ -26,7 +26,7 @@ const MARGIN: f64 = 10.0;
 const MAX_EFFECTS: usize = 3;
 /// Sets that are fitted in earnest after a linear look at all of them.
 const PAIRS_TRIED: usize = 6;
-const KINDS_TRIED: usize = 4;
+const KINDS_TRIED: usize = 8;
 /// A start whose response cannot lower χ² by this much, at any amplitude, is not worth a fit.
 const WORTH_A_FIT: f64 = 6.0;
 /// One effect more must promise this much: what it costs is more.
@@ -43,12 +43,19 @@ const WORTH_BESIDE_THE_BEST: f64 = 0.1;
 const STARTS_TRIED: usize = 2;
 /// A set contends with the best one of its size if it lowers χ² by this share of what that does …
 const CONTENDS: f64 = 0.8;
+/// … or this share, beside an effect that moves heat: on the boundary for its present value a further effect, which would
+/// change that value, shows only part of what it can do …
+const CONTENDS_BESIDE_HEAT: f64 = 0.2;
 /// … and so many sets are given boundaries of their own at once.
 const CONTENDERS: usize = 6;
 /// Times that a boundary is estimated for a heat path and the heat path fitted again …
-const HEAT_ROUNDS: usize = 3;
+const HEAT_ROUNDS: usize = 4;
 /// … unless χ² changed by less than this.
 const SETTLED: f64 = 1.0;
+/// A hypothesis is given up whose χ² would still be so much larger than another's …
+const HOPELESS: f64 = 50.0;
+/// … if it fell by the last round's step so many times more.
+const ROUNDS_HOPED_FOR: f64 = 4.0;
 /// Times that a bracket of lags is moved to where the fit wants it.
 const SENSOR_ROUNDS: usize = 3;
 
@@ -92,14 +99,13 @@ pub(super) fn search(
     }
     progress(0.8);
     while !best.members.is_empty() && best.members.len() < MAX_EFFECTS {
-        // What a wrong heat path leaves in the boundary would be taken for a further effect.
-        if best.chi_square > noise_only {
-            best = settled(evidence, model, candidates, best)?;
-        }
+        // What a wrong heat path, or that of a contender, leaves in the boundary would be taken for a further effect.
+        best = settled(evidence, model, candidates, best)?;
         let trial = Trial { evidence, model, candidates };
         let mut further = fit_forward(&trial, &best);
-        // What a single effect could be exchanged for was fitted alone already.
-        if best.members.len() > 1 {
+        // What a single effect could be exchanged for was fitted alone already; where nothing is left, exchanges are judged
+        // as equivalents.
+        if best.members.len() > 1 && best.chi_square > noise_only {
             further.extend(fit_swaps(&trial, &best));
         }
         settle_contenders(evidence, model, candidates, &best, &mut further)?;
@@ -156,7 +162,7 @@ fn noise_variance<'h>(base: &Hypothesis, others: impl IntoIterator<Item = &'h Hy
 
 /// Each candidate alone, from its most promising starts; one that promises nothing keeps its linear estimate.
 fn fit_singles(trial: &Trial, base: &Hypothesis) -> Vec<Hypothesis> {
-    let responses = trial.responses(base);
+    let responses = trial.responses(base).list;
     let foremost = responses.iter().map(Response::gain).fold(0.0, f64::max);
     (0..trial.candidates.len())
         .into_par_iter()
@@ -185,7 +191,7 @@ fn fit_singles(trial: &Trial, base: &Hypothesis) -> Vec<Hypothesis> {
 
 /// Pairs that promise more than the best of the singles does.
 fn fit_pairs(trial: &Trial, base: &Hypothesis, best_single: f64) -> Vec<Hypothesis> {
-    let responses = trial.responses(base);
+    let responses = trial.responses(base).list;
     let needed = base.chi_square - best_single + MARGIN;
     pairs(trial, &responses, PAIRS_TRIED)
         .into_par_iter()
@@ -220,7 +226,7 @@ fn foremost(trial: &Trial, mut responses: Vec<Response>, count: usize, least_gai
 
 /// One effect more.
 fn fit_forward(trial: &Trial, from: &Hypothesis) -> Vec<Hypothesis> {
-    foremost(trial, trial.responses(from), KINDS_TRIED, WORTH_A_STEP)
+    foremost(trial, trial.responses(from).list, KINDS_TRIED, WORTH_A_STEP)
         .into_par_iter()
         .filter_map(|response| {
             let mut members = from.members.clone();
@@ -243,8 +249,8 @@ pub(super) fn fit_swap(trial: &Trial, from: &Hypothesis, out: usize, kinds: usiz
     others.remove(out);
     let Some(rest) = trial.at(&others) else { return Vec::new() };
     let mut responses = trial.responses(&rest);
-    responses.retain(|r| trial.candidates[r.member.candidate].kind() != kind);
-    foremost(trial, responses, kinds, WORTH_BESIDE * (rest.chi_square - from.chi_square))
+    responses.list.retain(|r| trial.candidates[r.member.candidate].kind() != kind);
+    foremost(trial, responses.list, kinds, WORTH_BESIDE * (responses.chi_square - from.chi_square))
         .into_par_iter()
         .filter_map(|response| {
             let mut members = others.clone();
@@ -284,10 +290,13 @@ pub(super) fn settle_contenders(
     list: &mut [Hypothesis],
 ) -> Result<(), DiagnoseError> {
     let gain = |h: &Hypothesis| from.chi_square - h.chi_square;
-    let least = MARGIN.max(CONTENDS * list.iter().map(gain).fold(0.0, f64::max));
+    let beside_heat = from.members.iter().any(|m| candidates[m.candidate].moves_heat());
+    let share = if beside_heat { CONTENDS_BESIDE_HEAT } else { CONTENDS };
+    let least = MARGIN.max(share * list.iter().map(gain).fold(0.0, f64::max));
     let mut order: Vec<usize> = (0..list.len()).filter(|&i| gain(&list[i]) > least).collect();
     order.sort_by(|&a, &b| list[a].chi_square.total_cmp(&list[b].chi_square));
     let mut ways = Vec::new();
+    let mut to_beat = f64::INFINITY;
     for place in order {
         let trial = Trial { evidence, model, candidates };
         let Some(with) = trial.model_of(&list[place].members) else { continue };
@@ -297,9 +306,12 @@ pub(super) fn settle_contenders(
         if seen && (moves_sensor(&with) || evidence.is_anchored(&with)) {
             list[place] = trial.fit(&list[place].members, Effort::QUICK).unwrap_or_else(|| list[place].clone());
         } else if !evidence.is_anchored(&with) && ways.len() < CONTENDERS {
-            list[place] = settled(evidence, model, candidates, list[place].clone())?;
+            list[place] = settle(evidence, model, candidates, list[place].clone(), to_beat)?;
             ways.push(way);
+        } else {
+            continue;
         }
+        to_beat = to_beat.min(list[place].total());
     }
     Ok(())
 }
@@ -313,32 +325,40 @@ pub(super) fn settled(
 ) -> Result<Hypothesis, DiagnoseError> {
     let with = (Trial { evidence, model, candidates }).model_of(&hypothesis.members);
     let known = with.is_none_or(|with| evidence.is_anchored(&with));
-    if known { Ok(hypothesis) } else { settle(evidence, model, candidates, hypothesis) }
+    if known { Ok(hypothesis) } else { settle(evidence, model, candidates, hypothesis, f64::INFINITY) }
 }
 
 /// Estimates the boundary anew under what a hypothesis found, and fits again.
 ///
 /// A boundary that was estimated for one lag is only extrapolated to another: the minimum over estimates made for each lag
-/// is where the middle of a bracket and the fit agree.
+/// is where the middle of a bracket and the fit agree. A hypothesis that will not come near `to_beat`, the χ² of another, is
+/// given up.
 pub(super) fn settle(
     evidence: &mut Evidence,
     model: &CoilModel,
     candidates: &[Candidate],
     mut hypothesis: Hypothesis,
+    to_beat: f64,
 ) -> Result<Hypothesis, DiagnoseError> {
     let with = |evidence: &Evidence, h: &Hypothesis| (Trial { evidence, model, candidates }).model_of(&h.members);
     let fit = |evidence: &Evidence, h: &Hypothesis| {
         (Trial { evidence, model, candidates }).fit(&h.members, Effort::QUICK).unwrap_or_else(|| h.clone())
     };
+    let hopeless = |h: &Hypothesis, before: f64| {
+        h.total() - ROUNDS_HOPED_FOR * (before - h.total()).max(0.0) > to_beat + HOPELESS
+    };
     let Some(found) = with(evidence, &hypothesis) else { return Ok(hypothesis) };
+    let heat = (Trial { evidence, model, candidates }).heat_parameters(&hypothesis.members);
     let lags = hypothesis.members.iter().any(|m| candidates[m.candidate].moves_sensor());
     if !lags {
-        for _ in 0..HEAT_ROUNDS {
+        for round in 1..=HEAT_ROUNDS {
             let Some(found) = with(evidence, &hypothesis) else { break };
             evidence.anchor(&found, Begin::Nearby)?;
+            evidence.tilt(&found, &heat)?;
             let before = hypothesis.total();
             hypothesis = fit(evidence, &hypothesis);
-            if (hypothesis.total() - before).abs() < SETTLED {
+            let settled = (hypothesis.total() - before).abs() < SETTLED;
+            if settled || round == HEAT_ROUNDS || hopeless(&hypothesis, before) {
                 break;
             }
         }
@@ -346,11 +366,16 @@ pub(super) fn settle(
     }
     if !evidence.is_bracketed(&found) {
         evidence.anchor(&found, Begin::Nearby)?;
+        let before = hypothesis.total();
         hypothesis = fit(evidence, &hypothesis);
+        if hopeless(&hypothesis, before) {
+            return Ok(hypothesis);
+        }
     }
     for _ in 0..SENSOR_ROUNDS {
         let Some(found) = with(evidence, &hypothesis) else { break };
         evidence.bracket(&found, Begin::Nearby)?;
+        evidence.tilt(&found, &heat)?;
         hypothesis = fit(evidence, &hypothesis);
         if with(evidence, &hypothesis).is_some_and(|m| evidence.is_central(&m)) {
             break;

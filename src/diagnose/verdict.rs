@@ -6,7 +6,7 @@ use super::evidence::{Evidence, Role, dot, sum_of_squares};
 use super::hypothesis::{Hypothesis, Trial};
 use super::plain::{Plain, compete};
 use super::prune::{Bar, prune, settled_and_pruned};
-use super::search::{Found, all_singles, fit_swap, settle, settle_contenders, without};
+use super::search::{Found, all_singles, fit_swap, settle, settle_contenders, settled, without};
 use super::stranger::{other_winding, strangers};
 use super::{
     Caution, Contender, DiagnoseError, Diagnosis, Equivalent, Extension, Finding, FittedParameter, Rung, Unexplained,
@@ -15,8 +15,9 @@ use super::{
 use crate::fit::Effort;
 use crate::rate::CoilModel;
 
-/// An effect must have this share of the coil's own signal: no model is more accurate than that.
-pub(super) const LEAST_SHARE_OF_SIGNAL: f64 = 0.01;
+/// Sets that differ by less than this share of what they explain explain it equally well: no effect's equation is more
+/// accurate than that.
+const EQUAL_SHARE: f64 = 0.01;
 /// Sets whose χ² differ by less explain the records equally well (odds of 400 at best).
 pub(super) const EQUAL: f64 = 12.0;
 const MAX_EQUIVALENTS: usize = 2;
@@ -29,7 +30,7 @@ const TOLERATED_EXCESS: f64 = 0.12;
 /// A plain function of time is there if it lowers χ² by this much, and by this share of the rows.
 const PLAIN_GAIN: f64 = 40.0;
 const PLAIN_SHARE_OF_ROWS: f64 = 0.02;
-/// Share of the declared model's excess that accepted effects may leave.
+/// Share of the declared model's excess that accepted effects may leave, unless that is more than the model's inaccuracy.
 const TOLERATED_REST: f64 = 0.05;
 
 /// Judges what the search found.
@@ -45,7 +46,8 @@ pub(super) fn judge(
     let freedom = |h: &Hypothesis| (rows as f64 - h.parameters as f64 - 1.0).max(1.0);
     let excess = |h: &Hypothesis| h.chi_square - freedom(h);
     let tolerated = TOLERATED_EXCESS + 3.0 * (2.0 / rows as f64).sqrt();
-    let bar = Bar { base: &base, variance, tolerated };
+    let signal = evidence.of(Role::Fit).map(|c| c.signal_square(model, evidence.pattern)).sum();
+    let bar = Bar { base: &base, variance, signal, tolerated };
     best = settled_and_pruned(evidence, model, candidates, best, &bar, &mut cautions)?;
     let trial = Trial { evidence, model, candidates };
     let stranger = other_winding(&trial, &base, &best, 1.0 + tolerated);
@@ -61,6 +63,7 @@ pub(super) fn judge(
             best = main;
             reasons.push(equivalents);
         }
+        best = settled(evidence, model, candidates, best)?;
         // On the boundaries that the last comparison led to, something may have become needless.
         let trial = Trial { evidence, model, candidates };
         let members = best.members.len();
@@ -89,7 +92,8 @@ pub(super) fn judge(
         if quiet { Verdict::Adequate } else { Verdict::Unexplained }
     } else {
         let gained = base.chi_square - best.chi_square;
-        let rest = best.chi_square / freedom(&best) > 1.0 + tolerated && left > TOLERATED_REST;
+        let beyond = left > TOLERATED_REST || excess(&best) > bar.accuracy();
+        let rest = best.chi_square / freedom(&best) > 1.0 + tolerated && beyond;
         let plain_rest = plain.iter().any(|p| is_plain(p, TOLERATED_REST * gained));
         if rest || plain_rest {
             Verdict::Unexplained
@@ -148,7 +152,7 @@ pub(super) fn settle_one(
     let Some(mut best) = least else { return Ok(None) };
     let candidate = &candidates[best.members[0].candidate];
     if candidate.moves_heat() || candidate.moves_sensor() {
-        best = settle(evidence, model, candidates, best)?;
+        best = settle(evidence, model, candidates, best, f64::INFINITY)?;
     }
     let trial = Trial { evidence, model, candidates };
     let Some(best) = trial.fit(&best.members, Effort { standard_errors: true, ..Effort::QUICK }) else {
@@ -195,6 +199,8 @@ fn settle_equivalents(
     place: usize,
     variance: f64,
 ) -> Result<(Hypothesis, Vec<Equivalent>), DiagnoseError> {
+    // The boundaries may be those of the last one's equivalents.
+    let best = settled(evidence, model, candidates, best)?;
     let trial = Trial { evidence, model, candidates };
     let Some(rest) = without(&trial, &best, place) else { return Ok((best, Vec::new())) };
     let rows = evidence.rows(Role::Fit);
@@ -206,7 +212,7 @@ fn settle_equivalents(
         std::iter::once(best).chain(others).map(|rival| (total(&rival), rival)).collect();
     let least = rivals.iter().map(|r| r.0).fold(f64::INFINITY, f64::min);
     let explained = rest.total() - rivals.iter().map(|r| r.1.total()).fold(f64::INFINITY, f64::min);
-    let equal = (EQUAL * variance).max(LEAST_SHARE_OF_SIGNAL.powi(2) * explained);
+    let equal = (EQUAL * variance).max(EQUAL_SHARE.powi(2) * explained);
     rivals.retain(|(value, _)| *value < least + equal);
     // The closest make the set; within it a physical effect goes before an empirical one.
     rivals.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -1,0 +1,110 @@
+//! How a record's boundary, as it is estimated, follows the values of what moves heat.
+//!
+//! ```text
+//! H(p) = H[p; B(p₀)] + Σ_k (p_k − p₀_k) (H[p₀ + h e_k; B(p₀ + h e_k)] − H[p₀ + h e_k; B(p₀)]) / h
+//! ```
+//!
+//! H is the pack's history and B(p) the boundary that is estimated under the values p. With the second term a fit of p is
+//! joint with the boundary's estimate to first order: fitting on a boundary for p₀ and estimating it again in turn gets
+//! there too, but in small steps, and the standard errors would be those of a boundary that is known.
+
+use rayon::prelude::*;
+
+use super::DiagnoseError;
+use super::anchor::{name_of, way_of};
+use super::evidence::{Begin, Case, Evidence};
+use super::field::Keep;
+use crate::rate::CoilModel;
+use crate::thermal::{Driven, ThermalHistory};
+
+/// How a boundary follows one value of what moves heat.
+pub(super) struct Tilt {
+    effect: String,
+    parameter: usize,
+    /// Of the value, where the boundary was estimated.
+    from: f64,
+    /// The pack's change a unit of the value, in SI, that comes from the boundary alone.
+    per_unit: ThermalHistory,
+}
+
+/// Step of the difference, as a share of the value.
+const STEP: f64 = 0.05;
+/// Beyond this share of the value the boundary is not taken to go on in a straight line.
+const STRAIGHT: f64 = 0.5;
+
+impl Evidence<'_> {
+    /// Finds how the boundaries that were estimated for a model follow values of its effects: of the effect's place in
+    /// the model and the parameter's in the effect.
+    ///
+    /// # Errors
+    /// As [`Evidence::new`].
+    pub fn tilt(&mut self, model: &CoilModel, values: &[(usize, usize)]) -> Result<(), DiagnoseError> {
+        let pattern = self.pattern;
+        self.cases.par_iter_mut().try_for_each(|case| {
+            let Some(anchor) = case.anchor_of(model) else { return Ok(()) };
+            case.anchors[anchor].tilts.clear();
+            let tilts = values
+                .par_iter()
+                .filter_map(|&(effect, parameter)| {
+                    let moved = moved(model, effect, parameter)?;
+                    let boundary = case.boundary_at(&moved.1, pattern, Begin::Beside, moved.1.sensor_lag_s());
+                    Some(boundary.map(|boundary| {
+                        let path = moved.1.heat_path().ok()?;
+                        let at = case.solved(&moved.1, Keep::Recent)?;
+                        let (driven, drive) = boundary.driving(&path, 0.0);
+                        let drive = Driven::new(case.drive(drive), case.record.times_s(), model.rate_mean_s);
+                        let mut per_unit = case.history(&driven, &drive)?;
+                        scale_and_add(&mut per_unit, 1.0 / moved.0, &at.history, -1.0 / moved.0);
+                        let from = model.effects[effect].values()[parameter];
+                        Some(Tilt { effect: name_of(&model.effects[effect]), parameter, from, per_unit })
+                    }))
+                })
+                .collect::<Result<Vec<_>, DiagnoseError>>()?;
+            case.anchors[anchor].tilts = tilts.into_iter().flatten().collect();
+            Ok(())
+        })
+    }
+}
+
+/// By how much a value is moved, and the model with it moved; None where it is zero.
+fn moved(model: &CoilModel, effect: usize, parameter: usize) -> Option<(f64, CoilModel)> {
+    let declared = &model.effects[effect];
+    let value = declared.values()[parameter];
+    let room = declared.parameters()[parameter].upper - value;
+    let step = if value + STEP * value.abs() < value + room { STEP * value.abs() } else { -STEP * value.abs() };
+    if step == 0.0 {
+        return None;
+    }
+    let mut values = declared.values().to_vec();
+    values[parameter] += step;
+    let mut moved = model.clone();
+    moved.effects[effect] = declared.with_values(values).ok()?;
+    Some((step, moved))
+}
+
+impl Case {
+    fn anchor_of(&self, model: &CoilModel) -> Option<usize> {
+        self.anchor_for(model.heat_path().ok()?.location, &way_of(model), model.sensor_lag_s())
+    }
+
+    /// What the boundary would add to the pack under a model if it were estimated for the model's own values.
+    pub(super) fn follow(&self, anchor: usize, model: &CoilModel, history: &mut ThermalHistory) {
+        for tilt in &self.anchors[anchor].tilts {
+            let Some(effect) = model.effects.iter().find(|e| name_of(e) == tilt.effect) else { continue };
+            let furthest = STRAIGHT * tilt.from.abs();
+            let by = (effect.values()[tilt.parameter] - tilt.from).clamp(-furthest, furthest);
+            scale_and_add(history, 1.0, &tilt.per_unit, by);
+        }
+    }
+}
+
+/// H ← a H + b G.
+fn scale_and_add(history: &mut ThermalHistory, a: f64, other: &ThermalHistory, b: f64) {
+    let add = |to: &mut Vec<f64>, from: &[f64]| to.iter_mut().zip(from).for_each(|(t, f)| *t = a * *t + b * f);
+    add(&mut history.temperature_k, &other.temperature_k);
+    add(&mut history.rate_k_per_s, &other.rate_k_per_s);
+    add(&mut history.axial_moment_k, &other.axial_moment_k);
+    add(&mut history.axial_moment_k_per_s, &other.axial_moment_k_per_s);
+    add(&mut history.ambient_k, &other.ambient_k);
+    add(&mut history.ambient_rate_k_per_s, &other.ambient_rate_k_per_s);
+}
