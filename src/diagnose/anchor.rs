@@ -39,16 +39,6 @@ impl Anchor {
     }
 }
 
-impl Anchor {
-    /// Whether it was estimated for the effects of a model at values, and for a lag, from which no kink is far.
-    pub fn is_nearly(&self, model: &CoilModel, lag_s: f64) -> bool {
-        let within = |a: f64, b: f64| (a - b).abs() <= NEARLY * a.abs().max(b.abs());
-        self.way == way_of(model)
-            && within(self.lag_s, lag_s)
-            && self.values.iter().zip(heat_values(model)).all(|(a, b)| within(*a, b))
-    }
-}
-
 /// The effects that move heat or the sensor: what a boundary's estimate depends on. Sorted.
 pub(super) fn way_of(model: &CoilModel) -> Vec<String> {
     moving(model).map(name_of).collect()

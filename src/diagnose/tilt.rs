@@ -108,3 +108,52 @@ fn scale_and_add(history: &mut ThermalHistory, a: f64, other: &ThermalHistory, b
     add(&mut history.ambient_k, &other.ambient_k);
     add(&mut history.ambient_rate_k_per_s, &other.ambient_rate_k_per_s);
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use statrs::distribution::{ContinuousCDF, Normal};
+
+    use super::super::experiment::fixtures::{effect, model, pattern};
+    use super::*;
+    use crate::boundary::expose;
+    use crate::numeric::piecewise::PiecewiseLinear;
+    use crate::record::Record;
+    use crate::units::REFERENCE_TEMPERATURE_K;
+
+    /// A day in a chamber that ramps up and down at 1.5 K/min.
+    fn record(model: &CoilModel) -> Record {
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let normal = Normal::new(0.0, 1.0).unwrap();
+        let mut noise = |deviation: f64| deviation * normal.inverse_cdf(random.random::<f64>());
+        let times_s: Vec<f64> = (0..600).map(|i| 10.0 * f64::from(i)).collect();
+        let knots_s = vec![0.0, 905.0, 1703.0, 2412.0, 4011.0, 6000.0];
+        let air_k = [0.0, 0.0, 20.0, 20.0, -20.0, -20.0].map(|t| REFERENCE_TEMPERATURE_K + t).to_vec();
+        let air = PiecewiseLinear::new(knots_s, air_k).unwrap();
+        let shown = expose(&model.heat_path().unwrap(), Some(25.0), 0.0, &air, &times_s).unwrap().shown_k;
+        let temperature_k = shown.into_iter().map(|t| t + noise(0.0005)).collect();
+        let rates = times_s.iter().map(|_| noise(1e-7)).collect();
+        Record::new("day", times_s, temperature_k, rates).unwrap()
+    }
+
+    #[test]
+    fn a_boundary_follows_a_value_as_if_it_were_estimated_anew() {
+        let spool = |capacity: f64| model(vec![effect("spool_mass", &[capacity, 200.0, 0.0])]);
+        let (pattern, records) = (pattern(), [record(&spool(2000.0))]);
+        let mut evidence = Evidence::new(&spool(1600.0), &pattern, &records, &[]).unwrap();
+        evidence.anchor(&spool(1600.0), Begin::Nearby).unwrap();
+        let rates = |evidence: &Evidence, capacity: f64| -> Vec<f64> {
+            evidence.cases[0].solved(&spool(capacity), Keep::Recent).unwrap().history.rate_k_per_s.clone()
+        };
+        let fixed = rates(&evidence, 2000.0);
+        evidence.tilt(&spool(1600.0), &[(0, 0)]).unwrap();
+        let following = rates(&evidence, 2000.0);
+        evidence.anchor(&spool(2000.0), Begin::Nearby).unwrap();
+        let anew = rates(&evidence, 2000.0);
+        let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+        let (without, with) = (apart(&fixed, &anew), apart(&following, &anew));
+        println!("{without:.3e} K/s from a new estimate on a boundary that stays, {with:.3e} on one that follows");
+        assert!(with < 0.25 * without);
+    }
+}

@@ -17,7 +17,7 @@ use crate::rate::CoilModel;
 
 /// Sets that differ by less than this share of what they explain explain it equally well: no effect's equation is more
 /// accurate than that.
-const EQUAL_SHARE: f64 = 0.01;
+pub(super) const EQUAL_SHARE: f64 = 0.01;
 /// Sets whose χ² differ by less explain the records equally well (odds of 400 at best).
 pub(super) const EQUAL: f64 = 12.0;
 const MAX_EQUIVALENTS: usize = 2;

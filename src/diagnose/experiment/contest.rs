@@ -189,7 +189,7 @@ fn without_candidates(declared: &CoilModel, diagnosis: &Diagnosis) -> (String, C
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(in crate::diagnose) mod tests {
     use super::*;
     use crate::coil::{Coil, CoilSpec, Fibre, LayerLength};
     use crate::effect::{self, DeclaredEffect};

@@ -30,7 +30,7 @@ mod plan;
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use super::verdict::{EQUAL, LEAST_SHARE_OF_SIGNAL};
+use super::verdict::{EQUAL, EQUAL_SHARE};
 use crate::pattern::Pattern;
 use crate::profile::Profile;
 use crate::units::REFERENCE_TEMPERATURE_K;
@@ -40,6 +40,9 @@ use plan::{Difference, Plan, Refit};
 pub use chamber::Chamber;
 pub use contest::{Contest, Rival};
 pub use plan::Refusal;
+
+#[cfg(test)]
+pub(super) use contest::tests as fixtures;
 
 /// A profile, and how surely it tells the candidates apart.
 #[derive(Debug, Clone, PartialEq)]
@@ -111,7 +114,7 @@ impl Separation {
 
 impl Outcome {
     fn new(refusal: Refusal, variance: f64) -> Self {
-        let needed = |explained: f64| (EQUAL * variance).max(LEAST_SHARE_OF_SIGNAL.powi(2) * explained);
+        let needed = |explained: f64| (EQUAL * variance).max(EQUAL_SHARE.powi(2) * explained);
         let needed_with_records = needed(refusal.explained_alone + refusal.explained_of_records);
         let chance = |runs: usize| {
             let found = (runs as f64 * refusal.chi_square_alone)
