@@ -344,9 +344,8 @@ pub(super) fn settle(
     let fit = |evidence: &Evidence, h: &Hypothesis| {
         (Trial { evidence, model, candidates }).fit(&h.members, Effort::QUICK).unwrap_or_else(|| h.clone())
     };
-    let hopeless = |h: &Hypothesis, before: f64| {
-        h.total() - ROUNDS_HOPED_FOR * (before - h.total()).max(0.0) > to_beat + HOPELESS
-    };
+    let hopeless =
+        |h: &Hypothesis, before: f64| h.total() - ROUNDS_HOPED_FOR * (before - h.total()).max(0.0) > to_beat + HOPELESS;
     let Some(found) = with(evidence, &hypothesis) else { return Ok(hypothesis) };
     let heat = (Trial { evidence, model, candidates }).heat_parameters(&hypothesis.members);
     let lags = hypothesis.members.iter().any(|m| candidates[m.candidate].moves_sensor());
