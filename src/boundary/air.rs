@@ -28,7 +28,7 @@ const SHORTEST_LAG_PER_INTERVAL: f64 = 0.02;
 /// Where rates are instantaneous, they are taken over this share of the interval.
 const INSTANT_PER_INTERVAL: f64 = 0.1;
 /// Knots of the reconstructed boundary are no further apart than this share of the interval.
-const KNOT_PER_INTERVAL: f64 = 0.5;
+const KNOT_PER_INTERVAL: f64 = 0.2;
 /// Two times closer than this are one [s].
 pub(super) const SAME_TIME_S: f64 = 1e-6;
 

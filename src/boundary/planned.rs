@@ -16,7 +16,7 @@ pub struct Exposure {
 }
 
 /// Times at which the sensor's input is worked out between two readings.
-const STEPS_PER_READING: usize = 2;
+const STEPS_PER_READING: usize = 5;
 
 /// Puts a pack into air, the film being that of the chamber where the path does not state where the sensor's air is.
 ///
@@ -165,15 +165,23 @@ mod tests {
                 rate_mean_s: 10.0,
             };
             let found = Boundary::in_known_chamber(&observation, &air).unwrap();
+            if lag_s == 0.0 && path.location == Location::OuterLayer {
+                let error_k = times_s.iter().zip(&exposed.shown_k).map(|(&t, shown)| found.outer_k().value(t) - shown);
+                let error_k = error_k.fold(0.0, |most: f64, e| most.max(e.abs()));
+                println!("{name}: outermost layer off by {error_k:.1e} K at most");
+                assert!(error_k < 5e-5, "{name}");
+            }
+            if path.conductivity_slope_per_k != 0.0 {
+                continue;
+            }
             let (driven, drive) = found.driving(&path, 0.0);
-            let linear = |path: &HeatPath| HeatPath { conductivity_slope_per_k: 0.0, ..path.clone() };
             let rates = |path: &HeatPath, drive: &Drive| {
-                thermal::solve(&linear(path), drive).unwrap().means(&times_s, 10.0).rate_k_per_s
+                thermal::solve(path, drive).unwrap().means(&times_s, 10.0).rate_k_per_s
             };
             let (again, truth) = (rates(&driven, &drive), rates(&exposed.path, &exposed.drive));
             let error = again.iter().zip(&truth).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / RATE_K_PER_S;
             println!("{name}: rates off by {error:.1e} of the ramp's at most");
-            assert!(error < 0.005, "{name}");
+            assert!(error < 3e-4, "{name}");
         }
     }
 }
