@@ -26,7 +26,9 @@ const MARGIN: f64 = 10.0;
 const MAX_EFFECTS: usize = 3;
 /// Sets that are fitted in earnest after a linear look at all of them.
 const PAIRS_TRIED: usize = 6;
-const KINDS_TRIED: usize = 8;
+const KINDS_TRIED: usize = 4;
+/// … and at most, as far as they promise a good share of what the first does.
+const KINDS_TRIED_AT_MOST: usize = 8;
 /// A start whose response cannot lower χ² by this much, at any amplitude, is not worth a fit.
 const WORTH_A_FIT: f64 = 6.0;
 /// One effect more must promise this much: what it costs is more.
@@ -204,18 +206,21 @@ fn fit_pairs(trial: &Trial, base: &Hypothesis, best_single: f64) -> Vec<Hypothes
         .collect()
 }
 
-/// The most promising response of each candidate of the `count` most promising kinds.
+/// The most promising response of each candidate of the `count` most promising kinds, and of a few more that promise
+/// nearly as much.
 fn foremost(trial: &Trial, mut responses: Vec<Response>, count: usize, least_gain: f64) -> Vec<Response> {
     responses.retain(|r| r.gain() > least_gain);
     responses.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
+    let good = WORTH_BESIDE * responses.first().map_or(0.0, Response::gain);
     let (mut kinds, mut seen) = (Vec::new(), Vec::new());
     responses.retain(|r| {
         let kind = trial.candidates[r.member.candidate].kind();
         if !kinds.contains(&kind) {
             kinds.push(kind.clone());
         }
-        let new = kinds.iter().position(|k| *k == kind).is_some_and(|place| place < count)
-            && !seen.contains(&r.member.candidate);
+        let place = kinds.iter().position(|k| *k == kind).unwrap_or(kinds.len());
+        let among = place < count || (place < count.max(KINDS_TRIED_AT_MOST) && r.gain() > good);
+        let new = among && !seen.contains(&r.member.candidate);
         if new {
             seen.push(r.member.candidate);
         }

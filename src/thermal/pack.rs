@@ -146,8 +146,9 @@ impl Pack {
         let steady_of = |input: fn(&Mode) -> f64| {
             let mut steady = DVector::zeros(outputs);
             for mode in &modes {
-                for (s, seen) in steady.iter_mut().zip(&mode.seen) {
-                    *s += seen * input(mode) / mode.decay_per_s;
+                let share = input(mode) / mode.decay_per_s;
+                for (s, seen) in steady.as_mut_slice().iter_mut().zip(&mode.seen) {
+                    *s += seen * share;
                 }
             }
             steady
@@ -161,7 +162,12 @@ impl Pack {
         drop_negligible(&mut modes);
         let decay_per_s: Vec<f64> = modes.iter().map(|mode| mode.decay_per_s).collect();
         let amplitude = |input: fn(&Mode) -> f64| {
-            DMatrix::from_fn(outputs, modes.len(), |j, i| modes[i].seen[j] * input(&modes[i]) / modes[i].decay_per_s)
+            let mut columns = Vec::with_capacity(outputs * modes.len());
+            for mode in &modes {
+                let share = input(mode) / mode.decay_per_s;
+                columns.extend(mode.seen.iter().map(|seen| seen * share));
+            }
+            DMatrix::from_vec(outputs, modes.len(), columns)
         };
         let boundary = Response::new(boundary_steady, amplitude(|mode| mode.boundary), &decay_per_s);
         let ambient = has_ambient.then(|| Response::new(ambient_steady, amplitude(|mode| mode.ambient), &decay_per_s));
@@ -288,11 +294,14 @@ fn radial_modes(
 
 /// Keeps the modes that any output sees of any input; a flange makes many that none does.
 fn drop_negligible(modes: &mut Vec<Mode>) {
-    let inputs: [fn(&Mode) -> f64; 3] = [|m| m.boundary, |m| m.ambient, |m| m.heat];
-    let share = |mode: &Mode, input: fn(&Mode) -> f64| {
-        let seen = mode.seen.iter().map(|s| s.abs()).fold(0.0, f64::max);
-        (seen * input(mode) / mode.decay_per_s).abs()
+    let shares = |mode: &Mode| {
+        let seen = mode.seen.iter().fold(0.0, |most: f64, s| if s.abs() > most { s.abs() } else { most });
+        [mode.boundary, mode.ambient, mode.heat].map(|input| (seen * input / mode.decay_per_s).abs())
     };
-    let largest = inputs.map(|input| modes.iter().map(|mode| share(mode, input)).fold(0.0, f64::max));
-    modes.retain(|mode| inputs.iter().zip(largest).any(|(&input, largest)| share(mode, input) > NEGLIGIBLE * largest));
+    let of_each: Vec<[f64; 3]> = modes.iter().map(shares).collect();
+    let largest = [0, 1, 2].map(|input| of_each.iter().map(|shares| shares[input]).fold(0.0, f64::max));
+    let mut of_each = of_each.iter();
+    modes.retain(|_| {
+        of_each.next().is_some_and(|shares| shares.iter().zip(largest).any(|(s, most)| *s > NEGLIGIBLE * most))
+    });
 }
