@@ -15,7 +15,7 @@ use crate::thermal::{self, BoreHeat, Drive, Extent, HeatPath, Instant, Location,
 /// Where only K = k/ρc is known, the film is stated for this heat capacity [J/(m³ K)]; nothing else depends on it.
 const NOMINAL_HEAT_CAPACITY_J_PER_M3_K: f64 = 1.7e6;
 /// Prior variance of a kink [(K/s)²]: wider than any chamber's ramp.
-const KINK_VARIANCE_K2_PER_S2: f64 = 1e-3;
+pub(super) const KINK_VARIANCE_K2_PER_S2: f64 = 1e-3;
 /// How steady a record is taken to begin: variances of the slope [(K/s)²] and of the modes [K²].
 const START_SLOPE_VARIANCE_K2_PER_S2: f64 = 1e-10;
 const START_MODE_VARIANCE_K2: f64 = 1e-6;
@@ -27,8 +27,11 @@ const START_MEMORY_S: f64 = 1000.0;
 const SHORTEST_LAG_PER_INTERVAL: f64 = 0.02;
 /// Where rates are instantaneous, they are taken over this share of the interval.
 const INSTANT_PER_INTERVAL: f64 = 0.1;
-/// Knots of the reconstructed boundary are no further apart than this share of the interval.
-const KNOT_PER_INTERVAL: f64 = 0.2;
+/// Knots of the reconstructed boundary are no further apart than this share of the interval …
+const KNOT_PER_INTERVAL: f64 = 0.5;
+/// … and right after a kink, where the outermost layer sets out along t^(3/2), than this, and this share of the time since.
+const KNOT_AFTER_KINK_PER_INTERVAL: f64 = 0.1;
+const KNOT_PER_TIME_SINCE_KINK: f64 = 0.03;
 /// Two times closer than this are one [s].
 pub(super) const SAME_TIME_S: f64 = 1e-6;
 
@@ -394,7 +397,7 @@ impl Scene {
         let smoothed = built.space.smooth(&built.rate_row);
         let layout = built.layout;
         let n = layout.size();
-        let shortest_s = KNOT_PER_INTERVAL * self.interval_s;
+        let mut kink_s = f64::NEG_INFINITY;
         let (mut knots_s, mut outer_k, mut air_k) = (Vec::new(), Vec::new(), Vec::new());
         let mut push = |time_s: f64, state: &[f64]| {
             if knots_s.last().is_none_or(|&last: &f64| time_s > last + 1e3 * SAME_TIME_S) {
@@ -409,7 +412,13 @@ impl Scene {
             let state = &smoothed.states[stage * n..stage * n + layout.moving()];
             push(time_s, state);
             let Some(&next_s) = built.stage_times_s.get(stage + 1) else { break };
-            let pieces = ((next_s - time_s) / shortest_s - 1e-9).ceil().clamp(1.0, 64.0) as usize;
+            if built.kink_stages.contains(&stage) {
+                kink_s = time_s;
+            }
+            let since_kink_s = time_s - kink_s;
+            let near_s = KNOT_AFTER_KINK_PER_INTERVAL * self.interval_s + KNOT_PER_TIME_SINCE_KINK * since_kink_s;
+            let longest_s = near_s.min(KNOT_PER_INTERVAL * self.interval_s);
+            let pieces = ((next_s - time_s) / longest_s - 1e-9).ceil().clamp(1.0, 64.0) as usize;
             if pieces < 2 {
                 continue;
             }
@@ -455,46 +464,5 @@ impl AirSpace {
             }
         }
         shock
-    }
-
-    /// Expected size of each kink, and how many of its own standard deviations that is.
-    pub fn kink_sizes(&self, smoothed: &Smoothed) -> Vec<(f64, f64)> {
-        self.kink_stages
-            .iter()
-            .map(|&stage| {
-                let place = Shock::Slope.place(stage);
-                let size = KINK_VARIANCE_K2_PER_S2 * smoothed.score[place];
-                let variance = KINK_VARIANCE_K2_PER_S2 * (1.0 - KINK_VARIANCE_K2_PER_S2 * smoothed.information[place]);
-                (size, size.abs() / variance.max(f64::MIN_POSITIVE).sqrt())
-            })
-            .collect()
-    }
-
-    /// By how much each kink comes earlier than assumed, all at once [s].
-    pub fn kink_leads_s(&self, smoothed: &Smoothed, air: &Air) -> Vec<f64> {
-        let lead_s = |(&stage, kink): (&usize, &Kink), size_k_per_s: f64| {
-            let place = Shock::Earlier.place(stage);
-            let prior = self.space.stages[stage].disturbances.iter().find(|d| d.0 == Shock::Earlier as usize);
-            let shift_k = match prior {
-                Some(&(_, variance)) if kink.slope_change_k_per_s != 0.0 => variance * smoothed.score[place],
-                // A new kink has no size yet and so no prior: as if it moved alone.
-                _ => smoothed.score[place] / smoothed.information[place].max(f64::MIN_POSITIVE),
-            };
-            shift_k / size_k_per_s
-        };
-        let sizes = self.kink_sizes(smoothed);
-        self.kink_stages.iter().zip(&air.kinks).zip(sizes).map(|(at, (size, _))| lead_s(at, size)).collect()
-    }
-
-    /// By how much the log-likelihood rises when all kinks move to where they should be, as far as it is a parabola.
-    pub fn gain_of_moving(&self, smoothed: &Smoothed) -> f64 {
-        self.kink_stages
-            .iter()
-            .map(|&stage| {
-                let score = smoothed.score[Shock::Earlier.place(stage)];
-                let prior = self.space.stages[stage].disturbances.iter().find(|d| d.0 == Shock::Earlier as usize);
-                0.5 * score * score * prior.map_or(0.0, |d| d.1)
-            })
-            .sum()
     }
 }

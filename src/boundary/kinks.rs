@@ -1,6 +1,6 @@
 //! Maximum likelihood of the air's kinks, the film and the jerk's noise.
 
-use super::air::{AirSpace, Scene};
+use super::air::{AirSpace, KINK_VARIANCE_K2_PER_S2, Scene};
 use super::layout::Shock;
 use super::{Air, BoundaryError, Kink, Start};
 use crate::numeric::state_space::Smoothed;
@@ -348,4 +348,47 @@ fn ascend(
             if towards.abs() >= 2.0 * step { 1.5 * step } else { step * (3.0 / (-curvature).sqrt()).clamp(0.02, 1.0) };
     }
     Ok(air)
+}
+
+impl AirSpace {
+    /// Expected size of each kink, and how many of its own standard deviations that is.
+    fn kink_sizes(&self, smoothed: &Smoothed) -> Vec<(f64, f64)> {
+        self.kink_stages
+            .iter()
+            .map(|&stage| {
+                let place = Shock::Slope.place(stage);
+                let size = KINK_VARIANCE_K2_PER_S2 * smoothed.score[place];
+                let variance = KINK_VARIANCE_K2_PER_S2 * (1.0 - KINK_VARIANCE_K2_PER_S2 * smoothed.information[place]);
+                (size, size.abs() / variance.max(f64::MIN_POSITIVE).sqrt())
+            })
+            .collect()
+    }
+
+    /// By how much each kink comes earlier than assumed, all at once [s].
+    fn kink_leads_s(&self, smoothed: &Smoothed, air: &Air) -> Vec<f64> {
+        let lead_s = |(&stage, kink): (&usize, &Kink), size_k_per_s: f64| {
+            let place = Shock::Earlier.place(stage);
+            let prior = self.space.stages[stage].disturbances.iter().find(|d| d.0 == Shock::Earlier as usize);
+            let shift_k = match prior {
+                Some(&(_, variance)) if kink.slope_change_k_per_s != 0.0 => variance * smoothed.score[place],
+                // A new kink has no size yet and so no prior: as if it moved alone.
+                _ => smoothed.score[place] / smoothed.information[place].max(f64::MIN_POSITIVE),
+            };
+            shift_k / size_k_per_s
+        };
+        let sizes = self.kink_sizes(smoothed);
+        self.kink_stages.iter().zip(&air.kinks).zip(sizes).map(|(at, (size, _))| lead_s(at, size)).collect()
+    }
+
+    /// By how much the log-likelihood rises when all kinks move to where they should be, as far as it is a parabola.
+    fn gain_of_moving(&self, smoothed: &Smoothed) -> f64 {
+        self.kink_stages
+            .iter()
+            .map(|&stage| {
+                let score = smoothed.score[Shock::Earlier.place(stage)];
+                let prior = self.space.stages[stage].disturbances.iter().find(|d| d.0 == Shock::Earlier as usize);
+                0.5 * score * score * prior.map_or(0.0, |d| d.1)
+            })
+            .sum()
+    }
 }

@@ -188,16 +188,14 @@ impl Boundary {
             let film_w_per_m2_k = found.air.film_w_per_m2_k;
             let in_air = HeatPath { location: Location::Ambient, film_w_per_m2_k, flange: None, ..path.clone() };
             let drive = Drive::boundary(found.air_k.clone());
-            let terms = thermal::slope_series(&in_air, &drive, observation.times_s, 0.0)?;
-            let layers = path.shape.layers;
+            let times_s = found.air_k.knots();
+            let terms = thermal::slope_series(&in_air, &drive, times_s, 0.0)?;
+            let (layers, powers) = (path.shape.layers, thermal::slope_powers(slope_per_k));
             let outermost = |row: usize| row * layers + layers - 1;
-            let bent = (0..observation.times_s.len())
-                .map(|row| {
-                    let [first, second] = [0, 1].map(|term: usize| terms[term].temperature_k[outermost(row)]);
-                    slope_per_k * (first + slope_per_k * second)
-                })
+            let bent = (0..times_s.len())
+                .map(|row| terms.iter().zip(powers).map(|(t, p)| p * t.temperature_k[outermost(row)]).sum())
                 .collect();
-            let bent_k = PiecewiseLinear::new(observation.times_s.to_vec(), bent).expect("readings are in order");
+            let bent_k = PiecewiseLinear::new(times_s.to_vec(), bent).expect("knots are in order");
             let mut scene = found.scene.bent(bent_k);
             let air = follow(&mut scene, found.air)?;
             found = Self::new(scene, air)?;

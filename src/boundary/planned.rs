@@ -52,8 +52,8 @@ pub fn expose(
     if slope_per_k != 0.0 && path.extent == Extent::Pack {
         let terms = thermal::slope_series(&HeatPath { flange: None, ..linear }, &by_air, &fine_s, 0.0)?;
         for (row, value) in outer.iter_mut().enumerate() {
-            let [first, second] = [0, 1].map(|term: usize| terms[term].temperature_k[(row + 1) * layers - 1]);
-            *value += slope_per_k * (first + slope_per_k * second);
+            let powers = thermal::slope_powers(slope_per_k);
+            *value += terms.iter().zip(powers).map(|(t, p)| p * t.temperature_k[(row + 1) * layers - 1]).sum::<f64>();
         }
     }
     let outer_k = PiecewiseLinear::new(fine_s, outer).expect("the times are in order");

@@ -1,20 +1,20 @@
 //! What a conductivity that depends on temperature does to the pack, cheaply enough to be tried many times.
 //!
 //! ```text
-//! H(a) = H(0) + a H_1 + a² H_2
+//! H(a) = H(0) + a H_1 + a² H_2 + a³ H_3
 //! ```
 //!
-//! H(0) is the linear field with whatever else a hypothesis changes; H_1 and H_2 belong to the path under which the
+//! H(0) is the linear field with whatever else a hypothesis changes; the others belong to the path under which the
 //! boundary was estimated.
 //!
-//! Holds for slopes that change the conductivity by some ten per cent over the record (the next term is of third order).
+//! Holds for slopes that change the conductivity by some ten or twenty per cent over the record (the next term is of fourth order).
 //! Leaves out how the other changes of a hypothesis change the effect of the slope.
 
 use crate::thermal::{self, Drive, HeatPath, SlopeTerm, ThermalHistory};
 
-/// First and second derivative of a pack's history with respect to the slope, the latter halved.
+/// What a slope adds to a pack's history, by powers of the slope.
 pub(super) struct SlopeResponse {
-    terms: [SlopeTerm; 2],
+    terms: [SlopeTerm; thermal::SLOPE_ORDERS],
 }
 
 impl SlopeResponse {
@@ -26,7 +26,7 @@ impl SlopeResponse {
 
     /// Adds the effect of a slope to a history without one.
     pub fn add_to(&self, history: &mut ThermalHistory, slope_per_k: f64) {
-        for (term, factor) in self.terms.iter().zip([slope_per_k, slope_per_k * slope_per_k]) {
+        for (term, factor) in self.terms.iter().zip(thermal::slope_powers(slope_per_k)) {
             let add = |to: &mut [f64], from: &[f64]| to.iter_mut().zip(from).for_each(|(t, f)| *t += factor * f);
             add(&mut history.temperature_k, &term.temperature_k);
             add(&mut history.rate_k_per_s, &term.rate_k_per_s);
@@ -68,9 +68,11 @@ mod tests {
                 let effect = distance(&exact.rate_k_per_s, &without.rate_k_per_s);
                 let error = distance(&exact.rate_k_per_s, &quick.rate_k_per_s);
                 println!("slope {slope_per_k}: effect {effect:.3e} K/s, error {error:.1e}");
-                assert!(error < 0.01 * effect);
+                // Where the outermost layer itself turns sharply, the two differ by how its shock is sampled.
+                let share = if path.film_w_per_m2_k.is_some() { 0.002 } else { 0.01 };
+                assert!(error < share * effect);
                 let effect = distance(&exact.temperature_k, &without.temperature_k);
-                assert!(distance(&exact.temperature_k, &quick.temperature_k) < 0.01 * effect);
+                assert!(distance(&exact.temperature_k, &quick.temperature_k) < share * effect);
             }
         }
     }

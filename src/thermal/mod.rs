@@ -23,7 +23,7 @@ use half_space::HalfSpaceField;
 pub use history::{Instant, Side, ThermalHistory};
 use modal::PackField;
 use pack::Pack;
-pub use slope::{SlopeTerm, slope_series};
+pub use slope::{SLOPE_ORDERS, SlopeTerm, slope_powers, slope_series};
 use stepped::SteppedField;
 
 /// What the pack is made of, thermally.

@@ -38,11 +38,12 @@ impl Link {
         1.0 / (1.0 / (self.shape * conductivity_w_per_m_k) + self.rest)
     }
 
-    /// First and second derivative of the conductance with respect to the material's conductivity.
-    pub fn derivatives(&self, conductivity_w_per_m_k: f64) -> (f64, f64) {
+    /// First, second and third derivative of the conductance with respect to the material's conductivity.
+    pub fn derivatives(&self, conductivity_w_per_m_k: f64) -> [f64; 3] {
         let held = 1.0 + self.shape * conductivity_w_per_m_k * self.rest;
         let first = self.shape / (held * held);
-        (first, -2.0 * first * self.shape * self.rest / held)
+        let second = -2.0 * first * self.shape * self.rest / held;
+        [first, second, -3.0 * second * self.shape * self.rest / held]
     }
 }
 

@@ -1,15 +1,16 @@
 //! A conductivity that depends weakly on temperature, as a series in its slope: no time steps.
 //!
 //! ```text
-//! T = T0 + a T1 + a² T2,   k = k0 (1 + a θ),   θ = T − 20 °C
+//! T = T0 + a T1 + a² T2 + a³ T3,   k = k0 (1 + a θ),   θ = T − 20 °C
 //! C dT_m/dt = −G T_m − div f_m
 //! f_1 = g' k0 θ0 ΔT0,   f_2 = g' k0 (θ0 ΔT1 + θ1 ΔT0) + ½ g'' k0² θ0² ΔT0      heat through one link, ΔT across it
+//! f_3 = g' k0 (θ0 ΔT2 + θ1 ΔT1 + θ2 ΔT0) + ½ g'' k0² (θ0² ΔT1 + 2 θ0 θ1 ΔT0) + ⅙ g''' k0³ θ0³ ΔT0
 //! ```
 //!
 //! Every order is the linear network driven by what the orders before leave; each is solved by the modes of that network,
 //! exactly for heat flows that are linear between the drive's knots and the rows' instants.
 //!
-//! Holds for slopes that change the conductivity by some ten per cent (the next term is of third order). Leaves out
+//! Holds for slopes that change the conductivity by some ten or twenty per cent (the next term is of fourth order). Leaves out
 //! flanges.
 //!
 //! # Source
@@ -23,7 +24,7 @@ use crate::numeric::piecewise::PiecewiseLinear;
 use crate::numeric::tridiagonal::diagonalise;
 use crate::units::REFERENCE_TEMPERATURE_K;
 
-/// The layers' temperatures and rates over each row's window, per unit (or squared unit) of the slope.
+/// The layers' temperatures and rates over each row's window, per unit (squared, cubed) of the slope.
 ///
 /// # Shapes
 /// Row-major, one row a window, one column a layer.
@@ -31,6 +32,14 @@ use crate::units::REFERENCE_TEMPERATURE_K;
 pub struct SlopeTerm {
     pub temperature_k: Vec<f64>,
     pub rate_k_per_s: Vec<f64>,
+}
+
+/// Terms of the series.
+pub const SLOPE_ORDERS: usize = 3;
+
+/// What the terms of the series are to be multiplied with.
+pub fn slope_powers(slope_per_k: f64) -> [f64; SLOPE_ORDERS] {
+    [slope_per_k, slope_per_k.powi(2), slope_per_k.powi(3)]
 }
 
 /// The network's modes, and the times at which everything is sampled.
@@ -42,7 +51,7 @@ struct Modes {
     times_s: Vec<f64>,
 }
 
-/// T1 and T2 of a path, whatever slope it states itself.
+/// T1, T2 and T3 of a path, whatever slope it states itself.
 ///
 /// # Errors
 /// A half space or a flange; values so extreme that the eigenvalues do not converge.
@@ -51,7 +60,7 @@ pub fn slope_series(
     drive: &Drive,
     ends_s: &[f64],
     window_s: f64,
-) -> Result<[SlopeTerm; 2], ThermalError> {
+) -> Result<[SlopeTerm; SLOPE_ORDERS], ThermalError> {
     check(&HeatPath { conductivity_slope_per_k: 1.0, ..path.clone() })?;
     if path.extent == Extent::HalfSpace || path.flange.is_some() {
         return Err(ThermalError::Nonlinear { what: "conductivity_temperature beside axial_gradient" });
@@ -85,15 +94,24 @@ pub fn slope_series(
     let links = modes.derivatives();
     let first_flows = modes.flows(|t, i| {
         let (across, above) = modes.across(&zeroth, i, t, boundary_k[t], REFERENCE_TEMPERATURE_K);
-        links[i].0 * above * across
+        links[i][0] * above * across
     });
     let (first, first_rate) = modes.solve(&first_flows);
     let second_flows = modes.flows(|t, i| {
         let (across, above) = modes.across(&zeroth, i, t, boundary_k[t], REFERENCE_TEMPERATURE_K);
         let (across_1, above_1) = modes.across(&first, i, t, 0.0, 0.0);
-        links[i].0 * (above * across_1 + above_1 * across) + 0.5 * links[i].1 * above * above * across
+        links[i][0] * (above * across_1 + above_1 * across) + 0.5 * links[i][1] * above * above * across
     });
     let (second, second_rate) = modes.solve(&second_flows);
+    let third_flows = modes.flows(|t, i| {
+        let (across, above) = modes.across(&zeroth, i, t, boundary_k[t], REFERENCE_TEMPERATURE_K);
+        let (across_1, above_1) = modes.across(&first, i, t, 0.0, 0.0);
+        let (across_2, above_2) = modes.across(&second, i, t, 0.0, 0.0);
+        links[i][0] * (above * across_2 + above_1 * across_1 + above_2 * across)
+            + 0.5 * links[i][1] * above * (above * across_1 + 2.0 * above_1 * across)
+            + links[i][2] * above.powi(3) * across / 6.0
+    });
+    let (third, third_rate) = modes.solve(&third_flows);
 
     let place_of = |time_s: f64| {
         let after = modes.times_s.partition_point(|t| *t < time_s - SAME_TIME_S);
@@ -115,7 +133,7 @@ pub fn slope_series(
         }
         SlopeTerm { temperature_k, rate_k_per_s }
     };
-    Ok([of(&first, &first_rate), of(&second, &second_rate)])
+    Ok([of(&first, &first_rate), of(&second, &second_rate), of(&third, &third_rate)])
 }
 
 /// Two times closer than this are one [s].
@@ -191,11 +209,11 @@ impl Modes {
         (&self.shape * content, &self.shape * warming)
     }
 
-    /// k0 g' and k0² g'' of the link from each node outwards; the last leads to the drive.
-    fn derivatives(&self) -> Vec<(f64, f64)> {
+    /// k0 g', k0² g'' and k0³ g''' of the link from each node outwards; the last leads to the drive.
+    fn derivatives(&self) -> Vec<[f64; 3]> {
         let k = self.network.conductivity_w_per_m_k;
         let links = self.network.links.iter().chain([&self.network.to_boundary]);
-        links.map(|link| link.derivatives(k)).map(|(first, second)| (k * first, k * k * second)).collect()
+        links.map(|link| link.derivatives(k)).map(|[a, b, c]| [k * a, k * k * b, k.powi(3) * c]).collect()
     }
 
     /// The difference of temperature across a link, and by how much its own is above `reference_k`; as the stepped
