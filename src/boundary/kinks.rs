@@ -120,6 +120,15 @@ fn refine(scene: &mut Scene, mut air: Air) -> Result<Air, BoundaryError> {
 
 /// Kinks and film in turn until neither moves, then the sensor's noise.
 fn settle(scene: &Scene, air: &mut Air) -> Result<(), BoundaryError> {
+    place(scene, air)?;
+    let smoothed = smooth(scene, air)?.1;
+    let ratio = smoothed.squared_innovations / smoothed.measurements as f64;
+    air.noise_k = (air.noise_k * ratio.sqrt().clamp(0.5, 2.0)).max(LEAST_NOISE_K);
+    Ok(())
+}
+
+/// Kinks and film in turn until neither moves.
+pub(super) fn place(scene: &Scene, air: &mut Air) -> Result<(), BoundaryError> {
     for _ in 0..SETTLING_ROUNDS {
         place_kinks(scene, air, NEWTON_STEPS)?;
         let before = air.film_w_per_m2_k;
@@ -128,9 +137,6 @@ fn settle(scene: &Scene, air: &mut Air) -> Result<(), BoundaryError> {
             break;
         }
     }
-    let smoothed = smooth(scene, air)?.1;
-    let ratio = smoothed.squared_innovations / smoothed.measurements as f64;
-    air.noise_k = (air.noise_k * ratio.sqrt().clamp(0.5, 2.0)).max(LEAST_NOISE_K);
     Ok(())
 }
 

@@ -44,7 +44,7 @@ use crate::numeric::piecewise::PiecewiseLinear;
 use crate::thermal::{self, Drive, Extent, HeatPath, Location, ThermalError};
 use air::Scene;
 
-pub use planned::{Exposure, expose, planned_whitener};
+pub use planned::{Exposure, expose, planned_whitener, seen_by_another};
 pub use whitener::RateWhitener;
 
 /// Everything about a record and a model that the boundary depends on.

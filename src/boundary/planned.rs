@@ -1,7 +1,7 @@
 //! A chamber whose air is known beforehand: what it does to a pack, what the sensor will show, and what will be made of it.
 
 use super::air::{Scene, behind_film};
-use super::{Air, Boundary, BoundaryError, Observation, RateWhitener, check};
+use super::{Air, Boundary, BoundaryError, Observation, RateWhitener, check, kinks};
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::thermal::{self, Drive, Extent, HeatPath, Instant, Location, ThermalError};
 
@@ -106,6 +106,21 @@ impl Boundary {
         check(observation)?;
         Self::new(Scene::new(observation)?, air.clone())?.unbent(observation, |_, air| Ok(air))
     }
+}
+
+/// What a heat path makes of such a chamber that is not the true one: the film and the kinks' times that suit it best.
+///
+/// # Errors
+/// As [`super::estimate`].
+pub fn seen_by_another(observation: &Observation, air: &Air) -> Result<Air, BoundaryError> {
+    check(observation)?;
+    let follow = |scene: &mut Scene, mut air: Air| {
+        kinks::place(scene, &mut air)?;
+        Ok(air)
+    };
+    let mut scene = Scene::new(observation)?;
+    let air = follow(&mut scene, air.clone())?;
+    Ok(Boundary::new(scene, air)?.unbent(observation, follow)?.air)
 }
 
 /// As [`Boundary::rate_whitener`] of readings in such a chamber; it does not depend on what they say.

@@ -16,8 +16,9 @@
 //! and the duration that the records show the chamber to be capable of. They are courses of the chamber's air; the pack
 //! follows through the film that the records showed.
 //!
-//! Leaves out: further columns, which count as zero; that film and kinks have to be found again (their times are taken to
-//! be known to one reading); what is wrong with all candidates.
+//! Leaves out: further columns, which count as zero; how well the fitted sizes are known; what is wrong with all candidates.
+//! Film and kinks are found again by those who see heat or sensor otherwise than what is true; what is true knows them, the
+//! kinks to one reading.
 //!
 //! # Source
 //! Hunter and Reiner, Technometrics 7 (1965) 307, and Box and Hill, ibid. 9 (1967) 57: the experiment at which rival models
