@@ -8,6 +8,7 @@ use nalgebra::DMatrix;
 use super::filmed::{Filmed, transition};
 use super::layout::{Layout, Shock};
 use super::{Air, BoundaryError, Kink, Observation};
+use crate::numeric::exponential::exponential;
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::numeric::state_space::{Measurement, Smoothed, Stage, StateSpace};
 use crate::thermal::{self, BoreHeat, Drive, Extent, HeatPath, Instant, Location, Material};
@@ -431,7 +432,7 @@ impl Scene {
             let step_s = (next_s - time_s) / pieces as f64;
             let key = (step_s / SAME_TIME_S).round() as u64;
             let step = between.entry(key).or_insert_with(|| {
-                transition(&(&built.dynamics * step_s).exp(), Layout { with_rate: false, ..layout }, None)
+                transition(&exponential(&(&built.dynamics * step_s)), Layout { with_rate: false, ..layout }, None)
             });
             for piece in 1..pieces {
                 from =

@@ -7,6 +7,7 @@ use nalgebra::DMatrix;
 
 use super::air::SAME_TIME_S;
 use super::layout::Layout;
+use crate::numeric::exponential::exponential;
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::thermal::pack::Pack;
 use crate::thermal::{HeatPath, ThermalError};
@@ -65,7 +66,7 @@ impl Filmed {
         {
             return exponential.clone();
         }
-        let exponential = Arc::new((dynamics * step_s).exp());
+        let exponential = Arc::new(exponential(&(dynamics * step_s)));
         if let Ok(mut known) = self.exponentials.lock()
             && known.len() < MOST_EXPONENTIALS
         {

@@ -121,7 +121,8 @@ impl<'a> Evidence<'a> {
             .par_iter()
             .map(|case| {
                 let beside = |lag_s: f64| case.estimate_at(model, pattern, Begin::Beside, lag_s);
-                Ok([beside(lag_s - half_width_s)?, beside(lag_s + half_width_s)?])
+                let sides = rayon::join(|| beside(lag_s - half_width_s), || beside(lag_s + half_width_s));
+                Ok([sides.0?, sides.1?])
             })
             .collect::<Result<Vec<_>, DiagnoseError>>()?;
         for (case, sides) in self.cases.iter_mut().zip(sides) {

@@ -1,6 +1,7 @@
 //! Mathematics without domain words; what a well-kept library has is called, not written again.
 
 pub mod allan;
+pub mod exponential;
 pub mod expression;
 mod kalman;
 pub mod maximise;
