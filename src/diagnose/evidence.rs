@@ -28,6 +28,8 @@ pub(super) enum Role {
 pub(super) struct Evidence<'a> {
     pub pattern: &'a Pattern,
     pub cases: Vec<Case>,
+    /// Whether what was to be held out is fitted, and the other way round.
+    pub exchanged: bool,
 }
 
 /// One record.
@@ -74,7 +76,7 @@ impl<'a> Evidence<'a> {
         let with_role = |records: &[Record], role| records.iter().map(|r| Case::new(r, role)).collect::<Vec<_>>();
         let mut cases = with_role(records, Role::Fit);
         cases.extend(with_role(holdout, Role::Holdout));
-        let mut evidence = Self { pattern, cases };
+        let mut evidence = Self { pattern, cases, exchanged: false };
         evidence.anchor(model, Begin::Anew)?;
         for case in &evidence.cases {
             case.check()?;
@@ -158,6 +160,22 @@ impl<'a> Evidence<'a> {
         let Ok(path) = model.heat_path() else { return false };
         let (way, lag_s) = (way_of(model), model.sensor_lag_s());
         self.cases.iter().all(|case| case.brackets.iter().any(|b| b.holds(path.location, &way, lag_s, share)))
+    }
+
+    /// From here on what was held out is fitted, and what was fitted held out.
+    pub fn exchange(&mut self) {
+        self.exchanged = !self.exchanged;
+        for case in &mut self.cases {
+            case.role = match case.role {
+                Role::Fit => Role::Holdout,
+                Role::Holdout => Role::Fit,
+            };
+        }
+    }
+
+    /// The roles that the records have now which were given to be fitted, and to be held out.
+    pub fn roles(&self) -> [Role; 2] {
+        if self.exchanged { [Role::Holdout, Role::Fit] } else { [Role::Fit, Role::Holdout] }
     }
 
     /// Number of rows in the records of a role.

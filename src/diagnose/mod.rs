@@ -176,6 +176,10 @@ pub enum Caution {
     OtherWinding { winding: &'static str },
     #[error("no hold-out record: effects were confirmed on blocks in time that they were not fitted to")]
     NoHoldout,
+    #[error(
+        "the records to fit show nothing that the model lacks, the hold-out does: what is said was fitted to the hold-out and confirmed on the records to fit"
+    )]
+    FittedToHoldout,
     #[error("{kind} was not accepted: {reason}")]
     Refused { kind: String, reason: Refusal },
 }
@@ -305,10 +309,81 @@ fn diagnose_and<T>(
     progress(0.15);
     let records: Vec<&Record> = request.records.iter().chain(request.holdout).collect();
     let candidates = candidate::candidates(request.model, &records);
-    let found = search::search(&mut evidence, request.model, &candidates, progress)?;
-    progress(0.9);
-    let diagnosis = verdict::judge(&mut evidence, request.model, &candidates, found)?;
+    let answer = |evidence: &mut evidence::Evidence, progress: &(dyn Fn(f64) + Sync)| {
+        let found = search::search(evidence, request.model, &candidates, progress)?;
+        progress(0.9);
+        verdict::judge(evidence, request.model, &candidates, found)
+    };
+    let mut diagnosis = answer(&mut evidence, progress)?;
+    // Where what is to be fitted shows nothing, the other records may; the former then confirm it.
+    if diagnosis.verdict == Verdict::Adequate && !request.holdout.is_empty() {
+        evidence.exchange();
+        let other = answer(&mut evidence, &|share| progress(0.9 + 0.1 * share))?;
+        if other.verdict == Verdict::Adequate {
+            evidence.exchange();
+        } else {
+            diagnosis = other;
+            diagnosis.cautions.insert(0, Caution::FittedToHoldout);
+        }
+    }
     let further = further(&evidence, &diagnosis);
     progress(1.0);
     Ok((diagnosis, further))
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use statrs::distribution::{ContinuousCDF, Normal};
+
+    use super::experiment::fixtures::{effect, model, pattern};
+    use super::*;
+    use crate::boundary::expose;
+    use crate::numeric::piecewise::PiecewiseLinear;
+    use crate::rate::RateModel;
+    use crate::thermal::solve;
+    use crate::units::REFERENCE_TEMPERATURE_K;
+
+    /// A day in a chamber that goes up and down by `swing_k`.
+    fn day(model: &CoilModel, swing_k: f64, seed: u64) -> Record {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let normal = Normal::new(0.0, 1.0).unwrap();
+        let mut noise = |deviation: f64| deviation * normal.inverse_cdf(random.random::<f64>());
+        let times_s: Vec<f64> = (1..=600).map(|i| 10.0 * f64::from(i)).collect();
+        let knots_s = vec![0.0, 905.0, 1703.0, 2412.0, 4011.0, 6000.0];
+        let air_k = [0.0, 0.0, 1.0, 1.0, -1.0, -1.0].map(|t| REFERENCE_TEMPERATURE_K + swing_k * t).to_vec();
+        let air = PiecewiseLinear::new(knots_s, air_k).unwrap();
+        let exposed = expose(&model.heat_path().unwrap(), Some(25.0), 0.0, &air, &times_s).unwrap();
+        let history = solve(&exposed.path, &exposed.drive).unwrap().means(&times_s, model.rate_mean_s);
+        let rates = RateModel::new(model, &pattern(), &[]).unwrap().series_rad_per_s(&history);
+        let rates = rates.into_iter().map(|r| r + noise(1e-7)).collect();
+        let temperature_k = exposed.shown_k.into_iter().map(|t| t + noise(0.002)).collect();
+        Record::new("day", times_s, temperature_k, rates).unwrap()
+    }
+
+    #[test]
+    fn what_only_the_hold_out_shows_is_found_there_and_confirmed_by_the_rest() {
+        let complete = model(vec![effect("strain_mismatch", &[0.004])]);
+        let (gentle, wild) = ([day(&complete, 0.6, 1)], [day(&complete, 20.0, 2)]);
+        let (declared, pattern) = (model(Vec::new()), pattern());
+        let asked = |records, holdout| {
+            let request = Request { model: &declared, pattern: &pattern, records, holdout };
+            diagnose(&request, &|_| ()).unwrap()
+        };
+        let says = |d: &Diagnosis| d.cautions.contains(&Caution::FittedToHoldout);
+        let found = asked(&gentle, &wild);
+        println!("{:?}: {:?}", found.verdict, found.ladder);
+        assert!(says(&found) && found.verdict != Verdict::Adequate);
+        let kinds = found
+            .effects
+            .iter()
+            .flat_map(|f| std::iter::once(f.effect.kind()).chain(f.equivalents.iter().map(|e| e.effect.kind())));
+        assert!(kinds.collect::<Vec<_>>().contains(&"strain_mismatch".to_owned()));
+        // The ladder's columns stay those of the records as they were given.
+        let (first, last) = (&found.ladder[0], &found.ladder[1]);
+        assert!(first.holdout_rmse_rad_per_s.unwrap() > 1.2 * last.holdout_rmse_rad_per_s.unwrap());
+        assert!(first.rmse_rad_per_s < 1.1 * last.rmse_rad_per_s);
+        assert!(!says(&asked(&wild, &gentle)));
+    }
 }

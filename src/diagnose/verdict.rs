@@ -109,7 +109,7 @@ pub(super) fn judge(
         cautions.extend(strangers(trial.evidence, model));
     }
     let unexplained = (verdict == Verdict::Unexplained).then(|| describe(&trial, &extended, plain, left));
-    let ladder = ladder(&trial, &base, &best, rows);
+    let ladder = ladder(&trial, &base, &best);
     let suggested_experiment = experiment(verdict, &effects);
     let mut contenders: Vec<Contender> = Vec::new();
     for single in &singles {
@@ -125,13 +125,14 @@ pub(super) fn judge(
             chi_square_less: base.chi_square - single.chi_square,
         });
     }
-    let squares: f64 = trial.evidence.of(Role::Fit).map(|c| c.noise_rad_per_s.powi(2) * c.record.rows() as f64).sum();
+    let [given, _] = trial.evidence.roles();
+    let squares: f64 = trial.evidence.of(given).map(|c| c.noise_rad_per_s.powi(2) * c.record.rows() as f64).sum();
     Ok(Diagnosis {
         verdict,
         effects,
         ladder,
         candidates: contenders,
-        noise_floor_rad_per_s: (squares / rows as f64).sqrt(),
+        noise_floor_rad_per_s: (squares / trial.evidence.rows(given) as f64).sqrt(),
         unexplained,
         suggested_experiment,
         cautions,
@@ -318,27 +319,36 @@ fn finding(trial: &Trial, best: &Hypothesis, place: usize, equivalents: Vec<Equi
 }
 
 /// The errors after each accepted effect, the most effective first.
-fn ladder(trial: &Trial, base: &Hypothesis, best: &Hypothesis, rows: usize) -> Vec<Rung> {
-    let held_out = trial.evidence.rows(Role::Holdout);
-    let freedom = (held_out as f64 - trial.evidence.of(Role::Holdout).count() as f64).max(1.0);
+fn ladder(trial: &Trial, base: &Hypothesis, best: &Hypothesis) -> Vec<Rung> {
+    let rows = |role: Role| trial.evidence.rows(role);
+    let [given, held_out] = trial.evidence.roles();
+    let chi_square = |h: &Hypothesis, role: Role| match role {
+        Role::Fit => h.chi_square,
+        Role::Holdout => h.unseen,
+    };
+    let reduced = |h: &Hypothesis, role: Role| {
+        let fitted = match role {
+            Role::Fit => h.parameters + 1,
+            Role::Holdout => trial.evidence.of(role).count(),
+        };
+        chi_square(h, role) / (rows(role) as f64 - fitted as f64).max(1.0)
+    };
     let rung = |h: &Hypothesis| -> Option<Rung> {
         let model = trial.model_of(&h.members)?;
         let rmse = |role: Role| -> Option<f64> {
-            let (mut squares, mut count) = (0.0, 0);
+            let mut squares = 0.0;
             for case in trial.evidence.of(role) {
-                let (residuals, _) = case.plain_residuals(&model, trial.evidence.pattern)?;
-                squares += sum_of_squares(&residuals);
-                count += residuals.len();
+                squares += sum_of_squares(&case.plain_residuals(&model, trial.evidence.pattern)?.0);
             }
-            (count > 0).then(|| (squares / count as f64).sqrt())
+            (rows(role) > 0).then(|| (squares / rows(role) as f64).sqrt())
         };
         Some(Rung {
             effects: h.members.iter().map(|m| trial.candidates[m.candidate].kind()).collect(),
-            rmse_rad_per_s: rmse(Role::Fit)?,
-            holdout_rmse_rad_per_s: rmse(Role::Holdout),
-            reduced_chi_square: h.chi_square / (rows as f64 - h.parameters as f64 - 1.0).max(1.0),
-            holdout_reduced_chi_square: (held_out > 0).then_some(h.unseen / freedom),
-            bic: bic(h, rows),
+            rmse_rad_per_s: rmse(given)?,
+            holdout_rmse_rad_per_s: rmse(held_out),
+            reduced_chi_square: reduced(h, given),
+            holdout_reduced_chi_square: (rows(held_out) > 0).then(|| reduced(h, held_out)),
+            bic: chi_square(h, given) + h.parameters as f64 * (rows(given) as f64).ln(),
         })
     };
     let mut rungs: Vec<Rung> = rung(base).into_iter().collect();
