@@ -134,6 +134,9 @@ const RANK: f64 = 1e-12;
 /// The first step's length, in units of the scaled start. MINPACK's 100 leaps over the minimum of a curve that is flat
 /// far away (NIST's BoxBOD from its first start); 1 finds all of NIST's 27 from both starts.
 const FIRST_STEP: f64 = 1.0;
+/// … and a variable counts as this share of its start at least when a derivative's step is chosen: a first step of just the
+/// start's length may end at zero but for rounding, where a step of a share of the variable would change nothing.
+const LEAST_SIZE: f64 = 1e-4;
 /// A residual that is worse than any; its square is finite.
 const HUGE: f64 = 1e140;
 
@@ -214,6 +217,7 @@ fn search(
     }
     let problem = Inner {
         count: first.len(),
+        start: DVector::from_column_slice(&start),
         at: DVector::from_vec(start),
         residuals: |u: &[f64]| residuals(&outer(u)),
         differences: effort.differences,
@@ -308,6 +312,7 @@ fn covariance(
 
 /// The problem as the optimiser sees it.
 struct Inner<R> {
+    start: DVector<f64>,
     at: DVector<f64>,
     residuals: R,
     differences: Differences,
@@ -352,7 +357,7 @@ impl<R: Fn(&[f64]) -> Option<Vec<f64>>> LeastSquaresProblem<f64, Dyn, Dyn> for I
         let here = self.here()?;
         let mut jacobian = DMatrix::zeros(here.len(), self.at.len());
         for index in 0..self.at.len() {
-            let size = self.at[index].abs();
+            let size = self.at[index].abs().max(LEAST_SIZE * self.start[index].abs());
             let scale = if size > 0.0 { size } else { 1.0 };
             let moved = |step: f64| {
                 let mut u = self.at.clone();
@@ -441,6 +446,19 @@ mod tests {
                 let achieved = (fit.parameters[i] / value - 1.0, fit.standard_errors[i].unwrap() / error - 1.0);
                 println!("b{}: relative {:.1e}, of its error {:.1e}", i + 1, achieved.0, achieved.1);
                 assert!(achieved.0.abs() < 1e-8 && achieved.1.abs() < 1e-7);
+            }
+        }
+    }
+
+    #[test]
+    fn a_factor_is_found_on_the_other_side_of_one_from_wherever_the_fit_starts() {
+        let signal: Vec<f64> = (0..200).map(|i| (0.1 * f64::from(i)).sin()).collect();
+        for start in [0.22, 0.9, 1.05, 1.1, 5.5] {
+            for factor in [0.3, 0.75, 1.3, 4.0] {
+                let parameters = [Parameter::bounded(start, 0.1, 10.0)];
+                let residuals = |p: &[f64]| Some(signal.iter().map(|s| (factor - p[0]) * s).collect());
+                let fit = least_squares(&parameters, residuals, Effort::QUICK).unwrap();
+                assert!((fit.parameters[0] / factor - 1.0).abs() < 1e-3, "{start}: {} of {factor}", fit.parameters[0]);
             }
         }
     }
