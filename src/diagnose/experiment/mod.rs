@@ -5,7 +5,7 @@
 //! ```
 //!
 //! χ²_ij is by how much j is expected to be refused if i is true, after everything that is free in j is fitted again to the
-//! experiment and the records at hand together ([`plan`]). What is needed is what the diagnosis itself asks for before it
+//! experiment and the records at hand together (`plan`). What is needed is what the diagnosis itself asks for before it
 //! calls two candidates different. What is found differs from what is expected by chance:
 //!
 //! ```text
