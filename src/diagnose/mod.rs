@@ -106,7 +106,18 @@ pub struct Finding {
     pub confirmed_by: f64,
 }
 
+/// A value counts as determined that is so many standard errors from where it would do nothing.
+const DETERMINED: f64 = 3.0;
+
 impl Finding {
+    /// Whether the records hold any of what was fitted away from where the effect would do nothing.
+    fn is_determined(&self) -> bool {
+        let idle = if is_declared_number(&self.effect) { 1.0 } else { 0.0 };
+        let far = |p: &FittedParameter| p.standard_error.is_some_and(|e| (p.value - idle).abs() > DETERMINED * e);
+        let mut fitted = self.parameters.iter().filter(|p| p.fitted).peekable();
+        fitted.peek().is_none() || fitted.any(far)
+    }
+
     /// An effect at values that no record was asked about.
     pub fn unfitted(effect: DeclaredEffect) -> Self {
         let parameters = effect
@@ -315,11 +326,12 @@ fn diagnose_and<T>(
         verdict::judge(evidence, request.model, &candidates, found)
     };
     let mut diagnosis = answer(&mut evidence, progress)?;
-    // Where what is to be fitted shows nothing, the other records may; the former then confirm it.
+    // Where what is to be fitted shows nothing, the other records may; the former then confirm it. Two effects that undo each
+    // other nearly everywhere are no such finding.
     if diagnosis.verdict == Verdict::Adequate && !request.holdout.is_empty() {
         evidence.exchange();
         let other = answer(&mut evidence, &|share| progress(0.9 + 0.1 * share))?;
-        if other.verdict == Verdict::Adequate {
+        if other.verdict == Verdict::Adequate || !other.effects.iter().all(Finding::is_determined) {
             evidence.exchange();
         } else {
             diagnosis = other;
