@@ -320,17 +320,17 @@ fn diagnose_and<T>(
     progress(0.15);
     let records: Vec<&Record> = request.records.iter().chain(request.holdout).collect();
     let candidates = candidate::candidates(request.model, &records);
-    let answer = |evidence: &mut evidence::Evidence, progress: &(dyn Fn(f64) + Sync)| {
-        let found = search::search(evidence, request.model, &candidates, progress)?;
+    let answer = |evidence: &mut evidence::Evidence, most_effects: usize, progress: &(dyn Fn(f64) + Sync)| {
+        let found = search::search(evidence, request.model, &candidates, most_effects, progress)?;
         progress(0.9);
         verdict::judge(evidence, request.model, &candidates, found)
     };
-    let mut diagnosis = answer(&mut evidence, progress)?;
-    // Where what is to be fitted shows nothing, the other records may; the former then confirm it. Two effects that undo each
-    // other nearly everywhere are no such finding.
+    let mut diagnosis = answer(&mut evidence, search::MAX_EFFECTS, progress)?;
+    // Where what is to be fitted shows nothing, the other records may; the former then confirm it. Of several effects they
+    // could confirm none.
     if diagnosis.verdict == Verdict::Adequate && !request.holdout.is_empty() {
         evidence.exchange();
-        let other = answer(&mut evidence, &|share| progress(0.9 + 0.1 * share))?;
+        let other = answer(&mut evidence, 1, &|share| progress(0.9 + 0.1 * share))?;
         if other.verdict == Verdict::Adequate || !other.effects.iter().all(Finding::is_determined) {
             evidence.exchange();
         } else {

@@ -23,7 +23,8 @@ pub(super) struct Found {
 
 /// A set must be this much better than a smaller one.
 const MARGIN: f64 = 10.0;
-const MAX_EFFECTS: usize = 3;
+/// Effects that a model may lack at once.
+pub(super) const MAX_EFFECTS: usize = 3;
 /// Sets that are fitted in earnest after a linear look at all of them.
 const PAIRS_TRIED: usize = 6;
 const KINDS_TRIED: usize = 4;
@@ -61,11 +62,12 @@ const ROUNDS_HOPED_FOR: f64 = 4.0;
 /// Times that a bracket of lags is moved to where the fit wants it.
 const SENSOR_ROUNDS: usize = 3;
 
-/// Searches; boundaries for other sensors are added to the evidence on the way.
+/// Searches sets of at most `most_effects`; boundaries for other sensors are added to the evidence on the way.
 pub(super) fn search(
     evidence: &mut Evidence,
     model: &CoilModel,
     candidates: &[Candidate],
+    most_effects: usize,
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<Found, DiagnoseError> {
     let rows = evidence.rows(Role::Fit);
@@ -86,7 +88,7 @@ pub(super) fn search(
     let noise_only = rows as f64 + NOTHING_LEFT * (2.0 * rows as f64).sqrt();
     let best_single = singles.iter().map(|h| h.chi_square).fold(base.chi_square, f64::min);
     let mut twos = Vec::new();
-    if best_single > noise_only {
+    if best_single > noise_only && most_effects > 1 {
         twos = fit_pairs(&trial, &base, best_single);
         settle_contenders(evidence, model, candidates, &base, &mut twos)?;
     }
@@ -100,7 +102,7 @@ pub(super) fn search(
         }
     }
     progress(0.8);
-    while !best.members.is_empty() && best.members.len() < MAX_EFFECTS {
+    while !best.members.is_empty() && best.members.len() < most_effects {
         // What a wrong heat path, or that of a contender, leaves in the boundary would be taken for a further effect.
         best = settled(evidence, model, candidates, best)?;
         let trial = Trial { evidence, model, candidates };
