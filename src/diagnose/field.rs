@@ -182,19 +182,9 @@ impl Case {
 }
 
 /// Σ_i w_i H_i.
-fn mixed(histories: [&ThermalHistory; 3], weights: [f64; 3]) -> ThermalHistory {
-    let mix = |part: fn(&ThermalHistory) -> &Vec<f64>| -> Vec<f64> {
-        let [a, b, c] = histories.map(part);
-        a.iter().zip(b).zip(c).map(|((a, b), c)| weights[0] * a + weights[1] * b + weights[2] * c).collect()
-    };
-    ThermalHistory {
-        layers: histories[1].layers,
-        times_s: histories[1].times_s.clone(),
-        temperature_k: mix(|h| &h.temperature_k),
-        rate_k_per_s: mix(|h| &h.rate_k_per_s),
-        axial_moment_k: mix(|h| &h.axial_moment_k),
-        axial_moment_k_per_s: mix(|h| &h.axial_moment_k_per_s),
-        ambient_k: mix(|h| &h.ambient_k),
-        ambient_rate_k_per_s: mix(|h| &h.ambient_rate_k_per_s),
-    }
+fn mixed([first, second, third]: [&ThermalHistory; 3], weights: [f64; 3]) -> ThermalHistory {
+    let mut sum = first.clone();
+    sum.mix(weights[0], second, weights[1]);
+    sum.mix(1.0, third, weights[2]);
+    sum
 }

@@ -6,6 +6,7 @@ use super::candidate::Candidate;
 use super::evidence::{Evidence, Role, dot, sum_of_squares};
 use crate::effect::Acts;
 use crate::fit::{Effort, Fit, Parameter, least_squares};
+use crate::numeric::span::Span;
 use crate::rate::CoilModel;
 
 /// A candidate with values for its parameters.
@@ -181,7 +182,7 @@ impl Trial<'_> {
     /// what its own parameters cannot make up for. An effect that resembles one of its members changes the residuals by
     /// little until both are fitted together.
     pub fn responses(&self, hypothesis: &Hypothesis) -> Responses {
-        let own = Span::of(self.derivatives(hypothesis).unwrap_or_default());
+        let own = Span::of(&self.derivatives(hypothesis).unwrap_or_default());
         let rest = own.complement(&hypothesis.residuals);
         let starts: Vec<Member> = (0..self.candidates.len())
             .filter(|&candidate| self.may_join(candidate, &hypothesis.members))
@@ -246,39 +247,6 @@ const LEAST_RESPONSE: f64 = 1e-9;
 const LEAST_OWN_SHARE: f64 = 1e-6;
 /// Step of a derivative, as a share of the parameter's size.
 const STEP: f64 = 1e-4;
-
-/// An orthonormal basis of a few columns.
-struct Span(Vec<Vec<f64>>);
-
-impl Span {
-    fn of(columns: Vec<Vec<f64>>) -> Self {
-        let mut span = Self(Vec::new());
-        for column in columns {
-            let length = sum_of_squares(&column).sqrt();
-            // Twice: once leaves what rounding takes from columns that are nearly parallel.
-            let mut rest = span.complement(&span.complement(&column));
-            let left = sum_of_squares(&rest).sqrt();
-            if left > DEPENDENT * length && left.is_finite() {
-                rest.iter_mut().for_each(|v| *v /= left);
-                span.0.push(rest);
-            }
-        }
-        span
-    }
-
-    /// What of a column no combination of the basis makes up for.
-    fn complement(&self, column: &[f64]) -> Vec<f64> {
-        let mut rest = column.to_vec();
-        for unit in &self.0 {
-            let along = dot(unit, &rest);
-            rest.iter_mut().zip(unit).for_each(|(r, u)| *r -= along * u);
-        }
-        rest
-    }
-}
-
-/// A column that others make up for but for this share of its length is theirs.
-const DEPENDENT: f64 = 1e-6;
 
 impl Response {
     /// By how much χ² falls with the best amplitude.

@@ -46,15 +46,15 @@ impl Evidence<'_> {
             let tilts = values
                 .par_iter()
                 .filter_map(|&(effect, parameter)| {
-                    let moved = moved(model, effect, parameter)?;
-                    let boundary = case.boundary_at(&moved.1, pattern, Begin::Beside, moved.1.sensor_lag_s());
+                    let (step, moved) = moved(model, effect, parameter)?;
+                    let boundary = case.boundary_at(&moved, pattern, Begin::Beside, moved.sensor_lag_s());
                     Some(boundary.map(|boundary| {
-                        let path = moved.1.heat_path().ok()?;
-                        let at = case.solved(&moved.1, Keep::Recent)?;
+                        let path = moved.heat_path().ok()?;
+                        let at = case.solved(&moved, Keep::Recent)?;
                         let (driven, drive) = boundary.driving(&path, 0.0);
                         let drive = Driven::new(case.drive(drive), case.record.times_s(), model.rate_mean_s);
                         let mut per_unit = case.history(&driven, &drive)?;
-                        scale_and_add(&mut per_unit, 1.0 / moved.0, &at.history, -1.0 / moved.0);
+                        per_unit.mix(1.0 / step, &at.history, -1.0 / step);
                         let from = model.effects[effect].values()[parameter];
                         Some(Tilt { effect: name_of(&model.effects[effect]), parameter, from, per_unit })
                     }))
@@ -71,7 +71,7 @@ fn moved(model: &CoilModel, effect: usize, parameter: usize) -> Option<(f64, Coi
     let declared = &model.effects[effect];
     let value = declared.values()[parameter];
     let room = declared.parameters()[parameter].upper - value;
-    let step = if value + STEP * value.abs() < value + room { STEP * value.abs() } else { -STEP * value.abs() };
+    let step = if STEP * value.abs() < room { STEP * value.abs() } else { -STEP * value.abs() };
     if step == 0.0 {
         return None;
     }
@@ -93,20 +93,9 @@ impl Case {
             let Some(effect) = model.effects.iter().find(|e| name_of(e) == tilt.effect) else { continue };
             let furthest = STRAIGHT * tilt.from.abs();
             let by = (effect.values()[tilt.parameter] - tilt.from).clamp(-furthest, furthest);
-            scale_and_add(history, 1.0, &tilt.per_unit, by);
+            history.mix(1.0, &tilt.per_unit, by);
         }
     }
-}
-
-/// H ← a H + b G.
-fn scale_and_add(history: &mut ThermalHistory, a: f64, other: &ThermalHistory, b: f64) {
-    let add = |to: &mut Vec<f64>, from: &[f64]| to.iter_mut().zip(from).for_each(|(t, f)| *t = a * *t + b * f);
-    add(&mut history.temperature_k, &other.temperature_k);
-    add(&mut history.rate_k_per_s, &other.rate_k_per_s);
-    add(&mut history.axial_moment_k, &other.axial_moment_k);
-    add(&mut history.axial_moment_k_per_s, &other.axial_moment_k_per_s);
-    add(&mut history.ambient_k, &other.ambient_k);
-    add(&mut history.ambient_rate_k_per_s, &other.ambient_rate_k_per_s);
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ mod kalman;
 pub mod maximise;
 pub mod noise;
 pub mod piecewise;
+pub mod span;
 pub mod state_space;
 pub mod statistics;
 pub mod tridiagonal;

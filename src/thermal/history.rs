@@ -61,6 +61,17 @@ impl ThermalHistory {
         self.times_s.len()
     }
 
+    /// H ← a H + b G, entry by entry, of a history of the same layers and times.
+    pub fn mix(&mut self, a: f64, other: &Self, b: f64) {
+        let add = |to: &mut [f64], from: &[f64]| to.iter_mut().zip(from).for_each(|(t, f)| *t = a * *t + b * f);
+        add(&mut self.temperature_k, &other.temperature_k);
+        add(&mut self.rate_k_per_s, &other.rate_k_per_s);
+        add(&mut self.axial_moment_k, &other.axial_moment_k);
+        add(&mut self.axial_moment_k_per_s, &other.axial_moment_k_per_s);
+        add(&mut self.ambient_k, &other.ambient_k);
+        add(&mut self.ambient_rate_k_per_s, &other.ambient_rate_k_per_s);
+    }
+
     pub fn is_empty(&self) -> bool {
         self.times_s.is_empty()
     }

@@ -17,6 +17,7 @@ use super::contest::{Contest, Rival};
 use crate::boundary::{Air, Boundary, Kink, Observation, RateWhitener, expose, planned_whitener, seen_by_another};
 use crate::fit::{Effort, Fit, Parameter, least_squares};
 use crate::numeric::piecewise::PiecewiseLinear;
+use crate::numeric::span::Span;
 use crate::numeric::statistics::standard_deviation;
 use crate::pattern::Pattern;
 use crate::predict::layer_gains_rad_per_k;
@@ -90,9 +91,6 @@ pub(super) enum Refit {
     Linear,
     Full,
 }
-
-/// A column is taken for a sum of others if they leave less than this of it.
-const LEAST_OF_COLUMN: f64 = 1e-6;
 
 impl<'a> Plan<'a> {
     /// Readings every `step_s` over the whole profile.
@@ -311,14 +309,14 @@ fn expected(rival: &Rival, give: impl Fn(&CoilModel) -> Option<Vec<f64>>, refit:
             .and_then(|both| <[f64; 2]>::try_from(both).ok());
     }
     let columns = rival.derivatives(&at_values, &give)?;
-    let alone = left_over(at_values.clone(), columns.clone());
+    let alone = left_over(&at_values, &columns);
     let mut held = at_values;
     held.extend(std::iter::repeat_n(0.0, rival.hold.nrows()));
     let with_hold = |(place, mut column): (usize, Vec<f64>)| {
         column.extend(rival.hold.column(place).iter());
         column
     };
-    let together = left_over(held, columns.into_iter().enumerate().map(with_hold).collect());
+    let together = left_over(&held, &columns.into_iter().enumerate().map(with_hold).collect::<Vec<_>>());
     Some([alone, together])
 }
 
@@ -339,25 +337,8 @@ fn fitted(rival: &Rival, give: &impl Fn(&CoilModel) -> Option<Vec<f64>>, held: b
 }
 
 /// Sum of squares of what columns leave of a vector.
-pub(super) fn left_over(mut of: Vec<f64>, mut columns: Vec<Vec<f64>>) -> f64 {
-    for place in 0..columns.len() {
-        let (before, rest) = columns.split_at_mut(place);
-        let column = &mut rest[0];
-        let whole = sum_of_squares(column).sqrt();
-        // Twice, so that what is left is orthogonal to rounding.
-        for _ in 0..2 {
-            for known in before.iter() {
-                let along = dot(column, known);
-                column.iter_mut().zip(known).for_each(|(c, k)| *c -= along * k);
-            }
-        }
-        let length = sum_of_squares(column).sqrt();
-        let scale = if length > LEAST_OF_COLUMN * whole { 1.0 / length } else { 0.0 };
-        column.iter_mut().for_each(|c| *c *= scale);
-        let along = dot(&of, column);
-        of.iter_mut().zip(column.iter()).for_each(|(o, c)| *o -= along * c);
-    }
-    sum_of_squares(&of)
+pub(super) fn left_over(of: &[f64], columns: &[Vec<f64>]) -> f64 {
+    sum_of_squares(&Span::of(columns).complement(of))
 }
 
 #[cfg(test)]
@@ -392,8 +373,8 @@ mod tests {
     #[test]
     fn what_columns_cannot_explain_is_left_over_however_often_they_are_given() {
         let columns = vec![vec![2.0, 0.0, 0.0], vec![1.0, 1.0, 0.0], vec![0.0, 5.0, 0.0]];
-        assert!((left_over(vec![3.0, 4.0, 12.0], columns) - 144.0).abs() < 1e-9);
-        assert!((left_over(vec![3.0, 4.0, 12.0], vec![vec![0.0; 3]]) - 169.0).abs() < 1e-9);
+        assert!((left_over(&[3.0, 4.0, 12.0], &columns) - 144.0).abs() < 1e-9);
+        assert!((left_over(&[3.0, 4.0, 12.0], &[vec![0.0; 3]]) - 169.0).abs() < 1e-9);
     }
 
     #[test]
