@@ -371,13 +371,6 @@ mod tests {
     }
 
     #[test]
-    fn what_columns_cannot_explain_is_left_over_however_often_they_are_given() {
-        let columns = vec![vec![2.0, 0.0, 0.0], vec![1.0, 1.0, 0.0], vec![0.0, 5.0, 0.0]];
-        assert!((left_over(&[3.0, 4.0, 12.0], &columns) - 144.0).abs() < 1e-9);
-        assert!((left_over(&[3.0, 4.0, 12.0], &[vec![0.0; 3]]) - 169.0).abs() < 1e-9);
-    }
-
-    #[test]
     fn a_rival_of_another_size_is_fitted_again_and_is_refused_only_as_far_as_the_records_hold_it() {
         let of_gain = |gain: f64| rival("mismatch", model(vec![effect("strain_mismatch", &[gain])]));
         let mut free = contest(vec![of_gain(0.004), of_gain(0.006)]);
