@@ -52,7 +52,8 @@ class Coil:
         self.kappa = f["thermo_optic_per_k"] * hidden.get("thermo_optic_factor", 1.0)
         self.k = t["conductivity_w_per_m_k"] * hidden.get("conductivity_factor", 1.0)
         self.c = t["volumetric_heat_capacity_j_per_m3_k"]
-        seg = segments(w["pattern"], self.n_layers)
+        self.c *= hidden.get("heat_capacity_factor", 1.0)
+        seg = np.array(hidden["wound_segments"]) if "wound_segments" in hidden else segments(hidden.get("wound_as", w["pattern"]), self.n_layers)
         # Integrals of (2z - L) dz over each layer's part in either half of the fibre.
         self.half_a, self.half_b = np.zeros(self.n_layers), np.zeros(self.n_layers)
         self.direction = np.zeros(self.n_layers)
@@ -70,13 +71,18 @@ class Coil:
         self.scale = self.index / (self.total * self.diameter) * DEG_PER_H  # deg/h per m2 of kappa * rate
 
 
-def radial(coil, film, spool=None):
-    """Capacities, conductances between neighbours, conductances to the air, layer averages; all per radian and metre."""
+def radial(coil, film, spool=None, gap=None):
+    """Capacities, conductances between neighbours, conductances to the air, layer averages; all per radian and metre.
+
+    `gap` is a layer (1 innermost) and the conductance [W/(m2 K)] of the contact above it."""
     n = coil.n_layers * CELLS
     edge = coil.bore + np.arange(n + 1) * coil.pitch / CELLS
     centre = 0.5 * (edge[1:] + edge[:-1])
     cap = coil.c * 0.5 * (edge[1:] ** 2 - edge[:-1] ** 2)
     link = coil.k / np.log(centre[1:] / centre[:-1])
+    if gap:
+        below = gap[0] * CELLS
+        link[below - 1] = 1.0 / (1.0 / link[below - 1] + 1.0 / (gap[1] * edge[below]))
     air = np.zeros(n)
     air[-1] = 1.0 / (np.log(edge[-1] / centre[-1]) / coil.k + 1.0 / (film * edge[-1]))
     mean = np.zeros((coil.n_layers, n))
@@ -108,28 +114,30 @@ def modes(cap, link, air):
     return rate, vec / root[:, None], vec.T / root[None, :]  # T = right q, q' = -rate q + left f
 
 
-def follow(rate, u, dt=1.0):
-    """q' = -rate q + u(t), u linear between samples, in equilibrium at first."""
+def follow(rate, u, dt=1.0, start=None):
+    """q' = -rate q + u(t), u linear between samples, in equilibrium at first unless a start is given."""
     e = np.exp(-rate * dt)
     phi1 = -np.expm1(-rate * dt) / rate
     phi2 = (dt - phi1) / (rate * dt)
     drive = np.r_[0.0, (phi1 - phi2) * u[:-1] + phi2 * u[1:]]
-    start = u[0] / rate
-    drive[0] = start
+    drive[0] = u[0] / rate if start is None else start
     return lfilter([1.0], [1.0, -e], drive)
 
 
-def linear_field(coil, air, hidden):
-    """Layer means (and axial moments of temperature, or None) at every second."""
-    spool = None
+def linear_field(coil, air, hidden, start_s=0):
+    """Layer means (and axial moments of temperature, or None) at every second; the record's time 0 is at `start_s`."""
+    spool = gap = None
     if "spool_capacity" in hidden:
         spool = (hidden["spool_capacity"], hidden["spool_contact"], hidden.get("spool_mount", 0.0))
-    cap, link, to_air, mean, bore = radial(coil, hidden.get("film", FILM), spool)
+    if "gap_above" in hidden:
+        gap = (hidden["gap_above"], hidden["gap_conductance"])
+    if "films" in hidden:
+        return switched_field(coil, air, hidden["films"], start_s, spool, gap), None
+    cap, link, to_air, mean, bore = radial(coil, hidden.get("film", FILM), spool, gap)
     rate, right, left = modes(cap, link, to_air)
-    t = np.arange(len(air), dtype=float)
+    t = np.maximum(np.arange(len(air), dtype=float) - start_s, 0.0)
     lay = mean @ right
     if "flange_film" not in hidden:
-        out = np.zeros((len(air), coil.n_layers))
         gain, heat = left @ to_air, left @ bore
         flux = None
         if "heater_power" in hidden:
@@ -160,6 +168,23 @@ def linear_field(coil, air, hidden):
         mean_t += layer * zright[:, b].mean()
         moment_t += layer * (zright[:, b] * zeta).mean()
     return mean_t.T, moment_t.T
+
+
+def switched_field(coil, air, films, start_s, spool=None, gap=None):
+    """Layer means at every second where a fan changes the film: `films` holds (time [s], film) from then on, the first at 0."""
+    ends = [min(max(int(t) + start_s, 0), len(air) - 1) for t, _ in films[1:]] + [len(air) - 1]
+    parts, first, state = [], 0, None
+    for (_, film), last in zip(films, ends):
+        cap, link, to_air, mean, _ = radial(coil, film, spool, gap)
+        rate, right, left = modes(cap, link, to_air)
+        gain = left @ to_air
+        start = None if state is None else left @ (cap * state)
+        u = air[first:last + 1]
+        q = np.array([follow(rate[m], gain[m] * u, start=None if start is None else start[m]) for m in range(len(rate))])
+        state = right @ q[:, -1]
+        parts.append(((mean @ right) @ q).T[0 if first == 0 else 1:])
+        first = last
+    return np.vstack(parts)
 
 
 def nonlinear_field(coil, air, slope):
@@ -205,14 +230,12 @@ def nonlinear_field(coil, air, slope):
     return out, None
 
 
-def simulate(declared, hidden, air, seed, sigma, offset, channels=(), temperature_sigma=0.004):
-    """One record: header and rows. `air` holds the chamber's temperature [C] at every second from 0 on."""
-    rng = np.random.default_rng(seed)
-    coil = Coil(declared, hidden)
+def coil_rate(coil, hidden, air, start_s=0):
+    """Layers at every second (seconds x layers), their rate and the coil's rate [deg/h] over each second, and the effects' bias."""
     if "conductivity_slope" in hidden:
         layers, moment = nonlinear_field(coil, air, hidden["conductivity_slope"])
     else:
-        layers, moment = linear_field(coil, air, hidden)
+        layers, moment = linear_field(coil, air, hidden, start_s)
     mid = 0.5 * (layers[1:] + layers[:-1])
     rate = np.diff(layers, axis=0)
     share = coil.length / coil.total
@@ -224,6 +247,9 @@ def simulate(declared, hidden, air, seed, sigma, offset, channels=(), temperatur
         shape = coil.radius ** -2.0
         shape = shape - shape @ share
         kappa = kappa * (1.0 + hidden["stress"] * shape / np.abs(shape).max())
+    if "gain_layer" in hidden:
+        kappa = kappa.copy()
+        kappa[:, hidden["gain_layer"] - 1] *= 1.0 + hidden["gain_change"]
     differ = np.zeros(mid.shape)
     if "mismatch" in hidden:
         differ = differ + hidden["mismatch"]
@@ -241,11 +267,23 @@ def simulate(declared, hidden, air, seed, sigma, offset, channels=(), temperatur
         omega += coil.scale * extra * coil.kappa * ((rate @ coil.length) - lead_rate * coil.total)
     if "asymmetry" in hidden:
         omega *= 1.0 + hidden["asymmetry"] * np.sign(pack_rate)
-    t = np.arange(1, len(air)) - 0.5
+    if hidden.get("reversed"):
+        omega = -omega
     warm = pack - 20.0
     omega += hidden.get("bias_per_K", 0.0) * warm + hidden.get("bias_per_K2", 0.0) * warm ** 2
     omega += hidden.get("bias_rate", 0.0) * pack_rate
     omega += hidden.get("bias_gradient", 0.0) * (rate[:, -1] - rate[:, 0])
+    return layers, rate, omega
+
+
+def simulate(declared, hidden, air, seed, sigma, offset, channels=(), temperature_sigma=0.004):
+    """One record: header and rows. `air` holds the chamber's temperature [C] at every second from 0 on."""
+    rng = np.random.default_rng(seed)
+    coil = Coil(declared, hidden)
+    layers, rate, omega = coil_rate(coil, hidden, air)
+    share = coil.length / coil.total
+    pack, pack_rate = 0.5 * (layers[1:] + layers[:-1]) @ share, rate @ share
+    t = np.arange(1, len(air)) - 0.5
     omega += outside_catalogue(hidden, t, pack, pack_rate)
 
     stamps = np.arange(0, len(air), 10)
