@@ -14,12 +14,13 @@ use coilwright::coil::{Coil, CoilSpec, Fibre, LayerLength};
 use coilwright::pattern::windability::WindabilityClass;
 use coilwright::profile::ProfileSpec;
 use coilwright::rate::CoilModel;
-use coilwright::search::anneal::{Restart, cooling_for, generator};
-use coilwright::search::columns::{Norm, Work};
-use coilwright::search::optimise::{Optimisation, Plan, Rules};
-use coilwright::search::samples::SampleMatrix;
-use coilwright::search::walk::Space;
-use coilwright::search::worst_case::SolvedProfiles;
+use coilwright::search::anneal::restart::{Restart, cooling_for, generator};
+use coilwright::search::anneal::rounds::{Optimisation, Plan, Rounds, Rules};
+use coilwright::search::anneal::sample_cost::SampleCost;
+use coilwright::search::anneal::walk::Space;
+use coilwright::search::cost::columns::{Norm, Work};
+use coilwright::search::cost::samples::SampleMatrix;
+use coilwright::search::cost::worst_case::SolvedProfiles;
 use coilwright::thermal::{DEFAULT_CELLS_PER_LAYER, Extent, Location, Material};
 use coilwright::units::{deg_per_h_from_rad_per_s, k_per_s_from_c_per_h, percent_from_fraction};
 use rand::Rng;
@@ -161,8 +162,9 @@ fn main() {
     let moves: u64 = after("--moves").and_then(|m| m.parse().ok()).unwrap_or(2_000_000);
     let matrix = instance();
     let responses = responses(&matrix);
+    let cost = SampleCost::new(matrix.clone(), WindabilityClass::Any, Norm::Largest);
     let space = Space::new(matrix, WindabilityClass::Any);
-    let cooling = cooling_for(&space, Norm::Largest, SEED, moves);
+    let cooling = cooling_for(&cost, SEED, moves);
     println!("{LAYERS} layers, {} samples, class any, seed {SEED}", space.matrix().samples());
     if let Some(path) = after("--export") {
         let mut bytes = Vec::new();
@@ -177,10 +179,10 @@ fn main() {
     let (rate_as_shipped, best) = as_shipped(&space, moves);
     say("coilwright as shipped, one thread", moves, moves as f64 / rate_as_shipped, best);
 
-    let mut restart = Restart::new(&space, SEED, 0, None);
+    let mut restart = Restart::new(&cost, SEED, 0, None);
     let started = processor_s();
     while !restart.is_done(&cooling) {
-        restart.advance(&space, Norm::Largest, &cooling);
+        restart.advance(&cost, &cooling);
     }
     let seconds = processor_s() - started;
     say("coilwright, every sample judged", moves, seconds, restart.best_cost);
@@ -224,14 +226,13 @@ fn as_shipped(space: &Space, moves: u64) -> (f64, f64) {
     const RESTARTS: usize = 4;
     let plan = Plan {
         seed: SEED,
-        norm: Norm::Largest,
         restarts_per_round: RESTARTS,
         moves_per_restart: moves / ROUNDS / RESTARTS as u64,
         rules: Rules { rounds: ROUNDS, patience: ROUNDS, moves: None, target: None },
         starts: vec![],
     };
     let started = processor_s();
-    let mut search = Optimisation::new(space.matrix().clone(), space.class(), plan);
+    let mut search = Optimisation::new(SampleCost::new(space.matrix().clone(), space.class(), Norm::Largest), plan);
     while search.advance() {}
     let seconds = processor_s() - started;
     say_work(search.state().work, seconds);

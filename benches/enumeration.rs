@@ -12,12 +12,13 @@ use std::time::Instant;
 use coilwright::io::model_file::read_model;
 use coilwright::pattern::Pattern;
 use coilwright::pattern::windability::WindabilityClass;
-use coilwright::search::columns::{Columns, Norm};
-use coilwright::search::exact::{Task, prove, starting_patterns};
-use coilwright::search::optimise::{Optimisation, Plan, Rules, default_moves_per_restart};
-use coilwright::search::samples::SampleMatrix;
-use coilwright::search::signs::{segments_of_signs, sign_columns};
-use coilwright::search::worst_case::SolvedProfiles;
+use coilwright::search::anneal::rounds::{Optimisation, Plan, Rounds, Rules, default_moves_per_restart};
+use coilwright::search::anneal::sample_cost::SampleCost;
+use coilwright::search::cost::columns::{Columns, Norm};
+use coilwright::search::cost::samples::SampleMatrix;
+use coilwright::search::cost::signs::{segments_of_signs, sign_columns};
+use coilwright::search::cost::worst_case::SolvedProfiles;
+use coilwright::search::proof::{Task, prove, starting_patterns};
 use coilwright::units::deg_per_h_from_rad_per_s;
 
 /// Patterns between two comparisons with the reference.
@@ -104,9 +105,8 @@ fn compare(path: &Path) {
     let found = (1..=20).filter(|&seed| {
         let rules = Rules { rounds: u64::MAX, patience: 6, moves: None, target: None };
         let moves_per_restart = default_moves_per_restart(layers);
-        let plan =
-            Plan { seed, norm: Norm::Largest, restarts_per_round: 8, moves_per_restart, rules, starts: Vec::new() };
-        let mut search = Optimisation::new(matrix.clone(), class, plan);
+        let plan = Plan { seed, restarts_per_round: 8, moves_per_restart, rules, starts: Vec::new() };
+        let mut search = Optimisation::new(SampleCost::new(matrix.clone(), class, Norm::Largest), plan);
         while search.advance() {}
         search.best().is_some_and(|found| found.cost <= smallest[0].0 * (1.0 + 1e-9))
     });

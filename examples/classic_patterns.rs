@@ -12,7 +12,7 @@ use coilwright::io::pattern_file::print_pattern;
 use coilwright::pattern::classic::Classic;
 use coilwright::pattern::windability::WindingGraph;
 use coilwright::reproduce::yan1998;
-use coilwright::search::worst_case::SolvedProfiles;
+use coilwright::search::cost::worst_case::SolvedProfiles;
 use coilwright::units::deg_per_h_from_rad_per_s;
 
 const LAYER_COUNTS: [usize; 11] = [8, 12, 16, 20, 24, 28, 32, 36, 40, 44, 48];

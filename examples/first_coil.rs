@@ -8,7 +8,7 @@ use std::path::Path;
 use coilwright::io::model_file::read_model;
 use coilwright::pattern::classic::Classic;
 use coilwright::pattern::windability::WindingGraph;
-use coilwright::search::worst_case::SolvedProfiles;
+use coilwright::search::cost::worst_case::SolvedProfiles;
 use coilwright::units::deg_per_h_from_rad_per_s;
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -16,7 +16,7 @@ use coilwright::pattern::Pattern;
 use coilwright::pattern::classic::Classic;
 use coilwright::report::traveller::traveller_page;
 use coilwright::schedule::Schedule;
-use coilwright::search::worst_case::SolvedProfiles;
+use coilwright::search::cost::worst_case::SolvedProfiles;
 use coilwright::units::deg_per_h_from_rad_per_s;
 use coilwright::verify::{Claim, RateCheck, Truth, Verification, verify};
 use rand::{RngExt, SeedableRng};

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::optimise::bench_of;
+use super::optimise::evaluator_of;
 use super::progress::StopFlag;
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
@@ -11,11 +11,11 @@ use crate::io::campaign_file::{
 };
 use crate::io::files::write_atomically;
 use crate::report::plot::{Axis, Chart, Series};
-use crate::search::guaranteed::UnitStep;
-use crate::search::objective::Objective;
-use crate::search::optimise::{DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Plan, Rules};
-use crate::search::verdict::improvement_over_qua;
-use crate::search::worst_case::SolvedProfiles;
+use crate::search::anneal::rounds::{DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Plan, Rules};
+use crate::search::cost::guaranteed::UnitStep;
+use crate::search::cost::objective::Objective;
+use crate::search::cost::worst_case::SolvedProfiles;
+use crate::search::evaluator::improvement_over_qua;
 use crate::units::deg_per_h_from_rad_per_s;
 
 /// A grid of searches (coils, layer counts, classes, objectives, seeds)
@@ -108,10 +108,9 @@ fn search(
     let (model, layers) = (&cell.file.model, cell.file.model.coil.layers());
     let solved = SolvedProfiles::new(model, &cell.file.profiles.profiles())?;
     let unit_step = UnitStep::new(model, cell.file.profiles.max_rate_k_per_s).ok();
-    let bench = bench_of(&cell.file, &solved, cell.objective, unit_step.as_ref());
+    let evaluator = evaluator_of(&cell.file, &solved, cell.objective, unit_step.as_ref());
     let plan = Plan {
         seed: cell.seed,
-        norm: cell.objective.norm(),
         restarts_per_round: DEFAULT_RESTARTS_PER_ROUND,
         moves_per_restart: campaign
             .moves_per_restart
@@ -124,16 +123,16 @@ fn search(
         },
         starts: Vec::new(),
     };
-    let mut optimisation = bench.search(cell.class, plan, None)?.expect("nothing was saved that might not fit");
+    let mut optimisation = evaluator.search(cell.class, plan, None)?.expect("nothing was saved that might not fit");
     while optimisation.advance() {
         if stop.is_set() {
             return Ok(None);
         }
     }
-    let baselines = bench.baselines()?;
+    let baselines = evaluator.baselines()?;
     let found = &optimisation.state().found;
-    let best = match bench.best(cell.class, found, &baselines)? {
-        Some(best) => Some(bench.improved(cell.class, best, found, None)?.0),
+    let best = match evaluator.best(cell.class, found, &baselines)? {
+        Some(best) => Some(evaluator.improved(cell.class, best, found, None)?.0),
         None => None,
     };
     Ok(best.map(|best| CellJson {

@@ -12,8 +12,8 @@ use crate::io::pattern_file::resolve_pattern;
 use crate::io::profile_file::read_profile_file;
 use crate::pattern::classic::Classic;
 use crate::rate::RateModel;
-use crate::search::guaranteed::{GuaranteedError, UnitStep};
-use crate::search::worst_case::{SolvedProfiles, WorstCase};
+use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
+use crate::search::cost::worst_case::{SolvedProfiles, WorstCase};
 use crate::units::deg_per_h_from_rad_per_s;
 
 /// Worst rate error of windings over a model's profiles

@@ -18,9 +18,9 @@ use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
 use crate::pattern::windability::WindabilityClass;
 use crate::rate::{RateError, RateModel};
-use crate::search::exact::{Progress, Status, Task, prove, starting_patterns};
-use crate::search::guaranteed::UnitStep;
-use crate::search::worst_case::SolvedProfiles;
+use crate::search::cost::guaranteed::UnitStep;
+use crate::search::cost::worst_case::SolvedProfiles;
+use crate::search::proof::{Progress, Status, Task, prove, starting_patterns};
 use crate::units::deg_per_h_from_rad_per_s;
 
 /// The best winding of a class with a proof, or a lower bound on what any winding can reach

@@ -9,7 +9,7 @@ use crate::io::model_file::NamedPattern;
 use crate::io::pattern_file::resolve_pattern;
 use crate::io::run_directory::FormerJson;
 use crate::pattern::windability::WindabilityClass;
-use crate::search::verdict::{Bench, EQUALLY_GOOD, Judged};
+use crate::search::evaluator::{EQUALLY_GOOD, Evaluator, Judged};
 use crate::units::deg_per_h_from_rad_per_s;
 
 /// A winding's name, a pattern file, or the folder of a search, whose best pattern counts.
@@ -28,15 +28,15 @@ pub(super) fn former_pattern(stated: &str, layers: usize) -> Result<NamedPattern
 
 /// The former pattern judged under the model of the search, beside the best one found.
 pub(super) fn compare_with_former(
-    bench: &Bench,
+    evaluator: &Evaluator,
     class: WindabilityClass,
     best: &Judged,
     former: &NamedPattern,
 ) -> Result<FormerJson, CliError> {
-    let old = bench.judge(&former.name, &former.pattern)?;
+    let old = evaluator.judge(&former.name, &former.pattern)?;
     let (new_cost, old_cost) = (best.objective_rad_per_s, old.objective_rad_per_s);
     let best_changed = new_cost < old_cost * (1.0 - EQUALLY_GOOD);
-    let what = bench.objective.key();
+    let what = evaluator.objective.key();
     let shown = |cost: f64| format!("{:.4} °/h", deg_per_h_from_rad_per_s(cost));
     let (old_shown, new_shown, name) = (shown(old_cost), shown(new_cost), &former.name);
     let statement = if best_changed {

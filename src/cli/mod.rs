@@ -47,10 +47,10 @@ use crate::metrics::MetricsError;
 use crate::predict::PredictError;
 use crate::rate::RateError;
 use crate::record::RecordError;
-use crate::search::guaranteed::GuaranteedError;
-use crate::search::tolerance::ToleranceError;
-use crate::search::verdict::JudgeError;
-use crate::search::worst_case::SearchError;
+use crate::search::cost::guaranteed::GuaranteedError;
+use crate::search::cost::tolerance::ToleranceError;
+use crate::search::cost::worst_case::SearchError;
+use crate::search::evaluator::JudgeError;
 use progress::ProgressMode;
 use screen::Screen;
 

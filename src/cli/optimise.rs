@@ -17,12 +17,11 @@ use crate::io::model_file::{ModelFile, NamedPattern, read_model};
 use crate::io::pattern_file::resolve_pattern;
 use crate::io::run_directory::{BestFoundJson, GridCheckJson, OptimiseJson, Request, write_request, write_results};
 use crate::pattern::windability::WindabilityClass;
-use crate::search::guaranteed::UnitStep;
-use crate::search::objective::Objective;
-use crate::search::optimise::{DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Plan, Rules, Stop};
-use crate::search::robust::Rounds;
-use crate::search::verdict::{Bench, Judged, improvement_over_qua};
-use crate::search::worst_case::SolvedProfiles;
+use crate::search::anneal::rounds::{DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Plan, Rounds, Rules, Stop};
+use crate::search::cost::guaranteed::UnitStep;
+use crate::search::cost::objective::Objective;
+use crate::search::cost::worst_case::SolvedProfiles;
+use crate::search::evaluator::{Evaluator, Judged, improvement_over_qua};
 use crate::units::{deg_per_h_from_rad_per_s, rad_per_s_from_deg_per_h};
 
 /// Search the winding pattern with the smallest error
@@ -160,7 +159,6 @@ impl SearchOptions {
         let patience = if self.budget.is_some() { PATIENCE_WITH_BUDGET } else { DEFAULT_PATIENCE };
         Ok(Plan {
             seed: self.seed.unwrap_or(file.search.seed),
-            norm: objective.norm(),
             restarts_per_round: self.restarts.into(),
             moves_per_restart: self.moves_per_restart.unwrap_or_else(|| objective.default_moves_per_restart(layers)),
             rules: Rules {
@@ -204,9 +202,9 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let started = Instant::now();
     let solved = SolvedProfiles::new(&file.model, &file.profiles.profiles())?;
     let unit_step = UnitStep::new(&file.model, file.profiles.max_rate_k_per_s).ok();
-    let bench = bench_of(&file, &solved, objective, unit_step.as_ref());
-    let baselines = bench.baselines()?;
-    let mut search = bench
+    let evaluator = evaluator_of(&file, &solved, objective, unit_step.as_ref());
+    let baselines = evaluator.baselines()?;
+    let mut search = evaluator
         .search(class, plan.clone(), saved)?
         .ok_or_else(|| CliError::Checkpoint { path: folder.map(|f| f.join(CHECKPOINT_FILE)).unwrap_or_default() })?;
     if let Some(folder) = folder.filter(|f| !(arguments.resume && f.join(CHECKPOINT_FILE).exists())) {
@@ -224,17 +222,17 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let mut concluded = None;
     let mut conclusion = |search: &dyn Rounds| -> Result<Option<Stop>, CliError> {
         let found = &search.state().found;
-        let Some(best) = bench.best(class, found, &baselines)?.filter(|_| bench.is_provable(class)) else {
+        let Some(best) = evaluator.best(class, found, &baselines)?.filter(|_| evaluator.is_provable(class)) else {
             return Ok(None);
         };
-        let (best, is_optimal) = bench.improved(class, best, found, target)?;
+        let (best, is_optimal) = evaluator.improved(class, best, found, target)?;
         let stop = if is_optimal { Some(Stop::Proved) } else { is_good_enough(&best).then_some(Stop::Target) };
         concluded = stop.map(|_| best);
         Ok(stop)
     };
     let (ended, found_s) = anneal(search.as_mut(), &mut conclusion, budget, started, &stop, checkpoint, screen)?;
 
-    let Some(best) = bench.best(class, &search.state().found, &baselines)? else {
+    let Some(best) = evaluator.best(class, &search.state().found, &baselines)? else {
         screen.note("interrupted before anything was found");
         return Ok(Ending::Interrupted);
     };
@@ -243,7 +241,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let annealed = best.pattern.clone();
     let best = match concluded {
         Some(concluded) => concluded,
-        None if is_unhurried => bench.improved(class, best, &search.state().found, target)?.0,
+        None if is_unhurried => evaluator.improved(class, best, &search.state().found, target)?.0,
         None => best,
     };
     let seconds = started.elapsed().as_secs_f64();
@@ -259,14 +257,14 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let (best, (proof, proof_cut_short)) = match arguments.prove.filter(|_| ended != Ended::Signal) {
         None => (best, nothing_proved),
         Some(time) => {
-            let (best, proof, cut) = prove_best(&bench, class, best, &baselines, time, &stop, screen)?;
+            let (best, proof, cut) = prove_best(&evaluator, class, best, &baselines, time, &stop, screen)?;
             (best, (proof, cut))
         }
     };
-    let grid_check = if ended == Ended::Signal { None } else { bench.grid_check(&best, &baselines)? };
+    let grid_check = if ended == Ended::Signal { None } else { evaluator.grid_check(&best, &baselines)? };
     let grid_check = grid_check.as_ref().map(GridCheckJson::of);
     let caution = grid_check.as_ref().and_then(|check| check.caution.clone());
-    let compared_with = former.map(|f| compare_with_former(&bench, class, &best, &f)).transpose()?;
+    let compared_with = former.map(|f| compare_with_former(&evaluator, class, &best, &f)).transpose()?;
     let judged_now = (search.evaluations() - evaluated_before) as f64;
     let answer = OptimiseJson {
         model: file.model.name.clone(),
@@ -276,7 +274,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         best: PatternJson::of(&best),
         baselines: baselines.iter().map(PatternJson::of).collect(),
         improvement_over_qua: improvement_over_qua(&best, &baselines),
-        statement: bench.statement(&best, &baselines, class)
+        statement: evaluator.statement(&best, &baselines, class)
             + &words(&proof)
             + &caution.map_or_else(String::new, |caution| format!(" {caution}")),
         grid_check,
@@ -298,14 +296,14 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
 }
 
 /// What patterns of a model are judged by.
-pub(super) fn bench_of<'a>(
+pub(super) fn evaluator_of<'a>(
     file: &'a ModelFile,
     solved: &'a SolvedProfiles,
     objective: Objective,
     unit_step: Option<&'a UnitStep>,
-) -> Bench<'a> {
+) -> Evaluator<'a> {
     let ModelFile { model, profiles, tolerance, .. } = file;
-    Bench { model, solved, objective, unit_step, profiles, tolerance: tolerance.as_ref() }
+    Evaluator { model, solved, objective, unit_step, profiles, tolerance: tolerance.as_ref() }
 }
 
 /// The state to go on from; refuses to write over an unfinished run unasked.
@@ -314,7 +312,7 @@ fn saved_state(
     folder: &Path,
     request: &Request,
     screen: &Screen,
-) -> Result<Option<crate::search::optimise::State>, CliError> {
+) -> Result<Option<crate::search::anneal::rounds::State>, CliError> {
     if arguments.fresh {
         return Ok(None);
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use super::optimise::bench_of;
+use super::optimise::evaluator_of;
 use super::progress::StopFlag;
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
@@ -17,15 +17,18 @@ use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
 use crate::pattern::windability::WindabilityClass;
 use crate::report::plot::{Axis, Chart, Series};
-use crate::search::builds::Builds;
-use crate::search::limits::Limits;
-use crate::search::objective::Objective;
-use crate::search::optimise::{DEFAULT_RESTARTS_PER_ROUND, Found, Plan, Rules, default_moves_per_restart};
+use crate::search::anneal::limits::Limits;
+use crate::search::anneal::quantile::QuantileCost;
+use crate::search::anneal::rounds::{
+    DEFAULT_RESTARTS_PER_ROUND, Found, Optimisation, Plan, Rounds, Rules, default_moves_per_restart,
+};
+use crate::search::compile::Whose;
+use crate::search::cost::objective::Objective;
+use crate::search::cost::sampled_coils::SampledCoils;
+use crate::search::cost::tolerance::Coils;
+use crate::search::cost::worst_case::SolvedProfiles;
+use crate::search::evaluator::{Evaluator, Judged};
 use crate::search::pareto::{Point, front};
-use crate::search::robust::{RobustSearch, Rounds, Whose};
-use crate::search::tolerance::Coils;
-use crate::search::verdict::{Bench, Judged};
-use crate::search::worst_case::SolvedProfiles;
 
 /// The front of worst-case error against windability and robustness
 #[derive(Debug, clap::Args)]
@@ -58,17 +61,17 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
     let seed = arguments.seed.unwrap_or(file.search.seed);
     let solved = SolvedProfiles::new(&file.model, &file.profiles.profiles())?;
-    let unit_step = crate::search::guaranteed::UnitStep::new(&file.model, file.profiles.max_rate_k_per_s).ok();
-    let bench = bench_of(&file, &solved, Objective::WorstRate, unit_step.as_ref());
-    let mut judged = bench.baselines()?;
+    let unit_step = crate::search::cost::guaranteed::UnitStep::new(&file.model, file.profiles.max_rate_k_per_s).ok();
+    let evaluator = evaluator_of(&file, &solved, Objective::WorstRate, unit_step.as_ref());
+    let mut judged = evaluator.baselines()?;
     let captive = (1..=usize::from(arguments.most_captive)).map(WindabilityClass::Captive);
     let classes: Vec<WindabilityClass> =
         std::iter::once(WindabilityClass::Standard).chain(captive).chain([WindabilityClass::Any]).collect();
     let climbs: Vec<Option<usize>> =
         CLIMBS.into_iter().filter(|c| *c < file.model.coil.layers()).map(Some).chain([None]).collect();
-    let mut whose = vec![bench.builds(Whose::Declared, WindabilityClass::Any, seed)?];
+    let mut whose = vec![evaluator.sampled_coils(Whose::Declared, WindabilityClass::Any, seed)?];
     if file.tolerance.is_some() {
-        whose.push(bench.builds(Whose::Built, WindabilityClass::Any, seed)?);
+        whose.push(evaluator.sampled_coils(Whose::Built, WindabilityClass::Any, seed)?);
     }
     let kept = arguments.output.as_deref().map(|folder| Front { folder, file: &file, seed, rounds: arguments.rounds });
     let parts = parts(&classes, &climbs, whose.len());
@@ -79,10 +82,10 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
             Some(found) => found,
             None => {
                 let searched = match part.climb {
-                    Climb::Unlimited => candidates(&bench, &file, part.class, seed, arguments.rounds, &stop)?,
+                    Climb::Unlimited => candidates(&evaluator, &file, part.class, seed, arguments.rounds, &stop)?,
                     Climb::Within { most_climb, builds } => {
                         let limits = Limits { class: part.class, most_climb };
-                        limited(&bench, &whose[builds], limits, seed, &stop)?
+                        limited(&evaluator, &whose[builds], limits, seed, &stop)?
                     }
                 };
                 let Some(found) = searched else { return Ok(interrupted(&arguments.output, screen)) };
@@ -93,7 +96,9 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
             }
         };
         let name = part.class.to_string().replace(':', "-");
-        judged.extend(bench.judge_all(&found.into_iter().map(|pattern| (name.clone(), pattern)).collect::<Vec<_>>())?);
+        judged.extend(
+            evaluator.judge_all(&found.into_iter().map(|pattern| (name.clone(), pattern)).collect::<Vec<_>>())?,
+        );
         progress.at(number as u64 + 1, &words);
     }
     progress.finish();
@@ -183,7 +188,7 @@ fn interrupted(output: &Option<PathBuf>, screen: &Screen) -> Ending {
 
 /// What a search of a class found; none if a signal came first.
 fn candidates(
-    bench: &Bench,
+    evaluator: &Evaluator,
     file: &ModelFile,
     class: WindabilityClass,
     seed: u64,
@@ -193,13 +198,12 @@ fn candidates(
     let layers = file.model.coil.layers();
     let plan = Plan {
         seed,
-        norm: bench.objective.norm(),
         restarts_per_round: DEFAULT_RESTARTS_PER_ROUND,
         moves_per_restart: default_moves_per_restart(layers),
         rules: Rules { rounds, patience: rounds, moves: None, target: None },
         starts: Vec::new(),
     };
-    let mut search = bench.search(class, plan, None)?.expect("nothing was saved that might not fit");
+    let mut search = evaluator.search(class, plan, None)?.expect("nothing was saved that might not fit");
     while search.advance() {
         if stop.is_set() {
             return Ok(None);
@@ -210,22 +214,21 @@ fn candidates(
 
 /// What a search within limits found; none if a signal came first.
 fn limited(
-    bench: &Bench,
-    builds: &Builds,
+    evaluator: &Evaluator,
+    builds: &SampledCoils,
     limits: Limits,
     seed: u64,
     stop: &StopFlag,
 ) -> Result<Option<Vec<Pattern>>, CliError> {
-    let layers = bench.model.coil.layers();
+    let layers = evaluator.model.coil.layers();
     let plan = Plan {
         seed,
-        norm: bench.objective.norm(),
         restarts_per_round: LIMITED_RESTARTS,
         moves_per_restart: 4 * (layers * layers) as u64,
         rules: Rules { rounds: 1, patience: 1, moves: None, target: None },
         starts: Vec::new(),
     };
-    let mut search = RobustSearch::new(builds.clone(), limits, plan);
+    let mut search = Optimisation::new(QuantileCost::new(builds.clone(), limits), plan);
     while search.advance() {
         if stop.is_set() {
             return Ok(None);

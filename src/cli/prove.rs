@@ -9,8 +9,8 @@ use super::screen::Screen;
 use crate::io::json::ProofJson;
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
-use crate::search::exact::{Progress, Status, Task, prove};
-use crate::search::verdict::{Bench, Judged};
+use crate::search::evaluator::{Evaluator, Judged};
+use crate::search::proof::{Progress, Status, Task, prove};
 use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
 
 /// Steps of the bar, one a per cent.
@@ -22,7 +22,7 @@ const BAR_STEPS: u64 = 100;
 /// # Errors
 /// More layers than a proof can take.
 pub fn prove_best(
-    bench: &Bench,
+    evaluator: &Evaluator,
     class: WindabilityClass,
     best: Judged,
     others: &[Judged],
@@ -44,10 +44,10 @@ pub fn prove_best(
         );
         if stop.is_set() || started.elapsed() >= time { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let task = Task { model: bench.model, solved: bench.solved, class };
+    let task = Task { model: evaluator.model, solved: evaluator.solved, class };
     let certificate = prove(&task, &starts, &watcher)?;
     let best = if certificate.best_rad_per_s < best.worst.rate_rad_per_s.abs() {
-        bench.judge(&best.name, &certificate.pattern)?
+        evaluator.judge(&best.name, &certificate.pattern)?
     } else {
         best
     };

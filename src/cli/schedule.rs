@@ -13,7 +13,7 @@ use crate::io::traveller::traveller;
 use crate::report::cross_section::cross_section;
 use crate::report::traveller::traveller_page;
 use crate::schedule::Schedule;
-use crate::search::worst_case::SolvedProfiles;
+use crate::search::cost::worst_case::SolvedProfiles;
 
 /// The winding of a coil step by step, from the inside out
 #[derive(Debug, clap::Args)]

@@ -12,7 +12,7 @@ use crate::io::temperature_file::TemperaturesJson;
 use crate::pattern::classic::Classic;
 use crate::predict::predict;
 use crate::report::temperatures::{rate_chart, temperature_chart};
-use crate::search::worst_case::SearchError;
+use crate::search::cost::worst_case::SearchError;
 use crate::thermal::{Drive, Instant, ThermalHistory, solve};
 use crate::units::REFERENCE_TEMPERATURE_K;
 

@@ -10,7 +10,7 @@ use crate::io::pattern_file::resolve_pattern;
 use crate::io::tolerance_json::{DistributionJson, ToleranceJson};
 use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
-use crate::search::tolerance::{ToleranceSpec, measure, study};
+use crate::search::cost::tolerance::{ToleranceSpec, measure, study};
 use crate::units::rad_per_s_from_deg_per_h;
 
 /// Monte Carlo of the worst case under the spreads of the model's [tolerance]

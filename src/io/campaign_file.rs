@@ -11,7 +11,7 @@ use super::model_file::{ModelFile, parse_model};
 use super::schedule_file::sha256_hex;
 use super::toml_reader::{TomlReader, parse};
 use crate::pattern::windability::WindabilityClass;
-use crate::search::objective::Objective;
+use crate::search::cost::objective::Objective;
 
 /// A campaign file, understood: the grid is the product of its lists.
 #[derive(Debug, Clone)]

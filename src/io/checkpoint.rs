@@ -12,9 +12,9 @@ use serde::{Deserialize, Serialize};
 use super::fault::Faults;
 use super::files::{WriteError, write_atomically};
 use super::json::SCHEMA_VERSION;
-use crate::search::anneal::Restart;
-use crate::search::columns::Work;
-use crate::search::optimise::{Found, RoundRecord, State, Stop};
+use crate::search::anneal::restart::Restart;
+use crate::search::anneal::rounds::{Found, RoundRecord, State, Stop};
+use crate::search::cost::columns::Work;
 
 /// The name of a checkpoint in its run's folder.
 pub const CHECKPOINT_FILE: &str = "checkpoint.json";

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::json::SCHEMA_VERSION;
 use super::schema::{described, table, with_dialect};
-use crate::search::objective::Objective;
+use crate::search::cost::objective::Objective;
 
 /// The schema of a campaign file.
 pub fn campaign_schema() -> Value {

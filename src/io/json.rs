@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindingGraph;
-use crate::search::exact::{Certificate, Status};
-use crate::search::worst_case::WorstCase;
+use crate::search::cost::worst_case::WorstCase;
+use crate::search::proof::{Certificate, Status};
 use crate::units::deg_per_h_from_rad_per_s;
 
 /// Raised when a key changes its meaning or goes; new keys do not raise it.

@@ -11,8 +11,8 @@ use crate::pattern::windability::WindabilityClass;
 use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;
 use crate::schedule::production::Production;
-use crate::search::objective::Objective;
-use crate::search::tolerance::ToleranceSpec;
+use crate::search::cost::objective::Objective;
+use crate::search::cost::tolerance::ToleranceSpec;
 use crate::thermal::{self, DEFAULT_CELLS_PER_LAYER, Extent, Location, Material};
 use crate::units::{m_from_mm, m_from_nm, m_from_um};
 

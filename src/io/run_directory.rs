@@ -13,9 +13,9 @@ use super::model_file::{ModelFile, NamedPattern};
 use super::pattern_file::print_pattern;
 use super::schedule_file::sha256_hex;
 use crate::pattern::windability::WindabilityClass;
-use crate::search::objective::Objective;
-use crate::search::optimise::{Plan, RoundRecord, State};
-use crate::search::verdict::{GridCheck, Judged};
+use crate::search::anneal::rounds::{Plan, RoundRecord, State};
+use crate::search::cost::objective::Objective;
+use crate::search::evaluator::{GridCheck, Judged};
 use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
 
 impl PatternJson {

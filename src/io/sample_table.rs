@@ -1,6 +1,6 @@
 //! The samples of a proof as a table, for other solvers.
 
-use crate::search::exact::rows::Row;
+use crate::search::proof::rows::Row;
 use crate::units::deg_per_h_from_rad_per_s;
 
 /// One sample a line: the constant and a coefficient a layer [°/h], so that Ω = constant + Σ_j a_j (2 P(j) − 1 − N).

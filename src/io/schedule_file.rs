@@ -12,7 +12,7 @@ use crate::pattern::Half;
 use crate::pattern::windability::WindingGraph;
 use crate::schedule::production::Production;
 use crate::schedule::{Rotation, Schedule, Step};
-use crate::search::worst_case::WorstCase;
+use crate::search::cost::worst_case::WorstCase;
 use crate::thermal::Flange;
 use crate::units::{deg_per_h_from_rad_per_s, mm_from_m, nm_from_m, percent_from_fraction, um_from_m};
 

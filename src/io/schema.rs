@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 
 use crate::effect::{CATALOGUE, CHANNEL, CUSTOM, EffectSpec};
 use crate::pattern::classic::Classic;
-use crate::search::objective::Objective;
+use crate::search::cost::objective::Objective;
 
 use super::json::SCHEMA_VERSION;
 use super::schedule_reader::STEP_COLUMNS;

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::search::tolerance::{Distribution, Measure, ToleranceSpec};
+use crate::search::cost::tolerance::{Distribution, Measure, ToleranceSpec};
 use crate::units::deg_per_h_from_rad_per_s;
 
 #[derive(Debug, Serialize)]

@@ -1,6 +1,6 @@
 //! The `[tolerance]` table of a model file: how much what is built spreads.
 
-use crate::search::tolerance::ToleranceSpec;
+use crate::search::cost::tolerance::ToleranceSpec;
 use crate::units::{fraction_from_percent, m_from_mm, rad_per_s_from_deg_per_h};
 
 use super::toml_reader::{Limits, TableReader, TomlReader};

@@ -13,8 +13,8 @@ use crate::io::schedule_file::sha256_hex;
 use crate::pattern::{Pattern, PatternError};
 use crate::profile::Profile;
 use crate::rate::RateModel;
-use crate::search::tolerance::{Measure, ToleranceError, ToleranceSpec, measure, study};
-use crate::search::worst_case::{SearchError, SolvedProfiles};
+use crate::search::cost::tolerance::{Measure, ToleranceError, ToleranceSpec, measure, study};
+use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
 use crate::units::{
     REFERENCE_TEMPERATURE_K, c_per_h_from_k_per_s, deg_per_h_from_rad_per_s, min_from_s, percent_from_fraction,
 };

@@ -16,7 +16,7 @@ use crate::coil::{Coil, CoilError, CoilSpec, Fibre, LayerLength};
 use crate::pattern::classic::Classic;
 use crate::profile::{Piece, Profile};
 use crate::rate::{CoilModel, RateModel};
-use crate::search::worst_case::{SearchError, SolvedProfiles};
+use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
 use crate::thermal::{DEFAULT_CELLS_PER_LAYER, Drive, Extent, Field, Instant, Location, Material, solve};
 use crate::units::{
     REFERENCE_TEMPERATURE_K, k_per_s_from_c_per_h, m_from_mm, m_from_nm, m_from_um, rad_per_s_from_deg_per_h,

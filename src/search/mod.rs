@@ -1,18 +1,8 @@
-//! What the best pattern is: worst cases, objectives, annealing, proofs.
+//! What the best pattern is: costs, annealing, proofs.
 
 pub mod anneal;
-pub mod builds;
-pub mod columns;
-pub mod exact;
-pub mod guaranteed;
-pub mod limits;
-pub mod objective;
-pub mod optimise;
+pub mod compile;
+pub mod cost;
+pub mod evaluator;
 pub mod pareto;
-pub mod robust;
-pub mod samples;
-pub mod signs;
-pub mod tolerance;
-pub mod verdict;
-pub mod walk;
-pub mod worst_case;
+pub mod proof;

@@ -1,7 +1,7 @@
 //! The trade-off between a small error and an easy winding: what nothing else beats in every respect.
 
-use super::verdict::Judged;
 use crate::pattern::windability::{Windability, WindingGraph};
+use crate::search::evaluator::Judged;
 
 /// A pattern with everything that it is weighed by; less is better throughout.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,7 +65,7 @@ pub fn front(points: &[Point]) -> Vec<Point> {
 mod tests {
     use super::*;
     use crate::pattern::Pattern;
-    use crate::search::worst_case::WorstCase;
+    use crate::search::cost::worst_case::WorstCase;
 
     fn point(segments: &[usize], objective_rad_per_s: f64) -> Point {
         let worst =

@@ -4,11 +4,12 @@
 use coilwright::pattern::Pattern;
 use coilwright::pattern::windability::WindabilityClass;
 use coilwright::profile::ProfileSpec;
-use coilwright::search::objective::Objective;
-use coilwright::search::optimise::{Optimisation, Plan, Rules, default_moves_per_restart};
-use coilwright::search::signs::segments_of_signs;
-use coilwright::search::verdict::Bench;
-use coilwright::search::worst_case::SolvedProfiles;
+use coilwright::search::anneal::rounds::{Optimisation, Plan, Rounds, Rules, default_moves_per_restart};
+use coilwright::search::anneal::sample_cost::SampleCost;
+use coilwright::search::cost::objective::Objective;
+use coilwright::search::cost::signs::segments_of_signs;
+use coilwright::search::cost::worst_case::SolvedProfiles;
+use coilwright::search::evaluator::Evaluator;
 use coilwright::units::{deg_per_h_from_rad_per_s, k_per_s_from_c_per_h};
 
 use crate::paper::{paper_model, paper_ramp};
@@ -24,23 +25,22 @@ fn profiles(count: usize) -> ProfileSpec {
     }
 }
 
-fn search(bench: &Bench, class: WindabilityClass, seed: u64) -> f64 {
+fn search(bench: &Evaluator, class: WindabilityClass, seed: u64) -> f64 {
     let matrix = bench.objective.of_profiles(bench.model, bench.solved).unwrap();
     let plan = Plan {
         seed,
-        norm: bench.objective.norm(),
         restarts_per_round: 8,
         moves_per_restart: default_moves_per_restart(12) / 4,
         rules: Rules { rounds: 20, patience: 2, moves: None, target: None },
         starts: vec![],
     };
-    let mut search = Optimisation::new(matrix, class, plan);
+    let mut search = Optimisation::new(SampleCost::new(matrix, class, bench.objective.norm()), plan);
     while search.advance() {}
     bench.best(class, &search.state().found, &[]).unwrap().unwrap().objective_rad_per_s
 }
 
 /// Patterns in the order of their largest sample, which the reference cannot be below, until no further one can win.
-fn exhaustive_minimum(bench: &Bench) -> f64 {
+fn exhaustive_minimum(bench: &Evaluator) -> f64 {
     let matrix = bench.objective.of_profiles(bench.model, bench.solved).unwrap();
     let patterns = (0..1u32 << 11).map(|bits| {
         let high: Vec<bool> = (0..11).map(|m| bits >> m & 1 == 1).collect();
@@ -64,8 +64,14 @@ fn twenty_seeds_of_twenty_find_the_exhaustive_minimum_over_2048_standard_pattern
     let (model, profiles) = (paper_model(200.0, 2.7e-7), profiles(64));
     let solved = SolvedProfiles::new(&model, &profiles.profiles()).unwrap();
     for objective in [Objective::WorstRate, Objective::RootMeanSquare] {
-        let bench =
-            Bench { model: &model, solved: &solved, objective, unit_step: None, profiles: &profiles, tolerance: None };
+        let bench = Evaluator {
+            model: &model,
+            solved: &solved,
+            objective,
+            unit_step: None,
+            profiles: &profiles,
+            tolerance: None,
+        };
         let smallest = exhaustive_minimum(&bench);
         println!("{}: exhaustive minimum {:.6} °/h", objective.key(), deg_per_h_from_rad_per_s(smallest));
         for seed in 1..=20 {
@@ -81,7 +87,7 @@ fn without_the_class_limit_the_paper_coil_does_far_better_than_a_quadrupole() {
     let solved = SolvedProfiles::new(&model, &profiles.profiles()).unwrap();
     let objective = Objective::WorstRate;
     let bench =
-        Bench { model: &model, solved: &solved, objective, unit_step: None, profiles: &profiles, tolerance: None };
+        Evaluator { model: &model, solved: &solved, objective, unit_step: None, profiles: &profiles, tolerance: None };
     let baselines = bench.baselines().unwrap();
     let qua = baselines.iter().find(|b| b.name == "qua").unwrap().objective_rad_per_s;
     let any = search(&bench, WindabilityClass::Any, 1);

@@ -7,7 +7,7 @@ use coilwright::coil::{Coil, CoilSpec, Fibre, LayerLength};
 use coilwright::pattern::classic::Classic;
 use coilwright::profile::{Piece, Profile};
 use coilwright::rate::{CoilModel, RateModel};
-use coilwright::search::worst_case::SolvedProfiles;
+use coilwright::search::cost::worst_case::SolvedProfiles;
 use coilwright::thermal::{
     DEFAULT_CELLS_PER_LAYER, Drive, Extent, Instant, Location, Material, StepResponse, ThermalHistory, solve,
 };

@@ -4,7 +4,7 @@
 //! max_s |Ω_s| ≥ Σ_s y_s Ω_s   for any y with Σ |y_s| ≤ 1
 //! ```
 //!
-//! A blend is a row like any other, so the rearrangement bound of [`orders`](super::orders) holds for it. Single rows
+//! A blend is a row like any other, so the rearrangement bound of [`permutation_tree`](super::permutation_tree) holds for it. Single rows
 //! bound little, because the open layers can nearly always cancel what is placed in one sample; they cannot in all
 //! samples at once, and the best y says so. It is the dual solution of the relaxation in which the open layers share
 //! the open places in any proportions (the permutahedron), so the best blend's bound is the linear relaxation's, without
@@ -18,8 +18,8 @@
 //! # Source
 //! Kelley, J. SIAM 8, 703 (1960), cutting planes; Dantzig and Wolfe, Oper. Res. 8, 101 (1960).
 
-use super::game;
-use super::orders::{Node, Orders, Places};
+use super::matrix_game;
+use super::permutation_tree::{Node, PermutationTree, Places};
 use super::rows::Row;
 
 /// Nodes of a level from which the next level's are made while learning, times the square of the layers.
@@ -54,7 +54,7 @@ pub type Weights = Vec<(usize, f64)>;
 
 /// Finds blends for nodes.
 #[derive(Debug)]
-pub struct Blender<'a> {
+pub struct Surrogates<'a> {
     rows: &'a [Row],
     /// For each kind of term and layer: the factors of all rows.
     factors: Vec<Vec<Vec<f64>>>,
@@ -72,7 +72,7 @@ enum Verdict {
     Open(Weights),
 }
 
-impl<'a> Blender<'a> {
+impl<'a> Surrogates<'a> {
     pub fn new(rows: &'a [Row], lengths_m: &[f64], has_difference: bool, has_axial: bool) -> Self {
         let layers = lengths_m.len();
         let of_rows: Vec<Vec<Vec<f64>>> =
@@ -90,7 +90,7 @@ impl<'a> Blender<'a> {
     }
 
     /// Gives every level of a search the bounds that refute most.
-    pub fn teach(&self, orders: &mut Orders, limit_rad_per_s: f64, mirrored: bool) -> Lesson {
+    pub fn teach(&self, orders: &mut PermutationTree, limit_rad_per_s: f64, mirrored: bool) -> Lesson {
         let breadth = (BREADTH_TIMES_LAYERS_SQUARED / self.layers.pow(2)).clamp(1, MOST_BREADTH);
         let mut used = vec![false; self.rows.len()];
         let mut places = Places::default();
@@ -134,7 +134,7 @@ impl<'a> Blender<'a> {
         }
         Lesson {
             used: (0..used.len()).filter(|&s| used[s]).collect(),
-            open: frontier.iter().map(|(node, _)| Orders::segments(node)).collect(),
+            open: frontier.iter().map(|(node, _)| PermutationTree::segments(node)).collect(),
         }
     }
 
@@ -153,7 +153,7 @@ impl<'a> Blender<'a> {
         for _ in 0..MOST_STEPS {
             let payoffs: Vec<Vec<f64>> =
                 columns.iter().map(|column| active.iter().map(|&(s, sign)| sign * column[s]).collect()).collect();
-            let game = game::solve(&payoffs);
+            let game = matrix_game::solve(&payoffs);
             let weights: Weights = active
                 .iter()
                 .zip(&game.rows)
@@ -290,7 +290,7 @@ mod tests {
     }
 
     /// Nodes that a search under a limit leaves open, and the leaves among them.
-    fn open_nodes(orders: &Orders, node: &mut Node, limit: f64) -> (usize, usize) {
+    fn open_nodes(orders: &PermutationTree, node: &mut Node, limit: f64) -> (usize, usize) {
         let mut found = (0, usize::from(node.open == 0));
         for place in 0..LAYERS {
             if orders.place(node, place, true) {
@@ -309,9 +309,9 @@ mod tests {
         let rows = rows();
         let lengths_m = [1.0; LAYERS];
         let best = smallest_by_enumeration(&rows, &mut Vec::new());
-        let blender = Blender::new(&rows, &lengths_m, false, false);
+        let blender = Surrogates::new(&rows, &lengths_m, false, false);
         let open = |limit: f64| {
-            let mut orders = Orders::new(&lengths_m, WindabilityClass::Any, false, None);
+            let mut orders = PermutationTree::new(&lengths_m, WindabilityClass::Any, false, None);
             blender.teach(&mut orders, limit, true);
             open_nodes(&orders, &mut orders.root(), limit)
         };
@@ -319,7 +319,7 @@ mod tests {
         assert_eq!(leaves, 1, "{nodes}");
         assert!(nodes < 100, "{nodes}");
         // A beam of 48 of the 6! / 2 patterns leads to the best one.
-        let mut orders = Orders::new(&lengths_m, WindabilityClass::Any, false, None);
+        let mut orders = PermutationTree::new(&lengths_m, WindabilityClass::Any, false, None);
         let limit = 1.05 * best;
         blender.teach(&mut orders, limit, true);
         let found = promising(&orders, limit, true, 48);

@@ -175,7 +175,7 @@ impl SolvedProfile {
     }
 
     /// The rate error with its sign and the time at which its size is largest.
-    pub(super) fn worst(&self, rate_model: &RateModel) -> (f64, f64) {
+    pub(in crate::search) fn worst(&self, rate_model: &RateModel) -> (f64, f64) {
         let series = rate_model.series_rad_per_s(&self.history);
         let largest = series.iter().map(|r| r.abs()).fold(0.0, f64::max);
         let (mut best_rate, mut best_time_s) = (0.0_f64, 0.0);
@@ -210,7 +210,7 @@ mod tests {
     use super::*;
     use crate::coil::LayerLength;
     use crate::pattern::classic::Classic;
-    use crate::search::samples::tests::model;
+    use crate::search::cost::samples::tests::model;
 
     #[test]
     fn what_comes_after_a_profile_is_what_a_soak_at_its_end_would_show_and_can_be_the_worst() {

@@ -9,27 +9,27 @@
 //! |---|---|---|
 //! | D_bj | what G(0+) and each change of G owe to a unit weight of layer j in half A | `Part::columns` |
 //! | ρ_bj | half B's response over half A's | `Part::half_b_over_a` |
-//! | w_bj | the layer weights of coil b, whose lengths are its own | `Build::lengths_m` |
+//! | w_bj | the layer weights of coil b, whose lengths are its own | `SampledCoil::lengths_m` |
 //!
 //! Where electronics heat the bore, W is the largest of all partial sums plus the size of the heat's error at their
 //! ends. Where the model has no guaranteed worst case, W is the largest |v| over the instants at which probing patterns
 //! were seen to be worst under the declared profiles.
 //!
 //! Every coil is solved once. W falls short of the coil's true worst case only by what lies between the times that were
-//! compiled, so it is never above it; what is reported is judged by [`super::tolerance`] on the same coils.
+//! compiled, so it is never above it; what is reported is judged by [`crate::search::cost::tolerance`] on the same coils.
 //!
 //! # Source
 //! The same random numbers for every candidate: Law, Simulation Modeling and Analysis (2015), section 11.2.
 
 use rayon::prelude::*;
 
-use super::guaranteed::UnitStep;
-use super::samples::{SampleMatrix, any_rate_model};
-use super::tolerance::{Coils, Measure, ToleranceError, quantile};
-use super::worst_case::{SearchError, SolvedProfiles};
 use crate::pattern::{Pattern, axial_direction};
 use crate::profile::ProfileSpec;
 use crate::rate::{CoilModel, WeightResponse, segment_weights_m2};
+use crate::search::cost::guaranteed::UnitStep;
+use crate::search::cost::samples::{SampleMatrix, any_rate_model};
+use crate::search::cost::tolerance::{Coils, Measure, ToleranceError, quantile};
+use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
 use crate::thermal::{Drive, Instant, solve};
 use crate::units::REFERENCE_TEMPERATURE_K;
 
@@ -45,10 +45,10 @@ const MOST_INSTANTS: usize = 256;
 
 /// Every drawn coil, ready to be judged with any pattern.
 #[derive(Debug, Clone)]
-pub struct Builds {
+pub struct SampledCoils {
     layers: usize,
     share: f64,
-    builds: Vec<Build>,
+    coils: Vec<SampledCoil>,
 }
 
 /// A linear map from layer weights to samples.
@@ -77,7 +77,7 @@ enum Worst {
 }
 
 #[derive(Debug, Clone)]
-struct Build {
+struct SampledCoil {
     lengths_m: Vec<f64>,
     worst: Worst,
 }
@@ -161,7 +161,7 @@ fn ratio(a: &[f64], b: &[f64]) -> Option<f64> {
     a.iter().zip(b).all(|(a, b)| (b - ratio * a).abs() <= ROUNDING * largest * ratio.abs()).then_some(ratio)
 }
 
-impl Build {
+impl SampledCoil {
     fn worst(&self, pattern: &Arrangement, scratch: &mut Scratch) -> f64 {
         pattern.weigh(&self.lengths_m, scratch);
         let mut values = std::mem::take(&mut scratch.values);
@@ -238,31 +238,30 @@ impl<'a> Arrangement<'a> {
     }
 }
 
-impl Builds {
+impl SampledCoils {
     /// Solves every coil of a study; `probes` are patterns that show when coils without a guaranteed worst case err most.
     ///
     /// # Errors
-    /// As [`super::tolerance::study`].
+    /// As [`crate::search::cost::tolerance::study`].
     pub fn new(coils: &Coils, probes: &[Pattern]) -> Result<Self, ToleranceError> {
         let layers = coils.model().coil.layers();
-        let builds = match coils.measure() {
+        let coils = match coils.measure() {
             Measure::Guaranteed => {
-                let compile = |model: CoilModel| -> Result<Build, ToleranceError> {
+                let compile = |model: CoilModel| -> Result<SampledCoil, ToleranceError> {
                     let step = UnitStep::new(&model, coils.profiles().max_rate_k_per_s)?;
-                    Build::guaranteed(&model, &step, STRIDE)
+                    SampledCoil::guaranteed(&model, &step, STRIDE)
                 };
-                coils.built().map(|model| compile(model?)).collect::<Result<Vec<Build>, ToleranceError>>()?
+                coils.built().map(|model| compile(model?)).collect::<Result<Vec<SampledCoil>, ToleranceError>>()?
             }
             Measure::Sampled => {
                 let instants = binding_instants(coils.model(), coils.profiles(), probes)?;
-                coils.built().map(|model| Ok(Build::sampled(&model?, coils.profiles(), &instants)?)).collect::<Result<
-                    Vec<Build>,
-                    ToleranceError,
-                >>(
-                )?
+                coils
+                    .built()
+                    .map(|model| Ok(SampledCoil::sampled(&model?, coils.profiles(), &instants)?))
+                    .collect::<Result<Vec<SampledCoil>, ToleranceError>>()?
             }
         };
-        Ok(Self { layers, share: SHARE, builds })
+        Ok(Self { layers, share: SHARE, coils })
     }
 
     /// The coil as declared and nothing else: its guaranteed worst case, the bore's heat included.
@@ -270,7 +269,7 @@ impl Builds {
     /// # Errors
     /// Effects that leave a layer no turns.
     pub fn nominal(model: &CoilModel, step: &UnitStep) -> Result<Self, ToleranceError> {
-        Ok(Self { layers: model.coil.layers(), share: SHARE, builds: vec![Build::guaranteed(model, step, 1)?] })
+        Ok(Self { layers: model.coil.layers(), share: SHARE, coils: vec![SampledCoil::guaranteed(model, step, 1)?] })
     }
 
     /// The coil as declared and nothing else: its sampled worst case.
@@ -279,8 +278,8 @@ impl Builds {
     /// Models that cannot be solved.
     pub fn declared(model: &CoilModel, profiles: &ProfileSpec, probes: &[Pattern]) -> Result<Self, SearchError> {
         let instants = binding_instants(model, profiles, probes)?;
-        let builds = vec![Build::sampled(model, profiles, &instants)?];
-        Ok(Self { layers: model.coil.layers(), share: SHARE, builds })
+        let coils = vec![SampledCoil::sampled(model, profiles, &instants)?];
+        Ok(Self { layers: model.coil.layers(), share: SHARE, coils })
     }
 
     pub fn layers(&self) -> usize {
@@ -289,20 +288,20 @@ impl Builds {
 
     /// Numbers held for all coils together.
     pub fn samples(&self) -> usize {
-        let rows = |build: &Build| match &build.worst {
+        let rows = |build: &SampledCoil| match &build.worst {
             Worst::Largest(part) | Worst::Variation(part) => part.rows,
             Worst::Heated(changes, heat) => changes.rows + heat.rows,
         };
-        self.builds.iter().map(rows).sum()
+        self.coils.iter().map(rows).sum()
     }
 
     /// The quantile of the worst cases with a pattern P(j), innermost layer first.
     pub fn cost(&self, segments: &[usize]) -> f64 {
-        BuiltWorst::new(self, segments).cost
+        QuantileWorst::new(self, segments).cost
     }
 }
 
-impl Build {
+impl SampledCoil {
     fn guaranteed(model: &CoilModel, step: &UnitStep, stride: usize) -> Result<Self, ToleranceError> {
         let coil = model.wound_coil().map_err(SearchError::from)?;
         let parts = step.parts(model, stride)?;
@@ -367,7 +366,7 @@ fn binding_instants(
 
 /// The worst case of every coil with the present pattern, and room for a proposal.
 #[derive(Debug, Clone)]
-pub struct BuiltWorst {
+pub struct QuantileWorst {
     worst: Vec<f64>,
     proposed: Vec<f64>,
     /// Coils with the largest worst cases first: they are the ones that refuse a move.
@@ -379,12 +378,12 @@ pub struct BuiltWorst {
     pub judged: u64,
 }
 
-impl BuiltWorst {
-    pub fn new(builds: &Builds, segments: &[usize]) -> Self {
+impl QuantileWorst {
+    pub fn new(coils: &SampledCoils, segments: &[usize]) -> Self {
         let mut scratch = Scratch::default();
         let pattern = Arrangement::new(segments);
-        let worst: Vec<f64> = builds.builds.iter().map(|build| build.worst(&pattern, &mut scratch)).collect();
-        let cost = quantile_of(&worst, builds.share);
+        let worst: Vec<f64> = coils.coils.iter().map(|build| build.worst(&pattern, &mut scratch)).collect();
+        let cost = quantile_of(&worst, coils.share);
         let mut state = Self {
             proposed: worst.clone(),
             order: (0..worst.len()).collect(),
@@ -392,7 +391,7 @@ impl BuiltWorst {
             cost,
             proposed_cost: cost,
             scratch,
-            judged: builds.builds.len() as u64,
+            judged: coils.coils.len() as u64,
         };
         state.sort();
         state
@@ -403,12 +402,12 @@ impl BuiltWorst {
     }
 
     /// The quantile with another pattern, or `None` as soon as so many coils are above `limit` that it must be too.
-    pub fn propose(&mut self, builds: &Builds, segments: &[usize], limit: f64) -> Option<f64> {
+    pub fn propose(&mut self, coils: &SampledCoils, segments: &[usize], limit: f64) -> Option<f64> {
         let pattern = Arrangement::new(segments);
-        let count = builds.builds.len();
-        let mut left = count - (builds.share * (count - 1) as f64).floor() as usize;
+        let count = coils.coils.len();
+        let mut left = count - (coils.share * (count - 1) as f64).floor() as usize;
         for &index in &self.order {
-            let worst = builds.builds[index].worst(&pattern, &mut self.scratch);
+            let worst = coils.coils[index].worst(&pattern, &mut self.scratch);
             self.judged += 1;
             self.proposed[index] = worst;
             if !(worst <= limit) {
@@ -418,7 +417,7 @@ impl BuiltWorst {
                 }
             }
         }
-        self.proposed_cost = quantile_of(&self.proposed, builds.share);
+        self.proposed_cost = quantile_of(&self.proposed, coils.share);
         (self.proposed_cost <= limit).then_some(self.proposed_cost)
     }
 

@@ -20,7 +20,7 @@
 //! kind factor times place, bounded in the same way and added. Because Σ_j w_j = 0 for every pattern, S may be shifted by
 //! a constant; it is shifted so that the open layers' mean is zero, which keeps what single precision loses small.
 //!
-//! A node is refuted where a bound of its level, a row or a blend of rows ([`blends`](super::blends)), is not below the
+//! A node is refuted where a bound of its level, a row or a blend of rows ([`surrogates`](super::surrogates)), is not below the
 //! limit. Levels are counted by open layers.
 //!
 //! The winding's class needs no more than the set of open places: a pattern has at most K captive runs if at every
@@ -29,8 +29,8 @@
 //! # Source
 //! Hardy, Littlewood, Pólya, Inequalities, theorem 368 (rearrangement).
 
-use super::lanes::{Block, Bound, LANES, Level, Shape};
 use super::rows::{Row, deviations_m};
+use super::simd_bounds::{Block, Bound, LANES, Level, Shape};
 use crate::pattern::windability::WindabilityClass;
 
 /// More layers than this do not fit the set of open places.
@@ -39,7 +39,7 @@ pub const MOST_LAYERS: usize = 64;
 /// A problem: lengths, class, and bounds by level. Lengths are in units of the innermost layer's, so that with equal
 /// lengths every place is an exact small integer.
 #[derive(Debug, Clone)]
-pub struct Orders {
+pub struct PermutationTree {
     layers: usize,
     lengths_m: Vec<f64>,
     lengths: Vec<f32>,
@@ -92,7 +92,7 @@ impl Node {
     }
 }
 
-impl Orders {
+impl PermutationTree {
     /// No bounds yet. `has_difference` where the halves respond differently in any row that will be given;
     /// `axial_sign` where any has an axial term.
     pub fn new(lengths_m: &[f64], class: WindabilityClass, has_difference: bool, axial_sign: Option<f32>) -> Self {

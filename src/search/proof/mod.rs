@@ -6,7 +6,7 @@
 //!
 //! What is proved is about the supremum itself and not about its samples. A lower bound over some instants is a lower
 //! bound over all of them, so parts of the space are refuted on a few samples; every pattern that is not refuted so is
-//! judged by the reference worst case, refined in time ([`worst_case`](crate::search::worst_case)). `Optimal` therefore
+//! judged by the reference worst case, refined in time ([`worst_case`](crate::search::cost::worst_case)). `Optimal` therefore
 //! means: no pattern of the class has a refined worst rate below the best one's by more than one part in 10⁹.
 //!
 //! The proof is built in passes. Each refutes every pattern whose worst rate is below a share of the best known rate;
@@ -16,8 +16,8 @@
 //!
 //! | class | space | method |
 //! |---|---|---|
-//! | `standard` | 2^(N−1) choices of ends | [`ends`]: two sets of sums and pairs of boxes |
-//! | `captive:K`, `any` | permutations | [`descent`]: outermost layer first, bounded by blends of samples ([`blends`]) |
+//! | `standard` | 2^(N−1) choices of ends | [`sign_search`]: two sets of sums and pairs of boxes |
+//! | `captive:K`, `any` | permutations | [`descent`]: outermost layer first, bounded by blends of samples ([`surrogates`]) |
 //!
 //! Where nothing tells the halves of the fibre apart and nothing is added outside the coil, a pattern and its mirror
 //! image s → N+1−s have opposite errors and one of the two is searched.
@@ -25,17 +25,17 @@
 //! Holds for the worst rate (and so the worst phase, a fixed multiple of it). Leaves out the rms objective.
 
 pub mod beam;
-pub mod blends;
+pub mod box_join;
+pub mod candidates;
 pub mod descent;
-pub mod ends;
-pub mod game;
-pub mod judge;
-pub mod lanes;
-pub mod orders;
-pub mod pairs;
+pub mod matrix_game;
+pub mod permutation_tree;
 pub mod rows;
 mod sampling;
+pub mod sign_search;
+pub mod simd_bounds;
 mod starts;
+pub mod surrogates;
 #[cfg(test)]
 mod tests;
 
@@ -44,14 +44,14 @@ pub use starts::starting_patterns;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use judge::{Candidate, Judge, Peak};
+use candidates::{Candidate, Judge, Peak};
 use rows::Row;
 use sampling::Proof;
 
-use super::worst_case::{SearchError, SolvedProfiles};
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::rate::CoilModel;
+use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
 
 /// What is to be proved.
 #[derive(Debug, Clone, Copy)]
@@ -175,7 +175,7 @@ pub const RELATIVE_TOLERANCE: f64 = 1e-9;
 /// Proves which pattern is best, beginning with the best of given patterns.
 ///
 /// # Errors
-/// A model that cannot be solved, a start that does not fit it; more than [`orders::MOST_LAYERS`] layers, or none
+/// A model that cannot be solved, a start that does not fit it; more than [`permutation_tree::MOST_LAYERS`] layers, or none
 /// of the class among the starts.
 pub fn prove(task: &Task, starts: &[Pattern], watcher: Watcher) -> Result<Certificate, SearchError> {
     let Begun { mut judge, mut best, mut proof } = begin(task, starts, 0.0)?;
@@ -237,8 +237,8 @@ struct Begun<'a> {
 
 fn begin<'a>(task: &Task<'a>, starts: &[Pattern], good_enough_rad_per_s: f64) -> Result<Begun<'a>, SearchError> {
     let layers = task.model.coil.layers();
-    if layers > orders::MOST_LAYERS {
-        return Err(SearchError::TooManyLayers { found: layers, most: orders::MOST_LAYERS });
+    if layers > permutation_tree::MOST_LAYERS {
+        return Err(SearchError::TooManyLayers { found: layers, most: permutation_tree::MOST_LAYERS });
     }
     let mut judge = Judge::new(task.model, task.solved)?;
     let mut best: Option<Candidate> = None;

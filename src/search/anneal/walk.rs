@@ -12,18 +12,13 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::Rng;
 
-use super::columns::{Change, Columns};
-use super::limits::{Limits, draw, most_captive, pick};
-use super::samples::SampleMatrix;
-use super::signs::{segments_of_signs, sign_columns, sign_value, signs_of_segments};
 use crate::pattern::axial_direction;
 use crate::pattern::windability::WindabilityClass;
 use crate::rate::segment_weights_m2;
-
-/// Uniform in (0, 1].
-pub(super) fn uniform(random: &mut ChaCha8Rng) -> f64 {
-    ((random.next_u64() >> 11) + 1) as f64 * (1.0 / (1u64 << 53) as f64)
-}
+use crate::search::anneal::limits::{Limits, draw, most_captive, pick};
+use crate::search::cost::columns::{Change, Columns};
+use crate::search::cost::samples::SampleMatrix;
+use crate::search::cost::signs::{segments_of_signs, sign_columns, sign_value, signs_of_segments};
 
 /// What is walked over: the class, and the columns that fit it.
 #[derive(Debug, Clone)]
@@ -311,9 +306,9 @@ mod tests {
     use crate::coil::LayerLength;
     use crate::pattern::Pattern;
     use crate::pattern::windability::WindingGraph;
-    use crate::search::columns::{Norm, Values};
-    use crate::search::samples::tests::{model, profiles};
-    use crate::search::worst_case::SolvedProfiles;
+    use crate::search::cost::columns::{Norm, Values};
+    use crate::search::cost::samples::tests::{model, profiles};
+    use crate::search::cost::worst_case::SolvedProfiles;
 
     #[test]
     fn counting_intervals_agrees_with_the_winding_graph() {

@@ -18,8 +18,8 @@
 //! interval by every layer outside it. So 2^(N−1) patterns are the corners of a cube, mirror images are opposite
 //! corners, a move is one sign, and the exact search is a closest-pair problem.
 
-use super::columns::Columns;
-use super::samples::SampleMatrix;
+use crate::search::cost::columns::Columns;
+use crate::search::cost::samples::SampleMatrix;
 
 /// The columns d_m; column k belongs to layer index k + 1.
 ///
@@ -91,8 +91,8 @@ mod tests {
     use crate::coil::LayerLength;
     use crate::pattern::Pattern;
     use crate::pattern::windability::WindabilityClass;
-    use crate::search::samples::tests::{model, profiles};
-    use crate::search::worst_case::SolvedProfiles;
+    use crate::search::cost::samples::tests::{model, profiles};
+    use crate::search::cost::worst_case::SolvedProfiles;
 
     #[test]
     fn signs_and_segments_are_two_names_of_every_standard_pattern_and_of_no_other() {

@@ -15,14 +15,9 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
-use super::columns::{Norm, Values, Work};
-use super::walk::{Space, Walk, uniform};
-
-/// Moves between two points at which a restart can be stopped, saved and taken up again.
-pub const SLICE_MOVES: u64 = 1 << 15;
-
-/// The temperature is renewed after so many moves.
-const MOVES_PER_TEMPERATURE: u64 = 32;
+use super::limits::uniform;
+use crate::search::cost::columns::Work;
+use crate::search::cost::{Cost, Position, Proposal};
 
 /// A geometric cooling schedule; temperatures in the unit of the cost.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,9 +54,9 @@ pub struct Restart {
 
 impl Restart {
     /// A restart from a given pattern, or from one that its own generator draws.
-    pub fn new(space: &Space, seed: u64, index: u64, start: Option<&[usize]>) -> Self {
+    pub fn new<C: Cost>(cost: &C, seed: u64, index: u64, start: Option<&[usize]>) -> Self {
         let mut random = generator(seed, index + 1);
-        let segments = start.map_or_else(|| space.draw(&mut random), <[usize]>::to_vec);
+        let segments = start.map_or_else(|| cost.draw(&mut random), <[usize]>::to_vec);
         Self {
             index,
             moves: 0,
@@ -78,59 +73,51 @@ impl Restart {
     }
 
     /// Goes on for a slice, or to the end of the schedule if that comes first.
-    pub fn advance(&mut self, space: &Space, norm: Norm, cooling: &Cooling) {
-        let mut walk = space.walk(self.segments.clone());
-        let mut values = Values::new(space.columns(), walk.coefficients(), norm);
-        if values.cost() < self.best_cost {
-            (self.best_cost, self.best_segments) = (values.cost(), walk.segments());
+    pub fn advance<C: Cost>(&mut self, cost: &C, cooling: &Cooling) {
+        let mut position = cost.at(&self.segments);
+        if position.cost() < self.best_cost {
+            (self.best_cost, self.best_segments) = (position.cost(), position.segments());
         }
-        let mut best: Option<Walk> = None;
-        let until = cooling.moves.min(self.moves + SLICE_MOVES);
+        let until = cooling.moves.min(self.moves + C::PACE.slice_moves);
         while self.moves < until {
             let temperature = cooling.temperature(self.moves);
-            let pause = until.min(self.moves + MOVES_PER_TEMPERATURE);
+            let pause = until.min(self.moves + C::PACE.moves_per_temperature);
             while self.moves < pause {
                 self.moves += 1;
-                let limit = values.cost() - temperature * libm::log(uniform(&mut self.random));
-                let Some(changes) = walk.propose(space, &mut self.random) else { continue };
-                if values.propose(space.columns(), changes, limit).is_some() {
-                    values.accept();
-                    walk.accept(space);
-                    if values.cost() < self.best_cost {
-                        self.best_cost = values.cost();
-                        best = Some(walk.clone());
+                let limit = position.cost() - temperature * libm::log(uniform(&mut self.random));
+                if let Proposal::Within(_) = position.propose(cost, &mut self.random, limit) {
+                    position.accept(cost);
+                    if position.cost() < self.best_cost {
+                        (self.best_cost, self.best_segments) = (position.cost(), position.segments());
                     }
-                } else {
-                    walk.refuse(space);
                 }
             }
         }
-        if let Some(best) = best {
-            self.best_segments = best.segments();
-        }
-        self.segments = walk.segments();
-        self.work += values.work;
+        self.segments = position.segments();
+        self.work += position.work();
     }
 }
 
-/// A schedule for a space: as hot as a typical move is large, cooled until no such move passes.
+/// A schedule for a cost: as hot as a typical move is large, cooled until no such move passes.
 ///
 /// Measured on random patterns and moves from stream 0 of the seed.
-pub fn cooling_for(space: &Space, norm: Norm, seed: u64, moves: u64) -> Cooling {
-    const PATTERNS: usize = 8;
-    const MOVES: usize = 32;
+pub fn cooling_for<C: Cost>(cost: &C, seed: u64, moves: u64) -> Cooling {
     let mut random = generator(seed, 0);
     let (mut total, mut count) = (0.0, 0usize);
-    for _ in 0..PATTERNS {
-        let mut walk = space.walk(space.draw(&mut random));
-        let mut values = Values::new(space.columns(), walk.coefficients(), norm);
-        for _ in 0..MOVES {
-            if let Some(changes) = walk.propose(space, &mut random) {
-                let cost = values.propose(space.columns(), changes, f64::INFINITY).unwrap_or(values.cost());
-                total += (cost - values.cost()).abs();
-                count += 1;
-            }
-            walk.refuse(space);
+    for _ in 0..C::PACE.probed_patterns {
+        let mut position = cost.at(&cost.draw(&mut random));
+        for _ in 0..C::PACE.probed_moves {
+            let changed = match position.propose(cost, &mut random, f64::INFINITY) {
+                Proposal::Outside => continue,
+                // A cost that is no number changes nothing.
+                Proposal::Refused => position.cost(),
+                Proposal::Within(changed) => {
+                    position.refuse(cost);
+                    changed
+                }
+            };
+            total += (changed - position.cost()).abs();
+            count += 1;
         }
     }
     let typical = total / count.max(1) as f64;
@@ -148,43 +135,45 @@ mod tests {
     use super::*;
     use crate::coil::LayerLength;
     use crate::pattern::windability::WindabilityClass;
-    use crate::search::samples::SampleMatrix;
-    use crate::search::samples::tests::{model, profiles};
-    use crate::search::worst_case::SolvedProfiles;
+    use crate::search::anneal::sample_cost::SampleCost;
+    use crate::search::cost::columns::Norm;
+    use crate::search::cost::samples::SampleMatrix;
+    use crate::search::cost::samples::tests::{model, profiles};
+    use crate::search::cost::worst_case::SolvedProfiles;
 
-    fn space(class: WindabilityClass) -> Space {
+    fn cost(class: WindabilityClass) -> SampleCost {
         let model = model(10, LayerLength::Actual, &[]);
         let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
-        Space::new(SampleMatrix::of_profiles(&model, &solved).unwrap().0, class)
+        SampleCost::new(SampleMatrix::of_profiles(&model, &solved).unwrap().0, class, Norm::Largest)
     }
 
     #[test]
     fn a_restart_that_is_cut_and_taken_up_again_ends_as_the_unbroken_one() {
-        let space = space(WindabilityClass::Any);
-        let cooling = cooling_for(&space, Norm::Largest, 5, 3 * SLICE_MOVES);
-        let mut unbroken = Restart::new(&space, 5, 2, None);
+        let cost = cost(WindabilityClass::Any);
+        let cooling = cooling_for(&cost, 5, 3 * SampleCost::PACE.slice_moves);
+        let mut unbroken = Restart::new(&cost, 5, 2, None);
         let mut broken = unbroken.clone();
         while !unbroken.is_done(&cooling) {
-            unbroken.advance(&space, Norm::Largest, &cooling);
+            unbroken.advance(&cost, &cooling);
         }
         while !broken.is_done(&cooling) {
             let saved = broken.clone();
-            broken.advance(&space, Norm::Largest, &cooling);
+            broken.advance(&cost, &cooling);
             broken = saved;
-            broken.advance(&space, Norm::Largest, &cooling);
+            broken.advance(&cost, &cooling);
         }
         assert_eq!(unbroken, broken);
     }
 
     #[test]
     fn most_moves_are_refused_after_one_block_of_samples() {
-        let space = space(WindabilityClass::Any);
-        let cooling = cooling_for(&space, Norm::Largest, 1, SLICE_MOVES);
-        let mut restart = Restart::new(&space, 1, 0, None);
-        restart.advance(&space, Norm::Largest, &cooling);
+        let cost = cost(WindabilityClass::Any);
+        let cooling = cooling_for(&cost, 1, SampleCost::PACE.slice_moves);
+        let mut restart = Restart::new(&cost, 1, 0, None);
+        restart.advance(&cost, &cooling);
         let Work { moves, accepted, samples } = restart.work;
-        assert_eq!(moves, SLICE_MOVES);
+        assert_eq!(moves, SampleCost::PACE.slice_moves);
         assert!(accepted > 0 && accepted < moves / 4, "{accepted} of {moves}");
-        assert!(samples < moves * space.matrix().samples() as u64 / 2, "{samples} of {moves}");
+        assert!(samples < moves * cost.samples() as u64 / 2, "{samples} of {moves}");
     }
 }

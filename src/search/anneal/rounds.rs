@@ -2,21 +2,14 @@
 //!
 //! A round is a fixed number of restarts, advanced slice by slice in parallel. Each has a generator of its own, and
 //! what they found is gathered in their order, so the result depends on the seed alone and not on threads. Between
-//! slices the whole state is a plain value ([`Optimisation::state`]) that can be saved and taken up again.
-//!
-//! Under a largest-value objective the restarts run on a working set of samples: a thinned grid and whatever was seen
-//! to bind. What a restart found is judged on all samples; every sample that exceeds the working set's value joins the
-//! set for the next rounds. The working set's cost is never above the true one, so nothing good is lost by it, and
-//! nothing is reported that was not judged in full.
+//! slices the whole state is a plain value ([`State`]) that can be saved and taken up again.
 
 use rayon::prelude::*;
 
-use super::anneal::{Cooling, Restart, cooling_for, generator};
-use super::columns::{BLOCK, Norm, Work};
-use super::samples::SampleMatrix;
-use super::walk::Space;
+use super::restart::{Cooling, Restart, cooling_for};
 use crate::pattern::Pattern;
-use crate::pattern::windability::WindabilityClass;
+use crate::search::cost::columns::Work;
+use crate::search::cost::{Cost, InFull};
 
 /// When a search ends; whichever rule fires first.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,7 +28,6 @@ pub struct Rules {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     pub seed: u64,
-    pub norm: Norm,
     pub restarts_per_round: usize,
     pub moves_per_restart: u64,
     pub rules: Rules,
@@ -177,108 +169,86 @@ impl State {
 /// Patterns kept for the final judgement by the reference.
 pub const MOST_FOUND: usize = 24;
 
-/// A search under way.
+/// A search under way, whatever it makes small.
 #[derive(Debug)]
-pub struct Optimisation {
-    full: Space,
+pub struct Optimisation<C: Cost> {
+    full: C,
     plan: Plan,
     cooling: Cooling,
-    working: Space,
+    /// What the restarts run on, where it is not all of it.
+    working: Option<C>,
     state: State,
 }
 
-impl Optimisation {
-    pub fn new(matrix: SampleMatrix, class: WindabilityClass, plan: Plan) -> Self {
-        let full = Space::new(matrix, class);
-        let working = first_working_set(&full, &plan);
-        let state = State::new(working);
-        let mut search = Self::resume_parts(full, plan, state);
+/// A search in rounds that can be stopped, saved and taken up between slices, whatever it judges by.
+pub trait Rounds {
+    /// Advances every restart by one slice; true while there is more to do.
+    fn advance(&mut self) -> bool;
+
+    /// Judges what the restarts of an unfinished round have found so far. For the last answer of a search that is
+    /// stopped from outside; save its state before.
+    fn gather(&mut self);
+
+    /// Ends the search for a reason from outside.
+    fn conclude(&mut self, stop: Stop);
+
+    fn state(&self) -> &State;
+
+    fn plan(&self) -> &Plan;
+
+    /// The best pattern so far, if a round has ended or a start was given.
+    fn best(&self) -> Option<&Found> {
+        self.state().found.first()
+    }
+
+    /// Moves judged so far.
+    fn evaluations(&self) -> u64 {
+        self.state().work.moves + self.state().restarts.iter().map(|r| r.work.moves).sum::<u64>()
+    }
+}
+
+impl<C: Cost> Optimisation<C> {
+    pub fn new(cost: C, plan: Plan) -> Self {
+        let working = cost.first_working_set(plan.seed, &plan.starts);
+        let mut search = Self::resume_parts(cost, plan, State::new(working));
         for start in search.plan.starts.clone() {
-            search.judge(start);
+            search.judge(&start);
         }
         search.begin_round();
         search
     }
 
     /// Goes on from a saved state; everything else must be as it was when it was saved. `None` for a state that no
-    /// search over this matrix and class can have been in.
-    pub fn resume(matrix: SampleMatrix, class: WindabilityClass, plan: Plan, state: State) -> Option<Self> {
-        let full = Space::new(matrix, class);
+    /// search for this cost can have been in.
+    pub fn resume(cost: C, plan: Plan, state: State) -> Option<Self> {
         let is_pattern = |segments: &Vec<usize>| {
-            segments.len() == full.layers() && Pattern::new(segments.clone()).is_ok() && full.admits(segments)
+            segments.len() == cost.layers() && Pattern::new(segments.clone()).is_ok() && cost.admits(segments)
         };
-        let samples = full.matrix().samples();
-        let fits = state.working.iter().all(|&s| s < samples)
+        let runs_on_all = cost.first_working_set(plan.seed, &plan.starts).is_empty();
+        let fits = state.working.iter().all(|&s| s < cost.samples())
+            && state.working.is_empty() == runs_on_all
             && state.found.iter().all(|f| is_pattern(&f.segments))
             && state.restarts.iter().all(|r| is_pattern(&r.segments) && is_pattern(&r.best_segments))
             && (state.stop.is_some() || state.restarts.len() == plan.restarts_per_round);
-        fits.then(|| Self::resume_parts(full, plan, state))
+        fits.then(|| Self::resume_parts(cost, plan, state))
     }
 
-    fn resume_parts(full: Space, plan: Plan, state: State) -> Self {
-        let working = Space::new(full.matrix().select(&state.working), full.class());
-        let cooling = cooling_for(&full, plan.norm, plan.seed, plan.moves_per_restart);
+    fn resume_parts(full: C, plan: Plan, state: State) -> Self {
+        let working = (!state.working.is_empty()).then(|| full.select(&state.working));
+        let cooling = cooling_for(&full, plan.seed, plan.moves_per_restart);
         Self { full, plan, cooling, working, state }
     }
 
-    pub fn state(&self) -> &State {
-        &self.state
-    }
-
-    pub fn plan(&self) -> &Plan {
-        &self.plan
-    }
-
-    /// The best pattern so far; there is one as soon as a round has ended or a start was given.
-    pub fn best(&self) -> Option<&Found> {
-        self.state.found.first()
-    }
-
-    /// Moves judged so far.
-    pub fn evaluations(&self) -> u64 {
-        self.state.work.moves + self.state.restarts.iter().map(|r| r.work.moves).sum::<u64>()
-    }
-
-    /// How much of the present round is done, from 0 to 1.
-    pub fn round_progress(&self) -> f64 {
-        let done: u64 = self.state.restarts.iter().map(|r| r.moves).sum();
-        done as f64 / (self.plan.moves_per_restart * self.plan.restarts_per_round as u64) as f64
-    }
-
-    /// Advances every restart by one slice; true while there is more to do.
-    pub fn advance(&mut self) -> bool {
-        if self.state.stop.is_some() {
-            return false;
-        }
-        let (space, cooling, norm) = (&self.working, &self.cooling, self.plan.norm);
-        self.state.restarts.par_iter_mut().filter(|r| !r.is_done(cooling)).for_each(|restart| {
-            restart.advance(space, norm, cooling);
-        });
-        if self.state.restarts.iter().all(|r| r.is_done(&self.cooling)) || self.has_reached_target() {
-            self.end_round();
-        }
-        self.state.stop.is_none()
+    fn running(&self) -> &C {
+        self.working.as_ref().unwrap_or(&self.full)
     }
 
     /// Whether a restart has come upon something that is good enough on all samples: its round then ends early.
     fn has_reached_target(&self) -> bool {
         self.plan.rules.target.is_some_and(|target| {
             let promising = self.state.restarts.iter().filter(|r| r.best_cost <= target);
-            promising.map(|r| self.plan.norm.of(&values_of(&self.full, &r.best_segments))).any(|cost| cost <= target)
+            promising.map(|r| self.full.in_full(&r.best_segments, &[]).cost).any(|cost| cost <= target)
         })
-    }
-
-    /// Ends the search for a reason from outside.
-    pub fn conclude(&mut self, stop: Stop) {
-        self.state.conclude(stop);
-    }
-
-    /// Judges what the restarts of an unfinished round have found so far. For the last answer of a search that is
-    /// stopped from outside; save its state before.
-    pub fn gather(&mut self) {
-        for restart in self.state.restarts.clone() {
-            self.judge(restart.best_segments);
-        }
     }
 
     fn begin_round(&mut self) {
@@ -287,7 +257,7 @@ impl Optimisation {
         self.state.restarts = (first..first + count)
             .map(|index| {
                 let start = self.plan.starts.get(index as usize).map(Vec::as_slice);
-                Restart::new(&self.working, self.plan.seed, index, start)
+                Restart::new(self.running(), self.plan.seed, index, start)
             })
             .collect();
     }
@@ -298,9 +268,10 @@ impl Optimisation {
         let mut joining = Vec::new();
         for restart in restarts {
             self.state.work += restart.work;
-            joining.extend(self.judge(restart.best_segments));
+            joining.extend(self.judge(&restart.best_segments));
         }
-        self.state.end_round(&self.plan.rules, before, self.state.working.len());
+        let samples = self.running().samples();
+        self.state.end_round(&self.plan.rules, before, samples);
         if self.state.stop.is_none() {
             self.renew_working_set(joining);
             self.begin_round();
@@ -308,109 +279,80 @@ impl Optimisation {
     }
 
     /// Judges a pattern on all samples and keeps it if it is among the best; the samples that exceed the working set.
-    fn judge(&mut self, segments: Vec<usize>) -> Vec<usize> {
-        let layers = segments.len();
-        let values = values_of(&self.full, &segments);
-        let cost = self.plan.norm.of(&values);
-        // Of a pattern and its mirror image, if both cost the same, the one that comes first.
-        let mirrored: Vec<usize> = segments.iter().map(|s| layers + 1 - s).collect();
-        let mirrored_cost = self.plan.norm.of(&values_of(&self.full, &mirrored));
-        let same = (mirrored_cost - cost).abs() <= 1e-12 * cost;
-        let kept = if same && mirrored < segments { mirrored } else { segments };
-        self.state.keep(Found { cost, segments: kept });
-        if self.plan.norm != Norm::Largest {
-            return Vec::new();
-        }
-        let working = self.state.working.iter().map(|&s| values[s].abs()).fold(0.0, f64::max);
-        peaks(&values, working * (1.0 + 1e-9))
+    fn judge(&mut self, segments: &[usize]) -> Vec<usize> {
+        let InFull { cost, segments, joining } = self.full.in_full(segments, &self.state.working);
+        self.state.keep(Found { cost, segments });
+        joining
     }
 
     /// Adds samples and puts those first that bind the best patterns.
     fn renew_working_set(&mut self, mut joining: Vec<usize>) {
+        if self.working.is_none() {
+            return;
+        }
         joining.sort_unstable();
         joining.dedup();
-        let mut is_in = vec![false; self.full.matrix().samples()];
+        let mut is_in = vec![false; self.full.samples()];
         for &s in &self.state.working {
             is_in[s] = true;
         }
         joining.retain(|&s| !is_in[s]);
         self.state.working.extend(joining);
-        if self.plan.norm == Norm::Largest {
-            let patterns: Vec<&[usize]> = self.state.found.iter().map(|f| f.segments.as_slice()).collect();
-            order_by_binding(&self.full, &patterns, &mut self.state.working);
+        let best: Vec<&[usize]> = self.state.found.iter().map(|f| f.segments.as_slice()).collect();
+        self.full.order_working_set(&best, &mut self.state.working);
+        self.working = Some(self.full.select(&self.state.working));
+    }
+}
+
+impl<C: Cost> Rounds for Optimisation<C> {
+    fn advance(&mut self) -> bool {
+        if self.state.stop.is_some() {
+            return false;
         }
-        self.working = Space::new(self.full.matrix().select(&self.state.working), self.full.class());
-    }
-}
-
-fn values_of(space: &Space, segments: &[usize]) -> Vec<f64> {
-    space.columns().values(space.walk(segments.to_vec()).coefficients())
-}
-
-/// The local maxima of |v| above a limit.
-fn peaks(values: &[f64], limit: f64) -> Vec<usize> {
-    let size = |i: usize| values[i].abs();
-    (0..values.len())
-        .filter(|&i| {
-            size(i) > limit && (i == 0 || size(i) >= size(i - 1)) && (i + 1 == values.len() || size(i) >= size(i + 1))
-        })
-        .collect()
-}
-
-/// Every so many-th sample is in the first working set.
-const THINNING: usize = 8;
-const PROBED_PATTERNS: usize = 64;
-
-/// A thinned grid and the samples that bind random patterns; all samples where they are few or all of them count.
-fn first_working_set(full: &Space, plan: &Plan) -> Vec<usize> {
-    let samples = full.matrix().samples();
-    if plan.norm != Norm::Largest {
-        return (0..samples).collect();
-    }
-    let mut random = generator(plan.seed, 0);
-    let drawn: Vec<Vec<usize>> = (0..PROBED_PATTERNS).map(|_| full.draw(&mut random)).collect();
-    let mut working: Vec<usize> = if samples <= THINNING * BLOCK {
-        (0..samples).collect()
-    } else {
-        let binding = drawn.iter().chain(&plan.starts).flat_map(|segments| {
-            let values = values_of(full, segments);
-            peaks(&values, 0.9 * plan.norm.of(&values))
+        let (cost, cooling) = (self.working.as_ref().unwrap_or(&self.full), &self.cooling);
+        self.state.restarts.par_iter_mut().filter(|r| !r.is_done(cooling)).for_each(|restart| {
+            restart.advance(cost, cooling);
         });
-        binding.chain((0..samples).step_by(THINNING)).collect()
-    };
-    working.sort_unstable();
-    working.dedup();
-    let patterns: Vec<&[usize]> = drawn.iter().map(Vec::as_slice).collect();
-    order_by_binding(full, &patterns, &mut working);
-    working
-}
+        if self.state.restarts.iter().all(|r| r.is_done(&self.cooling)) || self.has_reached_target() {
+            self.end_round();
+        }
+        self.state.stop.is_none()
+    }
 
-/// Puts first the samples that come nearest to the largest value under given patterns.
-fn order_by_binding(full: &Space, patterns: &[&[usize]], samples: &mut [usize]) {
-    let mut scores = vec![0.0_f64; full.matrix().samples()];
-    for segments in patterns {
-        let values = values_of(full, segments);
-        let largest = Norm::Largest.of(&values);
-        if largest > 0.0 {
-            for (score, v) in scores.iter_mut().zip(&values) {
-                *score += (v / largest).powi(8);
-            }
+    fn gather(&mut self) {
+        for restart in self.state.restarts.clone() {
+            self.judge(&restart.best_segments);
         }
     }
-    samples.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]).then(a.cmp(&b)));
+
+    fn conclude(&mut self, stop: Stop) {
+        self.state.conclude(stop);
+    }
+
+    fn state(&self) -> &State {
+        &self.state
+    }
+
+    fn plan(&self) -> &Plan {
+        &self.plan
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::coil::LayerLength;
-    use crate::search::samples::tests::{model, profiles};
-    use crate::search::signs::{segments_of_signs, sign_columns, sign_value};
-    use crate::search::worst_case::SolvedProfiles;
+    use crate::pattern::windability::WindabilityClass;
+    use crate::search::anneal::sample_cost::SampleCost;
+    use crate::search::cost::columns::Norm;
+    use crate::search::cost::samples::SampleMatrix;
+    use crate::search::cost::samples::tests::{model, profiles};
+    use crate::search::cost::signs::{segments_of_signs, sign_columns, sign_value};
+    use crate::search::cost::worst_case::SolvedProfiles;
 
-    fn plan(norm: Norm, seed: u64) -> Plan {
+    fn plan(seed: u64) -> Plan {
         let rules = Rules { rounds: 8, patience: 2, moves: None, target: None };
-        Plan { seed, norm, restarts_per_round: 4, moves_per_restart: 4000, rules, starts: vec![] }
+        Plan { seed, restarts_per_round: 4, moves_per_restart: 4000, rules, starts: vec![] }
     }
 
     #[test]
@@ -427,7 +369,8 @@ mod tests {
                         norm.of(&columns.values(&high))
                     })
                     .fold(f64::INFINITY, f64::min);
-                let mut search = Optimisation::new(matrix.clone(), WindabilityClass::Standard, plan(norm, 3));
+                let mut search =
+                    Optimisation::new(SampleCost::new(matrix.clone(), WindabilityClass::Standard, norm), plan(3));
                 while search.advance() {}
                 let found = search.best().unwrap();
                 assert!((found.cost / smallest - 1.0).abs() < 1e-9, "{layers} layers, {norm:?}");
@@ -440,9 +383,9 @@ mod tests {
         let model = model(8, LayerLength::Equal, &[]);
         let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
         let (matrix, _) = SampleMatrix::of_profiles(&model, &solved).unwrap();
-        let mut plan = plan(Norm::Largest, 1);
+        let mut plan = plan(1);
         plan.rules = Rules { rounds: 2, patience: 9, moves: None, target: None };
-        let mut search = Optimisation::new(matrix, WindabilityClass::Any, plan);
+        let mut search = Optimisation::new(SampleCost::new(matrix, WindabilityClass::Any, Norm::Largest), plan);
         while search.advance() {}
         assert_eq!(search.evaluations(), 2 * 4 * 4000);
         assert_eq!(search.state().stop, Some(Stop::Rounds));
@@ -456,17 +399,18 @@ mod tests {
         let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
         let (matrix, _) = SampleMatrix::of_profiles(&model, &solved).unwrap();
         let search = |target: Option<f64>| {
-            let mut plan = plan(Norm::Largest, 1);
-            plan.moves_per_restart = 4 * crate::search::anneal::SLICE_MOVES;
+            let mut plan = plan(1);
+            plan.moves_per_restart = 4 * SampleCost::PACE.slice_moves;
             plan.rules = Rules { rounds: 1, patience: 9, moves: None, target };
-            let mut search = Optimisation::new(matrix.clone(), WindabilityClass::Any, plan);
+            let mut search =
+                Optimisation::new(SampleCost::new(matrix.clone(), WindabilityClass::Any, Norm::Largest), plan);
             while search.advance() {}
             search
         };
         let best_cost = search(None).best().unwrap().cost;
         let reached = search(Some(3.0 * best_cost));
         assert_eq!(reached.state().stop, Some(Stop::Target));
-        assert_eq!(reached.evaluations(), 4 * crate::search::anneal::SLICE_MOVES);
+        assert_eq!(reached.evaluations(), 4 * SampleCost::PACE.slice_moves);
         assert!(reached.best().unwrap().cost <= 3.0 * best_cost);
         assert_eq!(reached.state().first_with_best().unwrap().evaluations, reached.evaluations());
         assert_eq!(search(Some(0.5 * best_cost)).state().stop, Some(Stop::Rounds));
@@ -478,13 +422,13 @@ mod tests {
         let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
         let (matrix, _) = SampleMatrix::of_profiles(&model, &solved).unwrap();
         let start = segments_of_signs(&[true, false, false, true, true, false, true]);
-        let space = Space::new(matrix.clone(), WindabilityClass::Standard);
-        let cost = Norm::Largest.of(&values_of(&space, &start));
-        let mut plan = plan(Norm::Largest, 1);
+        let sampled = SampleCost::new(matrix.clone(), WindabilityClass::Standard, Norm::Largest);
+        let cost = sampled.in_full(&start, &[]).cost;
+        let mut plan = plan(1);
         plan.starts = vec![start];
         plan.moves_per_restart = 1;
         plan.restarts_per_round = 1;
-        let mut search = Optimisation::new(matrix, WindabilityClass::Standard, plan);
+        let mut search = Optimisation::new(sampled, plan);
         while search.advance() {}
         assert!(search.best().unwrap().cost <= cost);
     }

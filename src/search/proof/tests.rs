@@ -4,10 +4,10 @@ use std::ops::ControlFlow;
 
 use super::*;
 use crate::coil::LayerLength;
-use crate::search::columns::Norm;
-use crate::search::samples::SampleMatrix;
-use crate::search::samples::tests::{model, profiles};
-use crate::search::signs::segments_of_signs;
+use crate::search::cost::columns::Norm;
+use crate::search::cost::samples::SampleMatrix;
+use crate::search::cost::samples::tests::{model, profiles};
+use crate::search::cost::signs::segments_of_signs;
 
 fn patterns_of(class: WindabilityClass, layers: usize) -> Vec<Pattern> {
     if class == WindabilityClass::Standard {

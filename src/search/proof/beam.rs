@@ -1,7 +1,7 @@
 //! A broad and shallow look at the permutations: the pattern that a proof should begin with.
 //!
 //! Level by level, outermost layer first, the nodes with the smallest bounds are kept and the rest let go. The bounds are
-//! those of the proof ([`orders`](super::orders)), so that what is kept is what the relaxation holds to be nearest to
+//! those of the proof ([`permutation_tree`](super::permutation_tree)), so that what is kept is what the relaxation holds to be nearest to
 //! the best; it proves nothing, and what it finds is judged as everything else. A better pattern to begin with is
 //! a lower limit for the whole proof.
 //!
@@ -10,10 +10,10 @@
 
 use rayon::prelude::*;
 
-use super::orders::{Node, Orders, Places};
+use super::permutation_tree::{Node, PermutationTree, Places};
 
 /// Patterns whose bounds stay below the limit, most promising first, at most `width`.
-pub fn promising(orders: &Orders, limit_rad_per_s: f64, mirrored: bool, width: usize) -> Vec<Vec<usize>> {
+pub fn promising(orders: &PermutationTree, limit_rad_per_s: f64, mirrored: bool, width: usize) -> Vec<Vec<usize>> {
     let limit = limit_rad_per_s as f32;
     let mut kept = vec![(0.0, orders.root())];
     for _ in 0..orders.layers() {
@@ -40,5 +40,5 @@ pub fn promising(orders: &Orders, limit_rad_per_s: f64, mirrored: bool, width: u
         next.sort_unstable_by(order);
         kept = next;
     }
-    kept.iter().map(|(_, node)| Orders::segments(node)).collect()
+    kept.iter().map(|(_, node)| PermutationTree::segments(node)).collect()
 }

@@ -32,13 +32,13 @@
 
 use thiserror::Error;
 
-use super::samples::{SampleMatrix, any_rate_model};
-use super::worst_case::SearchError;
 use crate::numeric::maximise::golden_section;
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::pattern::Pattern;
 use crate::profile::{Piece, Profile};
 use crate::rate::{CoilModel, RateModel, WeightResponse};
+use crate::search::cost::samples::{SampleMatrix, any_rate_model};
+use crate::search::cost::worst_case::SearchError;
 use crate::thermal::{Drive, Field, Instant, StepResponse, ThermalHistory, solve};
 use crate::units::REFERENCE_TEMPERATURE_K;
 
@@ -199,7 +199,7 @@ impl UnitStep {
         Ok(found)
     }
 
-    /// The bound as a sum of sizes over samples, for any pattern: minimise it with [`super::columns::Norm::Sum`]. It falls
+    /// The bound as a sum of sizes over samples, for any pattern: minimise it with [`crate::search::cost::columns::Norm::Sum`]. It falls
     /// short of the bound only by what the grid's extremes miss, and by the bore's heat where there is any.
     ///
     /// # Errors
@@ -311,9 +311,9 @@ mod tests {
     use crate::effect::{self, DeclaredEffect};
     use crate::pattern::classic::Classic;
     use crate::profile::ProfileSpec;
-    use crate::search::columns::Norm;
-    use crate::search::samples::tests::model;
-    use crate::search::worst_case::SolvedProfiles;
+    use crate::search::cost::columns::Norm;
+    use crate::search::cost::samples::tests::model;
+    use crate::search::cost::worst_case::SolvedProfiles;
     use crate::thermal::Extent;
 
     const RATE_K_PER_S: f64 = 10.0 / 3600.0;

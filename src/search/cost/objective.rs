@@ -1,9 +1,9 @@
 //! What a search makes small.
 
-use super::columns::Norm;
-use super::samples::SampleMatrix;
-use super::worst_case::{SearchError, SolvedProfiles};
 use crate::rate::{CoilModel, RateModel};
+use crate::search::cost::columns::Norm;
+use crate::search::cost::samples::SampleMatrix;
+use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
 
 /// What a search makes small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -69,8 +69,8 @@ impl Objective {
     /// Moves of a restart for a layer count.
     pub fn default_moves_per_restart(self, layers: usize) -> u64 {
         match self {
-            Objective::P95 => super::robust::default_moves_per_restart(layers),
-            _ => super::optimise::default_moves_per_restart(layers),
+            Objective::P95 => crate::search::anneal::quantile::default_moves_per_restart(layers),
+            _ => crate::search::anneal::rounds::default_moves_per_restart(layers),
         }
     }
 

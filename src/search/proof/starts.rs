@@ -3,10 +3,13 @@
 use super::Task;
 use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
-use crate::search::columns::Norm;
-use crate::search::optimise::{DEFAULT_RESTARTS_PER_ROUND, Optimisation, Plan, Rules, default_moves_per_restart};
-use crate::search::samples::SampleMatrix;
-use crate::search::worst_case::SearchError;
+use crate::search::anneal::rounds::{
+    DEFAULT_RESTARTS_PER_ROUND, Optimisation, Plan, Rounds, Rules, default_moves_per_restart,
+};
+use crate::search::anneal::sample_cost::SampleCost;
+use crate::search::cost::columns::Norm;
+use crate::search::cost::samples::SampleMatrix;
+use crate::search::cost::worst_case::SearchError;
 
 /// Rounds without a better pattern after which the short search ends.
 const PATIENCE: u64 = 2;
@@ -31,13 +34,12 @@ pub fn starting_patterns(task: &Task, seed: u64) -> Result<Vec<Pattern>, SearchE
     let (matrix, _) = SampleMatrix::of_profiles(task.model, task.solved)?;
     let plan = Plan {
         seed,
-        norm: Norm::Largest,
         restarts_per_round: DEFAULT_RESTARTS_PER_ROUND,
         moves_per_restart: default_moves_per_restart(layers) / SHORTENED,
         rules: Rules { rounds: u64::MAX, patience: PATIENCE, moves: None, target: None },
         starts: Vec::new(),
     };
-    let mut search = Optimisation::new(matrix, task.class, plan);
+    let mut search = Optimisation::new(SampleCost::new(matrix, task.class, Norm::Largest), plan);
     while search.advance() {}
     let found = search.state().found.iter().take(MOST_FOUND);
     let found = found.map(|f| Pattern::new(f.segments.clone()).expect("a walk visits permutations only"));

@@ -13,7 +13,7 @@
 //! | S_j, D_j | their mean and half their difference; D = 0 where the halves respond alike | `Row::mean`, `Row::difference` |
 //! | X_j | response of the axial moment's weight | `Row::axial` |
 
-use crate::search::samples::SampleMatrix;
+use crate::search::cost::samples::SampleMatrix;
 
 /// One sample's coefficients, one entry a layer, innermost first.
 #[derive(Debug, Clone, PartialEq)]

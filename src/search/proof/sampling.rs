@@ -1,20 +1,20 @@
 //! Which samples a proof runs on, and the search over them.
 //!
 //! Samples at which patterns near the best known ones are worst come first; for permutations, a grid over all samples
-//! joins them, and blends of them are learnt ([`blends`](super::blends)). Where a pass leaves too much to be judged in
+//! joins them, and blends of them are learnt ([`surrogates`](super::surrogates)). Where a pass leaves too much to be judged in
 //! full, the samples that refuted it join and the pass is repeated.
 
 use super::beam::promising;
-use super::blends::{Blender, Lesson};
+use super::candidates::{Candidate, Judge};
 use super::descent::search;
-use super::ends::Ends;
-use super::judge::{Candidate, Judge};
-use super::orders::Orders;
+use super::permutation_tree::PermutationTree;
 use super::rows::Row;
+use super::sign_search::SignSearch;
+use super::surrogates::{Lesson, Surrogates};
 use super::{Outcome, RELATIVE_TOLERANCE, Watch};
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
-use crate::search::signs::{segments_of_signs, signs_of_segments};
+use crate::search::cost::signs::{segments_of_signs, signs_of_segments};
 
 /// Samples that a search over ends begins with, and the most that it may grow to.
 const FIRST_ENDS_ROWS: usize = 16;
@@ -41,9 +41,9 @@ fn usual_width(layers: usize) -> usize {
 
 #[derive(Debug)]
 enum Engine {
-    Ends(Box<Ends>),
+    SignSearch(Box<SignSearch>),
     /// One search, or two where the first layer's direction matters.
-    Orders(Vec<Orders>),
+    PermutationTree(Vec<PermutationTree>),
 }
 
 /// A search over chosen samples.
@@ -90,7 +90,7 @@ impl Proof {
     /// are kept.
     pub fn look_ahead(&mut self, judge: &mut Judge, best: &mut Candidate, width: usize, good_enough_rad_per_s: f64) {
         while best.rate_rad_per_s > good_enough_rad_per_s {
-            let Engine::Orders(directions) = &self.engine else { break };
+            let Engine::PermutationTree(directions) = &self.engine else { break };
             let limit_rad_per_s = best.rate_rad_per_s * (1.0 - RELATIVE_TOLERANCE);
             let mut outcome = Outcome::default();
             for orders in directions {
@@ -158,8 +158,8 @@ impl Proof {
         let mut whole = Outcome::default();
         loop {
             let outcome = match &self.engine {
-                Engine::Ends(ends) => ends.search(judge, limit_rad_per_s, watch),
-                Engine::Orders(directions) => {
+                Engine::SignSearch(ends) => ends.search(judge, limit_rad_per_s, watch),
+                Engine::PermutationTree(directions) => {
                     let mut outcome = Outcome::default();
                     for orders in directions {
                         outcome.absorb(search(orders, judge, limit_rad_per_s, self.mirrored, watch));
@@ -225,16 +225,16 @@ fn engine(
     let lengths_m = judge.lengths_m();
     if class == WindabilityClass::Standard {
         let lesson = Lesson { used: samples.to_vec(), open: Vec::new() };
-        return (Engine::Ends(Box::new(Ends::new(&rows, lengths_m, mirrored))), lesson);
+        return (Engine::SignSearch(Box::new(SignSearch::new(&rows, lengths_m, mirrored))), lesson);
     }
     let layout = judge.matrix().layout;
     let signs: &[Option<f32>] = if layout.axial { &[Some(1.0), Some(-1.0)] } else { &[None] };
-    let blender = Blender::new(&rows, lengths_m, !layout.halves_alike, layout.axial);
+    let blender = Surrogates::new(&rows, lengths_m, !layout.halves_alike, layout.axial);
     let mut whole = Lesson::default();
     let directions = signs
         .iter()
         .map(|&sign| {
-            let mut orders = Orders::new(lengths_m, class, !layout.halves_alike, sign);
+            let mut orders = PermutationTree::new(lengths_m, class, !layout.halves_alike, sign);
             let lesson = blender.teach(&mut orders, best_rad_per_s, mirrored);
             whole.used.extend(lesson.used.iter().map(|&row| samples[row]));
             whole.open.extend(lesson.open);
@@ -243,7 +243,7 @@ fn engine(
         .collect();
     whole.used.sort_unstable();
     whole.used.dedup();
-    (Engine::Orders(directions), whole)
+    (Engine::PermutationTree(directions), whole)
 }
 
 /// Patterns one step away from given ones: two layers exchanged, or one or two layers at the other end.

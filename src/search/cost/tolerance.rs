@@ -27,13 +27,13 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use statrs::statistics::Statistics;
 use thiserror::Error;
 
-use super::guaranteed::{GuaranteedError, UnitStep};
-use super::worst_case::{SearchError, SolvedProfiles};
 use crate::coil::CoilError;
 use crate::effect::{self, DeclaredEffect};
 use crate::pattern::Pattern;
 use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;
+use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
+use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
 
 /// Spreads of what is built, as standard deviations; zero: exact.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,7 +112,7 @@ impl Distribution {
     }
 
     pub fn p95_rad_per_s(&self) -> f64 {
-        self.quantile_rad_per_s(super::builds::SHARE)
+        self.quantile_rad_per_s(crate::search::cost::sampled_coils::SHARE)
     }
 
     pub fn p99_rad_per_s(&self) -> f64 {
@@ -257,7 +257,7 @@ impl<'a> Coils<'a> {
         let of = |p: usize| {
             let mut ascending: Vec<f64> = worst.iter().map(|coil| coil[p]).collect();
             ascending.sort_by(f64::total_cmp);
-            quantile(&ascending, super::builds::SHARE)
+            quantile(&ascending, crate::search::cost::sampled_coils::SHARE)
         };
         Ok((0..patterns.len()).map(of).collect())
     }
@@ -425,7 +425,7 @@ mod tests {
     use super::*;
     use crate::coil::LayerLength;
     use crate::pattern::classic::Classic;
-    use crate::search::samples::tests::{model, profiles};
+    use crate::search::cost::samples::tests::{model, profiles};
 
     fn profile_spec() -> ProfileSpec {
         let listed = profiles();

@@ -2,18 +2,18 @@
 
 use thiserror::Error;
 
-use super::exact::orders::MOST_LAYERS;
-use super::exact::{Effort, Improvement, Task, improve};
-use super::guaranteed::{GuaranteedError, UnitStep};
-use super::objective::Objective;
-use super::optimise::Found;
-use super::tolerance::{Coils, ToleranceError, ToleranceSpec};
-use super::worst_case::{SearchError, SolvedProfiles, WorstCase};
 use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
 use crate::pattern::windability::WindabilityClass;
 use crate::profile::{Profile, ProfileSpec};
 use crate::rate::{CoilModel, RateModel};
+use crate::search::anneal::rounds::Found;
+use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
+use crate::search::cost::objective::Objective;
+use crate::search::cost::tolerance::{Coils, ToleranceError, ToleranceSpec};
+use crate::search::cost::worst_case::{SearchError, SolvedProfiles, WorstCase};
+use crate::search::proof::permutation_tree::MOST_LAYERS;
+use crate::search::proof::{Effort, Improvement, Task, improve};
 use crate::thermal::{Extent, Location};
 use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
 
@@ -45,7 +45,7 @@ pub struct Judged {
 
 /// What a pattern is judged by.
 #[derive(Debug, Clone, Copy)]
-pub struct Bench<'a> {
+pub struct Evaluator<'a> {
     pub model: &'a CoilModel,
     pub solved: &'a SolvedProfiles,
     pub objective: Objective,
@@ -123,7 +123,7 @@ impl GridCheck {
 /// Relative difference below which two patterns count as equally good.
 pub const EQUALLY_GOOD: f64 = 1e-9;
 
-impl Bench<'_> {
+impl Evaluator<'_> {
     /// # Errors
     /// A pattern of another layer count; an objective that the model has not.
     pub fn judge(&self, name: &str, pattern: &Pattern) -> Result<Judged, JudgeError> {
@@ -134,7 +134,7 @@ impl Bench<'_> {
     /// Patterns by their names; built coils are drawn and solved once for all of them.
     ///
     /// # Errors
-    /// As [`Bench::judge`].
+    /// As [`Evaluator::judge`].
     pub fn judge_all(&self, named: &[(String, Pattern)]) -> Result<Vec<Judged>, JudgeError> {
         let p95_rad_per_s = if self.objective == Objective::P95 {
             let patterns: Vec<Pattern> = named.iter().map(|(_, pattern)| pattern.clone()).collect();
@@ -166,7 +166,7 @@ impl Bench<'_> {
         let or_none = |value: Option<f64>| value.unwrap_or(f64::INFINITY);
         let objective_rad_per_s = match self.objective {
             Objective::WorstRate | Objective::WorstPhase => worst.rate_rad_per_s.abs(),
-            Objective::RootMeanSquare => super::objective::rms_rad_per_s(&rate_model, self.solved),
+            Objective::RootMeanSquare => crate::search::cost::objective::rms_rad_per_s(&rate_model, self.solved),
             Objective::GuaranteedRate => or_none(guaranteed_rad_per_s),
             Objective::P95 => or_none(p95),
         };
@@ -217,7 +217,7 @@ impl Bench<'_> {
         Ok(Some(GridCheck { cells_per_layer: path.cells_per_layer, finer_cells_per_layer, patterns }))
     }
 
-    /// Whether [`Bench::improved`] can be expected to prove what is best, so that a search may try it early.
+    /// Whether [`Evaluator::improved`] can be expected to prove what is best, so that a search may try it early.
     pub fn is_provable(&self, class: WindabilityClass) -> bool {
         let layers = self.model.coil.layers();
         let lengths_m = self.model.coil.layer_lengths_m();
@@ -378,7 +378,7 @@ fn how_much_less(factor: f64) -> String {
 mod tests {
     use super::*;
     use crate::coil::LayerLength;
-    use crate::search::samples::tests::{model, profiles};
+    use crate::search::cost::samples::tests::{model, profiles};
 
     #[test]
     fn a_search_is_checked_on_a_grid_twice_as_fine_and_cautioned_where_that_changes_much() {
@@ -394,11 +394,17 @@ mod tests {
         };
         let solved = SolvedProfiles::new(&declared, &profiles).unwrap();
         let objective = Objective::WorstRate;
-        let bench =
-            Bench { model: &declared, solved: &solved, objective, unit_step: None, profiles: &spec, tolerance: None };
-        let baselines = bench.baselines().unwrap();
+        let evaluator = Evaluator {
+            model: &declared,
+            solved: &solved,
+            objective,
+            unit_step: None,
+            profiles: &spec,
+            tolerance: None,
+        };
+        let baselines = evaluator.baselines().unwrap();
         let of = |name: &str| baselines.iter().find(|b| b.name == name).unwrap();
-        let check = bench.grid_check(of("dip"), &baselines).unwrap().unwrap();
+        let check = evaluator.grid_check(of("dip"), &baselines).unwrap().unwrap();
         assert_eq!((check.cells_per_layer, check.finer_cells_per_layer), (1, 2));
         let finer = CoilModel { cells_per_layer: 2, ..declared.clone() };
         let finer_solved = SolvedProfiles::new(&finer, &profiles).unwrap();
@@ -416,7 +422,7 @@ mod tests {
         assert_eq!([-0.006, -0.004, 0.004, 0.006].map(cautioned), [true, false, false, true]);
 
         let half_space = CoilModel { extent: Extent::HalfSpace, ..declared.clone() };
-        let bench = Bench { model: &half_space, ..bench };
-        assert_eq!(bench.grid_check(of("dip"), &baselines).unwrap(), None);
+        let evaluator = Evaluator { model: &half_space, ..evaluator };
+        assert_eq!(evaluator.grid_check(of("dip"), &baselines).unwrap(), None);
     }
 }

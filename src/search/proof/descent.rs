@@ -1,14 +1,14 @@
 //! The search over permutations: a descent from the outermost layer inwards.
 //!
-//! [`orders`](super::orders) bounds what a node can lead to.
+//! [`permutation_tree`](super::permutation_tree) bounds what a node can lead to.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
-use super::judge::Judge;
-use super::orders::{Node, Orders, Places};
+use super::candidates::Judge;
+use super::permutation_tree::{Node, PermutationTree, Places};
 use super::{Outcome, Watch};
 
 /// Pieces of work that are shared out: more than threads, and always the same.
@@ -25,7 +25,7 @@ const NODES_PER_PAUSE: u64 = 1 << 12;
 /// What all pieces of a search share.
 #[derive(Clone, Copy)]
 struct Search<'a, 'w> {
-    orders: &'a Orders,
+    orders: &'a PermutationTree,
     judge: &'a Judge<'a>,
     limit_rad_per_s: f64,
     mirrored: bool,
@@ -34,7 +34,7 @@ struct Search<'a, 'w> {
 }
 
 /// Judges every pattern that may stay under the limit.
-pub fn search(orders: &Orders, judge: &Judge, limit_rad_per_s: f64, mirrored: bool, watch: &Watch) -> Outcome {
+pub fn search(orders: &PermutationTree, judge: &Judge, limit_rad_per_s: f64, mirrored: bool, watch: &Watch) -> Outcome {
     let mut outcome = Outcome::default();
     let mut shares = vec![orders.root()];
     let mut places = Places::default();
@@ -90,7 +90,7 @@ impl Descent<'_, '_> {
     fn descend(&mut self, node: &mut Node) -> ControlFlow<()> {
         let Search { orders, judge, limit_rad_per_s, mirrored, most_nodes, watch } = self.search;
         if node.open == 0 {
-            return self.found.judge(judge, &Orders::segments(node), limit_rad_per_s, watch);
+            return self.found.judge(judge, &PermutationTree::segments(node), limit_rad_per_s, watch);
         }
         for place in 0..orders.layers() {
             if !orders.place(node, place, mirrored) {

@@ -12,11 +12,11 @@
 
 use rayon::prelude::*;
 
-use super::columns::{Columns, Norm};
-use super::worst_case::{SearchError, SolvedProfiles};
 use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
 use crate::rate::{CoilModel, LayerWeights, RateError, RateModel, WeightResponse};
+use crate::search::cost::columns::{Columns, Norm};
+use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
 use crate::thermal::Instant;
 
 /// Which column belongs to which layer and half.
@@ -213,7 +213,7 @@ pub fn any_rate_model(model: &CoilModel) -> Result<RateModel, SearchError> {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(in crate::search) mod tests {
     use super::*;
     use crate::coil::{Coil, CoilSpec, Fibre, LayerLength};
     use crate::effect::{self, DeclaredEffect};

@@ -1,18 +1,18 @@
 //! The class `standard`, searched as a choice of signs: which end of what is inside it each layer lies at.
 //!
-//! With the columns d_m of [`signs`](crate::search::signs) the error is c + Σ ε_m d_m in every sample, for any layer
+//! With the columns d_m of [`signs`](crate::search::cost::signs) the error is c + Σ ε_m d_m in every sample, for any layer
 //! lengths, plus what lies between known bounds where the halves respond differently or something varies along the
-//! axis. The signs are cut into two sets of at most 2^20 sums each; [`pairs`](super::pairs) finds every pair of sums
+//! axis. The signs are cut into two sets of at most 2^20 sums each; [`box_join`](super::box_join) finds every pair of sums
 //! that stays under the limit. What signs are left over are tried one choice after the other. Where a pattern's mirror
 //! image has the opposite error, the outermost sign is fixed.
 
 use rayon::prelude::*;
 
-use super::judge::Judge;
-use super::pairs::{Matching, Step, Target, Tree};
+use super::box_join::{Matching, Step, Target, Tree};
+use super::candidates::Judge;
 use super::rows::{Range, Row};
 use super::{Outcome, Watch};
-use crate::search::signs::segments_of_signs;
+use crate::search::cost::signs::segments_of_signs;
 
 /// Sums in either set, as a power of two: 16 samples of them fit 64 MB.
 const MOST_BITS: usize = 20;
@@ -25,7 +25,7 @@ const SHARES: usize = 256;
 
 /// A choice of samples, made ready.
 #[derive(Debug)]
-pub struct Ends {
+pub struct SignSearch {
     rows: Vec<PreparedRow>,
     left: Tree,
     right: Tree,
@@ -46,7 +46,7 @@ struct PreparedRow {
     rounding: f64,
 }
 
-impl Ends {
+impl SignSearch {
     pub fn new(rows: &[Row], lengths_m: &[f64], mirrored: bool) -> Self {
         let signs = lengths_m.len() - 1;
         let rows: Vec<PreparedRow> = rows

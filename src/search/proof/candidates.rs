@@ -8,9 +8,9 @@ use super::{Outcome, Watch};
 use crate::coil::Coil;
 use crate::pattern::Pattern;
 use crate::rate::{CoilModel, LayerWeights, RateError, RateModel};
-use crate::search::columns::{BLOCK, Norm};
-use crate::search::samples::{SampleMatrix, any_rate_model};
-use crate::search::worst_case::{SearchError, SolvedProfiles};
+use crate::search::cost::columns::{BLOCK, Norm};
+use crate::search::cost::samples::{SampleMatrix, any_rate_model};
+use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
 use crate::thermal::Instant;
 
 /// A pattern and its worst rate by the reference, refined in time.

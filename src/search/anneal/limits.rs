@@ -3,8 +3,13 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::Rng;
 
-use super::signs::{segments_of_signs, signs_of_segments};
 use crate::pattern::windability::WindabilityClass;
+use crate::search::cost::signs::{segments_of_signs, signs_of_segments};
+
+/// Uniform in (0, 1].
+pub(super) fn uniform(random: &mut ChaCha8Rng) -> f64 {
+    ((random.next_u64() >> 11) + 1) as f64 * (1.0 / (1u64 << 53) as f64)
+}
 
 /// What the winding shop puts up with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

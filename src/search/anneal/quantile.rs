@@ -1,0 +1,126 @@
+//! The search for the pattern that is best when it is built imperfectly.
+//!
+//! ```text
+//! minimise P95(P) over the patterns of a class, the coils drawn once for all of them ([`SampledCoils`])
+//! ```
+//!
+//! A move is judged coil by coil, those first that are worst now, and refused as soon as so many coils are above the
+//! Metropolis limit that the quantile must be. Most moves are refused after a twentieth of the coils.
+//!
+//! The same cost serves the guaranteed worst case of a coil whose bore is heated: one coil, and no sum over samples; and
+//! any search that limits how far a crossover may climb.
+//!
+//! # Source
+//! Sample average approximation: Kleywegt, Shapiro, Homem-de-Mello, SIAM J. Optim. 12, 479 (2002).
+
+use rand_chacha::ChaCha8Rng;
+
+use super::limits::{Limits, draw, neighbour};
+use crate::search::cost::columns::Work;
+use crate::search::cost::sampled_coils::{QuantileWorst, SampledCoils};
+use crate::search::cost::{Cost, InFull, Pace, Position, Proposal};
+
+/// Moves of a restart for a layer count.
+pub fn default_moves_per_restart(layers: usize) -> u64 {
+    ((layers as u64).pow(2) * 16).max(1000)
+}
+
+/// The quantile of the worst case over sampled coils, within limits.
+#[derive(Debug, Clone)]
+pub struct QuantileCost {
+    coils: SampledCoils,
+    limits: Limits,
+}
+
+impl QuantileCost {
+    pub fn new(coils: SampledCoils, limits: impl Into<Limits>) -> Self {
+        Self { coils, limits: limits.into() }
+    }
+}
+
+/// A pattern, the worst case of every coil with it, and the pattern proposed last.
+#[derive(Debug, Clone)]
+pub struct QuantilePosition {
+    segments: Vec<usize>,
+    candidate: Vec<usize>,
+    worst: QuantileWorst,
+    moves: u64,
+    accepted: u64,
+}
+
+impl Position<QuantileCost> for QuantilePosition {
+    fn cost(&self) -> f64 {
+        self.worst.cost()
+    }
+
+    fn segments(&self) -> Vec<usize> {
+        self.segments.clone()
+    }
+
+    fn propose(&mut self, cost: &QuantileCost, random: &mut ChaCha8Rng, limit: f64) -> Proposal {
+        self.moves += 1;
+        let Some(candidate) = neighbour(cost.limits, &self.segments, random) else { return Proposal::Outside };
+        let proposed = self.worst.propose(&cost.coils, &candidate, limit);
+        self.candidate = candidate;
+        proposed.map_or(Proposal::Refused, Proposal::Within)
+    }
+
+    fn accept(&mut self, _cost: &QuantileCost) {
+        self.worst.accept();
+        self.accepted += 1;
+        std::mem::swap(&mut self.segments, &mut self.candidate);
+    }
+
+    fn refuse(&mut self, _cost: &QuantileCost) {}
+
+    fn work(&self) -> Work {
+        Work { moves: self.moves, accepted: self.accepted, samples: self.worst.judged }
+    }
+}
+
+impl Cost for QuantileCost {
+    type Position = QuantilePosition;
+
+    /// A move costs about a hundred times one over samples.
+    const PACE: Pace = Pace { slice_moves: 512, moves_per_temperature: 16, probed_patterns: 4, probed_moves: 16 };
+
+    fn layers(&self) -> usize {
+        self.coils.layers()
+    }
+
+    fn samples(&self) -> usize {
+        self.coils.samples()
+    }
+
+    fn admits(&self, segments: &[usize]) -> bool {
+        self.limits.admits(segments)
+    }
+
+    fn draw(&self, random: &mut ChaCha8Rng) -> Vec<usize> {
+        draw(self.limits, self.layers(), random)
+    }
+
+    fn at(&self, segments: &[usize]) -> QuantilePosition {
+        QuantilePosition {
+            segments: segments.to_vec(),
+            candidate: segments.to_vec(),
+            worst: QuantileWorst::new(&self.coils, segments),
+            moves: 0,
+            accepted: 0,
+        }
+    }
+
+    fn in_full(&self, segments: &[usize], _working: &[usize]) -> InFull {
+        InFull { cost: self.coils.cost(segments), segments: segments.to_vec(), joining: Vec::new() }
+    }
+
+    fn select(&self, _working: &[usize]) -> Self {
+        self.clone()
+    }
+
+    fn first_working_set(&self, _seed: u64, _starts: &[Vec<usize>]) -> Vec<usize> {
+        Vec::new()
+    }
+
+    fn order_working_set(&self, _best: &[&[usize]], _working: &mut [usize]) {}
+}

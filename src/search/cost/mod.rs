@@ -1,0 +1,103 @@
+//! What a search makes small, compiled for speed: samples, guaranteed worst cases, quantiles over built coils.
+//!
+//! [`Cost`] is what the annealer sees of it: a position at a pattern, moves from it that stay within what the winding
+//! shop puts up with, and which samples are worth running on.
+
+pub mod columns;
+pub mod guaranteed;
+pub mod objective;
+pub mod sampled_coils;
+pub mod samples;
+pub mod signs;
+pub mod tolerance;
+pub mod worst_case;
+
+use rand_chacha::ChaCha8Rng;
+
+use columns::Work;
+
+/// How fast a search over a cost goes: what is drawn and done between two looks at the clock.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pace {
+    /// Moves between two points at which a restart can be stopped, saved and taken up again.
+    pub slice_moves: u64,
+    /// The temperature is renewed after so many moves.
+    pub moves_per_temperature: u64,
+    /// Random patterns, and moves from each, that show how large a typical move is.
+    pub probed_patterns: usize,
+    pub probed_moves: usize,
+}
+
+/// What came of a proposed move.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Proposal {
+    /// It would leave what is allowed.
+    Outside,
+    /// Its cost is above the limit.
+    Refused,
+    /// Its cost, which is within the limit.
+    Within(f64),
+}
+
+/// A pattern judged on all samples.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InFull {
+    pub cost: f64,
+    /// The pattern, or its mirror image where both cost the same and that comes first.
+    pub segments: Vec<usize>,
+    /// Samples that should join the working set.
+    pub joining: Vec<usize>,
+}
+
+/// A cost over the patterns of a class.
+pub trait Cost: Clone + Send + Sync + std::fmt::Debug {
+    type Position: Position<Self>;
+
+    const PACE: Pace;
+
+    fn layers(&self) -> usize;
+
+    /// Numbers of which the cost is made.
+    fn samples(&self) -> usize;
+
+    /// Whether the winding shop puts up with P(j).
+    fn admits(&self, segments: &[usize]) -> bool;
+
+    /// A pattern drawn at random.
+    fn draw(&self, random: &mut ChaCha8Rng) -> Vec<usize>;
+
+    /// A position at a pattern, computed from nothing.
+    fn at(&self, segments: &[usize]) -> Self::Position;
+
+    /// A pattern judged on all samples, where the search runs on a working set of them.
+    fn in_full(&self, segments: &[usize], working: &[usize]) -> InFull;
+
+    /// The cost on some of the samples only.
+    fn select(&self, working: &[usize]) -> Self;
+
+    /// The samples that a search begins with; empty for all of them in their own order.
+    fn first_working_set(&self, seed: u64, starts: &[Vec<usize>]) -> Vec<usize>;
+
+    /// Puts those samples first that bind the best patterns.
+    fn order_working_set(&self, best: &[&[usize]], working: &mut [usize]);
+}
+
+/// A pattern, its cost, and the proposal made last.
+pub trait Position<C> {
+    fn cost(&self) -> f64;
+
+    /// P(j), innermost layer first.
+    fn segments(&self) -> Vec<usize>;
+
+    /// Draws a move and judges it against a limit that was drawn before.
+    fn propose(&mut self, cost: &C, random: &mut ChaCha8Rng, limit: f64) -> Proposal;
+
+    /// Goes where the last proposal leads, which must have been within its limit.
+    fn accept(&mut self, cost: &C);
+
+    /// Forgets a proposal that was within its limit.
+    fn refuse(&mut self, cost: &C);
+
+    /// What judging has cost since the position was made.
+    fn work(&self) -> Work;
+}
