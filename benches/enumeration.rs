@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
-use coilwright::io::model_file::read_model;
+use coilwright::io::read::model_file::read_model;
 use coilwright::pattern::Pattern;
 use coilwright::pattern::windability::WindabilityClass;
 use coilwright::search::anneal::rounds::{Optimisation, Plan, Rounds, Rules, default_moves_per_restart};

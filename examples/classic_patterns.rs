@@ -7,8 +7,8 @@ use std::error::Error;
 use std::path::Path;
 
 use coilwright::io::files::write_atomically;
-use coilwright::io::model_file::NamedPattern;
-use coilwright::io::pattern_file::print_pattern;
+use coilwright::io::model::NamedPattern;
+use coilwright::io::read::pattern_file::print_pattern;
 use coilwright::pattern::classic::Classic;
 use coilwright::pattern::windability::WindingGraph;
 use coilwright::reproduce::yan1998;

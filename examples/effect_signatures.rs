@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use coilwright::effect::{CATALOGUE, DeclaredEffect, EffectSpec};
-use coilwright::io::model_file::parse_model;
+use coilwright::io::read::model_file::parse_model;
 use coilwright::numeric::piecewise::PiecewiseLinear;
 use coilwright::pattern::classic::Classic;
 use coilwright::profile::{Piece, Profile};

@@ -5,7 +5,7 @@
 use std::error::Error;
 use std::path::Path;
 
-use coilwright::io::model_file::read_model;
+use coilwright::io::read::model_file::read_model;
 use coilwright::pattern::classic::Classic;
 use coilwright::pattern::windability::WindingGraph;
 use coilwright::search::cost::worst_case::SolvedProfiles;

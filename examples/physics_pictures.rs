@@ -6,7 +6,7 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use coilwright::io::model_file::parse_model;
+use coilwright::io::read::model_file::parse_model;
 use coilwright::pattern::classic::Classic;
 use coilwright::profile::{Piece, Profile};
 use coilwright::rate::{CoilModel, RateModel};

@@ -3,7 +3,7 @@
 
 libfuzzer_sys::fuzz_target!(|data: &[u8]| {
     let Ok(text) = std::str::from_utf8(data) else { return };
-    if let Err(faults) = coilwright::io::model_file::parse_model(std::path::Path::new("model.toml"), text) {
+    if let Err(faults) = coilwright::io::read::model_file::parse_model(std::path::Path::new("model.toml"), text) {
         let _ = faults.to_string();
     }
 });

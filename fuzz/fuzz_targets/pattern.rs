@@ -3,7 +3,7 @@
 
 libfuzzer_sys::fuzz_target!(|data: &[u8]| {
     let Ok(text) = std::str::from_utf8(data) else { return };
-    if let Err(faults) = coilwright::io::pattern_file::parse_pattern("pattern.toml", text) {
+    if let Err(faults) = coilwright::io::read::pattern_file::parse_pattern("pattern.toml", text) {
         let _ = faults.to_string();
     }
 });

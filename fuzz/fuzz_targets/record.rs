@@ -3,7 +3,7 @@
 
 libfuzzer_sys::fuzz_target!(|data: &[u8]| {
     let Ok(text) = std::str::from_utf8(data) else { return };
-    if let Err(faults) = coilwright::io::record_file::parse_record("record.csv", text) {
+    if let Err(faults) = coilwright::io::read::record_file::parse_record("record.csv", text) {
         let _ = faults.to_string();
     }
 });

@@ -6,10 +6,10 @@ use super::optimise::evaluator_of;
 use super::progress::StopFlag;
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
-use crate::io::campaign_file::{
+use crate::io::files::write_atomically;
+use crate::io::read::campaign_file::{
     CampaignFile, CampaignJson, Cell, CellJson, cell_path, read_campaign, read_cell, summary_csv,
 };
-use crate::io::files::write_atomically;
 use crate::report::plot::{Axis, Chart, Series};
 use crate::search::anneal::rounds::{DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Plan, Rules};
 use crate::search::cost::guaranteed::UnitStep;

@@ -6,7 +6,7 @@ use super::screen::Screen;
 use super::{CliError, Ending};
 use crate::io::fault::Faults;
 use crate::io::json::{CheckJson, FaultJson};
-use crate::io::model_file::read_model;
+use crate::io::read::model_file::read_model;
 
 /// All faults of a model file at once
 #[derive(Debug, clap::Args)]

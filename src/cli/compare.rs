@@ -8,12 +8,15 @@ use super::schedule::pattern_of;
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
 use crate::compare::compare;
-use crate::io::comparison_json::{CompareJson, PartJson, RecordComparisonJson};
-use crate::io::comparison_rows::{ComparisonRow, comparison_rows};
 use crate::io::files::write_atomically;
-use crate::io::inputs_json::{InputsJson, RecordInputJson};
-use crate::io::measurement_folder::{COMPARISON_FILE, MODEL_FILE, check_free, table_name, write_document, write_table};
-use crate::io::model_file::{ModelFile, read_model};
+use crate::io::json::comparison::{CompareJson, PartJson, RecordComparisonJson};
+use crate::io::json::inputs::{InputsJson, RecordInputJson};
+use crate::io::model::ModelFile;
+use crate::io::read::model_file::read_model;
+use crate::io::write::comparison_rows::{ComparisonRow, comparison_rows};
+use crate::io::write::measurement_folder::{
+    COMPARISON_FILE, MODEL_FILE, check_free, table_name, write_document, write_table,
+};
 use crate::report::comparison::pictures;
 
 /// A model's prediction beside measured records, and where it fails

@@ -8,17 +8,18 @@ use super::screen::{Screen, table};
 use super::{CliError, Ending};
 use crate::diagnose::experiment::{Chamber, design};
 use crate::diagnose::{self, Diagnosis, Request};
-use crate::io::diagnosis_json::{DiagnosisJson, DiagnosisRow, FindingJson};
 use crate::io::files::write_atomically;
-use crate::io::inputs_json::{InputsJson, RecordInputJson};
-use crate::io::measurement_folder::{
+use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow, FindingJson};
+use crate::io::json::inputs::{InputsJson, RecordInputJson};
+use crate::io::json::schedule::{RATE_DECIMALS, rounded};
+use crate::io::model::ModelFile;
+use crate::io::read::model_file::read_model;
+use crate::io::read::profile_file::print_profile;
+use crate::io::read::record_file::read_record;
+use crate::io::write::measurement_folder::{
     DIAGNOSIS_FILE, MODEL_FILE, before_and_after_name, check_free, write_document, write_table,
 };
-use crate::io::model_edit::{Remark, with_effect};
-use crate::io::model_file::{ModelFile, read_model};
-use crate::io::profile_file::print_profile;
-use crate::io::record_file::read_record;
-use crate::io::schedule_file::{RATE_DECIMALS, rounded};
+use crate::io::write::model_edit::{Remark, with_effect};
 use crate::pattern::Pattern;
 use crate::predict::{noise_floor_rad_per_s, predict};
 use crate::rate::CoilModel;

@@ -3,7 +3,7 @@
 use super::screen::Screen;
 use super::{CliError, Ending};
 use crate::effect::{CATALOGUE, CHANNEL, CUSTOM};
-use crate::io::effects_json::{EffectJson, EffectsJson, ParameterJson};
+use crate::io::json::effects::{EffectJson, EffectsJson, ParameterJson};
 
 /// The effects that a model file can declare, with equations, parameters and sources
 #[derive(Debug, clap::Args)]

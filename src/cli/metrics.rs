@@ -7,9 +7,9 @@ use super::report::{REPORT_FILE, write_report};
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
 use crate::io::files::write_atomically;
-use crate::io::inputs_json::{InputsJson, RecordInputJson};
-use crate::io::measurement_folder::{METRICS_FILE, check_free, write_document};
-use crate::io::metrics_json::{MetricsJson, RecordMetricsJson};
+use crate::io::json::inputs::{InputsJson, RecordInputJson};
+use crate::io::json::metrics::{MetricsJson, RecordMetricsJson};
+use crate::io::write::measurement_folder::{METRICS_FILE, check_free, write_document};
 use crate::metrics::{Metrics, repeatability_rad_per_s};
 use crate::report::allan::allan_chart;
 

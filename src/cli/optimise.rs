@@ -9,13 +9,16 @@ use super::progress::StopFlag;
 use super::prove::{prove_best, words};
 use super::screen::{Screen, table};
 use super::{CliError, Ending, report, schedule};
-use crate::io::checkpoint::{CHECKPOINT_FILE, read_checkpoint, write_checkpoint};
 use crate::io::fault::Faults;
 use crate::io::files::write_atomically;
 use crate::io::json::{PatternJson, ProofJson};
-use crate::io::model_file::{ModelFile, NamedPattern, read_model};
-use crate::io::pattern_file::resolve_pattern;
-use crate::io::run_directory::{BestFoundJson, GridCheckJson, OptimiseJson, Request, write_request, write_results};
+use crate::io::model::{ModelFile, NamedPattern};
+use crate::io::read::model_file::read_model;
+use crate::io::read::pattern_file::resolve_pattern;
+use crate::io::write::checkpoint::{CHECKPOINT_FILE, read_checkpoint, write_checkpoint};
+use crate::io::write::run_directory::{
+    BestFoundJson, GridCheckJson, OptimiseJson, Request, write_request, write_results,
+};
 use crate::pattern::windability::WindabilityClass;
 use crate::search::anneal::rounds::{DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Plan, Rounds, Rules, Stop};
 use crate::search::cost::guaranteed::UnitStep;

@@ -6,8 +6,8 @@ use clap::ValueEnum;
 
 use super::CliError;
 use super::screen::Screen;
-use crate::io::metrics_json::GrossErrorJson;
-use crate::io::record_file::read_record;
+use crate::io::json::metrics::GrossErrorJson;
+use crate::io::read::record_file::read_record;
 use crate::record::Record;
 
 /// What to do with values that stand alone.

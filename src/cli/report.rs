@@ -6,8 +6,8 @@ use super::screen::Screen;
 use super::{CliError, Ending};
 use crate::io::files::write_atomically;
 use crate::io::json::ReportJson;
-use crate::io::measurement_folder::{holds_measurements, read_measurements};
-use crate::io::run_reader::read_run;
+use crate::io::read::run_reader::read_run;
+use crate::io::write::measurement_folder::{holds_measurements, read_measurements};
 use crate::report::measurement::measurement_page;
 use crate::report::search_run::search_page;
 

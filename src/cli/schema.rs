@@ -4,9 +4,9 @@ use clap::ValueEnum;
 
 use super::screen::Screen;
 use super::{CliError, Ending};
-use crate::io::further_schemas::{campaign_schema, compensation_schema};
 use crate::io::json::SchemaJson;
-use crate::io::schema::{model_schema, pattern_schema, record_schema, schedule_schema};
+use crate::io::json::further_schemas::{campaign_schema, compensation_schema};
+use crate::io::json::schema::{model_schema, pattern_schema, record_schema, schedule_schema};
 
 /// The JSON Schema of a file format, for editors
 #[derive(Debug, clap::Args)]

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use super::screen::Screen;
 use super::{CliError, Ending};
+use crate::io::files::sha256_hex;
 use crate::io::json::{VerifyJson, ViolationJson};
-use crate::io::model_file::read_model;
-use crate::io::schedule_file::sha256_hex;
-use crate::io::schedule_reader::{read_claim, shop_of};
+use crate::io::read::model_file::read_model;
+use crate::io::read::schedule_reader::{read_claim, shop_of};
 use crate::units::deg_per_h_from_rad_per_s;
 use crate::verify::{RateCheck, Truth, verify};
 

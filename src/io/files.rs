@@ -3,6 +3,7 @@
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
+use sha2::{Digest, Sha256};
 use thiserror::Error;
 
 use super::fault::Faults;
@@ -61,6 +62,11 @@ pub fn read_text_up_to(path: &Path, largest_bytes: u64) -> Result<String, Faults
         return Err(fault("the file is empty".to_owned()));
     }
     Ok(text)
+}
+
+/// SHA-256 of a file's text, as 64 hexadecimal digits.
+pub fn sha256_hex(text: &str) -> String {
+    Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Writes to a temporary name in the same folder, then renames: readers see the old file or the new one, whole.

@@ -1,41 +1,10 @@
 //! Files in, files out: the only place (with `report`) that knows serde, paths, TOML, CSV and JSON.
+//!
+//! Inside, `json` (the documents) knows neither of the others, `read` may use `json`, and `write` both.
 
-pub mod campaign_file;
-pub mod checkpoint;
-pub mod comparison_json;
-pub mod comparison_rows;
-pub mod compensation_file;
-pub mod diagnosis_json;
-pub mod difference_equation;
-mod effect_tables;
-pub mod effects_json;
-pub mod experiment_json;
 pub mod fault;
 pub mod files;
-pub mod further_schemas;
-pub mod inputs_json;
 pub mod json;
-pub mod machine_program;
-pub mod measurement_folder;
-pub mod metrics_json;
-pub mod model_edit;
-pub mod model_file;
-mod page_reader;
-pub mod pareto_json;
-pub mod pareto_parts;
-pub mod pattern_file;
-mod production_table;
-pub mod profile_file;
-mod profile_tables;
-pub mod record_file;
-pub mod run_directory;
-pub mod run_reader;
-pub mod sample_table;
-pub mod schedule_file;
-pub mod schedule_reader;
-pub mod schema;
-pub mod temperature_file;
-pub mod tolerance_json;
-mod tolerance_table;
-pub mod toml_reader;
-pub mod traveller;
+pub mod model;
+pub mod read;
+pub mod write;

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::page::figure;
 use super::plot::{Axis, Chart, Series};
-use crate::io::metrics_json::{AllanNoiseJson, MetricsJson, RecordMetricsJson};
+use crate::io::json::metrics::{AllanNoiseJson, MetricsJson, RecordMetricsJson};
 
 /// Points of a noise's straight line; two would do, but parts of it are cut away.
 const LINE_POINTS: usize = 200;

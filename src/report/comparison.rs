@@ -5,8 +5,8 @@ use maud::{Markup, html};
 use super::page::figure;
 use super::plot::{Axis, Band, Chart, Mark, Series};
 use crate::compare::regimes::Regime;
-use crate::io::comparison_json::{CompareJson, PartJson, RecordComparisonJson};
-use crate::io::comparison_rows::ComparisonRow;
+use crate::io::json::comparison::{CompareJson, PartJson, RecordComparisonJson};
+use crate::io::write::comparison_rows::ComparisonRow;
 use crate::units::{min_from_s, percent_from_fraction};
 
 /// Cells of the map of residuals along temperature and along its rate.

@@ -5,8 +5,8 @@ use maud::{Markup, html};
 use super::ladder::ladder_chart;
 use super::page::figure;
 use super::plot::{Axis, Chart, Mark, Series};
-use crate::io::diagnosis_json::{DiagnosisJson, DiagnosisRow, FindingJson, ParameterJson};
-use crate::io::experiment_json::ExperimentJson;
+use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow, FindingJson, ParameterJson};
+use crate::io::json::experiment::ExperimentJson;
 use crate::units::{h_from_s, min_from_s, percent_from_fraction};
 
 /// Candidates that the page lists.

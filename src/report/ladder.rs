@@ -1,7 +1,7 @@
 //! The ladder of a diagnosis as a picture: what each piece of physics bought, against the noise.
 
 use super::plot::{Axis, Chart, Mark, Series};
-use crate::io::diagnosis_json::DiagnosisJson;
+use crate::io::json::diagnosis::DiagnosisJson;
 
 /// Noise floors that differ by less than this share are one line.
 const SAME_FLOOR: f64 = 0.08;
@@ -43,7 +43,7 @@ fn headline(body: &DiagnosisJson) -> String {
         return "Error against the noise floor".to_owned();
     };
     let unseen = first.holdout_rmse_deg_per_h.is_some();
-    let multiple = |rung: &crate::io::diagnosis_json::RungJson| {
+    let multiple = |rung: &crate::io::json::diagnosis::RungJson| {
         body.multiple_of_noise(rung.holdout_rmse_deg_per_h.unwrap_or(rung.rmse_deg_per_h), unseen)
     };
     let (before, after) = (multiple(first), multiple(last));

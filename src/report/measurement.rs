@@ -4,9 +4,9 @@ use maud::{Markup, html};
 
 use super::page::page;
 use super::{allan, comparison, diagnosis};
-use crate::io::inputs_json::InputsJson;
-use crate::io::measurement_folder::Measurements;
-use crate::io::schedule_file::sha256_hex;
+use crate::io::files::sha256_hex;
+use crate::io::json::inputs::InputsJson;
+use crate::io::write::measurement_folder::Measurements;
 
 /// One page that opens offline.
 pub fn measurement_page(found: &Measurements) -> String {

@@ -1,7 +1,7 @@
 //! Pictures of the pack's temperatures and of their rates.
 
 use super::plot::{Axis, Chart, Series};
-use crate::io::temperature_file::TemperaturesJson;
+use crate::io::json::temperatures::TemperaturesJson;
 use crate::units::min_from_s;
 
 /// More lines than this cannot be told apart.

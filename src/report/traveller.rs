@@ -4,11 +4,11 @@ use maud::{Markup, PreEscaped, html};
 
 use super::cross_section::cross_section;
 use super::page::{figure, page};
-use crate::io::schedule_file::{ScheduleJson, StepJson};
-use crate::io::schedule_reader::DATA_ELEMENT;
+use crate::io::json::schedule::{ScheduleJson, StepJson};
+use crate::io::read::schedule_reader::DATA_ELEMENT;
 use crate::pattern::Pattern;
 
-/// The traveller as one page; `document` as [`crate::io::traveller::traveller`] makes it.
+/// The traveller as one page; `document` as [`crate::io::write::traveller::traveller`] makes it.
 pub fn traveller_page(document: &ScheduleJson, pattern: &Pattern) -> String {
     let title = format!("Winding traveller: {}", document.model);
     // "</" would end the element early.

@@ -27,7 +27,7 @@ use crate::units::REFERENCE_TEMPERATURE_K;
 const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
 
 /// Error allowed in one step, as a share of the span of the drive's temperatures: rates right
-/// after a change of ramp are off by far more, and a winding that cancels most of them shows it (`tests/verify.rs`) …
+/// after a change of ramp are off by far more, and a winding that cancels most of them shows it (`tests/verify`) …
 pub(super) const TOLERANCE_SHARE: f64 = 1e-8;
 /// … but no less than this [K].
 const LEAST_TOLERANCE_K: f64 = 1e-9;

@@ -26,7 +26,7 @@ const EXACT_SHARE: f64 = 1e-10;
 /// ramp the error still grows for an instant, until the next layer feels it.
 const MAXIMUM_SHARE: f64 = 1e-6;
 /// Where both sides step in time: of the worst rate error, and of what one layer alone could make. Four times what was
-/// found between them (`tests/verify.rs`: 1.3e−5 of a cylindrical winding's error, 1.2e−6 of a layer's).
+/// found between them (`tests/verify`: 1.3e−5 of a cylindrical winding's error, 1.2e−6 of a layer's).
 const STEPPED_SHARES: [f64; 2] = [5e-5, 5e-6];
 /// How far the declared network may be from a finer one: where a pattern cancels nearly everything, the layers' own
 /// errors are left.

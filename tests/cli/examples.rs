@@ -45,7 +45,7 @@ fn every_shipped_pattern_can_be_wound_on_a_coil_and_names_where_it_is_from() {
         for word in ["coil", "objective", "seed", "value"] {
             assert!(text.lines().any(|l| l.starts_with('#') && l.contains(word)), "{name} does not name its {word}");
         }
-        let named = coilwright::io::pattern_file::parse_pattern(&name, &text).unwrap();
+        let named = coilwright::io::read::pattern_file::parse_pattern(&name, &text).unwrap();
         assert_eq!(format!("{}.toml", named.name), name);
     }
     let answer =

@@ -1,6 +1,8 @@
 //! The program as its users meet it: exact output, exit codes, every kind of wrong request.
 
 mod bad_input;
+mod browser;
+mod campaign;
 mod commands;
 mod compare;
 mod compensate;
@@ -13,6 +15,7 @@ mod help;
 mod metrics;
 mod readme;
 mod reproduce;
+mod resume;
 mod schemas;
 mod terminal;
 

@@ -195,7 +195,7 @@ fn exit_codes_are_the_documented_ones() {
     assert!(stdout(&no).starts_with("row 1: direction must be first-to-second, found second-to-first"));
     assert_eq!(code(&run(&["verify", COIL, "absent.csv"])), 2);
     assert_eq!(code(&run(&["nonsense"])), 2);
-    // tests/resume.rs interrupts a search: 130.
+    // cli/resume.rs interrupts a search: 130.
     let help = run(&["--help"]);
     assert!(
         stdout(&help).contains("Exit codes: 0 done; 1 the answer is no; 2 the request was wrong; 130 interrupted.")

@@ -1,0 +1,159 @@
+//! The JSON document of `compare`; also read back for reports.
+
+use serde::{Deserialize, Serialize};
+
+use crate::compare::Comparison;
+use crate::compare::regimes::Part;
+use crate::compare::verdict::Verdict;
+use crate::units::deg_per_h_from_rad_per_s;
+
+use super::inputs::InputsJson;
+use super::metrics::GrossErrorJson;
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CompareJson {
+    pub model: String,
+    pub pattern: String,
+    /// "adequate" or "missing": whether every record is the model's prediction and noise.
+    pub verdict: String,
+    pub records: Vec<RecordComparisonJson>,
+    pub inputs: InputsJson,
+}
+
+/// One record beside its prediction.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RecordComparisonJson {
+    pub file: String,
+    pub rows: usize,
+    pub verdict: String,
+    pub rmse_deg_per_h: f64,
+    /// Null where the record does not vary.
+    pub nrmse_fit_percent: Option<f64>,
+    pub r_squared: Option<f64>,
+    pub noise_floor_deg_per_h: f64,
+    pub noise_floor_standard_error_deg_per_h: f64,
+    pub noise_floor_method: String,
+    pub reduced_chi_square: f64,
+    /// What the uncertainty of the estimated boundary is expected to add to it.
+    pub boundary_chi_square: f64,
+    /// Against noise and boundary together.
+    pub whitened_chi_square: f64,
+    pub offset_deg_per_h: f64,
+    pub largest_error_deg_per_h: f64,
+    pub largest_error_time_s: f64,
+    pub autocorrelation: Vec<f64>,
+    pub autocorrelation_band_99: f64,
+    pub ljung_box: LjungBoxJson,
+    pub correlations: Vec<CorrelationJson>,
+    pub regimes: Vec<PartJson>,
+    pub temperature_bands: Vec<PartJson>,
+    pub rate_bands: Vec<PartJson>,
+    /// Where the model fails, in words.
+    pub findings: Vec<String>,
+    pub estimated_film_w_per_m2_k: Option<f64>,
+    pub estimated_kinks_s: Vec<f64>,
+    pub gross_errors: Vec<GrossErrorJson>,
+    pub gaps: usize,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LjungBoxJson {
+    pub statistic: f64,
+    pub lags: usize,
+    pub p_value: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CorrelationJson {
+    pub with: String,
+    pub correlation: Option<f64>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PartJson {
+    pub name: String,
+    pub share_of_squared_error: f64,
+    pub rmse_deg_per_h: f64,
+    pub rows: usize,
+    pub share_of_rows: f64,
+    pub chi_square_per_row: f64,
+}
+
+/// How the noise floor is found; also said in reports.
+pub const NOISE_FLOOR_METHOD: &str =
+    "what quadratics leave of 11 rows each, windows above the 98 % point of chi-square left out";
+
+fn verdict_word(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Adequate => "adequate",
+        Verdict::Missing => "missing",
+    }
+}
+
+impl PartJson {
+    fn new(part: &Part) -> Self {
+        Self {
+            name: part.name.clone(),
+            share_of_squared_error: part.share_of_squared_error,
+            rmse_deg_per_h: deg_per_h_from_rad_per_s(part.rmse_rad_per_s),
+            rows: part.rows,
+            share_of_rows: part.share_of_rows,
+            chi_square_per_row: part.chi_square_per_row,
+        }
+    }
+}
+
+impl RecordComparisonJson {
+    pub fn new(file: &str, found: &Comparison, gross_errors: Vec<GrossErrorJson>, gaps: usize) -> Self {
+        let parts = |parts: &[Part]| parts.iter().map(PartJson::new).collect();
+        Self {
+            file: file.to_owned(),
+            rows: found.rows,
+            verdict: verdict_word(found.verdict).to_owned(),
+            rmse_deg_per_h: deg_per_h_from_rad_per_s(found.rmse_rad_per_s),
+            nrmse_fit_percent: Some(found.nrmse_fit_percent).filter(|p| p.is_finite()),
+            r_squared: found.r_squared,
+            noise_floor_deg_per_h: deg_per_h_from_rad_per_s(found.noise_rad_per_s),
+            noise_floor_standard_error_deg_per_h: deg_per_h_from_rad_per_s(found.noise_standard_error_rad_per_s),
+            noise_floor_method: NOISE_FLOOR_METHOD.to_owned(),
+            reduced_chi_square: found.reduced_chi_square,
+            boundary_chi_square: found.boundary_chi_square,
+            whitened_chi_square: found.whitened_chi_square,
+            offset_deg_per_h: deg_per_h_from_rad_per_s(found.offset_rad_per_s),
+            largest_error_deg_per_h: deg_per_h_from_rad_per_s(found.largest.residual_rad_per_s),
+            largest_error_time_s: found.largest.time_s,
+            autocorrelation: found.autocorrelation.clone(),
+            autocorrelation_band_99: found.autocorrelation_band,
+            ljung_box: LjungBoxJson {
+                statistic: found.ljung_box.statistic,
+                lags: found.ljung_box.lags,
+                p_value: found.ljung_box.p_value,
+            },
+            correlations: found
+                .correlations
+                .iter()
+                .map(|c| CorrelationJson { with: c.with.to_string(), correlation: c.value })
+                .collect(),
+            regimes: parts(&found.regimes),
+            temperature_bands: parts(&found.temperature_bands),
+            rate_bands: parts(&found.rate_bands),
+            findings: found.findings.iter().map(ToString::to_string).collect(),
+            estimated_film_w_per_m2_k: found.film_w_per_m2_k,
+            estimated_kinks_s: found.kinks_s.clone(),
+            gross_errors,
+            gaps,
+        }
+    }
+}
+
+impl CompareJson {
+    pub fn new(model: &str, pattern: &str, records: Vec<RecordComparisonJson>, inputs: InputsJson) -> Self {
+        let all = records.iter().all(|r| r.verdict == verdict_word(Verdict::Adequate));
+        let verdict = verdict_word(if all { Verdict::Adequate } else { Verdict::Missing });
+        Self { model: model.to_owned(), pattern: pattern.to_owned(), verdict: verdict.to_owned(), records, inputs }
+    }
+
+    pub fn is_adequate(&self) -> bool {
+        self.verdict == verdict_word(Verdict::Adequate)
+    }
+}

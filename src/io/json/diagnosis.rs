@@ -1,0 +1,304 @@
+//! The JSON documents of `diagnose` and `extend`; the former is also read back for reports.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::diagnose::experiment::Experiment;
+use crate::diagnose::{
+    Contender, Diagnosis, Equivalent, Finding, FittedParameter, Plain, Rung, Shape, Unexplained, Verdict,
+};
+use crate::effect::DeclaredEffect;
+use crate::units::deg_per_h_from_rad_per_s;
+
+use super::comparison::CompareJson;
+use super::experiment::ExperimentJson;
+use super::inputs::InputsJson;
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DiagnosisJson {
+    pub model: String,
+    pub verdict: String,
+    pub effects: Vec<FindingJson>,
+    pub ladder: Vec<RungJson>,
+    pub candidates: Vec<ContenderJson>,
+    pub noise_floor_deg_per_h: f64,
+    /// Null where no record was held out.
+    pub holdout_noise_floor_deg_per_h: Option<f64>,
+    /// What each step of the ladder bought, in words.
+    pub ladder_in_words: Vec<String>,
+    /// Null unless the verdict is `unexplained`.
+    pub unexplained: Option<UnexplainedJson>,
+    pub suggested_experiment: Option<String>,
+    /// The profile that would tell the candidates apart; null unless it was asked for and there is something to tell apart.
+    pub experiment: Option<ExperimentJson>,
+    pub cautions: Vec<String>,
+    pub inputs: InputsJson,
+}
+
+/// One row of a record: what the declared model and the one with the accepted effects leave.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DiagnosisRow {
+    pub time_s: f64,
+    pub residual_declared_deg_per_h: f64,
+    pub residual_extended_deg_per_h: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FindingJson {
+    pub kind: String,
+    pub parameters: BTreeMap<String, ParameterJson>,
+    /// The words among which the effect lets one choose, such as `lead`.
+    pub choices: BTreeMap<String, String>,
+    /// Kinds that explain the records equally well.
+    pub equivalents: Vec<String>,
+    pub equivalents_in_detail: Vec<EquivalentJson>,
+    /// By how much χ² rises without it, on fitted and on unseen data.
+    pub chi_square_less: f64,
+    pub confirmed_by: f64,
+    pub experiment: String,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ParameterJson {
+    pub value: f64,
+    /// Null where the records do not determine it, at a bound, or where it was held.
+    pub standard_error: Option<f64>,
+    pub unit: String,
+    pub fitted: bool,
+    pub at_bound: bool,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EquivalentJson {
+    pub kind: String,
+    pub choices: BTreeMap<String, String>,
+    pub chi_square_more: f64,
+    /// Of the two predicted responses in these records.
+    pub correlation: f64,
+    pub experiment: String,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RungJson {
+    pub effects: Vec<String>,
+    pub rmse_deg_per_h: f64,
+    pub holdout_rmse_deg_per_h: Option<f64>,
+    pub reduced_chi_square: f64,
+    pub holdout_reduced_chi_square: Option<f64>,
+    pub bic: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ContenderJson {
+    pub kind: String,
+    pub choices: BTreeMap<String, String>,
+    pub reduced_chi_square: f64,
+    pub bic: f64,
+    pub chi_square_less: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct UnexplainedJson {
+    pub excess_deg_per_h: f64,
+    pub share_of_excess: f64,
+    pub correlations: Vec<CorrelationJson>,
+    pub plain: Vec<PlainJson>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CorrelationJson {
+    pub with: String,
+    pub correlation: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlainJson {
+    pub shape: String,
+    pub period_s: Option<f64>,
+    pub time_constant_s: Option<f64>,
+    pub rms_deg_per_h: f64,
+    pub chi_square_less: f64,
+}
+
+fn choices(effect: &DeclaredEffect) -> BTreeMap<String, String> {
+    let specs = effect.spec().choices.iter().zip(effect.choices());
+    specs.map(|(choice, &index)| (choice.key.to_owned(), choice.options[index].to_owned())).collect()
+}
+
+impl DiagnosisJson {
+    /// `holdout_noise_rad_per_s` is that of the records that were held out, if there are any.
+    pub fn new(
+        model: &str,
+        diagnosis: &Diagnosis,
+        holdout_noise_rad_per_s: Option<f64>,
+        experiment: Option<&Experiment>,
+        inputs: InputsJson,
+    ) -> Self {
+        let mut document = Self {
+            model: model.to_owned(),
+            verdict: match diagnosis.verdict {
+                Verdict::Adequate => "adequate",
+                Verdict::Missing => "missing",
+                Verdict::Indistinguishable => "indistinguishable",
+                Verdict::Unexplained => "unexplained",
+            }
+            .to_owned(),
+            effects: diagnosis.effects.iter().map(FindingJson::new).collect(),
+            ladder: diagnosis.ladder.iter().map(RungJson::new).collect(),
+            candidates: diagnosis.candidates.iter().map(ContenderJson::new).collect(),
+            noise_floor_deg_per_h: deg_per_h_from_rad_per_s(diagnosis.noise_floor_rad_per_s),
+            unexplained: diagnosis.unexplained.as_ref().map(UnexplainedJson::new),
+            suggested_experiment: diagnosis.suggested_experiment.clone(),
+            cautions: diagnosis.cautions.iter().map(ToString::to_string).collect(),
+            holdout_noise_floor_deg_per_h: holdout_noise_rad_per_s.map(deg_per_h_from_rad_per_s),
+            experiment: experiment.map(|e| ExperimentJson::new(e, diagnosis.noise_floor_rad_per_s)),
+            ladder_in_words: Vec::new(),
+            inputs,
+        };
+        document.ladder_in_words = document.steps_in_words();
+        document
+    }
+
+    /// A value as a multiple of the noise of the fitted records, or of those held out.
+    pub fn multiple_of_noise(&self, value_deg_per_h: f64, holdout: bool) -> f64 {
+        let noise = self.holdout_noise_floor_deg_per_h.filter(|_| holdout).unwrap_or(self.noise_floor_deg_per_h);
+        value_deg_per_h / noise.max(f64::MIN_POSITIVE)
+    }
+
+    /// What each rung adds to the one before.
+    pub fn steps(&self) -> Vec<Vec<&str>> {
+        (0..self.ladder.len())
+            .map(|i| {
+                let before: &[String] = if i > 0 { &self.ladder[i - 1].effects } else { &[] };
+                self.ladder[i].effects.iter().filter(|e| !before.contains(e)).map(String::as_str).collect()
+            })
+            .collect()
+    }
+
+    fn steps_in_words(&self) -> Vec<String> {
+        self.ladder
+            .iter()
+            .zip(self.steps())
+            .enumerate()
+            .map(|(i, (rung, added))| {
+                let error = |value: f64, holdout: bool| {
+                    format!("{value:.4} °/h ({:.2} times the noise)", self.multiple_of_noise(value, holdout))
+                };
+                let model = match i {
+                    0 => "as declared".to_owned(),
+                    _ => format!("with {}", added.join(" and ")),
+                };
+                let unseen = rung
+                    .holdout_rmse_deg_per_h
+                    .map_or_else(String::new, |h| format!(", on the hold-out {}", error(h, true)));
+                format!("{model} the error is {} on the fitted records{unseen}", error(rung.rmse_deg_per_h, false))
+            })
+            .collect()
+    }
+}
+
+impl FindingJson {
+    pub fn new(finding: &Finding) -> Self {
+        Self {
+            kind: finding.effect.kind(),
+            parameters: finding.parameters.iter().map(|p| (p.key.clone(), ParameterJson::new(p))).collect(),
+            choices: choices(&finding.effect),
+            equivalents: finding.equivalents.iter().map(|e| e.effect.kind()).collect(),
+            equivalents_in_detail: finding.equivalents.iter().map(EquivalentJson::new).collect(),
+            chi_square_less: finding.chi_square_less,
+            confirmed_by: finding.confirmed_by,
+            experiment: finding.effect.spec().experiment.to_owned(),
+        }
+    }
+}
+
+impl ParameterJson {
+    fn new(parameter: &FittedParameter) -> Self {
+        Self {
+            value: parameter.unit.from_si(parameter.value),
+            standard_error: parameter.standard_error.map(|e| parameter.unit.difference_from_si(e)),
+            unit: parameter.unit.symbol().to_owned(),
+            fitted: parameter.fitted,
+            at_bound: parameter.at_bound,
+        }
+    }
+}
+
+impl EquivalentJson {
+    fn new(equivalent: &Equivalent) -> Self {
+        Self {
+            kind: equivalent.effect.kind(),
+            choices: choices(&equivalent.effect),
+            chi_square_more: equivalent.chi_square_more,
+            correlation: equivalent.correlation,
+            experiment: equivalent.effect.spec().experiment.to_owned(),
+        }
+    }
+}
+
+impl RungJson {
+    fn new(rung: &Rung) -> Self {
+        Self {
+            effects: rung.effects.clone(),
+            rmse_deg_per_h: deg_per_h_from_rad_per_s(rung.rmse_rad_per_s),
+            holdout_rmse_deg_per_h: rung.holdout_rmse_rad_per_s.map(deg_per_h_from_rad_per_s),
+            reduced_chi_square: rung.reduced_chi_square,
+            holdout_reduced_chi_square: rung.holdout_reduced_chi_square,
+            bic: rung.bic,
+        }
+    }
+}
+
+impl ContenderJson {
+    fn new(contender: &Contender) -> Self {
+        Self {
+            kind: contender.effect.kind(),
+            choices: choices(&contender.effect),
+            reduced_chi_square: contender.reduced_chi_square,
+            bic: contender.bic,
+            chi_square_less: contender.chi_square_less,
+        }
+    }
+}
+
+impl UnexplainedJson {
+    fn new(unexplained: &Unexplained) -> Self {
+        let correlations = unexplained.correlations.iter();
+        Self {
+            excess_deg_per_h: deg_per_h_from_rad_per_s(unexplained.excess_rad_per_s),
+            share_of_excess: unexplained.share_of_excess,
+            correlations: correlations
+                .map(|(with, correlation)| CorrelationJson { with: with.clone(), correlation: *correlation })
+                .collect(),
+            plain: unexplained.plain.iter().map(PlainJson::new).collect(),
+        }
+    }
+}
+
+impl PlainJson {
+    fn new(plain: &Plain) -> Self {
+        let (shape, period_s, time_constant_s) = match plain.shape {
+            Shape::Drift => ("drift", None, None),
+            Shape::Exponential { time_constant_s } => ("exponential", None, Some(time_constant_s)),
+            Shape::Sinusoid { period_s } => ("sinusoid", Some(period_s), None),
+        };
+        Self {
+            shape: shape.to_owned(),
+            period_s,
+            time_constant_s,
+            rms_deg_per_h: deg_per_h_from_rad_per_s(plain.rms_rad_per_s),
+            chi_square_less: plain.gain,
+        }
+    }
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ExtendJson {
+    /// The new model file.
+    pub written: String,
+    pub effect: FindingJson,
+    /// Every record given, as `compare` shows it.
+    pub before: CompareJson,
+    pub after: CompareJson,
+}

@@ -1,0 +1,81 @@
+//! JSON Schemas of a campaign file and of an exported compensator; see [`super::schema`].
+
+use serde_json::{Value, json};
+
+use crate::search::cost::objective::Objective;
+
+use super::SCHEMA_VERSION;
+use super::schema::{described, table, with_dialect};
+
+/// The schema of a campaign file.
+pub fn campaign_schema() -> Value {
+    let objectives: Vec<&str> = Objective::ALL.iter().map(|o| o.key()).chain(["guaranteed"]).collect();
+    let list = |items: Value, description: &str| json!({ "type": "array", "minItems": 1, "items": items, "description": description });
+    with_dialect(table(
+        "coilwright campaign file",
+        &["name", "models"],
+        json!({
+            "name": { "type": "string" },
+            "models": list(json!({ "type": "string" }), "model files, beside the campaign file"),
+            "layers": list(json!({ "type": "integer", "minimum": 2 }), "in place of the models' own"),
+            "classes": list(json!({ "type": "string", "pattern": "^(standard|any|captive:[0-9]+)$" }), "without it: standard"),
+            "objectives": list(json!({ "enum": objectives }), "without it: worst-rate"),
+            "seeds": list(json!({ "type": "integer", "minimum": 0 }), "without it: 1"),
+            "rounds": { "type": "integer", "minimum": 1 },
+            "moves_per_restart": { "type": "integer", "minimum": 1 },
+        }),
+    ))
+}
+
+/// The schema of the compensator that `compensate --export` writes.
+pub fn compensation_schema() -> Value {
+    let numbers =
+        |description: &str| json!({ "type": "array", "items": { "type": "number" }, "description": description });
+    let whole = |description: &str| json!({ "type": "integer", "minimum": 0, "description": description });
+    let gains = table(
+        "gains of one age",
+        &["gain", "chain_gain", "variance"],
+        json!({
+            "gain": numbers("of the states"),
+            "chain_gain": numbers("of the delayed rate errors [°/h per °C]"),
+            "variance": described("number", "of the innovation [°C²]"),
+        }),
+    );
+    with_dialect(table(
+        "coilwright compensator as a difference equation",
+        &[
+            "schema_version",
+            "model",
+            "equations",
+            "interval_s",
+            "delay_rows",
+            "offset_deg_per_h",
+            "transition",
+            "rate",
+            "reading",
+            "level_states",
+            "most_hypotheses",
+            "break_probability",
+            "least_log_weight",
+            "forgotten_rows",
+            "gains",
+        ],
+        json!({
+            "schema_version": { "const": SCHEMA_VERSION },
+            "model": described("string", "the model's name"),
+            "equations": { "type": "array", "items": { "type": "string" } },
+            "interval_s": { "type": "number", "exclusiveMinimum": 0 },
+            "delay_rows": whole("the rate error that comes out belongs to the row so many rows ago"),
+            "offset_deg_per_h": described("number", "bias of the gyro"),
+            "transition": { "type": "array", "items": numbers("one row of F") },
+            "rate": numbers("rate error per state [°/h per °C]"),
+            "reading": numbers("what the sensor shows of each state"),
+            "level_states": { "type": "array", "items": whole("a state that starts at the first reading") },
+            "most_hypotheses": whole("1: one difference equation"),
+            "break_probability": { "type": "number", "minimum": 0, "maximum": 1 },
+            "least_log_weight": described("number", "below the best hypothesis' own"),
+            "forgotten_rows": whole("without a reading, after which the next one begins anew"),
+            "gains": { "type": "array", "minItems": 1, "items": gains },
+        }),
+    ))
+}

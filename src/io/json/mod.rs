@@ -1,0 +1,226 @@
+//! JSON documents: mirror types of what commands answer, with the keys that scripts read.
+
+pub mod comparison;
+pub mod diagnosis;
+pub mod effects;
+pub mod experiment;
+pub mod further_schemas;
+pub mod inputs;
+pub mod metrics;
+pub mod pareto;
+pub mod schedule;
+pub mod schema;
+pub mod temperatures;
+pub mod tolerance;
+
+use serde::Serialize;
+
+use crate::pattern::Pattern;
+use crate::pattern::windability::WindingGraph;
+use crate::search::cost::worst_case::WorstCase;
+use crate::search::proof::{Certificate, Status};
+use crate::units::deg_per_h_from_rad_per_s;
+
+/// Raised when a key changes its meaning or goes; new keys do not raise it.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// A document with its schema version in front.
+#[derive(Debug, Serialize)]
+pub struct Document<T: Serialize> {
+    pub schema_version: u32,
+    #[serde(flatten)]
+    pub body: T,
+}
+
+impl<T: Serialize> Document<T> {
+    pub fn new(body: T) -> Self {
+        Self { schema_version: SCHEMA_VERSION, body }
+    }
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct WindabilityJson {
+    pub class: String,
+    pub reels: usize,
+    pub captive: usize,
+    pub max_climb: usize,
+}
+
+impl WindabilityJson {
+    pub fn of(pattern: &Pattern) -> Self {
+        let found = WindingGraph::new(pattern).windability();
+        Self {
+            class: found.class().to_string(),
+            reels: found.reels,
+            captive: found.captive,
+            max_climb: found.max_climb,
+        }
+    }
+}
+
+/// A pattern with its worst case.
+#[derive(Debug, Clone, Serialize)]
+pub struct PatternJson {
+    pub name: String,
+    pub segments: Vec<usize>,
+    pub worst_rate_deg_per_h: f64,
+    pub worst_phase_rad: f64,
+    pub worst_profile: String,
+    pub worst_time_s: f64,
+    /// Null where the model is nonlinear and no bound over all profiles exists.
+    pub guaranteed_worst_rate_deg_per_h: Option<f64>,
+    /// The 95 % quantile over built coils, where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub p95_rate_deg_per_h: Option<f64>,
+    pub windability: WindabilityJson,
+}
+
+impl PatternJson {
+    /// `phase_rad` is the phase at the worst rate; the worst rate is shown as a size.
+    pub fn new(
+        name: &str,
+        pattern: &Pattern,
+        worst: &WorstCase,
+        phase_rad: f64,
+        guaranteed_rad_per_s: Option<f64>,
+    ) -> Self {
+        Self {
+            name: name.to_owned(),
+            segments: pattern.segments().to_vec(),
+            worst_rate_deg_per_h: deg_per_h_from_rad_per_s(worst.rate_rad_per_s.abs()),
+            worst_phase_rad: phase_rad.abs(),
+            worst_profile: worst.profile.clone(),
+            worst_time_s: worst.time_s,
+            guaranteed_worst_rate_deg_per_h: guaranteed_rad_per_s.map(deg_per_h_from_rad_per_s),
+            p95_rate_deg_per_h: None,
+            windability: WindabilityJson::of(pattern),
+        }
+    }
+}
+
+#[derive(Debug, Serialize)]
+pub struct EvaluateJson {
+    pub model: String,
+    pub patterns: Vec<PatternJson>,
+}
+
+/// What was proved about the best pattern.
+#[derive(Debug, Clone, Serialize)]
+pub struct ProofJson {
+    /// "optimal", "gap" or "none".
+    pub status: String,
+    /// No pattern of the class has a smaller worst rate; null where nothing was proved.
+    pub lower_bound_deg_per_h: Option<f64>,
+}
+
+impl ProofJson {
+    pub fn none() -> Self {
+        Self { status: Status::None.to_string(), lower_bound_deg_per_h: None }
+    }
+
+    pub fn of(certificate: &Certificate) -> Self {
+        let bound = deg_per_h_from_rad_per_s(certificate.lower_bound_rad_per_s);
+        Self {
+            status: certificate.status.to_string(),
+            lower_bound_deg_per_h: (certificate.status != Status::None).then_some(bound),
+        }
+    }
+}
+
+/// The answer of `exact`.
+#[derive(Debug, Serialize)]
+pub struct ExactJson {
+    pub model: String,
+    pub windability: String,
+    pub best: PatternJson,
+    pub proof: ProofJson,
+    /// Nodes whose bound was computed; the same on every machine unless the clock ended the proof.
+    pub nodes: u64,
+    /// Patterns judged on all samples.
+    pub judged: u64,
+    /// Samples that the last pass refuted by.
+    pub rows: usize,
+    pub seconds: f64,
+}
+
+#[derive(Debug, Serialize)]
+pub struct FaultJson {
+    pub message: String,
+    /// Counted from 1; null for a fault of the file as a whole.
+    pub line: Option<usize>,
+    pub note: Option<String>,
+}
+
+#[derive(Debug, Serialize)]
+pub struct CheckJson {
+    pub file: String,
+    pub faults: Vec<FaultJson>,
+    pub advice: Vec<String>,
+}
+
+#[derive(Debug, Serialize)]
+pub struct ClassicJson {
+    pub name: String,
+    pub title: String,
+    pub layers: usize,
+    pub segments: Vec<usize>,
+    pub windability: WindabilityJson,
+}
+
+#[derive(Debug, Serialize)]
+pub struct PatternsJson {
+    pub patterns: Vec<ClassicJson>,
+}
+
+#[derive(Debug, Serialize)]
+pub struct ViolationJson {
+    /// Counted from 1; null for the file as a whole.
+    pub row: Option<usize>,
+    pub field: String,
+    pub expected: String,
+    pub found: String,
+    pub remedy: String,
+    pub message: String,
+}
+
+#[derive(Debug, Serialize)]
+pub struct VerifyJson {
+    pub model: String,
+    pub schedule: String,
+    pub checks: usize,
+    pub rate_check: String,
+    /// The worst over all profiles and times, worked out again, and how closely the claim must agree with it.
+    pub independent_worst_rate_deg_per_h: Option<f64>,
+    pub rate_tolerance_deg_per_h: Option<f64>,
+    /// The same on a finer heat network; null in a half space, which has a closed form.
+    pub finer_worst_rate_deg_per_h: Option<f64>,
+    pub recomputed: Vec<&'static str>,
+    pub taken_as_given: Vec<&'static str>,
+    pub violations: Vec<ViolationJson>,
+}
+
+/// What a command wrote.
+#[derive(Debug, Serialize)]
+pub struct WrittenJson {
+    pub files: Vec<String>,
+}
+
+/// A script for a shell.
+#[derive(Debug, Serialize)]
+pub struct CompletionsJson {
+    pub shell: String,
+    pub script: String,
+}
+
+/// A JSON Schema with what it is of.
+#[derive(Debug, Serialize)]
+pub struct SchemaJson {
+    pub kind: String,
+    pub schema: serde_json::Value,
+}
+
+#[derive(Debug, Serialize)]
+pub struct ReportJson {
+    pub report: String,
+    pub bytes: usize,
+}

@@ -1,0 +1,58 @@
+//! What a model file states, understood: read by `read`, answered about by `json` and `write`.
+
+use std::path::PathBuf;
+
+use crate::pattern::Pattern;
+use crate::pattern::windability::WindabilityClass;
+use crate::profile::ProfileSpec;
+use crate::rate::CoilModel;
+use crate::schedule::production::Production;
+use crate::search::cost::objective::Objective;
+use crate::search::cost::tolerance::ToleranceSpec;
+
+/// A model file, understood.
+#[derive(Debug, Clone)]
+pub struct ModelFile {
+    pub path: PathBuf,
+    /// As read, for hashes and for edits that keep comments.
+    pub source: String,
+    pub model: CoilModel,
+    /// The declared pattern and its name.
+    pub pattern: Option<NamedPattern>,
+    pub profiles: ProfileSpec,
+    pub search: SearchSettings,
+    pub production: Production,
+    pub tolerance: Option<ToleranceSpec>,
+    pub advice: Vec<Advice>,
+}
+
+/// A pattern under the name by which it was asked for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NamedPattern {
+    pub name: String,
+    pub pattern: Pattern,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SearchSettings {
+    pub windability: WindabilityClass,
+    pub objective: Objective,
+    pub seed: u64,
+}
+
+/// What a reader of the results should know, though it is no fault.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Advice {
+    #[error("[profiles] is absent: profiles of up to 60 °C/h are sampled, 64 of 4 ramps over 6000 s, seed 1")]
+    DefaultProfiles,
+    #[error(
+        "sensor.location is \"outer_layer\", but the effect surface_film makes the drive the ambient air; the film holds"
+    )]
+    FilmMovesSensor,
+    #[error(
+        "sensor.location is \"ambient\" without the effect surface_film: the pack's outer surface is taken to have the air's temperature"
+    )]
+    AmbientWithoutFilm,
+    #[error("finite_pack changes nothing where thermal.model is \"pack\" already")]
+    FinitePackTwice,
+}

@@ -1,0 +1,19 @@
+//! Files in: models, patterns, profiles, records, campaigns, and what the program itself wrote, to be shown or verified.
+//!
+//! A reader collects every fault of its file with the source line; a format that people write too is printed beside its
+//! reader, so that what is printed can be read.
+
+pub mod campaign_file;
+mod effect_tables;
+pub mod machine_program;
+pub mod model_file;
+mod page_reader;
+pub mod pattern_file;
+mod production_table;
+pub mod profile_file;
+mod profile_tables;
+pub mod record_file;
+pub mod run_reader;
+pub mod schedule_reader;
+mod tolerance_table;
+pub mod toml_reader;

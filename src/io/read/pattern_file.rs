@@ -1,0 +1,120 @@
+//! Pattern files, and patterns by name.
+
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+use crate::io::fault::{Fault, Faults};
+use crate::io::files::read_text;
+use crate::io::model::NamedPattern;
+use crate::pattern::Pattern;
+use crate::pattern::classic::{Classic, ClassicError};
+
+use super::toml_reader::{TomlReader, parse};
+
+#[derive(Debug, Error)]
+pub enum ResolveError {
+    #[error(transparent)]
+    Classic(#[from] ClassicError),
+    #[error("the pattern file {path} has {found} layers where the coil has {expected}", path = .path.display())]
+    Layers { path: PathBuf, expected: usize, found: usize },
+    #[error("the pattern file has faults:\n{0}")]
+    File(Faults),
+}
+
+/// A pattern by the name of a classic winding or by the path of a pattern file.
+///
+/// A path is tried from `base` (the model file's folder), then from the working directory.
+///
+/// # Errors
+/// A name that is neither, a winding that does not fit the layer count, a faulty file.
+pub fn resolve_pattern(stated: &str, layers: usize, base: Option<&Path>) -> Result<NamedPattern, ResolveError> {
+    if let Ok(classic) = Classic::from_key(stated) {
+        return Ok(NamedPattern { name: classic.key().to_owned(), pattern: classic.pattern(layers)? });
+    }
+    let beside = base.map(|b| b.join(stated)).filter(|p| p.is_file());
+    let path = beside.unwrap_or_else(|| PathBuf::from(stated));
+    let looks_like_a_path = stated.ends_with(".toml") || stated.contains(std::path::MAIN_SEPARATOR);
+    if !path.exists() && !looks_like_a_path {
+        return Err(ClassicError::Unknown { found: format!("\"{stated}\"") }.into());
+    }
+    let named = read_pattern(&path).map_err(ResolveError::File)?;
+    if named.pattern.layers() != layers {
+        return Err(ResolveError::Layers { path, expected: layers, found: named.pattern.layers() });
+    }
+    Ok(named)
+}
+
+/// Reads and checks a pattern file.
+///
+/// # Errors
+/// All faults of the file at once.
+pub fn read_pattern(path: &Path) -> Result<NamedPattern, Faults> {
+    let source = read_text(path)?;
+    parse_pattern(&path.display().to_string(), &source)
+}
+
+/// As [`read_pattern`], of a text that was read already.
+///
+/// # Errors
+/// All faults of the text at once.
+pub fn parse_pattern(file: &str, source: &str) -> Result<NamedPattern, Faults> {
+    let document = parse(file, source)?;
+    let mut reader = TomlReader::new(file, source);
+    let r = &mut reader;
+    let mut root = r.root(&document);
+    let name = root.needed_text(r, "name", "a string").map(str::to_owned);
+    let layers = root.needed_integer(r, "layers", 2, 10_000);
+    let segments = root.needed_integers(r, "segments");
+    let segments_span = root.span_of("segments");
+    let layers_span = root.span_of("layers");
+    root.finish(r);
+    if let (Some(layers), Some(segments)) = (layers, &segments)
+        && layers as usize != segments.len()
+    {
+        let message = format!("layers is {layers}, but segments lists {}: correct one of them", segments.len());
+        r.fault(Fault::new(message, layers_span));
+    }
+    let pattern = segments.and_then(|stated| {
+        let mut clean = true;
+        for (i, (segment, span)) in stated.iter().enumerate() {
+            let message = if *segment < 1 || *segment > stated.len() as i64 {
+                format!("segment {segment} on layer {} is outside 1 … {}", i + 1, stated.len())
+            } else if let Some(first) = stated[..i].iter().position(|(s, _)| s == segment) {
+                format!(
+                    "segment {segment} lies on layer {} and again on layer {}: each segment lies on exactly one layer",
+                    first + 1,
+                    i + 1
+                )
+            } else {
+                continue;
+            };
+            clean = false;
+            r.fault(Fault::new(message, span.clone()));
+        }
+        if !clean {
+            return None;
+        }
+        match Pattern::new(stated.into_iter().map(|(s, _)| s as usize).collect()) {
+            Ok(pattern) => Some(pattern),
+            Err(error) => {
+                r.fault(Fault::new(error.to_string(), segments_span));
+                None
+            }
+        }
+    });
+    let value = name.zip(pattern).map(|(name, pattern)| NamedPattern { name, pattern });
+    reader.finish(value)
+}
+
+/// A pattern file's text; `comments` are written above it, one a line.
+pub fn print_pattern(named: &NamedPattern, comments: &[String]) -> String {
+    let mut document = toml_edit::DocumentMut::new();
+    document["name"] = toml_edit::value(&named.name);
+    document["layers"] = toml_edit::value(named.pattern.layers() as i64);
+    let segments: toml_edit::Array = named.pattern.segments().iter().map(|&s| s as i64).collect();
+    document["segments"] = toml_edit::value(segments);
+    let head: String = comments.iter().map(|c| format!("# {c}\n")).collect();
+    let body = document.to_string().replace("]\n", "]   # innermost layer first\n");
+    head + &body
+}

@@ -1,0 +1,316 @@
+//! Compensation as text: CSV lines in, CSV lines out.
+
+use std::fmt::Write as _;
+use std::io::{BufRead, Read, Write};
+
+use serde::Serialize;
+
+use crate::compensate::Compensator;
+use crate::compensate::stream::{Compensated, Flag, Reading, Stream};
+use crate::io::fault::{Fault, Faults};
+use crate::io::read::record_file::{Column, Quantity, read_header};
+use crate::numeric::statistics::RunningDeviation;
+use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s};
+
+/// The column that is added, and the one that says what happened to a row.
+pub const ADDED_COLUMNS: &str = "rate_compensated_deg_per_h,flags";
+/// A longer line is no row of a record; it is cut here and flagged.
+const LONGEST_LINE_BYTES: u64 = 64 * 1024;
+
+/// What a stream did.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct StreamSummary {
+    pub rows: usize,
+    pub delay_rows: usize,
+    pub malformed: usize,
+    pub clock_back: usize,
+    pub gap: usize,
+    pub temperature_held: usize,
+    pub channel_held: usize,
+    pub rate_held: usize,
+    pub rate_rejected: usize,
+    /// Standard deviations over the rows without a flag.
+    pub rate_deviation_deg_per_h: Option<f64>,
+    pub compensated_deviation_deg_per_h: Option<f64>,
+}
+
+/// Why a stream ended before its input did.
+#[derive(Debug, thiserror::Error)]
+pub enum StreamError {
+    #[error("{0}")]
+    Header(#[from] Faults),
+    #[error("error: cannot read the input: {0}")]
+    Read(std::io::Error),
+    #[error("error: cannot write the output: {0}")]
+    Write(std::io::Error),
+}
+
+/// One line on its way through.
+struct Line {
+    text: String,
+    rate_rad_per_s: Option<f64>,
+}
+
+/// Which fields of a line are needed.
+struct Places {
+    count: usize,
+    columns: Vec<(usize, Column)>,
+    /// Of each further column that the compensator reads, its place among `columns`.
+    channels: Vec<usize>,
+}
+
+/// Compensates line by line; every line comes out, in order, delayed by the compensator's delay.
+///
+/// # Errors
+/// A header that lacks what is needed; an input or output that fails.
+pub fn compensate_lines(
+    compensator: &Compensator,
+    name: &str,
+    input: impl Read,
+    output: impl Write,
+) -> Result<StreamSummary, StreamError> {
+    let mut input = std::io::BufReader::with_capacity(1 << 16, input);
+    let mut sink = Sink::new(std::io::BufWriter::with_capacity(1 << 16, output));
+    let mut bytes = Vec::new();
+    let places = loop {
+        if !next_line(&mut input, &mut bytes)? {
+            let message = "expected a header such as time_s,temperature_c,rate_deg_per_h, found nothing";
+            return Err(Faults::of_file(name, message).into());
+        }
+        let line = String::from_utf8_lossy(&bytes);
+        let line = line.trim_start_matches('\u{feff}');
+        if is_comment(line) {
+            sink.plain(line);
+            continue;
+        }
+        let places = places(name, line, compensator)?;
+        sink.plain(&format!("{line},{ADDED_COLUMNS}"));
+        break places;
+    };
+    let mut channels = vec![None; places.columns.len()];
+    let mut stream: Stream<Line> = Stream::new(compensator);
+    while next_line(&mut input, &mut bytes)? {
+        let text = String::from_utf8_lossy(&bytes).into_owned();
+        let reading = if is_comment(&text) { None } else { reading(&text, &places, compensator, &mut channels) };
+        let line = Line { rate_rad_per_s: reading.and_then(|r| r.rate_rad_per_s), text };
+        stream.push(line, reading, |row| sink.row(row, places.count));
+        if input.buffer().is_empty() {
+            // Whoever feeds line by line waits for what is ready.
+            sink.flush();
+        }
+        sink.check()?;
+    }
+    sink.summary.delay_rows = stream.delay_rows();
+    stream.finish(|row| sink.row(row, places.count));
+    sink.flush();
+    sink.check()?;
+    let mut summary = sink.summary;
+    summary.rate_deviation_deg_per_h = sink.before.deviation().map(deg_per_h_from_rad_per_s);
+    summary.compensated_deviation_deg_per_h = sink.after.deviation().map(deg_per_h_from_rad_per_s);
+    Ok(summary)
+}
+
+fn is_comment(line: &str) -> bool {
+    line.is_empty() || line.starts_with('#')
+}
+
+fn next_line(input: &mut impl BufRead, bytes: &mut Vec<u8>) -> Result<bool, StreamError> {
+    bytes.clear();
+    let read = input.take(LONGEST_LINE_BYTES).read_until(b'\n', bytes).map_err(StreamError::Read)?;
+    while matches!(bytes.last(), Some(b'\n' | b'\r')) {
+        bytes.pop();
+    }
+    Ok(read > 0)
+}
+
+fn places(name: &str, header: &str, compensator: &Compensator) -> Result<Places, Faults> {
+    let fields: Vec<&str> = header.split(',').map(|f| f.trim().trim_matches('"')).collect();
+    let columns = read_header(&fields).map_err(|faults| Faults {
+        file: name.to_owned(),
+        source: header.to_owned(),
+        faults: faults
+            .into_iter()
+            .map(|(message, note)| Fault { message, span: Some(0..header.len()), note })
+            .collect(),
+    })?;
+    let count = columns.len();
+    let names = compensator.channel_names();
+    let needed = |c: &Column| match c.quantity {
+        Quantity::Time | Quantity::Temperature | Quantity::Rate | Quantity::InnerTemperature => true,
+        Quantity::Channel => names.contains(&c.name.as_str()),
+        Quantity::AmbientTemperature => false,
+    };
+    let columns: Vec<(usize, Column)> = columns.into_iter().enumerate().filter(|(_, c)| needed(c)).collect();
+    let place = |wanted: &&str| {
+        let found = columns.iter().position(|(_, c)| c.name == *wanted);
+        found.ok_or_else(|| Faults::of_file(name, format!("the model reads the column {wanted}, which is not there")))
+    };
+    let channels = names.iter().map(place).collect::<Result<_, _>>()?;
+    Ok(Places { count, columns, channels })
+}
+
+/// None where the fields are not as many as the header's or the time is no number; `channels` is room for the further columns.
+fn reading(line: &str, places: &Places, compensator: &Compensator, channels: &mut [Option<f64>]) -> Option<Reading> {
+    let mut found = Reading {
+        time_s: f64::NAN,
+        temperature_k: None,
+        inner_k: None,
+        channel_rad_per_s: Some(0.0),
+        rate_rad_per_s: None,
+    };
+    let mut count = 0;
+    let mut next = 0;
+    for field in line.split(',') {
+        if let Some((place, column)) = places.columns.get(next)
+            && *place == count
+        {
+            let value = column.value(field.trim().trim_matches('"')).ok();
+            match column.quantity {
+                Quantity::Time => found.time_s = value?,
+                Quantity::Temperature => found.temperature_k = value,
+                Quantity::Rate => found.rate_rad_per_s = value,
+                Quantity::InnerTemperature => found.inner_k = value,
+                Quantity::Channel => channels[next] = value,
+                Quantity::AmbientTemperature => {}
+            }
+            next += 1;
+        }
+        count += 1;
+    }
+    if let Compensator::Physical(physical) = compensator {
+        found.channel_rad_per_s = physical.channel_bias_rad_per_s(places.channels.iter().map(|c| channels[*c]));
+    }
+    (count == places.count).then_some(found)
+}
+
+struct Sink<W: Write> {
+    output: W,
+    summary: StreamSummary,
+    before: RunningDeviation,
+    after: RunningDeviation,
+    text: String,
+    failed: Option<std::io::Error>,
+}
+
+impl<W: Write> Sink<W> {
+    fn new(output: W) -> Self {
+        Self {
+            output,
+            summary: StreamSummary::default(),
+            before: RunningDeviation::default(),
+            after: RunningDeviation::default(),
+            text: String::new(),
+            failed: None,
+        }
+    }
+
+    fn plain(&mut self, line: &str) {
+        let done = writeln!(self.output, "{line}");
+        self.keep(done);
+    }
+
+    fn keep(&mut self, done: std::io::Result<()>) {
+        if let Err(error) = done {
+            self.failed.get_or_insert(error);
+        }
+    }
+
+    fn flush(&mut self) {
+        let done = self.output.flush();
+        self.keep(done);
+    }
+
+    fn check(&mut self) -> Result<(), StreamError> {
+        self.failed.take().map_or(Ok(()), |error| Err(StreamError::Write(error)))
+    }
+
+    fn row(&mut self, row: Compensated<Line>, columns: usize) {
+        if is_comment(&row.tag.text) {
+            let text = row.tag.text;
+            self.plain(&text);
+            return;
+        }
+        self.summary.rows += 1;
+        self.text.clear();
+        if row.flags.contains(&Flag::Malformed) && row.tag.text.split(',').count() != columns {
+            // As one quoted field, so that the output stays a table and nothing is lost.
+            let _ = write!(self.text, "\"{}\"{}", row.tag.text.replace('"', "\"\""), ",".repeat(columns - 1));
+        } else {
+            self.text.push_str(&row.tag.text);
+        }
+        self.text.push(',');
+        if let Some(rate) = row.rate_rad_per_s {
+            let _ = write!(self.text, "{:.8}", deg_per_h_from_rad_per_s(rate));
+        }
+        self.text.push(',');
+        for (i, flag) in row.flags.iter().enumerate() {
+            if i > 0 {
+                self.text.push('|');
+            }
+            self.text.push_str(flag.word());
+            let count = match flag {
+                Flag::Malformed => &mut self.summary.malformed,
+                Flag::ClockBack => &mut self.summary.clock_back,
+                Flag::Gap => &mut self.summary.gap,
+                Flag::TemperatureHeld => &mut self.summary.temperature_held,
+                Flag::ChannelHeld => &mut self.summary.channel_held,
+                Flag::RateHeld => &mut self.summary.rate_held,
+                Flag::RateRejected => &mut self.summary.rate_rejected,
+            };
+            *count += 1;
+        }
+        if let (true, Some(before), Some(after)) = (row.flags.is_empty(), row.tag.rate_rad_per_s, row.rate_rad_per_s) {
+            self.before.push(before);
+            self.after.push(after);
+        }
+        self.text.push('\n');
+        let done = self.output.write_all(self.text.as_bytes());
+        self.keep(done);
+    }
+}
+
+/// One method on a hold-out.
+#[derive(Debug, Clone, Serialize)]
+pub struct MethodJson {
+    pub method: &'static str,
+    /// Null where the method cannot be used; `reason` then says why.
+    pub rms_deg_per_h: Option<f64>,
+    pub delay_rows: Option<usize>,
+    pub reason: Option<String>,
+}
+
+#[derive(Debug, Serialize)]
+pub struct CompensateJson {
+    pub model: String,
+    pub method: &'static str,
+    pub summary: Option<StreamSummary>,
+    pub noise_floor_deg_per_h: Option<f64>,
+    /// All methods on the hold-out, where that was asked for.
+    pub methods: Vec<MethodJson>,
+    pub lines: Vec<BiasLineJson>,
+}
+
+/// A straight piece of the bias over temperature.
+#[derive(Debug, Clone, Serialize)]
+pub struct BiasLineJson {
+    /// Null: to the end.
+    pub until_c: Option<f64>,
+    /// Where that end may lie, with 95 % confidence.
+    pub until_within_c: Option<[f64; 2]>,
+    pub at_20_c_deg_per_h: f64,
+    pub slope_deg_per_h_per_c: f64,
+}
+
+impl BiasLineJson {
+    /// Empty for other compensators.
+    pub fn all(compensator: &Compensator) -> Vec<Self> {
+        let Compensator::Piecewise(piecewise) = compensator else { return Vec::new() };
+        let json = |line: &crate::compensate::empirical::BiasLine| Self {
+            until_c: Some(celsius_from_kelvin(line.until_k)).filter(|c| c.is_finite()),
+            until_within_c: line.until_within_k.map(|(low, high)| [low, high].map(celsius_from_kelvin)),
+            at_20_c_deg_per_h: deg_per_h_from_rad_per_s(line.at_reference_rad_per_s),
+            slope_deg_per_h_per_c: deg_per_h_from_rad_per_s(line.slope_rad_per_s_k),
+        };
+        piecewise.lines.iter().map(json).collect()
+    }
+}

@@ -1,0 +1,139 @@
+//! The folder of a comparison, a diagnosis or measures: what commands on records write with `-o`, and read back for reports.
+//!
+//! One folder may hold all three; each is a JSON document beside tables and pictures, which follow from it.
+
+use std::path::Path;
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use crate::io::fault::{Fault, Faults};
+use crate::io::files::{WriteError, read_text, read_text_up_to, write_atomically};
+use crate::io::json::Document;
+use crate::io::json::comparison::CompareJson;
+use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow};
+use crate::io::json::metrics::MetricsJson;
+
+use super::comparison_rows::ComparisonRow;
+
+pub const COMPARISON_FILE: &str = "comparison.json";
+pub const DIAGNOSIS_FILE: &str = "diagnosis.json";
+pub const METRICS_FILE: &str = "metrics.json";
+/// A copy of the model file that was asked about.
+pub const MODEL_FILE: &str = "model.toml";
+
+const LARGEST_TABLE_BYTES: u64 = 2 * 1024 * 1024 * 1024;
+
+/// Everything that a folder holds.
+#[derive(Debug, Clone, Default)]
+pub struct Measurements {
+    /// With one table a record.
+    pub comparison: Option<(CompareJson, Vec<Vec<ComparisonRow>>)>,
+    /// With one table a record, where effects were found.
+    pub diagnosis: Option<(DiagnosisJson, Vec<Vec<DiagnosisRow>>)>,
+    pub metrics: Option<MetricsJson>,
+    /// The text of the model file.
+    pub model_source: Option<String>,
+}
+
+/// Whether a folder holds measurements rather than a search.
+pub fn holds_measurements(folder: &Path) -> bool {
+    [COMPARISON_FILE, DIAGNOSIS_FILE, METRICS_FILE].iter().any(|name| folder.join(name).is_file())
+}
+
+/// Refuses a folder that holds a search, whose files have the same names.
+///
+/// # Errors
+/// As said.
+pub fn check_free(folder: &Path) -> Result<(), Faults> {
+    if folder.join("run.toml").is_file() {
+        let message = "holds a search: choose another folder for what concerns records";
+        return Err(Faults::of_file(folder.display().to_string(), message));
+    }
+    Ok(())
+}
+
+/// # Errors
+/// Files that are missing, damaged or of another program.
+pub fn read_measurements(folder: &Path) -> Result<Measurements, Faults> {
+    let comparison = match read_document::<CompareJson>(folder, COMPARISON_FILE, "comparison")? {
+        None => None,
+        Some(document) => {
+            let tables = (1..=document.records.len())
+                .map(|number| read_table(&folder.join(table_name(number))))
+                .collect::<Result<_, _>>()?;
+            Some((document, tables))
+        }
+    };
+    let diagnosis = match read_document::<DiagnosisJson>(folder, DIAGNOSIS_FILE, "diagnosis")? {
+        None => None,
+        Some(document) => {
+            let count = if document.effects.is_empty() { 0 } else { document.inputs.records.len() };
+            let tables = (1..=count)
+                .map(|number| read_table(&folder.join(before_and_after_name(number))))
+                .collect::<Result<_, _>>()?;
+            Some((document, tables))
+        }
+    };
+    let model = folder.join(MODEL_FILE);
+    Ok(Measurements {
+        comparison,
+        diagnosis,
+        metrics: read_document(folder, METRICS_FILE, "set of measures")?,
+        model_source: if model.is_file() { Some(read_text(&model)?) } else { None },
+    })
+}
+
+/// The name of the `number`-th record's table, counted from 1.
+pub fn table_name(number: usize) -> String {
+    format!("record-{number}.csv")
+}
+
+/// The name of the `number`-th record's table of a diagnosis, counted from 1.
+pub fn before_and_after_name(number: usize) -> String {
+    format!("before-after-{number}.csv")
+}
+
+/// Writes a document under its name.
+///
+/// # Errors
+/// A folder that cannot be written.
+pub fn write_document<T: Serialize>(folder: &Path, name: &str, document: &T) -> Result<(), WriteError> {
+    // A number that is not finite becomes null, which is no error.
+    let json = serde_json::to_string_pretty(&Document::new(document)).expect("keys are texts");
+    write_atomically(&folder.join(name), (json + "\n").as_bytes())
+}
+
+/// Writes rows as CSV under a name.
+///
+/// # Errors
+/// A folder that cannot be written.
+pub fn write_table<T: Serialize>(folder: &Path, name: &str, rows: &[T]) -> Result<(), WriteError> {
+    const IN_MEMORY: &str = "a buffer in memory takes every row";
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        csv.serialize(row).expect(IN_MEMORY);
+    }
+    write_atomically(&folder.join(name), &csv.into_inner().expect(IN_MEMORY))
+}
+
+fn read_document<T: DeserializeOwned>(folder: &Path, name: &str, what: &str) -> Result<Option<T>, Faults> {
+    let path = folder.join(name);
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let text = read_text(&path)?;
+    let document = serde_json::from_str(&text).map_err(|error| {
+        let message = format!("line {}: cannot be understood as a {what}: {error}", error.line());
+        Faults::one(path.display().to_string(), &text, Fault::new(message, None))
+    })?;
+    Ok(Some(document))
+}
+
+fn read_table<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<Vec<T>, Faults> {
+    let text = read_text_up_to(path, LARGEST_TABLE_BYTES)?;
+    csv::Reader::from_reader(text.as_bytes())
+        .deserialize()
+        .collect::<Result<_, _>>()
+        .map_err(|error| Faults::of_file(path.display().to_string(), error.to_string()))
+}

@@ -1,0 +1,15 @@
+//! Files out: the folders and files that commands leave behind, each written whole or not at all.
+//!
+//! What only this program writes and reads again (a checkpoint, the parts of a front) is read here too.
+
+pub mod checkpoint;
+pub mod comparison_rows;
+pub mod compensation_file;
+pub mod difference_equation;
+pub mod machine_program;
+pub mod measurement_folder;
+pub mod model_edit;
+pub mod pareto_parts;
+pub mod run_directory;
+pub mod sample_table;
+pub mod traveller;

@@ -1,0 +1,59 @@
+//! What the parts of a front's search found, one file a part: a front that was interrupted goes on from them.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::io::files::{WriteError, sha256_hex, write_atomically};
+use crate::io::model::ModelFile;
+use crate::pattern::Pattern;
+
+/// What all parts of one front have in common and what a part must agree with to be kept.
+#[derive(Debug, Clone)]
+pub struct Front<'a> {
+    pub folder: &'a Path,
+    pub file: &'a ModelFile,
+    pub seed: u64,
+    pub rounds: u64,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PartJson {
+    fingerprint: String,
+    /// What was searched, in words.
+    part: String,
+    /// P(j) of each pattern found, innermost layer first.
+    found: Vec<Vec<usize>>,
+}
+
+impl Front<'_> {
+    /// The patterns of a part that has been searched; none if it has not, or for another request.
+    pub fn read_part(&self, number: usize, part: &str) -> Option<Vec<Pattern>> {
+        let text = std::fs::read_to_string(self.path(number)).ok()?;
+        let read: PartJson = serde_json::from_str(&text).ok()?;
+        let layers = self.file.model.coil.layers();
+        let fits = read.fingerprint == self.fingerprint(part) && read.found.iter().all(|s| s.len() == layers);
+        fits.then(|| read.found.into_iter().map(|s| Pattern::new(s).ok()).collect())?
+    }
+
+    /// Keeps what a part found: whole or not at all.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write_part(&self, number: usize, part: &str, found: &[Pattern]) -> Result<(), WriteError> {
+        let found = found.iter().map(|p| p.segments().to_vec()).collect();
+        let document = PartJson { fingerprint: self.fingerprint(part), part: part.to_owned(), found };
+        let json = serde_json::to_string(&document).expect("numbers, strings and lists can always be written as JSON");
+        write_atomically(&self.path(number), (json + "\n").as_bytes())
+    }
+
+    fn path(&self, number: usize) -> PathBuf {
+        self.folder.join("parts").join(format!("{number:03}.json"))
+    }
+
+    fn fingerprint(&self, part: &str) -> String {
+        let version = env!("CARGO_PKG_VERSION");
+        sha256_hex(&format!("{version}\n{part}\n{} {}\n{}", self.seed, self.rounds, self.file.source))
+    }
+}

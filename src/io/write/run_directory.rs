@@ -1,0 +1,267 @@
+//! The folder of a search: `run.toml`, `best.toml`, `summary.json`, `baselines.csv`, `history.csv`, `model.toml`.
+//!
+//! Nothing in it depends on the clock, on the number of threads, or on whether the run was interrupted and resumed:
+//! the same request gives the same bytes. Speed is said on the screen only.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::io::files::{WriteError, sha256_hex, write_atomically};
+use crate::io::json::{Document, PatternJson, ProofJson};
+use crate::io::model::{ModelFile, NamedPattern};
+use crate::io::read::pattern_file::print_pattern;
+use crate::pattern::windability::WindabilityClass;
+use crate::search::anneal::rounds::{Plan, RoundRecord, State};
+use crate::search::cost::objective::Objective;
+use crate::search::evaluator::{GridCheck, Judged};
+use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
+
+impl PatternJson {
+    /// Of a pattern that was judged by the reference.
+    pub fn of(judged: &Judged) -> Self {
+        let Judged { name, pattern, worst, phase_rad, guaranteed_rad_per_s, .. } = judged;
+        Self {
+            p95_rate_deg_per_h: judged.p95_rad_per_s.map(deg_per_h_from_rad_per_s),
+            ..Self::new(name, pattern, worst, *phase_rad, *guaranteed_rad_per_s)
+        }
+    }
+}
+
+/// The answer of `optimise`.
+#[derive(Debug, Clone, Serialize)]
+pub struct OptimiseJson {
+    pub model: String,
+    pub objective: String,
+    pub windability: String,
+    pub seed: u64,
+    pub best: PatternJson,
+    pub baselines: Vec<PatternJson>,
+    /// QUA's objective over the best pattern's; null where QUA does not fit the layer count.
+    pub improvement_over_qua: Option<f64>,
+    pub statement: String,
+    /// Null where the temperature has no grid or the search was interrupted.
+    pub grid_check: Option<GridCheckJson>,
+    /// Null where no former pattern was stated.
+    pub compared_with: Option<FormerJson>,
+    pub proof: ProofJson,
+    pub evaluations: u64,
+    /// On the screen only: files don't depend on the clock.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub evaluations_per_s: Option<f64>,
+    /// On the screen only: the whole search, without reading the model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seconds: Option<f64>,
+    pub best_found: BestFoundJson,
+    pub rounds: u64,
+    /// "proved", "no improvement", "rounds", "moves", "target", "clock" or "interrupted".
+    pub stopped_by: String,
+    /// False where the clock or a signal ended the search: the same request may then end elsewhere.
+    pub reproducible: bool,
+}
+
+/// Worst rates on a grid twice as fine.
+#[derive(Debug, Clone, Serialize)]
+pub struct GridCheckJson {
+    pub cells_per_layer: usize,
+    pub finer_cells_per_layer: usize,
+    /// The best pattern, then QUA.
+    pub patterns: Vec<GridCheckedJson>,
+    /// Null where the grid changes little.
+    pub caution: Option<String>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct GridCheckedJson {
+    pub name: String,
+    pub worst_rate_deg_per_h: f64,
+    pub finer_worst_rate_deg_per_h: f64,
+    pub change_percent: f64,
+}
+
+impl GridCheckJson {
+    pub fn of(check: &GridCheck) -> Self {
+        let patterns = check.patterns.iter().map(|checked| GridCheckedJson {
+            name: checked.name.clone(),
+            worst_rate_deg_per_h: deg_per_h_from_rad_per_s(checked.rate_rad_per_s),
+            finer_worst_rate_deg_per_h: deg_per_h_from_rad_per_s(checked.finer_rad_per_s),
+            change_percent: percent_from_fraction(checked.change()),
+        });
+        Self {
+            cells_per_layer: check.cells_per_layer,
+            finer_cells_per_layer: check.finer_cells_per_layer,
+            patterns: patterns.collect(),
+            caution: check.caution(),
+        }
+    }
+}
+
+/// When the best pattern was come upon.
+#[derive(Debug, Clone, Serialize)]
+pub struct BestFoundJson {
+    /// "classic", "annealing", or "bounds" where the search by bounds at the end found better.
+    pub by: &'static str,
+    /// Moves judged by then.
+    pub evaluations: u64,
+    /// On the screen only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seconds: Option<f64>,
+}
+
+/// A former pattern under the model of this search.
+#[derive(Debug, Clone, Serialize)]
+pub struct FormerJson {
+    #[serde(flatten)]
+    pub pattern: PatternJson,
+    /// Whether the best pattern of this search is better by more than rounding.
+    pub best_changed: bool,
+    /// The former pattern's objective, and as a multiple of the best one's.
+    pub cost_deg_per_h: f64,
+    pub cost_factor: Option<f64>,
+    pub statement: String,
+}
+
+/// A request, as far as the search's course depends on it.
+#[derive(Debug, Clone)]
+pub struct Request<'a> {
+    pub file: &'a ModelFile,
+    pub class: WindabilityClass,
+    pub objective: Objective,
+    pub plan: &'a Plan,
+    /// As given on the command line, if it was.
+    pub budget: Option<&'a str>,
+}
+
+impl Request<'_> {
+    /// What a checkpoint must agree with. A budget of time changes where a search ends, not its course.
+    pub fn fingerprint(&self) -> String {
+        sha256_hex(&format!("{}\n{}", self.settings(), self.file.source))
+    }
+
+    fn settings(&self) -> toml_edit::Table {
+        let mut table = toml_edit::Table::new();
+        let plan = self.plan;
+        table["seed"] = toml_edit::value(plan.seed as i64);
+        table["windability"] = toml_edit::value(self.class.to_string());
+        table["objective"] = toml_edit::value(self.objective.key());
+        table["restarts_per_round"] = toml_edit::value(plan.restarts_per_round as i64);
+        table["moves_per_restart"] = toml_edit::value(plan.moves_per_restart as i64);
+        table["patience_rounds"] = toml_edit::value(plan.rules.patience as i64);
+        if plan.rules.rounds < i64::MAX as u64 {
+            table["rounds"] = toml_edit::value(plan.rules.rounds as i64);
+        }
+        if let Some(moves) = plan.rules.moves {
+            table["moves"] = toml_edit::value(moves as i64);
+        }
+        if let Some(target) = plan.rules.target {
+            table["target_deg_per_h"] = toml_edit::value(deg_per_h_from_rad_per_s(target));
+        }
+        for start in &plan.starts {
+            let segments: toml_edit::Array = start.iter().map(|&s| s as i64).collect();
+            table["init"] = toml_edit::value(segments);
+        }
+        table
+    }
+
+    /// The text of `run.toml`.
+    pub fn run_toml(&self) -> String {
+        let mut document = toml_edit::DocumentMut::new();
+        document["program"] = toml_edit::value(concat!("coilwright ", env!("CARGO_PKG_VERSION")));
+        document["command"] = toml_edit::value("optimise");
+        document["model"] = toml_edit::value(self.file.path.display().to_string());
+        document["model_name"] = toml_edit::value(&self.file.model.name);
+        document["model_sha256"] = toml_edit::value(sha256_hex(&self.file.source));
+        if let Some(budget) = self.budget {
+            document["budget"] = toml_edit::value(budget);
+        }
+        document["search"] = toml_edit::Item::Table(self.settings());
+        document.to_string()
+    }
+}
+
+/// Writes what is known when a run begins; its checkpoint comes after it.
+///
+/// # Errors
+/// Files that cannot be written.
+pub fn write_request(folder: &Path, request: &Request) -> Result<(), WriteError> {
+    write_atomically(&folder.join("run.toml"), request.run_toml().as_bytes())?;
+    write_atomically(&folder.join("model.toml"), request.file.source.as_bytes())
+}
+
+/// Writes what a run has found; the summary last, so that where it is, the rest is.
+///
+/// # Errors
+/// Files that cannot be written.
+pub fn write_results(folder: &Path, answer: &OptimiseJson, best: &Judged, state: &State) -> Result<(), WriteError> {
+    let named = NamedPattern { name: best.name.clone(), pattern: best.pattern.clone() };
+    let mut comments = vec![
+        format!("coil: {}", answer.model),
+        format!("objective: {}, class: {}, seed: {}", answer.objective, answer.windability, answer.seed),
+        format!("worst rate error: {:.6} deg/h under {}", answer.best.worst_rate_deg_per_h, answer.best.worst_profile),
+    ];
+    comments.extend(answer.best.p95_rate_deg_per_h.map(|p95| format!("P95 over built coils: {p95:.6} deg/h")));
+    write_atomically(&folder.join("best.toml"), print_pattern(&named, &comments).as_bytes())?;
+    write_atomically(&folder.join("baselines.csv"), &baselines_csv(&answer.baselines, &answer.best))?;
+    write_atomically(&folder.join("history.csv"), &history_csv(&state.history))?;
+    let best_found = BestFoundJson { seconds: None, ..answer.best_found.clone() };
+    let summary = OptimiseJson { evaluations_per_s: None, seconds: None, best_found, ..answer.clone() };
+    let json = serde_json::to_string_pretty(&Document::new(summary)).expect("the answer's numbers are finite");
+    write_atomically(&folder.join("summary.json"), (json + "\n").as_bytes())
+}
+
+const CSV_IN_MEMORY: &str = "a buffer in memory takes every row";
+
+fn baselines_csv(baselines: &[PatternJson], best: &PatternJson) -> Vec<u8> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    // A column only of searches over built coils, so that the others' files stay as they are.
+    let p95 = |value: &dyn Fn() -> String| best.p95_rate_deg_per_h.map(|_| value());
+    let mut header: Vec<String> = [
+        "name",
+        "worst_rate_deg_per_h",
+        "worst_phase_rad",
+        "worst_profile",
+        "worst_time_s",
+        "guaranteed_worst_rate_deg_per_h",
+    ]
+    .map(str::to_owned)
+    .to_vec();
+    header.extend(p95(&|| "p95_rate_deg_per_h".to_owned()));
+    header.extend(["class", "reels", "captive", "max_climb", "segments"].map(str::to_owned));
+    csv.write_record(&header).expect(CSV_IN_MEMORY);
+    for pattern in baselines.iter().chain(std::iter::once(best)) {
+        let segments: Vec<String> = pattern.segments.iter().map(ToString::to_string).collect();
+        let mut row = vec![
+            pattern.name.clone(),
+            pattern.worst_rate_deg_per_h.to_string(),
+            pattern.worst_phase_rad.to_string(),
+            pattern.worst_profile.clone(),
+            pattern.worst_time_s.to_string(),
+            pattern.guaranteed_worst_rate_deg_per_h.map(|g| g.to_string()).unwrap_or_default(),
+        ];
+        row.extend(p95(&|| pattern.p95_rate_deg_per_h.map(|v| v.to_string()).unwrap_or_default()));
+        row.extend([
+            pattern.windability.class.clone(),
+            pattern.windability.reels.to_string(),
+            pattern.windability.captive.to_string(),
+            pattern.windability.max_climb.to_string(),
+            segments.join(" "),
+        ]);
+        csv.write_record(&row).expect(CSV_IN_MEMORY);
+    }
+    csv.into_inner().expect(CSV_IN_MEMORY)
+}
+
+fn history_csv(history: &[RoundRecord]) -> Vec<u8> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    csv.write_record(["round", "evaluations", "best_deg_per_h", "working_samples"]).expect(CSV_IN_MEMORY);
+    for record in history {
+        csv.write_record([
+            record.round.to_string(),
+            record.evaluations.to_string(),
+            deg_per_h_from_rad_per_s(record.best_cost).to_string(),
+            record.working_samples.to_string(),
+        ])
+        .expect(CSV_IN_MEMORY);
+    }
+    csv.into_inner().expect(CSV_IN_MEMORY)
+}
