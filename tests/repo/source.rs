@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::OnceLock;
 
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 
@@ -83,11 +84,27 @@ pub fn path_after(tokens: &[Token], i: usize) -> Option<&str> {
     if is_path { tokens.get(i + 3).map(|t| t.text.as_str()) } else { None }
 }
 
+/// The repository's root.
+pub fn root() -> &'static Path {
+    static ROOT: OnceLock<PathBuf> = OnceLock::new();
+    ROOT.get_or_init(|| {
+        let own = Path::new(env!("CARGO_MANIFEST_DIR"));
+        own.ancestors().nth(2).expect("this package stands two folders below the root").to_path_buf()
+    })
+}
+
 /// All Rust files below a folder, in the order of their names.
-pub fn sources(folder: &str) -> Vec<Source> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+pub fn sources(folder: &str) -> impl Iterator<Item = &'static Source> {
+    // Read once, however many rules ask.
+    static ALL: OnceLock<Vec<Source>> = OnceLock::new();
+    let all = ALL.get_or_init(|| ["benches", "examples", "src", "tests"].into_iter().flat_map(read_below).collect());
+    let inside = format!("{folder}/");
+    all.iter().filter(move |source| source.name.starts_with(&inside))
+}
+
+fn read_below(folder: &str) -> Vec<Source> {
     let mut files: Vec<PathBuf> = Vec::new();
-    let mut folders = vec![root.join(folder)];
+    let mut folders = vec![root().join(folder)];
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(&folder).into_iter().flatten() {
             let path = entry.expect("a folder of the repository can be listed").path();
@@ -102,7 +119,8 @@ pub fn sources(folder: &str) -> Vec<Source> {
     files
         .into_iter()
         .map(|path| {
-            let name = path.strip_prefix(root).expect("found below the root").display().to_string().replace('\\', "/");
+            let name =
+                path.strip_prefix(root()).expect("found below the root").display().to_string().replace('\\', "/");
             Source::new(name, fs::read_to_string(&path).expect("source files are UTF-8"))
         })
         .collect()

@@ -122,7 +122,7 @@ fn listed_edges_between_siblings_make_no_circle() {
 #[test]
 fn only_units_converts() {
     let mut faults = Vec::new();
-    for source in sources("src").into_iter().chain(sources("benches")).chain(sources("examples")) {
+    for source in sources("src").chain(sources("benches")).chain(sources("examples")) {
         if source.name != "src/units.rs" {
             let found = conversions(&source.tokens);
             faults.extend(found.into_iter().map(|(what, line)| format!("{}:{line}: {what}", source.name)));
@@ -136,7 +136,7 @@ fn files_formats_and_pages_are_known_to_io_report_and_cli_only() {
     // Without serde in scope no domain type can derive Serialize either.
     let outside = ["serde", "serde_json", "toml_edit", "csv", "maud", "plotters", "comfy_table", "PathBuf"];
     let mut faults = Vec::new();
-    for source in sources("src").into_iter().filter(|s| floor_of(&s.module()).is_some_and(|floor| floor < 5)) {
+    for source in sources("src").filter(|s| floor_of(&s.module()).is_some_and(|floor| floor < 5)) {
         for (i, token) in source.tokens.iter().enumerate() {
             let path_into_std = token.text == "std" && source.path_after(i).is_some_and(|next| next == "fs");
             if outside.contains(&token.text.as_str()) || path_into_std {
@@ -174,7 +174,7 @@ fn the_library_never_prints_exits_or_reads_clock_or_environment() {
 #[test]
 fn no_test_is_switched_off() {
     let mut faults = Vec::new();
-    for source in sources("src").into_iter().chain(sources("tests")).chain(sources("benches")) {
+    for source in sources("src").chain(sources("tests")).chain(sources("benches")) {
         let ignored = source.all_tokens.windows(3).filter(|w| w[0].text == "#" && w[2].text == "ignore");
         faults.extend(ignored.map(|w| format!("{}:{}", source.name, w[0].line)));
     }
@@ -187,7 +187,7 @@ fn every_source_file_says_at_its_head_what_it_is_for() {
         .into_iter()
         .flat_map(sources)
         .filter(|s| !s.text.starts_with("//! ") || s.text.lines().next().is_some_and(|head| head.len() < 20))
-        .map(|s| s.name)
+        .map(|s| s.name.clone())
         .collect();
     assert_no(faults);
 }
@@ -208,7 +208,7 @@ fn no_file_or_folder_is_named_after_nothing_in_particular() {
     let faults = ["src", "tests", "benches", "examples"]
         .into_iter()
         .flat_map(sources)
-        .map(|s| s.name)
+        .map(|s| s.name.clone())
         .filter(|name| name.split(['/', '.']).any(|part| FORBIDDEN_NAMES.contains(&part)))
         .collect();
     assert_no(faults);
