@@ -7,7 +7,7 @@ use super::report::{REPORT_FILE, write_report};
 use super::schedule::pattern_of;
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
-use crate::compare::compare;
+use crate::compare::{compare, suspicion};
 use crate::io::files::write_atomically;
 use crate::io::json::comparison::{CompareJson, PartJson, RecordComparisonJson};
 use crate::io::json::inputs::{InputsJson, RecordInputJson};
@@ -62,7 +62,10 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
             return Err(CliError::ColumnsMissing { file: name, columns });
         }
         let found = compare(&file.model, &named.pattern, &record)?;
-        shown.push(RecordComparisonJson::new(&name, &found, gross_errors, gaps));
+        let mut compared = RecordComparisonJson::new(&name, &found, gross_errors, gaps);
+        let suspected = suspicion::of_record(&record, file.model.rate_mean_s);
+        compared.findings.extend(suspected.iter().map(ToString::to_string));
+        shown.push(compared);
         inputs.push(RecordInputJson::new(path, "compared")?);
         if arguments.output.is_some() {
             tables.push(comparison_rows(&record, &found));

@@ -6,6 +6,7 @@ use super::report::{REPORT_FILE, write_report};
 use super::schedule::pattern_of;
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
+use crate::compare::suspicion;
 use crate::diagnose::experiment::{Chamber, design};
 use crate::diagnose::{self, Diagnosis, Request};
 use crate::io::files::write_atomically;
@@ -24,7 +25,9 @@ use crate::pattern::Pattern;
 use crate::predict::{noise_floor_rad_per_s, predict};
 use crate::rate::CoilModel;
 use crate::record::Record;
-use crate::report::diagnosis::{self, before_and_after_chart, rest_in_words, value_in_words, verdict_in_words};
+use crate::report::diagnosis::{
+    self, before_and_after_chart, explanations, rest_in_words, value_in_words, verdict_in_words,
+};
 use crate::report::ladder::ladder_chart;
 use crate::units::deg_per_h_from_rad_per_s;
 
@@ -98,7 +101,8 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         Chamber::of(&all).filter(|_| wanted).and_then(|chamber| design(&contest, &pattern, &chamber, arguments.seed));
     let holdout_noise = (!holdout.is_empty()).then(|| noise_of(&holdout));
     let inputs = InputsJson::new(Some(&file), inputs);
-    let body = DiagnosisJson::new(&file.model.name, &diagnosis, holdout_noise, experiment.as_ref(), inputs);
+    let mut body = DiagnosisJson::new(&file.model.name, &diagnosis, holdout_noise, experiment.as_ref(), inputs);
+    body.cautions.extend(suspicions(&file.model, &all, &diagnosis));
     if let Some(path) = &arguments.experiment {
         match (&experiment, &body.experiment) {
             (Some(found), Some(shown)) => {
@@ -118,6 +122,14 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let adequate = diagnosis.verdict == diagnose::Verdict::Adequate;
     screen.answer(body, text)?;
     Ok(if arguments.strict && !adequate { Ending::No } else { Ending::Done })
+}
+
+/// What the records and the fitted factors make one suspect.
+fn suspicions(model: &CoilModel, records: &[&Record], diagnosis: &Diagnosis) -> Vec<String> {
+    let factors = diagnosis.effects.iter().filter(|f| f.effect.kind() == "thermo_optic");
+    let of_factors = factors.filter_map(|f| suspicion::of_factor(f.effect.values()[0]));
+    let of_records = records.iter().flat_map(|record| suspicion::of_record(record, model.rate_mean_s));
+    of_factors.chain(of_records).map(|s| s.to_string()).collect()
 }
 
 /// Root mean square of the records' noises, each by its rows.
@@ -180,6 +192,9 @@ fn text(body: &DiagnosisJson) -> String {
     let mut text = format!("{}: {}\n", body.model, verdict_in_words(body));
     for effect in &body.effects {
         text += &format!("\n{}\n", effect_in_words(effect));
+    }
+    for (kind, words) in explanations(&body.effects) {
+        text += &format!("\n{kind}: {words}\n");
     }
     let rest = rest_in_words(body);
     if !rest.is_empty() {

@@ -52,6 +52,8 @@ fn describe(effect: &EffectJson) -> String {
         line("choice", &format!("{} = {}: {}", choice.key, options.join(" | "), choice.meaning));
     }
     line("in a record", effect.signature);
+    line("happens", effect.happens);
+    line("to do", effect.remedy);
     line("to isolate", effect.experiment);
     line("source", effect.source);
     text

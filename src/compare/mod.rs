@@ -22,6 +22,7 @@
 //! in [`crate::predict`].
 
 pub mod regimes;
+pub mod suspicion;
 pub mod verdict;
 
 use crate::boundary::{Boundary, BoundaryError};

@@ -32,6 +32,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     }],
     source: "Mohr, J. Lightwave Technol. 14, 27 (1996): the axial contribution to the Shupe error",
     signature: "an error in the transients that does not follow from the radial model and whose sign belongs to the flange",
+    happens: "One flange exchanges heat with the air, so the two ends of every layer differ in temperature and the directions of winding no longer cancel.",
+    remedy: "Insulate or equalise the flanges; with the flange declared, windings can be compared with the axial gradient counted.",
     experiment: "heat one flange, then the other; or insulate both",
     build: |values, choices, _| {
         let flange = if choices[0] == 0 { Flange::First } else { Flange::Second };

@@ -27,6 +27,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     choices: &[],
     source: "thesis chapter on FOG drift compensation (2021), section 3.2: D_∇Ṫ",
     signature: "a pulse after each change of ramp that lasts until the pack has settled",
+    happens: "A bias follows the change of the temperature difference across the pack, without any coil physics behind it.",
+    remedy: "Compensate with the difference between the outermost and the innermost layer; a second sensor at the bore shows whether it is real.",
     experiment: "a second sensor at the bore: regress on the measured difference's rate",
     build: |values, _, _| Box::new(BiasGradientRate { gain_rad_per_k: values[0] }),
 };

@@ -39,6 +39,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     choices: &[],
     source: "thesis chapter on FOG drift compensation (2021), section 3.2: D_ΔT",
     signature: "the residual follows temperature, also in a soak",
+    happens: "The gyro's bias drifts with the pack's temperature even when nothing changes in time; light source, coupler and electronics do this, the winding does not.",
+    remedy: "Compensate with the temperature itself; no winding changes it.",
     experiment: "long soaks at several temperatures",
     build: |values, _, _| {
         Box::new(BiasTemperature { linear_rad_per_s_k: values[0], quadratic_rad_per_s_k2: values[1] })

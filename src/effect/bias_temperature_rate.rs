@@ -27,6 +27,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     choices: &[],
     source: "thesis chapter on FOG drift compensation (2021), section 3.2: D_Ṫ",
     signature: "a step that lasts as long as a ramp; the same as a strain mismatch in every record of one coil",
+    happens: "A bias follows the pack's rate of temperature; from one coil's records it cannot be told from a strain mismatch, only the sign under a flip can.",
+    remedy: "Compensate with the rate of temperature, and flip the coil to learn whether fibre or electronics is the cause.",
     experiment: "flip the coil: an elasto-optic error changes sign, an electronic one does not",
     build: |values, _, _| Box::new(BiasTemperatureRate { gain_rad_per_k: values[0] }),
 };

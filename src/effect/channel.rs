@@ -29,6 +29,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     choices: &[],
     source: "empirical: a linear coefficient for whatever was logged beside temperature and rate",
     signature: "the residual follows the column, whatever the temperature does",
+    happens: "The rate follows a logged quantity that has nothing to do with the coil's heat, such as a supply voltage or a laser current.",
+    remedy: "Stabilise that quantity, or compensate with the logged column; no winding changes it.",
     experiment: "vary the logged quantity at constant temperature",
     build: |values, _, binding| Box::new(ChannelBias { gain_rad_per_s_per_unit: values[0], column: column(binding) }),
 };

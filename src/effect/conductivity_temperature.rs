@@ -28,6 +28,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     choices: &[],
     source: "polymer coatings and adhesives: a few 0.1 % per kelvin",
     signature: "the error of equal ramps is larger in the cold (or warm) and settles slower there",
+    happens: "The potting conducts heat better or worse as it warms, so the pack's time constants depend on temperature.",
+    remedy: "Declare the slope: transients in the cold and the warm are then both predicted, and a winding that suits one is not chosen for both.",
     experiment: "the same ramp at −30, 20 and 60 °C",
     build: |values, _, _| Box::new(ConductivityTemperature { slope_per_k: values[0] }),
 };

@@ -32,6 +32,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     choices: &[],
     source: "the user",
     signature: "whatever the formula describes",
+    happens: "The rate holds what the formula describes.",
+    remedy: "Compensate with the formula; where it stands for a cause, name and remove the cause.",
     experiment: "the one that changes the formula's variables one at a time",
     build: |values, _, binding| Box::new(CustomBias::new(values, binding)),
 };

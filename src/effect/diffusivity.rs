@@ -28,6 +28,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     choices: &[],
     source: "effective conductivity of a fibre pack is rarely known better than 20 %",
     signature: "all transients are faster or slower by one factor",
+    happens: "Heat moves through the pack faster or slower than the declared conductivity and heat capacity say.",
+    remedy: "Correct the declared numbers by the factor: nothing is wrong with the coil, but windings ranked with the old numbers should be ranked again.",
     experiment: "a laser-flash or hot-disk measurement of the pack; a second sensor at the bore",
     build: |values, _, _| Box::new(Diffusivity { factor: values[0] }),
 };

@@ -48,6 +48,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     choices: &[],
     source: "stiffening of the potting below T_g, as reported for quadrupolar coils; logistic form is the simplest monotonic one",
     signature: "an error ∝ Ṫ in the cold only",
+    happens: "Below its glass transition the potting is stiff and strains one half of the fibre more than the other; above it lets go.",
+    remedy: "Choose a potting whose transition lies outside the range of use, or compensate with the pack's rate of temperature below the transition only.",
     experiment: "the same slow ramp through the whole temperature range: the error steps where the potting stiffens",
     build: |values, _, _| {
         Box::new(GlassTransition { mismatch: values[0], transition_k: values[1], width_k: values[2] })

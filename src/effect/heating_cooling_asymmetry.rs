@@ -27,6 +27,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     choices: &[],
     source: "empirical: hysteresis of potting and coating",
     signature: "residuals of heating and cooling ramps have the same sign and size relative to the error itself",
+    happens: "The coil answers more strongly in one direction of temperature than in the other, as where a contact opens on cooling and closes on heating.",
+    remedy: "Look for a contact or a potting that moves; until it is found, compensate with a gain of its own for each direction.",
     experiment: "the same ramp upwards and downwards through the same temperatures",
     build: |values, _, _| Box::new(HeatingCoolingAsymmetry { gain: values[0] }),
 };

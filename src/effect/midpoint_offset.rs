@@ -31,6 +31,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     }],
     source: "trimming of FOG coils: 0.50 °/h per metre per °C/min at D = 0.1 m",
     signature: "with an isothermal lead a step ∝ the pack's mean rate during a ramp; with an ambient lead a transient while the pack lags behind the air",
+    happens: "Surplus fibre at one end lies outside the pack, so the coil's middle is not the fibre's and the halves no longer answer each other.",
+    remedy: "Trim the longer lead by twice the offset, or keep both leads at the pack's temperature.",
     experiment: "heat the lead alone; trim a known length and repeat the ramp",
     build: |values, choices, _| {
         let lead = if choices[0] == 0 { Lead::Ambient } else { Lead::Isothermal };

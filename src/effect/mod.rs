@@ -233,6 +233,10 @@ pub struct EffectSpec {
     pub source: &'static str,
     /// What it looks like in a record.
     pub signature: &'static str,
+    /// One plain sentence: what happens in the coil or beside it.
+    pub happens: &'static str,
+    /// One plain sentence: what to do about it.
+    pub remedy: &'static str,
     /// Which experiment would isolate it.
     pub experiment: &'static str,
     pub build: Build,
@@ -420,6 +424,9 @@ mod tests {
         for spec in CATALOGUE {
             for text in [spec.summary, spec.equation, spec.source, spec.signature, spec.experiment] {
                 assert!(!text.is_empty(), "{}", spec.kind);
+            }
+            for sentence in [spec.happens, spec.remedy] {
+                assert!(sentence.starts_with(char::is_uppercase) && sentence.ends_with('.'), "{}", spec.kind);
             }
             for p in spec.parameters {
                 assert!(p.lower <= p.start && p.start <= p.upper, "{} {}", spec.kind, p.key);

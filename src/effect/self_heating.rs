@@ -39,6 +39,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     choices: &[],
     source: "warm-up drift of FOG; first-order heating of the electronics",
     signature: "an error that dies out after power-on whatever the chamber does, also at constant temperature",
+    happens: "The electronics warm the bore after power-on, and the heat spreads outwards through the pack.",
+    remedy: "Move the source away from the bore or wait until it has settled; where it stays, the model with this heat compensates it.",
     experiment: "power-on at constant chamber temperature; then the same with the electronics outside",
     build: |values, _, _| Box::new(SelfHeating(BoreHeat { power_w_per_m2: values[0], time_constant_s: values[1] })),
 };

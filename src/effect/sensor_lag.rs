@@ -27,6 +27,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     choices: &[],
     source: "first-order sensor dynamics; thermocouples in lacquer have lags of seconds to minutes",
     signature: "the measured error comes earlier than the predicted one by τ at each change of ramp, and is sharper",
+    happens: "The sensor reaches the temperature of what it is attached to only after its own time constant, so the coil seems to answer before it is warmed.",
+    remedy: "Declare the lag, or fit a smaller or better attached sensor; the coil itself is not at fault and no winding changes it.",
     experiment: "a step of the chamber's temperature with a bare second thermocouple beside the first",
     build: |values, _, _| Box::new(SensorLag { lag_s: values[0] }),
 };

@@ -48,6 +48,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     choices: &[],
     source: "lumped-capacitance model, Incropera et al., Fundamentals of Heat and Mass Transfer, chapter 5",
     signature: "the inner layers lag behind for the time C/h_eff during every ramp: an error ∝ Ṫ that builds up and dies out slowly, strongest in patterns that do not cancel a linear gradient",
+    happens: "The spool takes up and gives back heat through its contact with the innermost layer, so the inner layers lag behind during and after every ramp.",
+    remedy: "Add the spool to the model before another winding is chosen; a lighter spool, a thermal break at the bore or a winding that cancels a linear gradient makes its error smaller.",
     experiment: "the same ramp with the coil on its spool and freed from it, or a second sensor at the bore",
     build: |values, _, _| {
         Box::new(SpoolMass(Spool {

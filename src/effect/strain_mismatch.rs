@@ -28,6 +28,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     choices: &[],
     source: "Mohr and Schadt, Proc. SPIE 5502, 410 (2004): bias from elasto-optic interactions; 0.03 … 4.9 °/h at 5 °C/min are reported",
     signature: "a step of the error that lasts as long as the ramp and is ∝ the pack's mean rate, the same at every temperature",
+    happens: "One half of the fibre is strained more than the other, so equal warming of both halves does not cancel and an error follows the pack's rate of temperature.",
+    remedy: "Wind both halves with equal tension or trim the fibre at one end; in the gyro, compensate with the pack's rate of temperature.",
     experiment: "ramps of several rates long enough to settle; flip the coil (it changes sign), trim an end (it does not follow)",
     build: |values, _, _| Box::new(StrainMismatch { mismatch: values[0] }),
 };

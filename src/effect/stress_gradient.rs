@@ -27,6 +27,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     choices: &[],
     source: "Lamé's thick ring, Timoshenko and Goodier, Theory of Elasticity (1951), section 26: the stress varies as 1/r²",
     signature: "an error ∝ the pack's mean rate during a ramp for patterns whose halves lie at different radii, besides changed transients",
+    happens: "Thermal stress is largest at the bore and strains the inner layers' fibre more, so layers respond differently to the same change of temperature.",
+    remedy: "A softer potting or spool, or one whose expansion matches the fibre's, lowers the stress; a winding whose halves lie at equal radii cancels most of it.",
     experiment: "coils of the same pattern potted with adhesives of different stiffness",
     build: |values, _, binding| Box::new(StressGradient { factors: factors(values[0], binding) }),
 };

@@ -28,6 +28,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     choices: &[],
     source: "Newton's law of cooling; film coefficients of free and forced air 2 … 250 W/(m²K), Incropera et al., table 1.1",
     signature: "the measured error begins late and rounded after each change of the recorded temperature's rate; the delay is about the pack's heat capacity over h",
+    happens: "What the sensor shows is the air, and the outermost layer follows it late through the film of air around the coil.",
+    remedy: "Place the sensor under the outermost layer's lacquer, or declare sensor.location = \"ambient\" with this film; more air speed makes the film's delay shorter and the coil's error larger.",
     experiment: "a second sensor under the outermost layer's lacquer, or another air speed in the chamber",
     build: |values, _, _| Box::new(SurfaceFilm { film_w_per_m2_k: values[0] }),
 };

@@ -27,6 +27,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     choices: &[],
     source: "dn/dT of doped silica in a coating: 0.8 … 1.4e-5 per kelvin",
     signature: "the whole error is larger or smaller by one factor at every temperature and rate",
+    happens: "The fibre answers a change of temperature more or less than the declared dn/dT says, all layers alike.",
+    remedy: "Correct the declared dn/dT by the factor; the ranking of windings stays, their errors scale.",
     experiment: "an interferometric measurement of the fibre's dn/dT",
     build: |values, _, _| Box::new(ThermoOptic { factor: values[0] }),
 };

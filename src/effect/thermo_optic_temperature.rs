@@ -28,6 +28,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     choices: &[],
     source: "Leviton and Frey, Proc. SPIE 6273 (2006): dn/dT of silica rises with temperature",
     signature: "the whole error scales with temperature: equal ramps give larger transients in the warm",
+    happens: "The fibre's thermo-optic response grows or falls with temperature, so equal ramps make unequal errors in the cold and the warm.",
+    remedy: "Declare the slope: it belongs to the fibre, and a compensation with a constant coefficient is wrong at the ends of the range.",
     experiment: "the same ramp at −30, 20 and 60 °C; unlike a conductivity's slope the transients keep their duration",
     build: |values, _, _| Box::new(ThermoOpticTemperature { slope_per_k: values[0] }),
 };

@@ -27,6 +27,8 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     choices: &[],
     source: "orthocyclic winding: a nested layer holds one turn less",
     signature: "the layers' weights change and with them the shape of the transient after each change of ramp",
+    happens: "Layers that nest in the one below have fewer turns, so layers that should cancel differ in length.",
+    remedy: "Declare the counted turns, so that a winding is judged by the lengths it will have; even out the turns in the next coil.",
     experiment: "count the turns; it cannot be switched off on a wound coil",
     build: |values, _, _| Box::new(TurnMismatch { turns: values[0] }),
 };

@@ -41,6 +41,22 @@ pub fn value_in_words(parameter: &ParameterJson) -> String {
     text
 }
 
+/// What happens in the coil and what to do about it, an effect a line: those that were accepted and what does as well.
+pub fn explanations(found: &[FindingJson]) -> Vec<(&str, String)> {
+    let mut said: Vec<(&str, String)> = Vec::new();
+    for effect in found {
+        let own = (effect.kind.as_str(), effect.happens.as_str(), effect.remedy.as_str());
+        let others =
+            effect.equivalents_in_detail.iter().map(|e| (e.kind.as_str(), e.happens.as_str(), e.remedy.as_str()));
+        for (kind, happens, remedy) in std::iter::once(own).chain(others) {
+            if !happens.is_empty() && !said.iter().any(|(known, _)| *known == kind) {
+                said.push((kind, format!("{happens} {remedy}")));
+            }
+        }
+    }
+    said
+}
+
 /// What is left over, a line a statement; none where everything is explained.
 pub fn rest_in_words(body: &DiagnosisJson) -> Vec<String> {
     let Some(rest) = &body.unexplained else { return Vec::new() };
@@ -158,6 +174,7 @@ fn effects(found: &[FindingJson]) -> Markup {
                 }
             } }
         } }
+        dl.facts { @for (kind, words) in explanations(found) { dt { (kind) } dd { (words) } } }
     }
 }
 
@@ -209,5 +226,39 @@ fn candidates(body: &DiagnosisJson) -> Markup {
             } } }
         } }
         @if rest > 0 { p { "And " (rest) " more that do less." } }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::Finding;
+    use crate::effect::{CATALOGUE, DeclaredEffect, find};
+
+    fn finding(kind: &str) -> FindingJson {
+        FindingJson::new(&Finding::unfitted(DeclaredEffect::at_start(find(kind).expect("in the catalogue"))))
+    }
+
+    #[test]
+    fn every_effect_of_a_set_is_explained_once_in_two_sentences() {
+        let mut first = finding("strain_mismatch");
+        let other = finding("bias_temperature_rate");
+        first.equivalents_in_detail = vec![crate::io::json::diagnosis::EquivalentJson {
+            kind: other.kind.clone(),
+            choices: other.choices.clone(),
+            chi_square_more: 0.0,
+            correlation: 1.0,
+            happens: other.happens.clone(),
+            remedy: other.remedy.clone(),
+            experiment: other.experiment.clone(),
+        }];
+        let found = [first, other, finding("spool_mass")];
+        let said = explanations(&found);
+        let kinds: Vec<&str> = said.iter().map(|(kind, _)| *kind).collect();
+        assert_eq!(kinds, ["strain_mismatch", "bias_temperature_rate", "spool_mass"]);
+        for (kind, words) in &said {
+            let spec = CATALOGUE.iter().find(|s| s.kind == *kind).expect("in the catalogue");
+            assert_eq!(*words, format!("{} {}", spec.happens, spec.remedy));
+        }
     }
 }

@@ -56,6 +56,11 @@ pub struct FindingJson {
     /// By how much χ² rises without it, on fitted and on unseen data.
     pub chi_square_less: f64,
     pub confirmed_by: f64,
+    /// What happens in the coil, and what to do about it; empty in documents of older versions.
+    #[serde(default)]
+    pub happens: String,
+    #[serde(default)]
+    pub remedy: String,
     pub experiment: String,
 }
 
@@ -76,6 +81,10 @@ pub struct EquivalentJson {
     pub chi_square_more: f64,
     /// Of the two predicted responses in these records.
     pub correlation: f64,
+    #[serde(default)]
+    pub happens: String,
+    #[serde(default)]
+    pub remedy: String,
     pub experiment: String,
 }
 
@@ -208,6 +217,8 @@ impl FindingJson {
             equivalents_in_detail: finding.equivalents.iter().map(EquivalentJson::new).collect(),
             chi_square_less: finding.chi_square_less,
             confirmed_by: finding.confirmed_by,
+            happens: finding.effect.spec().happens.to_owned(),
+            remedy: finding.effect.spec().remedy.to_owned(),
             experiment: finding.effect.spec().experiment.to_owned(),
         }
     }
@@ -232,6 +243,8 @@ impl EquivalentJson {
             choices: choices(&equivalent.effect),
             chi_square_more: equivalent.chi_square_more,
             correlation: equivalent.correlation,
+            happens: equivalent.effect.spec().happens.to_owned(),
+            remedy: equivalent.effect.spec().remedy.to_owned(),
             experiment: equivalent.effect.spec().experiment.to_owned(),
         }
     }

@@ -19,6 +19,8 @@ pub struct EffectJson {
     pub choices: Vec<ChoiceJson>,
     pub source: &'static str,
     pub signature: &'static str,
+    pub happens: &'static str,
+    pub remedy: &'static str,
     pub experiment: &'static str,
 }
 
@@ -75,6 +77,8 @@ impl EffectJson {
                 .collect(),
             source: spec.source,
             signature: spec.signature,
+            happens: spec.happens,
+            remedy: spec.remedy,
             experiment: spec.experiment,
         }
     }
