@@ -31,6 +31,8 @@ pub mod search;
 pub mod verify;
 // Floor 5: files and pages.
 pub mod io;
+#[cfg(feature = "report")]
 pub mod report;
 // Floor 6: the command line.
+#[cfg(feature = "cli")]
 pub mod cli;

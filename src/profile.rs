@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
 use crate::numeric::piecewise::PiecewiseLinear;
+use crate::units::k_per_s_from_c_per_h;
 
 /// A ramp (or, at rate zero, a soak) of one duration.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,6 +93,20 @@ pub struct ProfileSpec {
     pub duration_s: f64,
     pub seed: u64,
     pub listed: Vec<Profile>,
+}
+
+/// What a model file that says nothing of profiles is searched over: 64 profiles of 4 ramps of up to 60 °C/h in 6000 s.
+impl Default for ProfileSpec {
+    fn default() -> Self {
+        Self {
+            max_rate_k_per_s: k_per_s_from_c_per_h(60.0),
+            count: 64,
+            segments: 4,
+            duration_s: 6000.0,
+            seed: 1,
+            listed: Vec::new(),
+        }
+    }
 }
 
 impl ProfileSpec {

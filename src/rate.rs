@@ -21,6 +21,8 @@
 //! Yan, Lan, Jian, Acta Optica Sinica (1998), Eq. (4), with the dots on ΔT that the paper lost; Shupe, Appl. Opt. 19,
 //! 654 (1980). The sign is the paper's: positive Ω for a positive phase as written.
 
+mod builder;
+
 use thiserror::Error;
 
 use crate::coil::{Coil, CoilError};
@@ -28,6 +30,8 @@ use crate::effect::{DeclaredEffect, Effect, FibrePlace, Lead, PackState, Surplus
 use crate::pattern::{Half, Pattern};
 use crate::thermal::{Extent, HeatPath, Location, Material, PackShape, ThermalHistory};
 use crate::units::{LIGHT_SPEED_M_PER_S, REFERENCE_TEMPERATURE_K};
+
+pub use builder::CoilModelBuilder;
 
 /// A coil, how it is heated, and which physics is taken into account; everything but the pattern.
 #[derive(Debug, Clone)]

@@ -25,6 +25,26 @@ pub fn deg_per_h_from_rad_per_s(rate_rad_per_s: f64) -> f64 {
     rate_rad_per_s * DEGREES_PER_RADIAN * SECONDS_PER_HOUR
 }
 
+/// A rate of rotation, held in rad/s and shown in °/h.
+///
+/// ```
+/// use coilwright::units::{RotationRate, rad_per_s_from_deg_per_h};
+///
+/// let rate = RotationRate { rad_per_s: rad_per_s_from_deg_per_h(1.0862) };
+/// assert_eq!(format!("{rate:.3}"), "1.086 °/h");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+pub struct RotationRate {
+    pub rad_per_s: f64,
+}
+
+impl std::fmt::Display for RotationRate {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        deg_per_h_from_rad_per_s(self.rad_per_s).fmt(f)?;
+        f.write_str(" °/h")
+    }
+}
+
 pub fn rad_per_s_from_deg_per_s(rate_deg_per_s: f64) -> f64 {
     rate_deg_per_s / DEGREES_PER_RADIAN
 }

@@ -9,6 +9,7 @@ use super::{CliError, Ending};
 use crate::compare::suspicion;
 use crate::diagnose::experiment::{Chamber, design};
 use crate::diagnose::{self, Diagnosis, Request};
+use crate::effect;
 use crate::io::files::write_atomically;
 use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow, FindingJson};
 use crate::io::json::inputs::{InputsJson, RecordInputJson};
@@ -126,7 +127,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
 
 /// What the records and the fitted factors make one suspect.
 fn suspicions(model: &CoilModel, records: &[&Record], diagnosis: &Diagnosis) -> Vec<String> {
-    let factors = diagnosis.effects.iter().filter(|f| f.effect.kind() == "thermo_optic");
+    let factors = diagnosis.effects.iter().filter(|f| f.effect.is_at(effect::THERMO_OPTIC_FACTOR));
     let of_factors = factors.filter_map(|f| suspicion::of_factor(f.effect.values()[0]));
     let of_records = records.iter().flat_map(|record| suspicion::of_record(record, model.rate_mean_s));
     of_factors.chain(of_records).map(|s| s.to_string()).collect()

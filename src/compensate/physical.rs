@@ -147,7 +147,10 @@ impl Physical {
         }
         let cannot_be_heated = buried > 0 || matches!(path.material, Material::Diffusivity { .. });
         if path.flange.is_some() || (path.bore_heat.is_some() && cannot_be_heated) {
-            return Err(not_linear(model));
+            let is_refused = |one: &CoilModel| {
+                one.heat_path().is_ok_and(|p| p.flange.is_some() || (p.bore_heat.is_some() && cannot_be_heated))
+            };
+            return Err(not_linear(model, is_refused));
         }
         let linearised = linearise(&mut path, range_k);
         let location = path.location;
@@ -159,7 +162,11 @@ impl Physical {
             };
         }
         let pack = Pack::new(&path)?;
-        let LinearModel { gains, gain_air, factor, bias, channels } = linear_gains(model, pattern, real_layers)?;
+        let Some(linear) = linear_gains(model, pattern, real_layers)? else {
+            let is_refused = |one: &CoilModel| matches!(linear_gains(one, pattern, real_layers), Ok(None));
+            return Err(not_linear(model, is_refused));
+        };
+        let LinearModel { gains, gain_air, factor, bias, channels } = linear;
         let mut order: Vec<usize> = (0..pack.decays_per_s().len()).collect();
         order.sort_by(|a, b| pack.decays_per_s()[*a].total_cmp(&pack.decays_per_s()[*b]));
         let slowest_per_s = order.first().map_or(f64::INFINITY, |&i| pack.decays_per_s()[i]);
@@ -369,11 +376,10 @@ fn linearise(path: &mut HeatPath, range_k: Option<(f64, f64)>) -> Option<Lineari
     Some(Linearised { at_k, conductivity_error: (slope_per_k * 0.5 * (high_k - low_k) / factor).abs() })
 }
 
-/// The declared effects that no difference equation of this kind can hold.
-fn not_linear(model: &CoilModel) -> CompensateError {
-    const UNSUITED: [&str; 5] =
-        ["self_heating", "axial_gradient", "glass_transition", "heating_cooling_asymmetry", "custom"];
-    let effects = model.effects.iter().map(DeclaredEffect::kind).filter(|k| UNSUITED.contains(&k.as_str())).collect();
+/// The declared effects that no difference equation of this kind can hold: those that are refused on their own too.
+fn not_linear(model: &CoilModel, is_refused: impl Fn(&CoilModel) -> bool) -> CompensateError {
+    let alone = |effect: &DeclaredEffect| CoilModel { effects: vec![effect.clone()], ..model.clone() };
+    let effects = model.effects.iter().filter(|e| is_refused(&alone(e))).map(DeclaredEffect::kind).collect();
     CompensateError::NotLinear { effects }
 }
 
@@ -390,8 +396,8 @@ struct LinearModel {
     channels: Vec<(String, f64)>,
 }
 
-/// An error where that is not the whole model.
-fn linear_gains(model: &CoilModel, pattern: &Pattern, layers: usize) -> Result<LinearModel, CompensateError> {
+/// None where that is not the whole model.
+fn linear_gains(model: &CoilModel, pattern: &Pattern, layers: usize) -> Result<Option<LinearModel>, CompensateError> {
     let names = model.missing_channels(&[]);
     let rate = RateModel::new(model, pattern, &names)?;
     let off = vec![0.0; names.len()];
@@ -445,7 +451,7 @@ fn linear_gains(model: &CoilModel, pattern: &Pattern, layers: usize) -> Result<L
         let expected = factor_at(temperature_k) * coil + at(temperature_k, &still, 0.0, &off) + from_channels;
         let found = at(temperature_k, &rates, air, &values);
         if (found - expected).abs() > 1e-9 * (size + from_channels.abs()) {
-            return Err(not_linear(model));
+            return Ok(None);
         }
     }
     let over_temperature = |values: Vec<f64>, without: f64| {
@@ -453,5 +459,6 @@ fn linear_gains(model: &CoilModel, pattern: &Pattern, layers: usize) -> Result<L
         if varies { PiecewiseLinear::new(table.clone(), values).ok() } else { None }
     };
     let (factor, bias) = (over_temperature(factors, 1.0), over_temperature(biases, 0.0));
-    Ok(LinearModel { gains, gain_air, factor, bias, channels: names.into_iter().zip(channel_gains).collect() })
+    let channels = names.into_iter().zip(channel_gains).collect();
+    Ok(Some(LinearModel { gains, gain_air, factor, bias, channels }))
 }

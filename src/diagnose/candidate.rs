@@ -1,6 +1,6 @@
 //! What may be missing: the effects that a model lacks, as things to fit.
 
-use crate::effect::{Acts, CATALOGUE, DeclaredEffect, EffectSpec, Subject};
+use crate::effect::{Acts, CATALOGUE, DeclaredEffect, EffectSpec, Nature, Subject};
 use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::units::Unit;
@@ -15,11 +15,6 @@ pub struct Candidate {
     pub starts: Vec<Vec<f64>>,
 }
 
-/// Effects that say what a rate follows, not why.
-const EMPIRICAL: [&str; 4] =
-    ["bias_temperature", "bias_temperature_rate", "bias_gradient_rate", "heating_cooling_asymmetry"];
-/// Effects that are no physics of their own but a wrong number in the model file.
-const DECLARED: [&str; 2] = ["diffusivity", "thermo_optic"];
 /// Starts a candidate has at most.
 const MAX_STARTS: usize = 6;
 
@@ -43,12 +38,12 @@ impl Candidate {
 }
 
 pub fn is_empirical(effect: &DeclaredEffect) -> bool {
-    EMPIRICAL.contains(&effect.spec().kind) || effect.spec().kind == crate::effect::CHANNEL.kind
+    effect.spec().nature == Nature::Empirical
 }
 
 /// Whether an effect is a factor on a declared number.
 pub fn is_declared_number(effect: &DeclaredEffect) -> bool {
-    DECLARED.contains(&effect.spec().kind)
+    effect.spec().nature == Nature::DeclaredNumber
 }
 
 /// Everything of the catalogue that the model does not have, and every further column that all records share.

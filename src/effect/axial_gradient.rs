@@ -1,13 +1,6 @@
-//! `axial_gradient`: one flange exchanges heat with the ambient, so temperature varies along the axis.
-//!
-//! ```text
-//! k dT/dz = ±h (T − T_air) at one flange; the optics see the layer's first axial moment ∫ Ṫ ζ dζ, signed by its direction
-//! ```
-//!
-//! # Source
-//! Mohr, J. Lightwave Technol. 14, 27 (1996): the axial contribution to the Shupe error.
+//! The effect `axial_gradient`: equation, parameters, source and signature stand in its `SPEC`.
 
-use super::{Acts, ChoiceSpec, Effect, EffectSpec, ParameterSpec};
+use super::{Acts, ChoiceSpec, Effect, EffectSpec, Nature, ParameterSpec};
 use crate::thermal::{Flange, FlangeFilm, HeatPath};
 use crate::units::Unit;
 
@@ -16,6 +9,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     summary: "One flange exchanges heat with the ambient, so temperature varies along the axis",
     equation: "k dT/dz = ±h (T − T_air) at one flange; the optics see the layer's first axial moment ∫ Ṫ ζ dζ, signed by its direction",
     acts: Acts::HeatPath,
+    nature: Nature::Physical,
     parameters: &[ParameterSpec {
         key: "film_w_per_m2_k",
         unit: Unit::WattPerSquareMetreKelvin,

@@ -1,13 +1,6 @@
-//! `bias_temperature`: a bias that depends on the pack's mean temperature.
-//!
-//! ```text
-//! Ω_b = b1 (T − 20 °C) + b2 (T − 20 °C)²
-//! ```
-//!
-//! # Source
-//! thesis chapter on FOG drift compensation (2021), section 3.2: D_ΔT.
+//! The effect `bias_temperature`: equation, parameters, source and signature stand in its `SPEC`.
 
-use super::{Acts, Effect, EffectSpec, PackState, ParameterSpec};
+use super::{Acts, Effect, EffectSpec, Nature, PackState, ParameterSpec};
 use crate::units::REFERENCE_TEMPERATURE_K;
 use crate::units::Unit;
 
@@ -16,6 +9,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     summary: "A bias that depends on the pack's mean temperature",
     equation: "Ω_b = b1 (T − 20 °C) + b2 (T − 20 °C)²",
     acts: Acts::Outside,
+    nature: Nature::Empirical,
     parameters: &[
         ParameterSpec {
             key: "linear_deg_per_h_per_k",

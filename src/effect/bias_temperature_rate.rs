@@ -1,13 +1,6 @@
-//! `bias_temperature_rate`: a bias that is proportional to the pack's mean rate of temperature; empirical.
-//!
-//! ```text
-//! Ω_b = b dT/dt
-//! ```
-//!
-//! # Source
-//! thesis chapter on FOG drift compensation (2021), section 3.2: D_Ṫ.
+//! The effect `bias_temperature_rate`: equation, parameters, source and signature stand in its `SPEC`.
 
-use super::{Acts, Effect, EffectSpec, PackState, ParameterSpec};
+use super::{Acts, Effect, EffectSpec, Nature, PackState, ParameterSpec};
 use crate::units::Unit;
 
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -15,6 +8,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     summary: "A bias that is proportional to the pack's mean rate of temperature; empirical",
     equation: "Ω_b = b dT/dt",
     acts: Acts::Outside,
+    nature: Nature::Empirical,
     parameters: &[ParameterSpec {
         key: "gain_deg_per_h_s_per_k",
         unit: Unit::DegPerHourSecondPerKelvin,

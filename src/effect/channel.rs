@@ -1,15 +1,8 @@
 //! `channel:NAME`: a bias that is linear in a further column of the record, such as a supply voltage.
 //!
-//! ```text
-//! Ω_b = b · c
-//! ```
-//!
 //! A profile has no further columns; there the effect adds nothing.
-//!
-//! # Source
-//! Empirical: a linear coefficient for whatever was logged beside temperature and rate.
 
-use super::{Acts, Binding, Effect, EffectSpec, PackState, ParameterSpec, Subject};
+use super::{Acts, Binding, Effect, EffectSpec, Nature, PackState, ParameterSpec, Subject};
 use crate::units::Unit;
 
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -17,6 +10,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     summary: "A bias that is linear in the record's column NAME",
     equation: "Ω_b = b · c",
     acts: Acts::Outside,
+    nature: Nature::Empirical,
     parameters: &[ParameterSpec {
         key: "gain_deg_per_h_per_unit",
         unit: Unit::DegPerHourPerUnit,

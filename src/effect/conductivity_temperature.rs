@@ -1,13 +1,6 @@
-//! `conductivity_temperature`: the pack's conductivity depends on temperature.
-//!
-//! ```text
-//! k = k0 (1 + a (T − 20 °C))
-//! ```
-//!
-//! # Source
-//! polymer coatings and adhesives: a few 0.1 % per kelvin.
+//! The effect `conductivity_temperature`: equation, parameters, source and signature stand in its `SPEC`.
 
-use super::{Acts, Effect, EffectSpec, ParameterSpec};
+use super::{Acts, Effect, EffectSpec, Nature, ParameterSpec};
 use crate::thermal::HeatPath;
 use crate::units::Unit;
 
@@ -16,6 +9,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     summary: "The pack's conductivity depends on temperature",
     equation: "k = k0 (1 + a (T − 20 °C))",
     acts: Acts::HeatPath,
+    nature: Nature::Physical,
     parameters: &[ParameterSpec {
         key: "slope_per_k",
         unit: Unit::PerKelvin,

@@ -19,7 +19,7 @@
 
 use thiserror::Error;
 
-use super::{Acts, Binding, Effect, EffectSpec, PackState, Subject};
+use super::{Acts, Binding, Effect, EffectSpec, Nature, PackState, Subject};
 use crate::numeric::expression::{Expression, ExpressionError};
 use crate::units::{celsius_from_kelvin, rad_per_s_from_deg_per_h};
 
@@ -28,6 +28,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     summary: "A bias in °/h by a formula of the user's own, with named parameters under [effect.parameters]",
     equation: "Ω_b = formula(t, T, dT_dt, T_in, T_mean, mean_rate, T_ambient, dT_ambient_dt, parameters, columns)",
     acts: Acts::Outside,
+    nature: Nature::Formula,
     parameters: &[],
     choices: &[],
     source: "the user",

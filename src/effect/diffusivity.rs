@@ -1,13 +1,6 @@
-//! `diffusivity`: No new physics: the declared conductivity (or diffusivity) is wrong by a factor.
-//!
-//! ```text
-//! k → factor · k
-//! ```
-//!
-//! # Source
-//! effective conductivity of a fibre pack is rarely known better than 20 %.
+//! The effect `diffusivity`: equation, parameters, source and signature stand in its `SPEC`.
 
-use super::{Acts, Effect, EffectSpec, ParameterSpec};
+use super::{Acts, Effect, EffectSpec, Nature, ParameterSpec};
 use crate::thermal::HeatPath;
 use crate::units::Unit;
 
@@ -16,6 +9,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     summary: "No new physics: the declared conductivity (or diffusivity) is wrong by a factor",
     equation: "k → factor · k",
     acts: Acts::HeatPath,
+    nature: Nature::DeclaredNumber,
     parameters: &[ParameterSpec {
         key: "factor",
         unit: Unit::One,

@@ -1,13 +1,6 @@
-//! `finite_pack`: the pack ends at an adiabatic bore instead of a half space.
-//!
-//! ```text
-//! K (1/r) d/dr(r dT/dr) = dT/dt, dT/dr = 0 at r = r_in
-//! ```
-//!
-//! # Source
-//! Shupe, Appl. Opt. 19, 654 (1980); heat conduction in a hollow cylinder, Carslaw and Jaeger (1959), chapter 7.
+//! The effect `finite_pack`: equation, parameters, source and signature stand in its `SPEC`.
 
-use super::{Acts, Effect, EffectSpec};
+use super::{Acts, Effect, EffectSpec, Nature};
 use crate::thermal::{Extent, HeatPath};
 
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -15,6 +8,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     summary: "The pack ends at an adiabatic bore instead of a half space",
     equation: "K (1/r) d/dr(r dT/dr) = dT/dt, dT/dr = 0 at r = r_in",
     acts: Acts::HeatPath,
+    nature: Nature::Physical,
     parameters: &[],
     choices: &[],
     source: "Shupe, Appl. Opt. 19, 654 (1980); heat conduction in a hollow cylinder, Carslaw and Jaeger (1959), chapter 7",

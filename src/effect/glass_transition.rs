@@ -1,13 +1,6 @@
-//! `glass_transition`: a strain mismatch of the halves that acts only below the potting's glass transition.
-//!
-//! ```text
-//! κ_B − κ_A = m κ / (1 + e^{(T − T_g)/w})
-//! ```
-//!
-//! # Source
-//! stiffening of the potting below T_g, as reported for quadrupolar coils; logistic form is the simplest monotonic one.
+//! The effect `glass_transition`: equation, parameters, source and signature stand in its `SPEC`.
 
-use super::{Acts, Effect, EffectSpec, FibrePlace, ParameterSpec};
+use super::{Acts, Effect, EffectSpec, FibrePlace, Nature, ParameterSpec};
 use crate::pattern::Half;
 use crate::units::Unit;
 
@@ -16,6 +9,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     summary: "A strain mismatch of the halves that acts only below the potting's glass transition",
     equation: "κ_B − κ_A = m κ / (1 + e^{(T − T_g)/w})",
     acts: Acts::Response,
+    nature: Nature::Physical,
     parameters: &[
         ParameterSpec {
             key: "mismatch",

@@ -1,13 +1,6 @@
-//! `heating_cooling_asymmetry`: the coil's error is larger while it warms up than while it cools, or the reverse.
-//!
-//! ```text
-//! Ω → Ω (1 + g sign(mean Ṫ))
-//! ```
-//!
-//! # Source
-//! empirical: hysteresis of potting and coating.
+//! The effect `heating_cooling_asymmetry`: equation, parameters, source and signature stand in its `SPEC`.
 
-use super::{Acts, Effect, EffectSpec, PackState, ParameterSpec};
+use super::{Acts, Effect, EffectSpec, Nature, PackState, ParameterSpec};
 use crate::units::Unit;
 
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -15,6 +8,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     summary: "The coil's error is larger while it warms up than while it cools, or the reverse",
     equation: "Ω → Ω (1 + g sign(mean Ṫ))",
     acts: Acts::Response,
+    nature: Nature::Empirical,
     parameters: &[ParameterSpec {
         key: "gain",
         unit: Unit::One,

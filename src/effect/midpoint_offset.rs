@@ -1,13 +1,6 @@
-//! `midpoint_offset`: surplus fibre 2δ at one end lies outside the pack, so the coil's middle is not the fibre's.
-//!
-//! ```text
-//! |ΔΩ| = n κ 2δ |Ṫ_lead − Ṫ_pack|/D; δ > 0: surplus at end A
-//! ```
-//!
-//! # Source
-//! trimming of FOG coils: 0.50 °/h per metre per °C/min at D = 0.1 m.
+//! The effect `midpoint_offset`: equation, parameters, source and signature stand in its `SPEC`.
 
-use super::{Acts, ChoiceSpec, Effect, EffectSpec, Lead, ParameterSpec, SurplusFibre};
+use super::{Acts, ChoiceSpec, Effect, EffectSpec, Lead, Nature, ParameterSpec, SurplusFibre};
 use crate::units::Unit;
 
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -15,6 +8,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     summary: "Surplus fibre 2δ at one end lies outside the pack, so the coil's middle is not the fibre's",
     equation: "|ΔΩ| = n κ 2δ |Ṫ_lead − Ṫ_pack|/D; δ > 0: surplus at end A",
     acts: Acts::Response,
+    nature: Nature::Physical,
     parameters: &[ParameterSpec {
         key: "offset_m",
         unit: Unit::Metre,

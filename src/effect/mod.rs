@@ -63,6 +63,31 @@ pub const CHANNEL: &EffectSpec = &channel::SPEC;
 /// An effect that the user writes.
 pub const CUSTOM: &EffectSpec = &custom::SPEC;
 
+/// One parameter of one effect: what a spread of built coils varies.
+#[derive(Debug, Clone, Copy)]
+pub struct Address {
+    pub spec: &'static EffectSpec,
+    /// Index among the spec's parameters.
+    pub parameter: usize,
+    /// The value at which the effect changes nothing, SI.
+    pub neutral: f64,
+}
+
+/// The effect that gives a half space the end of a pack.
+pub const END_OF_PACK: &EffectSpec = &finite_pack::SPEC;
+
+/// δ of the surplus fibre at one end.
+pub const OFFSET_OF_MIDDLE: Address = Address { spec: &midpoint_offset::SPEC, parameter: 0, neutral: 0.0 };
+/// The factor on the pack's diffusivity.
+pub const DIFFUSIVITY_FACTOR: Address = Address { spec: &diffusivity::SPEC, parameter: 0, neutral: 1.0 };
+/// The film coefficient at the pack's outer surface.
+pub const FILM: Address = Address { spec: &surface_film::SPEC, parameter: 0, neutral: 0.0 };
+/// The relative difference of the fibre's halves.
+pub const MISMATCH_OF_HALVES: Address = Address { spec: &strain_mismatch::SPEC, parameter: 0, neutral: 0.0 };
+
+/// The factor on dn/dT.
+pub const THERMO_OPTIC_FACTOR: Address = Address { spec: &thermo_optic::SPEC, parameter: 0, neutral: 1.0 };
+
 /// What an effect does to a model. Every method's default is "nothing".
 pub trait Effect: std::fmt::Debug + Send + Sync {
     /// Edits what the heat flows through.
@@ -193,6 +218,19 @@ pub enum Acts {
     Outside,
 }
 
+/// What kind of knowledge an effect is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Nature {
+    /// A mechanism with an equation of its own.
+    Physical,
+    /// Says what a rate follows, not why.
+    Empirical,
+    /// No physics of its own: a factor on a number that the model file states.
+    DeclaredNumber,
+    /// What the user wrote.
+    Formula,
+}
+
 /// A numeric parameter, as a user states it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ParameterSpec {
@@ -228,6 +266,7 @@ pub struct EffectSpec {
     pub summary: &'static str,
     pub equation: &'static str,
     pub acts: Acts,
+    pub nature: Nature,
     pub parameters: &'static [ParameterSpec],
     pub choices: &'static [ChoiceSpec],
     pub source: &'static str,
@@ -392,6 +431,11 @@ impl DeclaredEffect {
 
     pub fn spec(&self) -> &'static EffectSpec {
         self.spec
+    }
+
+    /// Whether it is the effect that an address leads to.
+    pub fn is_at(&self, address: Address) -> bool {
+        self.spec.kind == address.spec.kind
     }
 
     /// SI, in the order of the spec's parameters.

@@ -1,13 +1,6 @@
-//! `self_heating`: electronics heat the bore after power-on.
-//!
-//! ```text
-//! q(t) = q∞ (1 − e^{−t/τ}) into the bore, t from power-on at the start of the record or profile
-//! ```
-//!
-//! # Source
-//! warm-up drift of FOG; first-order heating of the electronics.
+//! The effect `self_heating`: equation, parameters, source and signature stand in its `SPEC`.
 
-use super::{Acts, Effect, EffectSpec, ParameterSpec};
+use super::{Acts, Effect, EffectSpec, Nature, ParameterSpec};
 use crate::thermal::{BoreHeat, HeatPath};
 use crate::units::Unit;
 
@@ -16,6 +9,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     summary: "Electronics heat the bore after power-on",
     equation: "q(t) = q∞ (1 − e^{−t/τ}) into the bore, t from power-on at the start of the record or profile",
     acts: Acts::HeatPath,
+    nature: Nature::Physical,
     parameters: &[
         ParameterSpec {
             key: "power_w_per_m2",

@@ -1,13 +1,6 @@
-//! `sensor_lag`: the sensor follows the outer layer with a first-order lag.
-//!
-//! ```text
-//! τ dT_sensor/dt = T_outer − T_sensor
-//! ```
-//!
-//! # Source
-//! first-order sensor dynamics; thermocouples in lacquer have lags of seconds to minutes.
+//! The effect `sensor_lag`: equation, parameters, source and signature stand in its `SPEC`.
 
-use super::{Acts, Effect, EffectSpec, ParameterSpec};
+use super::{Acts, Effect, EffectSpec, Nature, ParameterSpec};
 use crate::units::Unit;
 
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -15,6 +8,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     summary: "The sensor follows the outer layer with a first-order lag",
     equation: "τ dT_sensor/dt = T_outer − T_sensor",
     acts: Acts::Sensor,
+    nature: Nature::Physical,
     parameters: &[ParameterSpec {
         key: "lag_s",
         unit: Unit::Second,

@@ -1,13 +1,6 @@
-//! `spool_mass`: a spool of lumped heat capacity behind a contact conductance at the bore, optionally mounted to the ambient.
-//!
-//! ```text
-//! C dT_s/dt = h (T(r_in) − T_s) + h_m (T_ambient − T_s), per bore area
-//! ```
-//!
-//! # Source
-//! lumped-capacitance model, Incropera et al., Fundamentals of Heat and Mass Transfer, chapter 5.
+//! The effect `spool_mass`: equation, parameters, source and signature stand in its `SPEC`.
 
-use super::{Acts, Effect, EffectSpec, ParameterSpec};
+use super::{Acts, Effect, EffectSpec, Nature, ParameterSpec};
 use crate::thermal::{HeatPath, Spool};
 use crate::units::Unit;
 
@@ -16,6 +9,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     summary: "A spool of lumped heat capacity behind a contact conductance at the bore, optionally mounted to the ambient",
     equation: "C dT_s/dt = h (T(r_in) − T_s) + h_m (T_ambient − T_s), per bore area",
     acts: Acts::HeatPath,
+    nature: Nature::Physical,
     parameters: &[
         ParameterSpec {
             key: "heat_capacity_j_per_m2_k",

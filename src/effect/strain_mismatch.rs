@@ -1,13 +1,6 @@
-//! `strain_mismatch`: Elasto-optic: the two halves of the fibre respond differently (the T-dot or Mohr bias).
-//!
-//! ```text
-//! κ_B − κ_A = m κ; in a steady ramp Ω = n κ m L Ṫ/(4D)
-//! ```
-//!
-//! # Source
-//! Mohr and Schadt, Proc. SPIE 5502, 410 (2004): bias from elasto-optic interactions; 0.03 … 4.9 °/h at 5 °C/min are reported.
+//! The effect `strain_mismatch`: equation, parameters, source and signature stand in its `SPEC`.
 
-use super::{Acts, Effect, EffectSpec, FibrePlace, ParameterSpec};
+use super::{Acts, Effect, EffectSpec, FibrePlace, Nature, ParameterSpec};
 use crate::pattern::Half;
 use crate::units::Unit;
 
@@ -16,6 +9,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     summary: "Elasto-optic: the two halves of the fibre respond differently (the T-dot or Mohr bias)",
     equation: "κ_B − κ_A = m κ; in a steady ramp Ω = n κ m L Ṫ/(4D)",
     acts: Acts::Response,
+    nature: Nature::Physical,
     parameters: &[ParameterSpec {
         key: "mismatch",
         unit: Unit::One,

@@ -1,13 +1,6 @@
-//! `stress_gradient`: Elasto-optic: the thermal stress across the pack modifies the fibre's response layer by layer.
-//!
-//! ```text
-//! κ_j = κ (1 + s f_j), f_j ∝ 1/r_j² less its length-weighted mean, largest |f_j| = 1
-//! ```
-//!
-//! # Source
-//! Lamé's thick ring, Timoshenko and Goodier, Theory of Elasticity (1951), section 26: the stress varies as 1/r².
+//! The effect `stress_gradient`: equation, parameters, source and signature stand in its `SPEC`.
 
-use super::{Acts, Binding, Effect, EffectSpec, FibrePlace, ParameterSpec};
+use super::{Acts, Binding, Effect, EffectSpec, FibrePlace, Nature, ParameterSpec};
 use crate::units::Unit;
 
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -15,6 +8,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     summary: "Elasto-optic: the thermal stress across the pack modifies the fibre's response layer by layer",
     equation: "κ_j = κ (1 + s f_j), f_j ∝ 1/r_j² less its length-weighted mean, largest |f_j| = 1",
     acts: Acts::Response,
+    nature: Nature::Physical,
     parameters: &[ParameterSpec {
         key: "strength",
         unit: Unit::One,

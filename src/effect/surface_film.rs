@@ -1,13 +1,6 @@
-//! `surface_film`: the sensor (or the profile) is the ambient air; the outer layer follows through a film.
-//!
-//! ```text
-//! k dT/dr = h (T_air − T) at r = r_out
-//! ```
-//!
-//! # Source
-//! Newton's law of cooling; film coefficients of free and forced air 2 … 250 W/(m²K), Incropera et al., table 1.1.
+//! The effect `surface_film`: equation, parameters, source and signature stand in its `SPEC`.
 
-use super::{Acts, Effect, EffectSpec, ParameterSpec};
+use super::{Acts, Effect, EffectSpec, Nature, ParameterSpec};
 use crate::thermal::{HeatPath, Location};
 use crate::units::Unit;
 
@@ -16,6 +9,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     summary: "The sensor (or the profile) is the ambient air; the outer layer follows through a film",
     equation: "k dT/dr = h (T_air − T) at r = r_out",
     acts: Acts::HeatPath,
+    nature: Nature::Physical,
     parameters: &[ParameterSpec {
         key: "film_w_per_m2_k",
         unit: Unit::WattPerSquareMetreKelvin,

@@ -1,13 +1,6 @@
-//! `thermo_optic`: No new physics: the declared thermo-optic coefficient κ is wrong by a factor.
-//!
-//! ```text
-//! κ → factor · κ
-//! ```
-//!
-//! # Source
-//! dn/dT of doped silica in a coating: 0.8 … 1.4e-5 per kelvin.
+//! The effect `thermo_optic`: equation, parameters, source and signature stand in its `SPEC`.
 
-use super::{Acts, Effect, EffectSpec, FibrePlace, ParameterSpec};
+use super::{Acts, Effect, EffectSpec, FibrePlace, Nature, ParameterSpec};
 use crate::units::Unit;
 
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -15,6 +8,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     summary: "No new physics: the declared thermo-optic coefficient κ is wrong by a factor",
     equation: "κ → factor · κ",
     acts: Acts::Response,
+    nature: Nature::DeclaredNumber,
     parameters: &[ParameterSpec {
         key: "factor",
         unit: Unit::One,

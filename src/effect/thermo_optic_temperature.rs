@@ -1,13 +1,6 @@
-//! `thermo_optic_temperature`: the fibre's thermo-optic response depends on temperature.
-//!
-//! ```text
-//! κ = κ0 (1 + a (T − 20 °C))
-//! ```
-//!
-//! # Source
-//! Leviton and Frey, Proc. SPIE 6273 (2006): dn/dT of silica rises with temperature.
+//! The effect `thermo_optic_temperature`: equation, parameters, source and signature stand in its `SPEC`.
 
-use super::{Acts, Effect, EffectSpec, FibrePlace, ParameterSpec};
+use super::{Acts, Effect, EffectSpec, FibrePlace, Nature, ParameterSpec};
 use crate::units::REFERENCE_TEMPERATURE_K;
 use crate::units::Unit;
 
@@ -16,6 +9,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     summary: "The fibre's thermo-optic response depends on temperature",
     equation: "κ = κ0 (1 + a (T − 20 °C))",
     acts: Acts::Response,
+    nature: Nature::Physical,
     parameters: &[ParameterSpec {
         key: "slope_per_k",
         unit: Unit::PerKelvin,

@@ -1,13 +1,6 @@
-//! `turn_mismatch`: Nesting: every second layer has fewer turns, so the layers' lengths alternate.
-//!
-//! ```text
-//! M_j = M − ΔM on layers 2, 4, 6, … counted from the spool
-//! ```
-//!
-//! # Source
-//! orthocyclic winding: a nested layer holds one turn less.
+//! The effect `turn_mismatch`: equation, parameters, source and signature stand in its `SPEC`.
 
-use super::{Acts, Effect, EffectSpec, ParameterSpec};
+use super::{Acts, Effect, EffectSpec, Nature, ParameterSpec};
 use crate::units::Unit;
 
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -15,6 +8,7 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
     summary: "Nesting: every second layer has fewer turns, so the layers' lengths alternate",
     equation: "M_j = M − ΔM on layers 2, 4, 6, … counted from the spool",
     acts: Acts::Winding,
+    nature: Nature::Physical,
     parameters: &[ParameterSpec {
         key: "turns",
         unit: Unit::One,

@@ -46,13 +46,13 @@ pub enum Advice {
     #[error("[profiles] is absent: profiles of up to 60 °C/h are sampled, 64 of 4 ramps over 6000 s, seed 1")]
     DefaultProfiles,
     #[error(
-        "sensor.location is \"outer_layer\", but the effect surface_film makes the drive the ambient air; the film holds"
+        "sensor.location is \"outer_layer\", but the effect {effect} makes the drive the ambient air; the film holds"
     )]
-    FilmMovesSensor,
+    FilmMovesSensor { effect: String },
     #[error(
-        "sensor.location is \"ambient\" without the effect surface_film: the pack's outer surface is taken to have the air's temperature"
+        "sensor.location is \"ambient\" without the effect {film}: the pack's outer surface is taken to have the air's temperature"
     )]
-    AmbientWithoutFilm,
-    #[error("finite_pack changes nothing where thermal.model is \"pack\" already")]
-    FinitePackTwice,
+    AmbientWithoutFilm { film: &'static str },
+    #[error("{effect} changes nothing where thermal.model is \"pack\" already")]
+    ChangesNothing { effect: String },
 }

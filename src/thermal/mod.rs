@@ -196,14 +196,35 @@ impl Drive {
     }
 }
 
+/// A part of the heat path that not every pack can have.
+#[derive(Debug, Error, Clone, Copy, PartialEq, Eq)]
+pub enum HeatPart {
+    #[error("a film or an ambient sensor")]
+    AmbientSensor,
+    #[error("the film at the outer surface")]
+    Film,
+    #[error("the spool's heat capacity")]
+    Spool,
+    #[error("heat from the bore")]
+    BoreHeat,
+    #[error("a flange that exchanges heat")]
+    Flange,
+    #[error("a conductivity that depends on temperature")]
+    VaryingConductivity,
+    #[error("a conductivity that depends on temperature, beside a flange that exchanges heat,")]
+    VaryingConductivityBesideFlange,
+}
+
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum ThermalError {
-    #[error("{what} needs a pack that ends somewhere: set thermal.model = \"pack\" or add the effect finite_pack")]
-    NeedsPack { what: &'static str },
     #[error(
-        "{what} needs thermal.conductivity_w_per_m_k and thermal.volumetric_heat_capacity_j_per_m3_k, found only thermal.diffusivity_m2_per_s"
+        "{part} needs a pack that ends somewhere: set thermal.model = \"pack\", or add the effect that ends the pack"
     )]
-    NeedsConductivity { what: &'static str },
+    NeedsPack { part: HeatPart },
+    #[error(
+        "{part} needs thermal.conductivity_w_per_m_k and thermal.volumetric_heat_capacity_j_per_m3_k, found only thermal.diffusivity_m2_per_s"
+    )]
+    NeedsConductivity { part: HeatPart },
     #[error("cells per layer must be 1 or an even number, found {found}")]
     Cells { found: usize },
     #[error("a heated flange needs at least 2 slices along the axis, found {found}")]
@@ -216,8 +237,8 @@ pub enum ThermalError {
         "the conductivity at {temperature_k:.1} K is not positive: the slope {slope_per_k} per K is too steep for this record or profile"
     )]
     ConductivityNotPositive { temperature_k: f64, slope_per_k: f64 },
-    #[error("{what} makes the field nonlinear: it has no step response")]
-    Nonlinear { what: &'static str },
+    #[error("{part} makes the field nonlinear: it has no step response")]
+    Nonlinear { part: HeatPart },
 }
 
 /// The response of every layer's rate to a unit step of the boundary's rate at t = 0.
@@ -233,7 +254,7 @@ impl StepResponse {
     pub fn of(path: &HeatPath) -> Result<Self, ThermalError> {
         check(path)?;
         if path.conductivity_slope_per_k != 0.0 {
-            return Err(ThermalError::Nonlinear { what: "conductivity_temperature" });
+            return Err(ThermalError::Nonlinear { part: HeatPart::VaryingConductivity });
         }
         Ok(match path.extent {
             Extent::HalfSpace => StepResponse::HalfSpace(half_space::HalfSpace::new(path)),
@@ -296,25 +317,25 @@ pub fn solve(path: &HeatPath, drive: &Drive) -> Result<Field, ThermalError> {
 pub fn check(path: &HeatPath) -> Result<(), ThermalError> {
     if path.extent == Extent::HalfSpace {
         let extras = [
-            (path.location == Location::Ambient, "a film or an ambient sensor"),
-            (path.spool.is_some(), "spool_mass"),
-            (path.bore_heat.is_some(), "self_heating"),
-            (path.flange.is_some(), "axial_gradient"),
-            (path.conductivity_slope_per_k != 0.0, "conductivity_temperature"),
+            (path.location == Location::Ambient, HeatPart::AmbientSensor),
+            (path.spool.is_some(), HeatPart::Spool),
+            (path.bore_heat.is_some(), HeatPart::BoreHeat),
+            (path.flange.is_some(), HeatPart::Flange),
+            (path.conductivity_slope_per_k != 0.0, HeatPart::VaryingConductivity),
         ];
-        if let Some((_, what)) = extras.into_iter().find(|(present, _)| *present) {
-            return Err(ThermalError::NeedsPack { what });
+        if let Some((_, part)) = extras.into_iter().find(|(present, _)| *present) {
+            return Err(ThermalError::NeedsPack { part });
         }
     }
     if matches!(path.material, Material::Diffusivity { .. }) {
         let extras = [
-            (path.location == Location::Ambient && path.film_w_per_m2_k.is_some(), "surface_film"),
-            (path.spool.is_some(), "spool_mass"),
-            (path.bore_heat.is_some(), "self_heating"),
-            (path.flange.is_some(), "axial_gradient"),
+            (path.location == Location::Ambient && path.film_w_per_m2_k.is_some(), HeatPart::Film),
+            (path.spool.is_some(), HeatPart::Spool),
+            (path.bore_heat.is_some(), HeatPart::BoreHeat),
+            (path.flange.is_some(), HeatPart::Flange),
         ];
-        if let Some((_, what)) = extras.into_iter().find(|(present, _)| *present) {
-            return Err(ThermalError::NeedsConductivity { what });
+        if let Some((_, part)) = extras.into_iter().find(|(present, _)| *present) {
+            return Err(ThermalError::NeedsConductivity { part });
         }
     }
     if path.cells_per_layer == 0 || (path.cells_per_layer != 1 && !path.cells_per_layer.is_multiple_of(2)) {

@@ -19,7 +19,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::network::Network;
-use super::{Drive, Extent, HeatPath, ThermalError, check, window_instants};
+use super::{Drive, Extent, HeatPart, HeatPath, ThermalError, check, window_instants};
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::numeric::tridiagonal::diagonalise;
 use crate::units::REFERENCE_TEMPERATURE_K;
@@ -63,7 +63,7 @@ pub fn slope_series(
 ) -> Result<[SlopeTerm; SLOPE_ORDERS], ThermalError> {
     check(&HeatPath { conductivity_slope_per_k: 1.0, ..path.clone() })?;
     if path.extent == Extent::HalfSpace || path.flange.is_some() {
-        return Err(ThermalError::Nonlinear { what: "conductivity_temperature beside axial_gradient" });
+        return Err(ThermalError::Nonlinear { part: HeatPart::VaryingConductivityBesideFlange });
     }
     let (instants, places) = window_instants(ends_s, window_s);
     let modes = Modes::new(path, |shortest_s| {

@@ -8,7 +8,7 @@ mod source;
 use std::collections::BTreeSet;
 
 use conversions::conversions;
-use source::{Source, flatten, sources};
+use source::{Source, Token, flatten, sources};
 
 /// Every module at the crate's root and its floor; a module that is not here has no place yet.
 const FLOORS: &[(&str, u8)] = &[
@@ -126,6 +126,51 @@ fn only_units_converts() {
         if source.name != "src/units.rs" {
             let found = conversions(&source.tokens);
             faults.extend(found.into_iter().map(|(what, line)| format!("{}:{line}: {what}", source.name)));
+        }
+    }
+    assert_no(faults);
+}
+
+#[test]
+fn an_effect_is_named_in_its_own_folder_only() {
+    // `verify` works the physics out a second time and shares nothing, not even names.
+    let may_name = ["effect", "verify"];
+    let kinds: BTreeSet<String> = sources("src/effect").flat_map(|source| kinds_in(&source.tokens)).collect();
+    assert!(kinds.len() > 20, "{kinds:?}");
+    let mut faults = Vec::new();
+    for source in sources("src").filter(|source| !may_name.contains(&source.module().as_str())) {
+        for token in source.tokens.iter().filter(|token| kinds.contains(&token.text)) {
+            faults.push(format!("{}:{}: {}", source.name, token.line, token.text));
+        }
+    }
+    assert_no(faults);
+}
+
+/// What `kind: "…"` says of each description of an effect, as a quoted token.
+fn kinds_in(tokens: &[Token]) -> Vec<String> {
+    tokens
+        .windows(3)
+        .filter(|three| three[0].text == "kind" && three[1].text == ":" && three[2].text.starts_with('"'))
+        .map(|three| three[2].text.clone())
+        .collect()
+}
+
+#[test]
+fn a_new_effect_is_one_file_and_two_lines_beside_it() {
+    let catalogue = sources("src/effect").find(|source| source.name == "src/effect/mod.rs").expect("the catalogue");
+    let mut faults = Vec::new();
+    for source in sources("src/effect").filter(|source| source.name != catalogue.name) {
+        let name = source.name.rsplit('/').next().unwrap_or_default().trim_end_matches(".rs");
+        let lines: BTreeSet<usize> = catalogue
+            .tokens
+            .windows(2)
+            .filter(|two| two[1].text == name && two[0].text == "mod" || two[0].text == name && two[1].text == ":")
+            .map(|two| two[0].line)
+            .collect();
+        // A third line gives it an address where built coils spread.
+        let is_in_catalogue = !["channel", "custom"].contains(&name) && !kinds_in(&source.tokens).is_empty();
+        if is_in_catalogue && !(2..=3).contains(&lines.len()) {
+            faults.push(format!("{name} stands on {} lines of {}", lines.len(), catalogue.name));
         }
     }
     assert_no(faults);

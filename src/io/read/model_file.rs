@@ -6,6 +6,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use crate::coil::{Coil, CoilError, CoilSpec, Fibre, LayerLength};
+use crate::effect::{self, DeclaredEffect};
 use crate::io::fault::{Fault, Faults};
 use crate::io::files::read_text;
 use crate::io::model::{Advice, ModelFile, NamedPattern, SearchSettings};
@@ -343,18 +344,19 @@ fn check_whole(r: &mut TomlReader, model: &CoilModel, thermal_span: Option<Range
 }
 
 fn advice_for(model: &CoilModel, has_profiles: bool) -> Vec<Advice> {
-    let declares = |kind: &str| model.effects.iter().any(|e| e.spec().kind == kind);
     let mut advice = Vec::new();
     if !has_profiles {
         advice.push(Advice::DefaultProfiles);
     }
-    match (model.location, declares("surface_film")) {
-        (Location::OuterLayer, true) => advice.push(Advice::FilmMovesSensor),
-        (Location::Ambient, false) => advice.push(Advice::AmbientWithoutFilm),
+    let film = model.effects.iter().find(|e| e.is_at(effect::FILM)).map(DeclaredEffect::kind);
+    match (model.location, film) {
+        (Location::OuterLayer, Some(effect)) => advice.push(Advice::FilmMovesSensor { effect }),
+        (Location::Ambient, None) => advice.push(Advice::AmbientWithoutFilm { film: effect::FILM.spec.kind }),
         _ => {}
     }
-    if model.extent == Extent::Pack && declares("finite_pack") {
-        advice.push(Advice::FinitePackTwice);
+    if model.extent == Extent::Pack {
+        let twice = model.effects.iter().filter(|e| e.spec().kind == effect::END_OF_PACK.kind);
+        advice.extend(twice.map(|e| Advice::ChangesNothing { effect: e.kind() }));
     }
     advice
 }

@@ -6,21 +6,15 @@ use crate::units::k_per_s_from_c_per_h;
 
 use super::toml_reader::{Limits, TableReader, TomlReader};
 
-/// Used where a file has no [profiles]: steep enough for chamber tests, long enough to settle.
-const DEFAULT_MAX_RATE_C_PER_H: f64 = 60.0;
-const DEFAULT_COUNT: i64 = 64;
-const DEFAULT_SEGMENTS: i64 = 4;
-const DEFAULT_DURATION_S: f64 = 6000.0;
-
 /// The `[profiles]` table, or what stands in for it.
 pub(super) fn read_profiles(r: &mut TomlReader, table: &mut TableReader) -> ProfileSpec {
     let rate = Limits::between(1e-6, 1e6);
     let max_rate = if table.is_present() { table.needed_number(r, "max_rate_c_per_h", rate) } else { None };
-    let max_rate_c_per_h = max_rate.unwrap_or(DEFAULT_MAX_RATE_C_PER_H);
-    let count = table.integer(r, "count", 0, 100_000).unwrap_or(DEFAULT_COUNT);
-    let segments = table.integer(r, "segments", 1, 1_000).unwrap_or(DEFAULT_SEGMENTS);
-    let duration_s = table.number(r, "duration_s", Limits::between(1e-3, 1e8)).unwrap_or(DEFAULT_DURATION_S);
-    let seed = table.integer(r, "seed", 0, i64::MAX).unwrap_or(1);
+    let usual = ProfileSpec::default();
+    let count = table.integer(r, "count", 0, 100_000).map_or(usual.count, |count| count as usize);
+    let segments = table.integer(r, "segments", 1, 1_000).map_or(usual.segments, |segments| segments as usize);
+    let duration_s = table.number(r, "duration_s", Limits::between(1e-3, 1e8)).unwrap_or(usual.duration_s);
+    let seed = table.integer(r, "seed", 0, i64::MAX).map_or(usual.seed, |seed| seed as u64);
     let mut listed: Vec<Profile> = Vec::new();
     let ramps = table.tables(r, "ramp");
     if count == 0 && ramps.is_empty() {
@@ -38,11 +32,11 @@ pub(super) fn read_profiles(r: &mut TomlReader, table: &mut TableReader) -> Prof
         ramp.finish(r);
     }
     ProfileSpec {
-        max_rate_k_per_s: k_per_s_from_c_per_h(max_rate_c_per_h),
-        count: count as usize,
-        segments: segments as usize,
+        max_rate_k_per_s: max_rate.map_or(usual.max_rate_k_per_s, k_per_s_from_c_per_h),
+        count,
+        segments,
         duration_s,
-        seed: seed as u64,
+        seed,
         listed,
     }
 }

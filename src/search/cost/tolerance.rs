@@ -28,7 +28,7 @@ use statrs::statistics::Statistics;
 use thiserror::Error;
 
 use crate::coil::CoilError;
-use crate::effect::{self, DeclaredEffect};
+use crate::effect::{self, Address, DeclaredEffect};
 use crate::pattern::Pattern;
 use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;
@@ -205,7 +205,7 @@ impl<'a> Coils<'a> {
         if active.is_empty() {
             return Err(ToleranceError::NoSpread);
         }
-        let has_film = model.effects.iter().any(|e| e.spec().kind == "surface_film");
+        let has_film = model.effects.iter().any(|e| e.is_at(effect::FILM));
         if active.contains(&Spread::Film) && !has_film {
             return Err(ToleranceError::NoFilm);
         }
@@ -386,24 +386,23 @@ fn built(
             Spread::RadialPitch => {
                 model.coil = model.coil.with_radial_pitch(model.coil.radial_pitch_m() * factor)?;
             }
-            Spread::MidpointOffset => change_effect(&mut model, "midpoint_offset", 0.0, |offset_m| offset_m + change),
-            Spread::Diffusivity => change_effect(&mut model, "diffusivity", 1.0, |f| f * factor),
-            Spread::Film => change_effect(&mut model, "surface_film", 0.0, |film| film * factor),
-            Spread::Mismatch => change_effect(&mut model, "strain_mismatch", 0.0, |m| m + change),
+            Spread::MidpointOffset => change_effect(&mut model, effect::OFFSET_OF_MIDDLE, |offset_m| offset_m + change),
+            Spread::Diffusivity => change_effect(&mut model, effect::DIFFUSIVITY_FACTOR, |f| f * factor),
+            Spread::Film => change_effect(&mut model, effect::FILM, |film| film * factor),
+            Spread::Mismatch => change_effect(&mut model, effect::MISMATCH_OF_HALVES, |m| m + change),
         }
     }
     Ok(model)
 }
 
-/// Changes the first value of an effect within its bounds; one that is not declared begins with `neutral`.
-fn change_effect(model: &mut CoilModel, kind: &str, neutral: f64, change: impl Fn(f64) -> f64) {
-    let Some(spec) = effect::find(kind) else { return };
-    let parameter = &spec.parameters[0];
+/// Changes a parameter within its bounds; an effect that is not declared begins where it changes nothing.
+fn change_effect(model: &mut CoilModel, address: Address, change: impl Fn(f64) -> f64) {
+    let Address { spec, parameter: index, neutral } = address;
+    let parameter = &spec.parameters[index];
     let within = |si: f64| si.clamp(parameter.unit.to_si(parameter.lower), parameter.unit.to_si(parameter.upper));
-    let declared = model.effects.iter_mut().find(|e| e.spec().kind == kind);
-    let before = declared.as_ref().map_or(neutral, |e| e.values()[0]);
+    let declared = model.effects.iter_mut().find(|e| e.is_at(address));
     let mut values = declared.as_ref().map_or(vec![neutral; spec.parameters.len()], |e| e.values().to_vec());
-    values[0] = within(change(before));
+    values[index] = within(change(values[index]));
     match declared {
         Some(effect) => {
             if let Ok(changed) = effect.with_values(values) {

@@ -18,7 +18,7 @@ use crate::pattern::windability::WindabilityClass;
 use crate::profile::{Piece, Profile};
 use crate::rate::{CoilModel, RateError, RateModel};
 use crate::thermal::{Drive, Field, HeatPath, Instant, StepResponse, ThermalError, ThermalHistory, solve};
-use crate::units::REFERENCE_TEMPERATURE_K;
+use crate::units::{REFERENCE_TEMPERATURE_K, RotationRate};
 
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum SearchError {
@@ -64,6 +64,13 @@ pub struct WorstCase {
     pub profile: String,
     pub profile_index: usize,
     pub time_s: f64,
+}
+
+impl std::fmt::Display for WorstCase {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let size = RotationRate { rad_per_s: self.rate_rad_per_s.abs() };
+        write!(f, "{size:.4} at {:.1} s of {}", self.time_s, self.profile)
+    }
 }
 
 /// Points a piece: close to its start, where layers respond one after the other, and then wider apart.
