@@ -11,6 +11,14 @@ pub struct Channel {
     pub values: Vec<f64>,
 }
 
+/// One row of what every record has.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Row {
+    pub time_s: f64,
+    pub temperature_k: f64,
+    pub rate_rad_per_s: f64,
+}
+
 /// A value that stands alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct GrossError {
@@ -168,16 +176,16 @@ impl Record {
 
     /// Single values of temperature and rate that do not belong to their neighbours.
     pub fn gross_errors(&self) -> Vec<GrossError> {
-        let find = |values: &[f64], column: &'static str| -> Vec<GrossError> {
-            let changes: Vec<f64> = values.windows(2).map(|w| w[1] - w[0]).collect();
-            let floor = FLOOR_FACTOR * robust_deviation(&changes);
-            let rows = gross_errors(values, NEIGHBOURS, SPREAD_FACTOR, floor);
-            rows.into_iter().map(|row| GrossError { row, column }).collect()
-        };
-        let mut found = find(&self.temperature_k, "temperature");
-        found.extend(find(&self.rate_rad_per_s, "rate"));
-        found.sort_by_key(|e| e.row);
-        found
+        gross_errors_of(&self.temperature_k, &self.rate_rad_per_s)
+    }
+
+    /// Row by row what every record has.
+    pub fn each_row(&self) -> impl Iterator<Item = Row> {
+        (0..self.rows()).map(|i| Row {
+            time_s: self.times_s[i],
+            temperature_k: self.temperature_k[i],
+            rate_rad_per_s: self.rate_rad_per_s[i],
+        })
     }
 
     /// The same record without some of its rows; they become gaps.
@@ -216,6 +224,20 @@ impl Record {
         steps.sort_by(f64::total_cmp);
         steps[steps.len() / 2]
     }
+}
+
+/// As [`Record::gross_errors`], of a stretch of rows.
+pub fn gross_errors_of(temperature_k: &[f64], rate_rad_per_s: &[f64]) -> Vec<GrossError> {
+    let find = |values: &[f64], column: &'static str| -> Vec<GrossError> {
+        let changes: Vec<f64> = values.windows(2).map(|w| w[1] - w[0]).collect();
+        let floor = FLOOR_FACTOR * robust_deviation(&changes);
+        let rows = gross_errors(values, NEIGHBOURS, SPREAD_FACTOR, floor);
+        rows.into_iter().map(|row| GrossError { row, column }).collect()
+    };
+    let mut found = find(temperature_k, "temperature");
+    found.extend(find(rate_rad_per_s, "rate"));
+    found.sort_by_key(|e| e.row);
+    found
 }
 
 #[cfg(test)]

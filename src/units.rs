@@ -7,6 +7,7 @@
 pub const LIGHT_SPEED_M_PER_S: f64 = 299_792_458.0;
 
 const SECONDS_PER_HOUR: f64 = 3600.0;
+const HOURS_PER_DAY: f64 = 24.0;
 const SECONDS_PER_MINUTE: f64 = 60.0;
 const DEGREES_PER_RADIAN: f64 = 180.0 / std::f64::consts::PI;
 const ZERO_CELSIUS_K: f64 = 273.15;
@@ -110,6 +111,30 @@ pub fn min_from_s(duration_s: f64) -> f64 {
 
 pub fn s_from_min(duration_min: f64) -> f64 {
     duration_min * SECONDS_PER_MINUTE
+}
+
+pub fn s_from_days(duration_d: f64) -> f64 {
+    s_from_h(duration_d * HOURS_PER_DAY)
+}
+
+pub fn s_from_ms(duration_ms: f64) -> f64 {
+    duration_ms / 1e3
+}
+
+pub fn s_from_us(duration_us: f64) -> f64 {
+    duration_us / 1e6
+}
+
+pub fn s_from_ns(duration_ns: f64) -> f64 {
+    duration_ns / 1e9
+}
+
+pub fn rad_per_s_from_arcsec_per_s(rate_arcsec_per_s: f64) -> f64 {
+    rate_arcsec_per_s / DEGREES_PER_RADIAN / SECONDS_PER_HOUR
+}
+
+pub fn celsius_from_fahrenheit(temperature_f: f64) -> f64 {
+    (temperature_f - 32.0) / 1.8
 }
 
 pub fn s_from_h(duration_h: f64) -> f64 {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::records::{GrossErrors, Noticed, read_noticed};
+use super::records::{GrossErrors, Noticed, RecordArguments, read_noticed};
 use super::report::{REPORT_FILE, write_report};
 use super::schedule::pattern_of;
 use super::screen::{Screen, table};
@@ -42,6 +42,8 @@ pub struct Arguments {
     /// Writes comparison.json, a table and pictures for each record, and report.html into this folder
     #[arg(long, short, value_name = "DIR")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    reading: RecordArguments,
 }
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
@@ -49,12 +51,14 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     if let Some(folder) = &arguments.output {
         check_free(folder)?;
     }
+    let format = arguments.reading.format(Some(&file))?;
     let named = pattern_of(&file, arguments.pattern.as_deref())?;
     let mut tables = Vec::with_capacity(arguments.records.len());
     let mut shown = Vec::with_capacity(arguments.records.len());
     let mut inputs = Vec::with_capacity(arguments.records.len());
     for path in &arguments.records {
-        let Noticed { record, gross_errors, gaps } = read_noticed(path, arguments.gross_errors, screen)?;
+        let Noticed { record, gross_errors, gaps } =
+            read_noticed(path, arguments.gross_errors, &format, Some(&file), screen)?;
         let names: Vec<String> = record.channels().iter().map(|c| c.name.clone()).collect();
         let columns = file.model.missing_channels(&names);
         let name = path.display().to_string();

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 
-use super::records::{GrossErrors, read_noticed};
+use super::records::{GrossErrors, RecordArguments, read_noticed};
 use super::schedule::pattern_of;
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
@@ -17,11 +17,16 @@ use crate::io::files::{NewFile, write_atomically};
 use crate::io::json::Document;
 use crate::io::model::{ModelFile, NamedPattern};
 use crate::io::read::model_file::read_model;
-use crate::io::write::compensation_file::{BiasLineJson, CompensateJson, MethodJson, StreamSummary, compensate_lines};
+use crate::io::read::record_columns::RecordFormat;
+use crate::io::write::compensation_file::{
+    BiasLineJson, CompensateJson, MeasuresJson, MethodJson, StreamSummary, compensate_lines,
+};
 use crate::io::write::difference_equation::DifferenceEquation;
+use crate::metrics::Metrics;
 use crate::numeric::statistics::rms;
 use crate::predict::noise_floor_rad_per_s;
 use crate::record::Record;
+use crate::report::compensation::compensation_chart;
 use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s, percent_from_fraction};
 
 /// Temperature and rate in, compensated rate out, as a file or as a stream
@@ -46,7 +51,7 @@ pub struct Arguments {
     /// A winding's name or a pattern file; without it, the model's own
     #[arg(long, short, value_name = "PATTERN")]
     pattern: Option<String>,
-    /// Writes the lines here instead of to stdout
+    /// Writes the lines here instead of to stdout; with --all-methods the picture of all (SVG)
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Writes the physical compensator as FILE.json and FILE.h
@@ -61,6 +66,8 @@ pub struct Arguments {
     /// Interval of the exported difference equation [s]; without it, that of the fitted record
     #[arg(long, value_name = "SECONDS")]
     interval: Option<f64>,
+    #[command(flatten)]
+    reading: RecordArguments,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -71,6 +78,8 @@ enum Way {
     Piecewise,
     /// Linear in T, dT/dt and d(T_out - T_in)/dt
     Regression,
+    /// Ridge regression on lagged temperatures
+    Learned,
 }
 
 impl From<Way> for Method {
@@ -79,15 +88,17 @@ impl From<Way> for Method {
             Way::Physical => Method::Physical,
             Way::Piecewise => Method::Piecewise,
             Way::Regression => Method::Regression,
+            Way::Learned => Method::Learned,
         }
     }
 }
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
+    let format = arguments.reading.format(Some(&file))?;
     let named = pattern_of(&file, arguments.pattern.as_deref())?;
     let fitted = match &arguments.fit {
-        Some(path) => Some(read_noticed(path, GrossErrors::Drop, screen)?.record),
+        Some(path) => Some(read_noticed(path, GrossErrors::Drop, &format, Some(&file), screen)?.record),
         None => None,
     };
     let method: Method = arguments.method.into();
@@ -114,7 +125,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
             return Ok(Ending::Done);
         }
     }
-    let summary = stream(arguments, &compensator, screen)?;
+    let summary = stream(arguments, &format, &compensator, screen)?;
     screen.note(&format!(
         "compensated {} rows ({}), {} rows behind; standard deviation {} -> {} °/h; malformed {}, clock back {}, gaps {}, temperature held {}, channel held {}, rate held {}, rate rejected {}",
         summary.rows,
@@ -136,6 +147,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
             method: method.key(),
             summary: Some(summary),
             noise_floor_deg_per_h: None,
+            before: None,
             methods: Vec::new(),
             lines: BiasLineJson::all(&compensator),
         };
@@ -161,7 +173,12 @@ fn shown(value: Option<f64>) -> String {
     value.map_or_else(|| "-".to_owned(), |v| format!("{v:.5}"))
 }
 
-fn stream(arguments: &Arguments, compensator: &Compensator, screen: &Screen) -> Result<StreamSummary, CliError> {
+fn stream(
+    arguments: &Arguments,
+    format: &RecordFormat,
+    compensator: &Compensator,
+    screen: &Screen,
+) -> Result<StreamSummary, CliError> {
     let path = arguments.record.as_deref().unwrap_or(Path::new("-"));
     let name = path.display().to_string();
     // With a JSON document on stdout the lines have no place there.
@@ -174,10 +191,10 @@ fn stream(arguments: &Arguments, compensator: &Compensator, screen: &Screen) -> 
         None => &mut std::io::sink(),
     };
     let summary = if name == "-" {
-        compensate_lines(compensator, "standard input", std::io::stdin().lock(), output)?
+        compensate_lines(compensator, format, "standard input", std::io::stdin().lock(), output)?
     } else {
         let input = File::open(path).map_err(|e| Faults::of_file(&name, format!("cannot be read: {e}")))?;
-        compensate_lines(compensator, &name, input, output)?
+        compensate_lines(compensator, format, &name, input, output)?
     };
     if let Some(file) = file {
         file.finish()?;
@@ -209,6 +226,40 @@ fn export(
     Ok(())
 }
 
+/// What a learned compensator leaves of days that it was not shown, where that is not what it leaves of its own.
+fn worth(compensator: &Compensator) -> Option<String> {
+    let Compensator::Learned(learned) = compensator else { return None };
+    learned.only_fits().then(|| {
+        format!(
+            "leaves {:.5} °/h of the record it was fitted to, {:.5} °/h of the parts of it that it was not shown: it only fits",
+            deg_per_h_from_rad_per_s(learned.left_rad_per_s),
+            deg_per_h_from_rad_per_s(learned.cross_validated_rad_per_s)
+        )
+    })
+}
+
+/// The averaging time of the bias stability, as in `metrics`.
+const AVERAGE_S: f64 = 10.0;
+
+/// Every measure, a column a method.
+fn before_and_after(body: &CompensateJson) -> String {
+    let measured: Vec<(&str, &MeasuresJson)> = body
+        .before
+        .iter()
+        .map(|m| ("before", m))
+        .chain(body.methods.iter().filter_map(|m| Some((m.method, m.measures.as_ref()?))))
+        .collect();
+    let Some((_, first)) = measured.first() else { return String::new() };
+    let mut header = vec!["measure", "unit"];
+    header.extend(measured.iter().map(|(name, _)| *name));
+    let rows = first.all().into_iter().enumerate().map(|(i, (name, unit, _))| {
+        let mut row = vec![name.to_owned(), unit.to_owned()];
+        row.extend(measured.iter().map(|(_, m)| m.all()[i].2.map_or_else(|| "-".to_owned(), |v| format!("{v:.6}"))));
+        row
+    });
+    table(&header, rows)
+}
+
 fn all_methods(
     arguments: &Arguments,
     file: &ModelFile,
@@ -217,30 +268,47 @@ fn all_methods(
     screen: &Screen,
 ) -> Result<Ending, CliError> {
     let (Some(fitted), Some(path)) = (fitted, &arguments.record) else { return Err(CliError::NoHoldout) };
-    let record = read_noticed(path, GrossErrors::Keep, screen)?.record;
+    let format = arguments.reading.format(Some(file))?;
+    let record = read_noticed(path, GrossErrors::Keep, &format, Some(file), screen)?.record;
     let rate = |values: &[f64]| deg_per_h_from_rad_per_s(rms(values));
+    let measures = |rates: Vec<f64>| -> Result<MeasuresJson, CliError> {
+        let left = Record::new("left", record.times_s().to_vec(), record.temperature_k().to_vec(), rates)?;
+        Ok(MeasuresJson::new(&Metrics::of(&left, AVERAGE_S)?))
+    };
+    let mut curves = vec![("before", record.rate_rad_per_s().to_vec())];
     let mut methods = Vec::new();
     for method in Method::ALL {
         methods.push(match Compensator::fit(method, &file.model, &named.pattern, fitted) {
-            Ok(compensator) => MethodJson {
-                method: method.key(),
-                rms_deg_per_h: Some(rate(&compensator.batch(&record))),
-                delay_rows: Some(compensator.delay_rows(record.interval_s())),
-                reason: None,
-            },
+            Ok(compensator) => {
+                let left = compensator.batch(&record);
+                curves.push((method.key(), left.clone()));
+                MethodJson {
+                    method: method.key(),
+                    rms_deg_per_h: Some(rate(&left)),
+                    delay_rows: Some(compensator.delay_rows(record.interval_s())),
+                    reason: worth(&compensator),
+                    measures: Some(measures(left)?),
+                }
+            }
             Err(error) => MethodJson {
                 method: method.key(),
                 rms_deg_per_h: None,
                 delay_rows: None,
                 reason: Some(error.to_string()),
+                measures: None,
             },
         });
+    }
+    if let Some(path) = &arguments.output {
+        write_atomically(path, compensation_chart(record.times_s(), &curves).svg().as_bytes())?;
+        screen.note(&format!("wrote {}", path.display()));
     }
     let body = CompensateJson {
         model: file.model.name.clone(),
         method: "all",
         summary: None,
         noise_floor_deg_per_h: Some(deg_per_h_from_rad_per_s(noise_floor_rad_per_s(&record))),
+        before: Some(measures(record.rate_rad_per_s().to_vec())?),
         methods,
         lines: Vec::new(),
     };
@@ -254,7 +322,9 @@ fn all_methods(
             ]
         });
         let noise = shown(body.noise_floor_deg_per_h);
-        table(&["method", "rms °/h", "delay rows", ""], rows) + &format!("noise floor of the record: {noise} °/h\n")
+        table(&["method", "rms °/h", "delay rows", ""], rows)
+            + &format!("noise floor of the record: {noise} °/h\n\n")
+            + &before_and_after(body)
     })?;
     Ok(Ending::Done)
 }

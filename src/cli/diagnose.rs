@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::records::{RecordArguments, read_remarked};
 use super::report::{REPORT_FILE, write_report};
 use super::schedule::pattern_of;
 use super::screen::{Screen, table};
@@ -17,7 +18,6 @@ use crate::io::json::schedule::{RATE_DECIMALS, rounded};
 use crate::io::model::ModelFile;
 use crate::io::read::model_file::read_model;
 use crate::io::read::profile_file::print_profile;
-use crate::io::read::record_file::read_record;
 use crate::io::write::measurement_folder::{
     DIAGNOSIS_FILE, MODEL_FILE, before_and_after_name, check_free, write_document, write_table,
 };
@@ -62,6 +62,8 @@ pub struct Arguments {
     /// Seed of the profiles that the experiment is chosen from
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    #[command(flatten)]
+    reading: RecordArguments,
 }
 
 /// What was asked and found.
@@ -80,10 +82,12 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     if let Some(folder) = &arguments.output {
         check_free(folder)?;
     }
+    let format = arguments.reading.format(Some(&file))?;
     let pattern = pattern_of(&file, arguments.pattern.as_deref())?.pattern;
     // Gross errors are left out by the diagnosis itself, which says so.
-    let read =
-        |paths: &[PathBuf]| -> Result<Vec<_>, CliError> { paths.iter().map(|path| Ok(read_record(path)?)).collect() };
+    let read = |paths: &[PathBuf]| -> Result<Vec<_>, CliError> {
+        paths.iter().map(|path| read_remarked(path, &format, Some(&file), screen)).collect()
+    };
     let (records, holdout) = (read(&arguments.records)?, read(&arguments.holdout)?);
     let progress = screen.progress("diagnose", Some(PARTS as u64));
     let request = Request { model: &file.model, pattern: &pattern, records: &records, holdout: &holdout };

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::diagnose::remarks;
-use super::records::{GrossErrors, Noticed, read_noticed};
+use super::records::{GrossErrors, Noticed, RecordArguments, read_noticed};
 use super::schedule::pattern_of;
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
@@ -52,6 +52,8 @@ pub struct Arguments {
     /// A winding's name or a pattern file; without it, the model's own
     #[arg(long, short, value_name = "PATTERN")]
     pattern: Option<String>,
+    #[command(flatten)]
+    reading: RecordArguments,
 }
 
 fn named_value(stated: &str) -> Result<(String, f64), String> {
@@ -62,12 +64,13 @@ fn named_value(stated: &str) -> Result<(String, f64), String> {
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
+    let format = arguments.reading.format(Some(&file))?;
     let named = pattern_of(&file, arguments.pattern.as_deref())?;
     let wanted = wanted(arguments, &file)?;
     let mut given: Vec<(Noticed, RecordInputJson)> = Vec::new();
     for (paths, role) in [(&arguments.fit, "fitted"), (&arguments.holdout, "held out")] {
         for path in paths {
-            let noticed = read_noticed(path, GrossErrors::Drop, screen)?;
+            let noticed = read_noticed(path, GrossErrors::Drop, &format, Some(&file), screen)?;
             let names: Vec<String> = noticed.record.channels().iter().map(|c| c.name.clone()).collect();
             let mut columns = file.model.missing_channels(&names);
             columns.extend(wanted.channels().into_iter().filter(|c| !names.contains(c)));

@@ -47,6 +47,7 @@ use crate::metrics::MetricsError;
 use crate::predict::PredictError;
 use crate::rate::RateError;
 use crate::record::RecordError;
+use crate::reproduce::thesis2021::ThesisError;
 use crate::search::cost::guaranteed::GuaranteedError;
 use crate::search::cost::tolerance::ToleranceError;
 use crate::search::cost::worst_case::SearchError;
@@ -137,6 +138,8 @@ pub enum Ending {
 /// Why a request cannot be carried out; all of them end with exit code 2.
 #[derive(Debug, Error)]
 pub enum CliError {
+    #[error("error: --columns: {message}")]
+    Columns { message: String },
     #[error("{0}")]
     Faults(#[from] Faults),
     #[error("error: {0}")]
@@ -169,6 +172,8 @@ pub enum CliError {
     NoExport,
     #[error("error: --all-methods needs a record to try them on")]
     NoHoldout,
+    #[error("error: {0}")]
+    Thesis(#[from] ThesisError),
     #[error("error: {0}")]
     Metrics(#[from] MetricsError),
     #[error("error: {0}")]

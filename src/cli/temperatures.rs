@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::records::{GrossErrors, read_noticed};
+use super::records::{GrossErrors, RecordArguments, read_noticed};
 use super::screen::Screen;
 use super::{CliError, Ending};
 use crate::io::files::write_atomically;
@@ -38,6 +38,8 @@ pub struct Arguments {
     /// Writes temperatures.csv, temperatures.svg and rates.svg into this folder, instead of CSV to stdout
     #[arg(long, short, value_name = "DIR")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    reading: RecordArguments,
 }
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
@@ -50,7 +52,8 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     }
     let (name, history) = match &arguments.record {
         Some(path) => {
-            let noticed = read_noticed(path, GrossErrors::Keep, screen)?;
+            let noticed =
+                read_noticed(path, GrossErrors::Keep, &arguments.reading.format(Some(&file))?, Some(&file), screen)?;
             let layers = file.model.coil.layers();
             let own = file.pattern.as_ref().map(|named| named.pattern.clone());
             // Temperatures don't depend on the pattern; the boundary's estimate weighs the layers by it.

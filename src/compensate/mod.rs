@@ -1,7 +1,7 @@
 //! Takes the predictable part out of a gyro's rate, from one thermometer, row by row.
 //!
-//! Three compensators: the physical model ([`physical`]), straight lines over temperature, and a regression on temperature
-//! and its rates ([`empirical`]). All run as a [`stream::Stream`], in batch too, so that both agree to the last digit.
+//! Four compensators: the physical model ([`physical`]), straight lines over temperature, a regression on temperature
+//! and its rates ([`empirical`]), and a ridge regression on lagged temperatures ([`learned`]). All run as a [`stream::Stream`], in batch too, so that both agree to the last digit.
 //!
 //! What remains is the inertial rate, the noise, and what the compensator does not know. An offset that a record was
 //! fitted with is taken out too.
@@ -9,6 +9,7 @@
 pub mod empirical;
 pub mod filter;
 mod heating;
+pub mod learned;
 pub mod physical;
 pub mod stream;
 
@@ -22,6 +23,7 @@ use crate::rate::{CoilModel, RateError};
 use crate::record::Record;
 use crate::thermal::ThermalError;
 use empirical::{PiecewiseBias, Regression};
+use learned::Learned;
 use physical::{MOST_DELAY_ROWS, Physical};
 use stream::{Compensated, Reading, Stream};
 
@@ -31,16 +33,18 @@ pub enum Method {
     Physical,
     Piecewise,
     Regression,
+    Learned,
 }
 
 impl Method {
-    pub const ALL: [Method; 3] = [Method::Physical, Method::Piecewise, Method::Regression];
+    pub const ALL: [Method; 4] = [Method::Physical, Method::Piecewise, Method::Regression, Method::Learned];
 
     pub fn key(self) -> &'static str {
         match self {
             Method::Physical => "physical",
             Method::Piecewise => "piecewise",
             Method::Regression => "regression",
+            Method::Learned => "learned",
         }
     }
 }
@@ -51,6 +55,7 @@ pub enum Compensator {
     Physical(Box<Physical>),
     Piecewise(PiecewiseBias),
     Regression(Regression),
+    Learned(Learned),
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
@@ -105,6 +110,7 @@ impl Compensator {
             }
             Method::Piecewise => Compensator::Piecewise(PiecewiseBias::fit(record)?),
             Method::Regression => Compensator::Regression(Regression::fit(record)?),
+            Method::Learned => Compensator::Learned(Learned::fit(record)?),
         })
     }
 
@@ -115,7 +121,7 @@ impl Compensator {
     pub fn declared(method: Method, model: &CoilModel, pattern: &Pattern) -> Result<Self, CompensateError> {
         match method {
             Method::Physical => Ok(Compensator::Physical(Box::new(Physical::new(model, pattern)?))),
-            Method::Piecewise | Method::Regression => Err(CompensateError::NeedsRecord { method }),
+            Method::Piecewise | Method::Regression | Method::Learned => Err(CompensateError::NeedsRecord { method }),
         }
     }
 
@@ -124,6 +130,7 @@ impl Compensator {
             Compensator::Physical(_) => Method::Physical,
             Compensator::Piecewise(_) => Method::Piecewise,
             Compensator::Regression(_) => Method::Regression,
+            Compensator::Learned(_) => Method::Learned,
         }
     }
 
@@ -131,7 +138,7 @@ impl Compensator {
     pub fn delay_rows(&self, interval_s: f64) -> usize {
         let delay_s = match self {
             Compensator::Physical(physical) => physical.delay_s,
-            Compensator::Piecewise(_) => 0.0,
+            Compensator::Piecewise(_) | Compensator::Learned(_) => 0.0,
             Compensator::Regression(regression) => regression.window_s,
         };
         ((delay_s / interval_s).round() as usize).clamp(1, MOST_DELAY_ROWS)
@@ -141,14 +148,14 @@ impl Compensator {
     pub fn channel_names(&self) -> Vec<&str> {
         match self {
             Compensator::Physical(physical) => physical.channel_names().collect(),
-            Compensator::Piecewise(_) | Compensator::Regression(_) => Vec::new(),
+            Compensator::Piecewise(_) | Compensator::Regression(_) | Compensator::Learned(_) => Vec::new(),
         }
     }
 
     fn channel_bias_of(&self, record: &Record, row: usize) -> Option<f64> {
         match self {
             Compensator::Physical(physical) => physical.channel_bias_of(record, row),
-            Compensator::Piecewise(_) | Compensator::Regression(_) => Some(0.0),
+            Compensator::Piecewise(_) | Compensator::Regression(_) | Compensator::Learned(_) => Some(0.0),
         }
     }
 

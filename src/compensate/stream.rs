@@ -9,6 +9,7 @@ use std::collections::VecDeque;
 use super::Compensator;
 use super::empirical::Window;
 use super::filter::Filter;
+use super::learned::Follower;
 use crate::numeric::statistics::median;
 
 /// What one row holds; None is a drop-out.
@@ -95,6 +96,7 @@ enum Predictor {
     Physical(Box<Filter>),
     Piecewise,
     Regression(Window),
+    Learned(Box<Follower>),
 }
 
 /// A compensator at work.
@@ -188,6 +190,7 @@ impl<'c, T> Stream<'c, T> {
             }
             Compensator::Piecewise(_) => Predictor::Piecewise,
             Compensator::Regression(_) => Predictor::Regression(Window::new(self.delay)),
+            Compensator::Learned(_) => Predictor::Learned(Box::default()),
         }
     }
 
@@ -195,6 +198,7 @@ impl<'c, T> Stream<'c, T> {
         match self.predictor.as_mut() {
             Some(Predictor::Physical(filter)) => filter.restart(),
             Some(Predictor::Regression(window)) => *window = Window::new(self.delay),
+            Some(Predictor::Learned(follower)) => **follower = Follower::default(),
             Some(Predictor::Piecewise) | None => {}
         }
     }
@@ -226,7 +230,7 @@ impl<'c, T> Stream<'c, T> {
             pending.channel_rad_per_s = self.last_channel_rad_per_s;
             let of_the_air_k = match self.compensator {
                 Compensator::Physical(physical) => temperature_k.map(|t| physical.of_the_air_k(reading.time_s, t)),
-                Compensator::Piecewise(_) | Compensator::Regression(_) => temperature_k,
+                Compensator::Piecewise(_) | Compensator::Regression(_) | Compensator::Learned(_) => temperature_k,
             };
             self.advance(of_the_air_k, reading.inner_k.filter(|t| t.is_finite()));
             pending.time_s = reading.time_s;
@@ -306,6 +310,12 @@ impl<'c, T> Stream<'c, T> {
         match self.predictor.as_mut() {
             Some(Predictor::Physical(filter)) => filter.step(temperature_k),
             Some(Predictor::Regression(window)) => window.push(temperature_k, inner_k),
+            Some(Predictor::Learned(follower)) => {
+                if let Compensator::Learned(learned) = self.compensator {
+                    let time_s = self.step as f64 * self.interval_s;
+                    follower.step(learned, time_s, temperature_k, self.delay + 2);
+                }
+            }
             Some(Predictor::Piecewise) | None => {}
         }
         self.step += 1;
@@ -325,6 +335,7 @@ impl<'c, T> Stream<'c, T> {
             (Some(Predictor::Regression(window)), Compensator::Regression(regression)) => {
                 Some(regression.bias_rad_per_s(&window.regressors(lag, self.interval_s)))
             }
+            (Some(Predictor::Learned(follower)), _) => follower.bias_rad_per_s(lag),
             (_, Compensator::Piecewise(piecewise)) => temperature_k.map(|t| piecewise.bias_rad_per_s(t)),
             _ => None,
         };

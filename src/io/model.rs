@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::io::read::record_columns::RecordFormat;
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::profile::ProfileSpec;
@@ -23,6 +24,8 @@ pub struct ModelFile {
     pub search: SearchSettings,
     pub production: Production,
     pub tolerance: Option<ToleranceSpec>,
+    /// How its records are to be read.
+    pub record: RecordFormat,
     pub advice: Vec<Advice>,
 }
 

@@ -19,8 +19,6 @@
 //! IEEE Std 952, annex C; Riley, Handbook of Frequency Stability Analysis, NIST SP 1065 (2008), section 5.2.4 (overlapping
 //! estimator) and 5.4.1 (degrees of freedom).
 
-use nalgebra::{DMatrix, DVector};
-
 /// One point of the Allan deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AllanPoint {
@@ -45,23 +43,26 @@ pub fn overlapping(rates: &[f64], interval_s: f64, factors: &[usize]) -> Vec<All
         sum += rate - mean;
         angle.push(sum);
     }
+    of_angles(&angle, 1, rates.len(), interval_s, factors)
+}
+
+/// Of angles `stride` values apart, at factors that count these.
+fn of_angles(angle: &[f64], stride: usize, values: usize, interval_s: f64, factors: &[usize]) -> Vec<AllanPoint> {
     factors
         .iter()
         .filter(|&&m| m > 0 && 2 * m < angle.len())
         .map(|&m| {
             let pairs = angle.len() - 2 * m;
             let square: f64 = (0..pairs).map(|k| (angle[k + 2 * m] - 2.0 * angle[k + m] + angle[k]).powi(2)).sum();
-            let m_real = m as f64;
-            let deviation = (square / (2.0 * pairs as f64)).sqrt() / m_real;
-            let freedom = degrees_of_freedom(rates.len() + 1, m);
-            AllanPoint {
-                tau_s: m_real * interval_s,
-                deviation,
-                pairs,
-                standard_error: deviation / (2.0 * freedom).sqrt(),
-            }
+            point(square, pairs, m * stride, values, interval_s)
         })
         .collect()
+}
+
+fn point(square: f64, pairs: usize, m: usize, values: usize, interval_s: f64) -> AllanPoint {
+    let deviation = (square / (2.0 * pairs as f64)).sqrt() / m as f64;
+    let standard_error = deviation / (2.0 * degrees_of_freedom(values + 1, m)).sqrt();
+    AllanPoint { tau_s: m as f64 * interval_s, deviation, pairs, standard_error }
 }
 
 /// Of the overlapping estimator for white noise of the rate (NIST SP 1065, Table 5), `n` points of the angle.
@@ -81,34 +82,6 @@ pub fn factors(values: usize) -> Vec<usize> {
     factors
 }
 
-/// N, read off where the curve falls with −½: the strength of white noise and whether such a stretch was found.
-///
-/// The first stretch with local slopes between −0.65 and −0.35 counts, each point by its degrees of freedom. Without one,
-/// something else covers the white noise everywhere, and what is returned is the largest that fits under the curve.
-pub fn white_by_slope(points: &[AllanPoint]) -> Option<(f64, bool)> {
-    let usable: Vec<&AllanPoint> = points.iter().filter(|p| p.deviation > 0.0).collect();
-    let slope = |i: usize| {
-        let (a, b) = (usable[i.saturating_sub(1)], usable[(i + 1).min(usable.len() - 1)]);
-        (b.deviation / a.deviation).ln() / (b.tau_s / a.tau_s).ln()
-    };
-    let falls = |i: &usize| (slope(*i) + 0.5).abs() < 0.15;
-    let square = |p: &AllanPoint| p.deviation * p.deviation * p.tau_s;
-    let least = usable.iter().map(|p| square(p)).min_by(f64::total_cmp)?;
-    // Beyond a hump of something slow the curve may fall with -1/2 too, far above the noise.
-    let is_low = |i: &usize| square(usable[*i]) < LOW * least;
-    let Some(first) = (0..usable.len()).find(|i| falls(i) && is_low(i)) else { return Some((least.sqrt(), false)) };
-    let stretch: Vec<&AllanPoint> = (first..usable.len()).take_while(falls).map(|i| usable[i]).collect();
-    let freedom: f64 = stretch.iter().map(|p| weight(p) * weight(p)).sum();
-    let sum: f64 = stretch.iter().map(|p| weight(p) * weight(p) * square(p)).sum();
-    Some(((sum / freedom).sqrt(), true))
-}
-
-/// A stretch of white noise has no other point of the curve further below it than this, in σ²τ.
-const LOW: f64 = 2.0;
-
-/// A quantised angle falls with −1 where it is seen first; what falls less steeply than this is not quantised.
-const QUANTISED_SLOPE: f64 = -0.75;
-
 /// The strengths of the five noises; zero where a noise does not show.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct NoiseModel {
@@ -126,46 +99,6 @@ fn unit_variances(tau_s: f64) -> [f64; 5] {
 }
 
 impl NoiseModel {
-    /// The non-negative strengths that fit the points best, each weighted by its own relative uncertainty.
-    ///
-    /// All 31 sets of noises are tried, and of those whose strengths are all positive the best is kept: exact for five.
-    pub fn fit(points: &[AllanPoint]) -> Self {
-        let usable: Vec<&AllanPoint> = points.iter().filter(|p| p.deviation > 0.0).collect();
-        let mut best = ([0.0; 5], usable.iter().map(|p| weight(p) * weight(p)).sum::<f64>());
-        let quantised = match usable[..] {
-            [a, b, ..] => (b.deviation / a.deviation).ln() < QUANTISED_SLOPE * (b.tau_s / a.tau_s).ln(),
-            _ => false,
-        };
-        for set in (1usize..32).filter(|set| quantised || set & 1 == 0) {
-            let columns: Vec<usize> = (0..5).filter(|c| set >> c & 1 == 1).collect();
-            if columns.len() > usable.len() {
-                continue;
-            }
-            // Relative residuals: (model/σ² − 1)·weight.
-            let matrix = DMatrix::from_fn(usable.len(), columns.len(), |row, column| {
-                let p = usable[row];
-                weight(p) * unit_variances(p.tau_s)[columns[column]] / (p.deviation * p.deviation)
-            });
-            let target = DVector::from_iterator(usable.len(), usable.iter().map(|p| weight(p)));
-            let scales: Vec<f64> = matrix.column_iter().map(|c| c.norm().max(f64::MIN_POSITIVE)).collect();
-            let scaled = DMatrix::from_fn(usable.len(), columns.len(), |row, c| matrix[(row, c)] / scales[c]);
-            let Ok(found) = scaled.clone().svd(true, true).solve(&target, 1e-12) else { continue };
-            if found.iter().any(|v| !(*v > 0.0)) {
-                continue;
-            }
-            let misfit = (&scaled * &found - &target).norm_squared();
-            if misfit < best.1 {
-                let mut variances = [0.0; 5];
-                for (place, &column) in columns.iter().enumerate() {
-                    variances[column] = found[place] / scales[place];
-                }
-                best = (variances, misfit);
-            }
-        }
-        let [quantisation, white, flicker, random_walk, ramp] = best.0.map(f64::sqrt);
-        Self { quantisation, white, flicker, random_walk, ramp }
-    }
-
     /// σ(τ) of the model.
     pub fn deviation(&self, tau_s: f64) -> f64 {
         let strengths = [self.quantisation, self.white, self.flicker, self.random_walk, self.ramp];
@@ -173,9 +106,77 @@ impl NoiseModel {
     }
 }
 
-/// One over the relative standard error of σ².
-fn weight(point: &AllanPoint) -> f64 {
-    0.5 * point.deviation / point.standard_error
+/// The Allan deviation of a sequence that is too long to be kept.
+///
+/// Up to [`MOST_ANGLES`] values it is [`overlapping`] itself. Beyond, every second angle is forgotten, again and again: averaging
+/// factors up to [`MOST_NEAR`] are still taken at every value, the longer ones at every `stride`-th, which costs nothing that
+/// overlapping had won.
+#[derive(Debug, Clone)]
+pub struct RunningAllan {
+    interval_s: f64,
+    /// Taken off each value before it is summed: it cancels, but not in rounding.
+    level: f64,
+    angle: f64,
+    values: usize,
+    stride: usize,
+    angles: Vec<f64>,
+    /// The last 2 `MOST_NEAR` + 1 angles, as a ring.
+    ring: Vec<f64>,
+    near: Vec<(usize, f64)>,
+}
+
+/// Angles that are kept: 16 MB.
+pub const MOST_ANGLES: usize = 1 << 21;
+/// The longest averaging factor that is taken at every value of a long sequence.
+pub const MOST_NEAR: usize = 1024;
+
+impl RunningAllan {
+    /// `level` is about the mean of what will come.
+    pub fn new(interval_s: f64, level: f64) -> Self {
+        let near = factors(3 * MOST_NEAR).into_iter().map(|m| (m, 0.0)).collect();
+        let ring = vec![0.0; 2 * MOST_NEAR + 1];
+        Self { interval_s, level, angle: 0.0, values: 0, stride: 1, angles: vec![0.0], ring, near }
+    }
+
+    pub fn values(&self) -> usize {
+        self.values
+    }
+
+    pub fn push(&mut self, value: f64) {
+        self.angle += value - self.level;
+        self.values += 1;
+        let size = self.ring.len();
+        self.ring[self.values % size] = self.angle;
+        for (m, sum) in &mut self.near {
+            if self.values >= 2 * *m {
+                let back = |k: usize| self.ring[(self.values - k) % size];
+                *sum += (self.angle - 2.0 * back(*m) + back(2 * *m)).powi(2);
+            }
+        }
+        if self.values.is_multiple_of(self.stride) {
+            self.angles.push(self.angle);
+            if self.angles.len() > MOST_ANGLES {
+                self.stride *= 2;
+                self.angles = self.angles.iter().copied().step_by(2).collect();
+            }
+        }
+    }
+
+    /// The points at [`factors`] of all values.
+    pub fn points(&self) -> Vec<AllanPoint> {
+        let factors = factors(self.values);
+        if self.stride == 1 {
+            return of_angles(&self.angles, 1, self.values, self.interval_s, &factors);
+        }
+        let mut points = Vec::with_capacity(factors.len());
+        for (m, sum) in self.near.iter().filter(|(m, _)| *m <= self.values / 3) {
+            points.push(point(*sum, self.values + 1 - 2 * m, *m, self.values, self.interval_s));
+        }
+        let mut far: Vec<usize> = factors.iter().filter(|m| **m > MOST_NEAR).map(|m| m.div_ceil(self.stride)).collect();
+        far.dedup();
+        points.extend(of_angles(&self.angles, self.stride, self.values, self.interval_s, &far));
+        points
+    }
 }
 
 #[cfg(test)]
@@ -183,42 +184,38 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_noise_model_is_found_again_from_its_own_curve() {
-        let truth = NoiseModel { quantisation: 0.5, white: 2.0, flicker: 0.3, random_walk: 0.01, ramp: 0.0 };
-        let points: Vec<AllanPoint> = (0..50)
-            .map(|i| {
-                let tau_s = 10f64.powf(0.1 * f64::from(i) - 1.0);
-                let deviation = truth.deviation(tau_s);
-                AllanPoint { tau_s, deviation, pairs: 100, standard_error: 0.1 * deviation }
-            })
-            .collect();
-        let found = NoiseModel::fit(&points);
-        assert!((found.quantisation - 0.5).abs() < 1e-6);
-        assert!((found.white - 2.0).abs() < 1e-6);
-        assert!((found.flicker - 0.3).abs() < 1e-6);
-        assert!((found.random_walk - 0.01).abs() < 1e-6);
-        assert!(found.ramp < 1e-6);
-    }
-
-    #[test]
-    fn white_noise_under_a_slow_hump_is_read_off_where_the_curve_falls() {
-        let points: Vec<AllanPoint> = (0..40)
-            .map(|i| {
-                let tau_s = 10f64.powf(0.1 * f64::from(i));
-                let hump = 3.0 * (-((tau_s / 500.0).ln()).powi(2)).exp();
-                let deviation = (4.0 / tau_s + hump * hump).sqrt();
-                AllanPoint { tau_s, deviation, pairs: 100, standard_error: 0.02 * deviation }
-            })
-            .collect();
-        let (white, found) = white_by_slope(&points).unwrap();
-        assert!(found && (white - 2.0).abs() < 0.02, "{white}");
-    }
-
-    #[test]
     fn a_straight_ramp_has_the_deviation_of_a_ramp() {
         let rates: Vec<f64> = (0..100).map(f64::from).collect();
         for point in overlapping(&rates, 1.0, &[1, 7, 20]) {
             assert!((point.deviation - point.tau_s / 2f64.sqrt()).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_running_deviation_is_that_of_the_whole_sequence_and_close_to_it_once_angles_are_forgotten() {
+        let rates: Vec<f64> = (0u64..3000).map(|i| 5.0 + (i * i * 7919 % 1009) as f64).collect();
+        let mut running = RunningAllan::new(2.0, 500.0);
+        rates.iter().for_each(|r| running.push(*r));
+        for (a, b) in running.points().iter().zip(overlapping(&rates, 2.0, &factors(3000))) {
+            assert_eq!((a.tau_s, a.pairs), (b.tau_s, b.pairs));
+            assert!((a.deviation / b.deviation - 1.0).abs() < 1e-9);
+        }
+        let mut random = 1u64;
+        let mut long = RunningAllan::new(1.0, 0.0);
+        let mut rates = Vec::new();
+        for _ in 0..MOST_ANGLES + 9000 {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            rates.push((random >> 40) as f64);
+            long.push(*rates.last().unwrap());
+        }
+        let all = overlapping(&rates, 1.0, &factors(rates.len()));
+        let found = long.points();
+        assert_eq!(found.len(), all.len());
+        for (a, b) in found.iter().zip(all) {
+            let tolerance =
+                if b.tau_s <= MOST_NEAR as f64 { 1e-9 } else { 0.05 * b.standard_error / b.deviation + 2e-3 };
+            assert!((a.tau_s / b.tau_s - 1.0).abs() < 2e-3);
+            assert!((a.deviation / b.deviation - 1.0).abs() < tolerance, "{a:?} {b:?}");
         }
     }
 }

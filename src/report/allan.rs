@@ -80,10 +80,10 @@ fn caption(record: &RecordMetricsJson) -> String {
     let walk = if record.angle_random_walk_has_slope {
         ""
     } else {
-        " Nothing falls with −½: the angle random walk in the table is an upper bound."
+        " White noise may be absent: the angle random walk in the table is an upper bound."
     };
     format!(
-        "Overlapping Allan deviation of {} regular rows of {}, with one standard error. Dashed: the angle random walk as read off the slope of −½, and the other noises as fitted to the whole curve; bias instability B is the flat line at 0.664 B.{walk}",
+        "Overlapping Allan deviation of {} regular rows of {}, with one standard error. Dashed: the noises by maximum likelihood on all octaves at once, without what follows the temperature; bias instability B is the flat line at 0.664 B.{walk}",
         record.allan_rows, record.file
     )
 }
@@ -114,8 +114,29 @@ fn measures(metrics: &MetricsJson) -> Markup {
                 } }
             }
         } }
+        @for record in &metrics.records {
+            @if !record.noise.is_empty() { (noises(record)) }
+            @for caution in &record.cautions { p { strong { "Caution. " } (record.file) ": " (caution) "." } }
+        }
         @if let Some(repeatability) = metrics.repeatability_deg_per_h {
             p { "Repeatability of the bias over " (metrics.records.len()) " records: " (format!("{repeatability:.6}")) " °/h." }
         }
+    }
+}
+
+fn noises(record: &RecordMetricsJson) -> Markup {
+    html! {
+        h3 { "Noise of " (record.file) }
+        p { "Maximum likelihood on the Haar variances of all octaves; the five intervals hold together with 95 %." }
+        div.scroll { table {
+            thead { tr { th.word { "Kind" } th { "Value" } th { "From" } th { "To" } th.word { "Unit" } } }
+            tbody {
+                @for noise in &record.noise { tr {
+                    td.word { (noise.kind.replace('_', " ")) }
+                    td { (digits(noise.value)) } td { (digits(noise.low)) } td { (digits(noise.high)) }
+                    td.word { (noise.unit) }
+                } }
+            }
+        } }
     }
 }

@@ -2,6 +2,7 @@
 
 pub mod allan;
 pub mod comparison;
+pub mod compensation;
 pub mod cross_section;
 pub mod diagnosis;
 pub mod ladder;
@@ -10,5 +11,6 @@ mod page;
 pub mod plot;
 pub mod search_run;
 pub mod temperatures;
+pub mod thesis2021;
 pub mod traveller;
 pub mod yan1998;

@@ -49,7 +49,10 @@ const SIBLING_EDGES: &[(&str, &str)] = &[
     ("compare", "boundary"),
     ("compare", "predict"),
     ("compensate", "boundary"),
+    ("compensate", "metrics"),
     ("compensate", "predict"),
+    ("reproduce", "compensate"),
+    ("reproduce", "metrics"),
     ("reproduce", "search"),
     ("report", "io"),
 ];

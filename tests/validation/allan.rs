@@ -4,7 +4,9 @@
 //! Tolerance: the printed digits of the tables; 1e-9 relative against allantools, which sums in another order;
 //! coefficients of synthetic noises as far as 16 384 values tell them.
 
-use coilwright::numeric::allan::{NoiseModel, factors, overlapping};
+use coilwright::numeric::allan::overlapping;
+use coilwright::numeric::coloured::{Interval, NoiseStrengths, noise_strengths};
+use coilwright::numeric::pyramid::Pyramid;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -92,14 +94,24 @@ fn each_noise_alone_gives_back_its_coefficient() {
     let mut random = ChaCha8Rng::seed_from_u64(4);
     let errors: Vec<f64> = (0..=ROWS).map(|_| quantum * (random.random::<f64>() - 0.5)).collect();
     let quantised: Vec<f64> = errors.windows(2).map(|e| (e[1] - e[0]) / INTERVAL_S).collect();
-    let found = |rates: &[f64]| NoiseModel::fit(&overlapping(rates, INTERVAL_S, &factors(rates.len())));
-    for (name, value, expected, tolerance) in [
+    let found = |rates: &[f64]| -> NoiseStrengths {
+        let mut pyramid = Pyramid::new(2, 0);
+        for (i, rate) in rates.iter().enumerate() {
+            pyramid.push(i as u64, *rate, |slow| slow[0] = INTERVAL_S * i as f64);
+        }
+        noise_strengths(&pyramid.finish(), INTERVAL_S, &[]).unwrap()
+    };
+    let cases: [(&str, Interval, f64, f64); 4] = [
         ("white", found(&white(1, ROWS)).white, INTERVAL_S.sqrt(), 0.03),
         ("random walk", found(&walk).random_walk, 1.0 / INTERVAL_S.sqrt(), 0.05),
         ("flicker", found(&flicker(3)).flicker, 1.0, 0.1),
         // Errors that are uniform over a quantum q have the deviation q/√12 = Q.
         ("quantisation", found(&quantised).quantisation, quantum / 12f64.sqrt(), 0.03),
-    ] {
+    ];
+    for (name, interval, expected, tolerance) in cases {
+        let value = interval.value;
+        println!("{name}: {interval:?}");
+        assert!(interval.low <= expected && expected <= interval.high, "{name}");
         println!("{name}: {value:.4} of {expected:.4}");
         assert!((value / expected - 1.0).abs() < tolerance, "{name}: {value} of {expected}");
     }

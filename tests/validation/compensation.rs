@@ -69,7 +69,7 @@ fn with_the_hidden_spool_or_lag_declared_the_physical_compensator_comes_near_the
         let holdout = record(name, "validation.csv");
         let rms_of =
             |effects, method| deg_per_h_from_rad_per_s(rms(&fitted_with(name, effects, method).batch(&holdout)));
-        let [physical, piecewise, regression] = Method::ALL.map(|method| rms_of(effects, method));
+        let [physical, piecewise, regression, _] = Method::ALL.map(|method| rms_of(effects, method));
         let noise = deg_per_h_from_rad_per_s(noise_floor_rad_per_s(&holdout));
         println!(
             "{name}: physical {physical:.4}, piecewise {piecewise:.4}, regression {regression:.4}, noise {noise:.4}"
@@ -186,7 +186,7 @@ fn the_physical_compensator_is_best_where_its_model_is_complete() {
     for name in ["a-control", "g-control-zyl"] {
         let holdout = record(name, "validation.csv");
         let rms_of = |method| deg_per_h_from_rad_per_s(rms(&fitted(name, method).batch(&holdout)));
-        let [physical, piecewise, regression] = Method::ALL.map(rms_of);
+        let [physical, piecewise, regression, _] = Method::ALL.map(rms_of);
         println!("{name}: physical {physical:.4}, piecewise {piecewise:.4}, regression {regression:.4} °/h rms");
         assert!(physical < 0.5 * piecewise && physical < 0.5 * regression, "{name}");
         // What is left above the noise is what a few rows of delay cannot know about the air.

@@ -2,10 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::metrics::{Allan, Metrics};
+use crate::metrics::Metrics;
 use crate::numeric::allan::NoiseModel;
+use crate::numeric::coloured::{Interval, NoiseStrengths};
 use crate::units::{
-    arcsec_from_rad, celsius_from_kelvin, deg_per_h_from_rad_per_s, deg_per_h_per_h_from_rad_per_s2,
+    arcsec_from_rad, celsius_from_kelvin, deg_from_rad, deg_per_h_from_rad_per_s, deg_per_h_per_h_from_rad_per_s2,
     deg_per_h_per_sqrt_h_from_rad_per_s_per_sqrt_s, deg_per_sqrt_h_from_rad_per_sqrt_s,
 };
 
@@ -23,6 +24,10 @@ pub struct MetricsJson {
     pub temperature_sensitivity_deg_per_h_per_c: Option<f64>,
     pub angle_random_walk_deg_per_sqrt_h: Option<f64>,
     pub peak_to_peak_deg_per_h: f64,
+    /// Of several records the largest.
+    pub drift_angle_deg: f64,
+    /// Of several records, for each kind the largest.
+    pub noise: Vec<NoiseJson>,
     pub records: Vec<RecordMetricsJson>,
     pub inputs: InputsJson,
 }
@@ -39,7 +44,7 @@ pub struct RecordMetricsJson {
     pub bias_instability_tau_s: Option<f64>,
     pub temperature_sensitivity_deg_per_h_per_c: Option<f64>,
     pub angle_random_walk_deg_per_sqrt_h: Option<f64>,
-    /// False: nothing falls with −½, and the angle random walk is an upper bound.
+    /// False: white noise may be absent, and the angle random walk is an upper bound.
     pub angle_random_walk_has_slope: bool,
     pub rate_random_walk_deg_per_h_per_sqrt_h: Option<f64>,
     pub flicker_deg_per_h: Option<f64>,
@@ -47,6 +52,15 @@ pub struct RecordMetricsJson {
     pub peak_to_peak_deg_per_h: f64,
     /// Of the means over `bias_stability_average_s`.
     pub averaged_peak_to_peak_deg_per_h: f64,
+    /// The rate integrated over the record.
+    pub drift_angle_deg: f64,
+    /// Five kinds, each with an interval; all five hold together with 95 %. Empty where the record is too short.
+    pub noise: Vec<NoiseJson>,
+    pub temperature_range_c: f64,
+    /// Root mean square of what follows the temperature, which was not taken for noise.
+    pub thermal_deg_per_h: Option<f64>,
+    /// What to keep in mind with these numbers.
+    pub cautions: Vec<String>,
     pub temperature_points: Vec<TemperaturePointJson>,
     /// Rows of the stretch without a gap that the Allan deviation is of; 0: no stretch was long enough.
     pub allan_rows: usize,
@@ -82,6 +96,17 @@ pub struct AllanNoiseJson {
     pub deviation_at_1_s_deg_per_h: f64,
 }
 
+/// The strength of one noise.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NoiseJson {
+    /// "white", "flicker", "rate_random_walk", "quantisation" or "ramp".
+    pub kind: String,
+    pub value: f64,
+    pub low: f64,
+    pub high: f64,
+    pub unit: String,
+}
+
 /// A value that stands alone.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GrossErrorJson {
@@ -94,7 +119,8 @@ pub struct GrossErrorJson {
 impl RecordMetricsJson {
     pub fn new(file: &str, metrics: &Metrics, gross_errors: Vec<GrossErrorJson>, gaps: usize) -> Self {
         let allan = metrics.allan.as_ref();
-        let of_noise = |show: fn(&Allan) -> f64| allan.map(show);
+        let noises = metrics.noises.as_ref();
+        let of_noise = |show: fn(&NoiseStrengths) -> f64| noises.map(show);
         Self {
             file: file.to_owned(),
             rows: metrics.rows,
@@ -102,20 +128,27 @@ impl RecordMetricsJson {
             bias_deg_per_h: deg_per_h_from_rad_per_s(metrics.bias_rad_per_s),
             bias_stability_deg_per_h: metrics.bias_stability_rad_per_s.map(deg_per_h_from_rad_per_s),
             bias_stability_average_s: metrics.average_s,
-            bias_instability_deg_per_h: of_noise(|a| deg_per_h_from_rad_per_s(a.minimum.deviation)),
-            bias_instability_tau_s: of_noise(|a| a.minimum.tau_s),
+            bias_instability_deg_per_h: allan.map(|a| deg_per_h_from_rad_per_s(a.minimum.deviation)),
+            bias_instability_tau_s: allan.map(|a| a.minimum.tau_s),
             temperature_sensitivity_deg_per_h_per_c: metrics
                 .temperature_sensitivity_rad_per_s_per_k
                 .map(deg_per_h_from_rad_per_s),
-            angle_random_walk_deg_per_sqrt_h: of_noise(|a| deg_per_sqrt_h_from_rad_per_sqrt_s(a.white_rad_per_sqrt_s)),
-            angle_random_walk_has_slope: allan.is_some_and(|a| a.has_white_slope),
-            rate_random_walk_deg_per_h_per_sqrt_h: of_noise(|a| {
-                deg_per_h_per_sqrt_h_from_rad_per_s_per_sqrt_s(a.noises.random_walk)
+            angle_random_walk_deg_per_sqrt_h: of_noise(|n| {
+                deg_per_sqrt_h_from_rad_per_sqrt_s(if n.white.low > 0.0 { n.white.value } else { n.white.high })
             }),
-            flicker_deg_per_h: of_noise(|a| deg_per_h_from_rad_per_s(a.noises.flicker)),
-            quantisation_arcsec: of_noise(|a| arcsec_from_rad(a.noises.quantisation)),
+            angle_random_walk_has_slope: noises.is_some_and(|n| n.white.low > 0.0),
+            rate_random_walk_deg_per_h_per_sqrt_h: of_noise(|n| {
+                deg_per_h_per_sqrt_h_from_rad_per_s_per_sqrt_s(n.random_walk.value)
+            }),
+            flicker_deg_per_h: of_noise(|n| deg_per_h_from_rad_per_s(n.flicker.value)),
+            quantisation_arcsec: of_noise(|n| arcsec_from_rad(n.quantisation.value)),
             peak_to_peak_deg_per_h: deg_per_h_from_rad_per_s(metrics.peak_to_peak_rad_per_s),
             averaged_peak_to_peak_deg_per_h: deg_per_h_from_rad_per_s(metrics.averaged_peak_to_peak_rad_per_s),
+            drift_angle_deg: deg_from_rad(metrics.drift_angle_rad),
+            noise: noises.map_or_else(Vec::new, strengths),
+            temperature_range_c: metrics.temperature_range_k,
+            thermal_deg_per_h: of_noise(|n| deg_per_h_from_rad_per_s(n.explained)),
+            cautions: cautions(metrics, gross_errors.len()),
             temperature_points: metrics
                 .temperature_points
                 .iter()
@@ -136,17 +169,80 @@ impl RecordMetricsJson {
                     })
                     .collect()
             }),
-            allan_noises: allan.map_or_else(Vec::new, noises),
+            allan_noises: noises.map_or_else(Vec::new, lines),
             gross_errors,
             gaps,
         }
     }
 }
 
-/// The lines of the noises that were found; the angle random walk is the one read off the slope.
-fn noises(allan: &Allan) -> Vec<AllanNoiseJson> {
-    let found = &allan.noises;
-    let walk = if allan.has_white_slope { allan.white_rad_per_sqrt_s } else { 0.0 };
+/// The five kinds with their intervals.
+fn strengths(found: &NoiseStrengths) -> Vec<NoiseJson> {
+    let noise = |kind: &str, interval: Interval, convert: fn(f64) -> f64, unit: &str| NoiseJson {
+        kind: kind.to_owned(),
+        value: convert(interval.value),
+        low: convert(interval.low),
+        high: convert(interval.high),
+        unit: unit.to_owned(),
+    };
+    vec![
+        noise("white", found.white, deg_per_sqrt_h_from_rad_per_sqrt_s, "°/√h"),
+        noise("flicker", found.flicker, deg_per_h_from_rad_per_s, "°/h"),
+        noise("rate_random_walk", found.random_walk, deg_per_h_per_sqrt_h_from_rad_per_s_per_sqrt_s, "°/h/√h"),
+        noise("quantisation", found.quantisation, arcsec_from_rad, "arcsec"),
+        noise("ramp", found.ramp, deg_per_h_per_h_from_rad_per_s2, "°/h/h"),
+    ]
+}
+
+/// What a reader must know beside the numbers.
+fn cautions(metrics: &Metrics, gross_errors: usize) -> Vec<String> {
+    let mut said = Vec::new();
+    let Some(noises) = &metrics.noises else {
+        said.push("too short or too irregular to tell noises apart: no noise coefficients".to_owned());
+        return said;
+    };
+    let total = metrics.bias_stability_rad_per_s.unwrap_or(0.0);
+    if noises.explained > CLEARLY * total && metrics.temperature_range_k > STILL_K {
+        said.push(format!(
+            "the temperature moved by {:.1} °C and {:.3} °/h rms of the rate follow it: taken for thermal, not for noise; \
+             slow noise that happens to follow the temperature is taken for thermal too",
+            metrics.temperature_range_k,
+            deg_per_h_from_rad_per_s(noises.explained)
+        ));
+    }
+    if noises.white.low <= 0.0 {
+        said.push("white noise may be absent: the angle random walk is an upper bound".to_owned());
+    }
+    let wide = [("flicker", noises.flicker), ("rate random walk", noises.random_walk)];
+    for (name, interval) in wide.iter().filter(|(_, i)| i.low > 0.0 && i.high > WIDE * i.low) {
+        said.push(format!(
+            "{name} is known to a factor of {:.1} only: a longer record tells more",
+            interval.high / interval.low
+        ));
+    }
+    if metrics.irregular_steps as f64 > IRREGULAR * metrics.rows as f64 {
+        said.push(format!(
+            "{} of {} steps differ from the usual interval of {} s: the noises are those of a regular clock",
+            metrics.irregular_steps, metrics.rows, metrics.interval_s
+        ));
+    }
+    if gross_errors > 0 {
+        said.push(format!("{gross_errors} values stand alone; where they are used they count as noise"));
+    }
+    said
+}
+
+/// Of the means' spread: less than this that follows the temperature is not worth a word.
+const CLEARLY: f64 = 0.1;
+const STILL_K: f64 = 0.5;
+/// Ends of an interval further apart than this factor are wide.
+const WIDE: f64 = 3.0;
+/// Of all steps.
+const IRREGULAR: f64 = 0.05;
+
+/// The lines of the noises that were found.
+fn lines(found: &NoiseStrengths) -> Vec<AllanNoiseJson> {
+    let (quantisation, walk) = (found.quantisation.value, found.white.value);
     let line = |noise: &str, value: f64, unit: &str, slope: f64, at_1_s: f64| AllanNoiseJson {
         noise: noise.to_owned(),
         value,
@@ -159,32 +255,32 @@ fn noises(allan: &Allan) -> Vec<AllanNoiseJson> {
     let mut lines = vec![
         line(
             "quantisation",
-            arcsec_from_rad(found.quantisation),
+            arcsec_from_rad(quantisation),
             "arcsec",
             -1.0,
-            at_1_s(NoiseModel { quantisation: found.quantisation, ..none }),
+            at_1_s(NoiseModel { quantisation, ..none }),
         ),
         line("angle random walk", deg_per_sqrt_h_from_rad_per_sqrt_s(walk), "°/√h", -0.5, walk),
         line(
             "bias instability",
-            deg_per_h_from_rad_per_s(found.flicker),
+            deg_per_h_from_rad_per_s(found.flicker.value),
             "°/h",
             0.0,
-            at_1_s(NoiseModel { flicker: found.flicker, ..none }),
+            at_1_s(NoiseModel { flicker: found.flicker.value, ..none }),
         ),
         line(
             "rate random walk",
-            deg_per_h_per_sqrt_h_from_rad_per_s_per_sqrt_s(found.random_walk),
+            deg_per_h_per_sqrt_h_from_rad_per_s_per_sqrt_s(found.random_walk.value),
             "°/h/√h",
             0.5,
-            at_1_s(NoiseModel { random_walk: found.random_walk, ..none }),
+            at_1_s(NoiseModel { random_walk: found.random_walk.value, ..none }),
         ),
         line(
             "rate ramp",
-            deg_per_h_per_h_from_rad_per_s2(found.ramp),
+            deg_per_h_per_h_from_rad_per_s2(found.ramp.value),
             "°/h/h",
             1.0,
-            at_1_s(NoiseModel { ramp: found.ramp, ..none }),
+            at_1_s(NoiseModel { ramp: found.ramp.value, ..none }),
         ),
     ];
     lines.retain(|l| l.value > 0.0);
@@ -205,8 +301,27 @@ impl MetricsJson {
             temperature_sensitivity_deg_per_h_per_c: worst(|r| r.temperature_sensitivity_deg_per_h_per_c),
             angle_random_walk_deg_per_sqrt_h: worst(|r| r.angle_random_walk_deg_per_sqrt_h),
             peak_to_peak_deg_per_h: worst(|r| Some(r.peak_to_peak_deg_per_h)).unwrap_or(0.0),
+            drift_angle_deg: records
+                .iter()
+                .map(|r| r.drift_angle_deg)
+                .max_by(|a, b| a.abs().total_cmp(&b.abs()))
+                .unwrap_or(0.0),
+            noise: loudest(&records),
             records,
             inputs,
         }
     }
+}
+
+/// For each kind the one of the record that has most of it.
+fn loudest(records: &[RecordMetricsJson]) -> Vec<NoiseJson> {
+    let mut found: Vec<NoiseJson> = Vec::new();
+    for noise in records.iter().flat_map(|r| &r.noise) {
+        match found.iter_mut().find(|n| n.kind == noise.kind) {
+            None => found.push(noise.clone()),
+            Some(held) if noise.value > held.value => *held = noise.clone(),
+            Some(_) => {}
+        }
+    }
+    found
 }

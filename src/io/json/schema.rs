@@ -86,6 +86,24 @@ pub fn model_schema() -> Value {
             "rate_mean_s": described("number", "each rate is the mean over this interval, which ends at its stamp"),
         }),
     );
+    let mapped = |description: &str| {
+        described("string", &format!("{description}; the file's name of the column, :UNIT behind it"))
+    };
+    let record = table(
+        "record: how the columns of the record files are named",
+        &[],
+        json!({
+            "time": mapped("time: s, ms, us, ns, min, h, d, iso, epoch_s, epoch_ms"),
+            "temperature": mapped("the sensor: c, k, f"),
+            "rate": mapped("deg_per_h, mdeg_per_h, deg_per_s, rad_per_s, arcsec_per_s, counts, mv, v"),
+            "inner": mapped("temperature of the bore: c, k, f"),
+            "ambient": mapped("temperature of the air: c, k, f"),
+            "scale": described("number", "raw units (counts, mv, v) that are one degree an hour"),
+            "bad_rows": { "enum": ["refuse", "skip"], "default": "refuse",
+                "description": "rows that lack a number, or whose stamp repeats or jumps back" },
+            "average_rows": { "type": "integer", "minimum": 1, "default": 1, "description": "rows averaged into one" },
+        }),
+    );
     let search = table(
         "search",
         &[],
@@ -105,6 +123,7 @@ pub fn model_schema() -> Value {
             "winding": winding,
             "thermal": thermal,
             "sensor": sensor,
+            "record": record,
             "effect": { "type": "array", "items": { "oneOf": effects } },
             "profiles": profiles(),
             "search": search,
@@ -355,14 +374,21 @@ pub fn schedule_schema() -> Value {
 pub fn record_schema() -> Value {
     with_dialect(json!({
         "title": "coilwright record: one row of the CSV",
+        "description": "names end in their unit, or have it in brackets; --columns or [record] in the model file map other names: time=Zeit:min,temperature=T1,rate=F:counts,scale=12.5",
         "type": "object",
         "required": ["time_s", "temperature_c", "rate_deg_per_h"],
         "properties": {
-            "time_s": described("number", "increases from row to row"),
-            "temperature_c": described("number", "what the sensor showed"),
-            "rate_deg_per_h": described("number", "what the gyro showed, at rest"),
-            "temperature_inner_c": described("number", "at the bore"),
-            "temperature_ambient_c": described("number", "of the air"),
+            "time_s": described("number", "increases from row to row; also time_ms, _us, _ns, _min, _h, _d, and time_iso for ISO 8601 stamps"),
+            "temperature_c": described("number", "what the sensor showed; also temperature_k, temperature_f"),
+            "rate_deg_per_h": described("number", "what the gyro showed, at rest; also rate_mdeg_per_h, _deg_per_s, _rad_per_s, _arcsec_per_s; mapped with a scale: counts, mv, v"),
+            "temperature_inner_c": described("number", "at the bore; also _k, _f"),
+            "temperature_ambient_c": described("number", "of the air; also _k, _f"),
+        },
+        "patternProperties": {
+            "^time_(ms|us|ns|min|h|d)$": { "type": "number" },
+            "^time_iso$": { "type": "string" },
+            "^temperature_((inner|ambient)_)?[kf]$": { "type": "number" },
+            "^rate_(mdeg_per_h|deg_per_s|rad_per_s|arcsec_per_s)$": { "type": "number" },
         },
         "additionalProperties": { "type": "number", "description": "a further channel by its name" },
     }))
@@ -425,7 +451,8 @@ mod tests {
             keys
         };
         assert_eq!(keys(&schema), known(""));
-        for name in ["fibre", "winding", "thermal", "sensor", "profiles", "search", "production", "tolerance"] {
+        for name in ["fibre", "winding", "thermal", "sensor", "record", "profiles", "search", "production", "tolerance"]
+        {
             assert_eq!(keys(&schema["properties"][name]), known(&format!("[{name}]")), "{name}");
         }
         for spec in CATALOGUE {

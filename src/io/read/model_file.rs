@@ -20,6 +20,7 @@ use super::effect_tables::read_effects;
 use super::pattern_file::resolve_pattern;
 use super::production_table::read_production;
 use super::profile_tables::{read_profiles, too_many_ramps};
+use super::record_columns::read_format;
 use super::tolerance_table::read_tolerance;
 use super::toml_reader::{Limits, TableReader, TomlReader, nearest, parse};
 
@@ -52,6 +53,7 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
     let mut search_table = root.table(r, "search");
     let mut production_table = root.table(r, "production");
     let mut tolerance_table = root.table(r, "tolerance");
+    let mut record_table = root.table(r, "record");
     root.finish(r);
 
     let fibre = read_fibre(r, &mut fibre_table);
@@ -80,6 +82,9 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
     production_table.finish(r);
     let tolerance = read_tolerance(r, &mut tolerance_table);
     tolerance_table.finish(r);
+
+    let record = read_format(r, &mut record_table);
+    record_table.finish(r);
 
     let whole = (|| {
         let (extent, material) = thermal_parts?;
@@ -128,6 +133,7 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
             search,
             production,
             tolerance,
+            record,
             advice,
         }
     });

@@ -12,132 +12,23 @@ use crate::io::fault::{Fault, Faults};
 use crate::io::files::read_text_up_to;
 use crate::numeric::statistics::median;
 use crate::record::{Channel, MIN_ROWS, Record, RecordError};
-use crate::units::{
-    celsius_from_kelvin, kelvin_from_celsius, rad_per_s_from_deg_per_h, rad_per_s_from_deg_per_s, s_from_h, s_from_min,
-};
+use crate::units::celsius_from_kelvin;
 
-use super::toml_reader::nearest;
+use super::record_columns::{Column, Division, FLAGS, Quantity, RecordFormat, read_header};
+use super::record_rows::{Cells, CellsRead, PLAUSIBLE_C, assumptions, average, implausible, suspicions};
 
 /// Ten million rows of three columns or so.
 const LARGEST_RECORD_BYTES: u64 = 512 * 1024 * 1024;
 /// More faults than this are counted, not drawn.
 const MOST_FAULTS: usize = 50;
-/// A coil that is mostly outside of this is in other units than its header says.
-const PLAUSIBLE_C: Range<f64> = -150.0..200.0;
-
-/// What a column holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
-    Time,
-    Temperature,
-    Rate,
-    InnerTemperature,
-    AmbientTemperature,
-    /// Anything else, by its name.
-    Channel,
-}
-
-/// A name that a header may have, and how its numbers become SI.
-struct ColumnName {
-    name: &'static str,
-    quantity: Quantity,
-    to_si: fn(f64) -> f64,
-}
-
-const fn column(name: &'static str, quantity: Quantity, to_si: fn(f64) -> f64) -> ColumnName {
-    ColumnName { name, quantity, to_si }
-}
-
-fn as_it_is(value: f64) -> f64 {
-    value
-}
-
-const NAMES: &[ColumnName] = &[
-    column("time_s", Quantity::Time, as_it_is),
-    column("time_min", Quantity::Time, s_from_min),
-    column("time_h", Quantity::Time, s_from_h),
-    column("temperature_c", Quantity::Temperature, kelvin_from_celsius),
-    column("temperature_k", Quantity::Temperature, as_it_is),
-    column("rate_deg_per_h", Quantity::Rate, rad_per_s_from_deg_per_h),
-    column("rate_deg_per_s", Quantity::Rate, rad_per_s_from_deg_per_s),
-    column("rate_rad_per_s", Quantity::Rate, as_it_is),
-    column("temperature_inner_c", Quantity::InnerTemperature, kelvin_from_celsius),
-    column("temperature_inner_k", Quantity::InnerTemperature, as_it_is),
-    column("temperature_ambient_c", Quantity::AmbientTemperature, kelvin_from_celsius),
-    column("temperature_ambient_k", Quantity::AmbientTemperature, as_it_is),
-];
-
-/// One column of a record file.
-#[derive(Debug, Clone)]
-pub struct Column {
-    pub name: String,
-    pub quantity: Quantity,
-    to_si: fn(f64) -> f64,
-}
-
-impl Column {
-    fn named(name: &str) -> Self {
-        let known = NAMES.iter().find(|n| n.name == name);
-        Self {
-            name: name.to_owned(),
-            quantity: known.map_or(Quantity::Channel, |n| n.quantity),
-            to_si: known.map_or(as_it_is, |n| n.to_si),
-        }
-    }
-
-    /// A field as a number in SI.
-    ///
-    /// # Errors
-    /// What was found instead, in words.
-    pub fn value(&self, field: &str) -> Result<f64, String> {
-        match field.parse::<f64>() {
-            Ok(value) if value.is_finite() => Ok((self.to_si)(value)),
-            _ if field.is_empty() => Err("nothing".to_owned()),
-            _ => Err(format!("\"{}\"", field.chars().take(40).collect::<String>())),
-        }
-    }
-}
-
-/// What the header of a record says, faults included.
-///
-/// # Errors
-/// Every fault of the header, as a message and a remedy.
-pub fn read_header(fields: &[&str]) -> Result<Vec<Column>, Vec<(String, Option<String>)>> {
-    let columns: Vec<Column> = fields.iter().map(|f| Column::named(f)).collect();
-    let mut faults = Vec::new();
-    if columns.len() == 1 && fields[0].contains([';', '\t']) {
-        let remedy = "separate the columns with commas and write decimals with a point";
-        return Err(vec![(
-            "the header is one column: expected commas between columns".to_owned(),
-            Some(remedy.into()),
-        )]);
-    }
-    for (i, column) in columns.iter().enumerate() {
-        if column.name.is_empty() {
-            faults.push((format!("column {} has no name: expected one such as supply_v", i + 1), None));
-        } else if columns[..i].iter().any(|c| c.name == column.name) {
-            faults.push((format!("column {} is there twice: give each column a name of its own", column.name), None));
-        } else if column.quantity != Quantity::Channel
-            && let Some(other) = columns[..i].iter().find(|c| c.quantity == column.quantity)
-        {
-            faults.push((format!("columns {} and {} hold the same: leave one out", other.name, column.name), None));
-        }
-    }
-    for (quantity, wanted) in
-        [(Quantity::Time, "time_s"), (Quantity::Temperature, "temperature_c"), (Quantity::Rate, "rate_deg_per_h")]
-    {
-        if columns.iter().any(|c| c.quantity == quantity) {
-            continue;
-        }
-        let accepted: Vec<&str> = NAMES.iter().filter(|n| n.quantity == quantity).map(|n| n.name).collect();
-        let stem = wanted.split('_').next().unwrap_or(wanted);
-        let others = columns.iter().filter(|c| c.quantity == Quantity::Channel);
-        let meant = others.map(|c| c.name.as_str()).find(|n| n.starts_with(stem) || nearest(n, &accepted).is_some());
-        let found = meant.map_or_else(|| "none of them".to_owned(), str::to_owned);
-        let message = format!("column {wanted} is missing: expected one of {}, found {found}", accepted.join(", "));
-        faults.push((message, meant.map(|name| format!("rename {name} and convert it if need be"))));
-    }
-    if faults.is_empty() { Ok(columns) } else { Err(faults) }
+/// A record, and what was noticed while reading it.
+#[derive(Debug)]
+pub struct ReadRecord {
+    pub record: Record,
+    /// Rows that were skipped: a cell without a number, a stamp that repeats or jumps back.
+    pub skipped_rows: usize,
+    /// What was assumed or looks odd, in words.
+    pub remarks: Vec<String>,
 }
 
 /// Reads and checks a record.
@@ -145,8 +36,24 @@ pub fn read_header(fields: &[&str]) -> Result<Vec<Column>, Vec<(String, Option<S
 /// # Errors
 /// All faults of the file at once, with line and column.
 pub fn read_record(path: &Path) -> Result<Record, Faults> {
+    Ok(read_record_as(path, &RecordFormat::default())?.record)
+}
+
+/// As [`read_record`], with columns, units and policies as stated; `-` is standard input.
+///
+/// # Errors
+/// All faults of the file at once, with line and column.
+pub fn read_record_as(path: &Path, format: &RecordFormat) -> Result<ReadRecord, Faults> {
     let source = read_text_up_to(path, LARGEST_RECORD_BYTES)?;
-    parse_record(&path.display().to_string(), &source)
+    parse_record_as(&path.display().to_string(), &source, format)
+}
+
+/// As [`read_record_as`], of a text that was read already.
+///
+/// # Errors
+/// All faults of the text at once.
+pub fn parse_record_as(file: &str, source: &str, format: &RecordFormat) -> Result<ReadRecord, Faults> {
+    Reading::new(file, source, format).record()
 }
 
 /// As [`read_record`], of a text that was read already.
@@ -154,19 +61,22 @@ pub fn read_record(path: &Path) -> Result<Record, Faults> {
 /// # Errors
 /// All faults of the text at once.
 pub fn parse_record(file: &str, source: &str) -> Result<Record, Faults> {
-    Reading::new(file, source).record()
+    Ok(parse_record_as(file, source, &RecordFormat::default())?.record)
 }
 
 struct Reading<'s> {
     file: &'s str,
     source: &'s str,
+    format: &'s RecordFormat,
+    separator: char,
     faults: Vec<Fault>,
     uncounted: usize,
+    skipped: usize,
 }
 
 impl<'s> Reading<'s> {
-    fn new(file: &'s str, source: &'s str) -> Self {
-        Self { file, source, faults: Vec::new(), uncounted: 0 }
+    fn new(file: &'s str, source: &'s str, format: &'s RecordFormat) -> Self {
+        Self { file, source, format, separator: ',', faults: Vec::new(), uncounted: 0, skipped: 0 }
     }
 
     fn fault(&mut self, fault: Fault) {
@@ -177,11 +87,16 @@ impl<'s> Reading<'s> {
         }
     }
 
-    fn record(mut self) -> Result<Record, Faults> {
+    fn record(mut self) -> Result<ReadRecord, Faults> {
         // A byte-order mark belongs to no column's name.
         let start = if self.source.starts_with('\u{feff}') { '\u{feff}'.len_utf8() } else { 0 };
+        let is_content = |line: &&str| !line.trim().is_empty() && !line.starts_with('#');
+        let header = self.source[start..].lines().find(is_content).unwrap_or("");
+        let division = Division::of_header(header);
+        self.separator = char::from(division.separator);
         let mut reader = ReaderBuilder::new()
             .has_headers(false)
+            .delimiter(division.separator)
             .flexible(true)
             .comment(Some(b'#'))
             .trim(Trim::All)
@@ -195,7 +110,7 @@ impl<'s> Reading<'s> {
         }
         let header_span = self.line_span(start, &row);
         let fields: Vec<&str> = row.iter().collect();
-        let columns = match read_header(&fields) {
+        let columns = match read_header(&fields, self.format, division) {
             Ok(columns) => columns,
             Err(faults) => {
                 for (message, note) in faults {
@@ -205,50 +120,24 @@ impl<'s> Reading<'s> {
             }
         };
         let mut values: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
-        let mut last_s: Option<f64> = None;
+        let mut cells = Cells::new(&columns, self.format);
         while self.next(&mut reader, &mut row) {
-            if row.len() != columns.len() {
-                let line = self.line_span(start, &row);
-                let message = format!(
-                    "line {}: expected {} columns as in the header, found {}",
-                    row.position().map_or(0, csv::Position::line),
-                    columns.len(),
-                    row.len()
-                );
-                self.fault(Fault::new(message, Some(line)));
-                continue;
-            }
-            for (place, (column, field)) in columns.iter().zip(row.iter()).enumerate() {
-                match column.value(field) {
-                    Ok(value) => {
-                        if column.quantity == Quantity::Time {
-                            if let Some(before_s) = last_s.filter(|before| value <= *before) {
-                                let line = row.position().map_or(0, csv::Position::line);
-                                let message = format!(
-                                    "line {line}, column {}: times must increase strictly, found {field} after {before_s} s",
-                                    column.name
-                                );
-                                let span = self.field_span(start, &row, place);
-                                self.fault(
-                                    Fault::new(message, Some(span))
-                                        .with_note("sort the rows, or leave out those that are there twice"),
-                                );
-                            }
-                            last_s = Some(value);
-                        }
-                        values[place].push(value);
+            match cells.read(&row) {
+                CellsRead::Row => values.iter_mut().zip(cells.numbers()).for_each(|(column, v)| column.push(*v)),
+                CellsRead::Skipped => self.skipped += 1,
+                CellsRead::Faults(faults) => {
+                    for fault in faults {
+                        let span = match fault.place {
+                            Some(place) => self.field_span(start, &row, place),
+                            None => self.line_span(start, &row),
+                        };
+                        self.fault(Fault {
+                            message: fault.message,
+                            span: Some(span),
+                            note: fault.note.map(str::to_owned),
+                        });
                     }
-                    Err(found) => {
-                        let line = row.position().map_or(0, csv::Position::line);
-                        let message =
-                            format!("line {line}, column {}: expected a finite number, found {found}", column.name);
-                        let span = self.field_span(start, &row, place);
-                        self.fault(
-                            Fault::new(message, Some(span))
-                                .with_note("leave out rows in which a sensor failed; a gap in time is no fault"),
-                        );
-                        values[place].push(f64::NAN);
-                    }
+                    values.iter_mut().zip(cells.numbers()).for_each(|(column, v)| column.push(*v));
                 }
             }
         }
@@ -256,14 +145,25 @@ impl<'s> Reading<'s> {
         self.gather_empty_columns(&columns, &values, &header_span);
         let rows = values.first().map_or(0, Vec::len);
         if self.faults.is_empty() && rows < MIN_ROWS {
-            self.fault(Fault::new(format!("expected at least {MIN_ROWS} rows of numbers, found {rows}"), None));
+            let skipped =
+                if self.skipped > 0 { format!(" and {} that were skipped", self.skipped) } else { String::new() };
+            self.fault(Fault::new(
+                format!("expected at least {MIN_ROWS} rows of numbers, found {rows}{skipped}"),
+                None,
+            ));
         }
         if !self.faults.is_empty() {
             return self.end(None, "");
         }
-        let built = build(self.file, &columns, values);
+        let mut remarks = assumptions(&columns, division);
+        let averaged = average(&columns, values, self.format.average_rows);
+        let skipped_rows = self.skipped;
+        let built = build(self.file, self.format, &columns, averaged);
         match built {
-            Ok(record) => Ok(record),
+            Ok(record) => {
+                remarks.extend(suspicions(record.times_s(), record.temperature_k()));
+                Ok(ReadRecord { record, skipped_rows, remarks })
+            }
             Err(error) => self.end(Some(error), ""),
         }
     }
@@ -281,21 +181,11 @@ impl<'s> Reading<'s> {
 
     fn check_temperatures(&mut self, columns: &[Column], values: &[Vec<f64>], header: &Range<usize>) {
         for (column, values) in columns.iter().zip(values) {
-            let is_temperature = matches!(
-                column.quantity,
-                Quantity::Temperature | Quantity::InnerTemperature | Quantity::AmbientTemperature
-            );
+            let is_temperature = column.is_temperature();
             let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
             let middle_c = celsius_from_kelvin(median(&finite));
             if is_temperature && !finite.is_empty() && !PLAUSIBLE_C.contains(&middle_c) {
-                let message = format!(
-                    "column {}: expected a coil's temperature between {} and {} °C, found a median of {middle_c:.2} °C",
-                    column.name, PLAUSIBLE_C.start, PLAUSIBLE_C.end
-                );
-                self.fault(
-                    Fault::new(message, Some(header.clone()))
-                        .with_note("a name that ends in _c holds degrees Celsius, one that ends in _k kelvin"),
-                );
+                self.fault(implausible(column, middle_c, Some(header.clone())));
             }
         }
     }
@@ -303,7 +193,9 @@ impl<'s> Reading<'s> {
     /// A column that holds no number at all is one fault, not one a row.
     fn gather_empty_columns(&mut self, columns: &[Column], values: &[Vec<f64>], header: &Range<usize>) {
         for (column, values) in columns.iter().zip(values) {
-            if values.len() < MIN_ROWS || values.iter().any(|v| v.is_finite()) {
+            let may_hold_words =
+                column.quantity == Quantity::Channel && (self.format.has_mapping() || column.name == FLAGS);
+            if values.len() < MIN_ROWS || values.iter().any(|v| v.is_finite()) || may_hold_words {
                 continue;
             }
             let own = format!(", column {}: expected a finite number", column.name);
@@ -320,7 +212,7 @@ impl<'s> Reading<'s> {
         }
     }
 
-    fn end(mut self, error: Option<RecordError>, message: &str) -> Result<Record, Faults> {
+    fn end(mut self, error: Option<RecordError>, message: &str) -> Result<ReadRecord, Faults> {
         if let Some(error) = error {
             self.faults.push(Fault::new(error.to_string(), None));
         }
@@ -349,13 +241,18 @@ impl<'s> Reading<'s> {
         if text.contains('"') {
             return line;
         }
-        let before: usize = text.split(',').take(place).map(|f| f.len() + 1).sum();
-        let length = text.split(',').nth(place).map_or(0, str::len);
+        let before: usize = text.split(self.separator).take(place).map(|f| f.len() + 1).sum();
+        let length = text.split(self.separator).nth(place).map_or(0, str::len);
         line.start + before..line.start + before + length
     }
 }
 
-fn build(file: &str, columns: &[Column], mut values: Vec<Vec<f64>>) -> Result<Record, RecordError> {
+fn build(
+    file: &str,
+    format: &RecordFormat,
+    columns: &[Column],
+    mut values: Vec<Vec<f64>>,
+) -> Result<Record, RecordError> {
     let mut take = |quantity: Quantity| {
         columns.iter().position(|c| c.quantity == quantity).map(|place| std::mem::take(&mut values[place]))
     };
@@ -370,7 +267,8 @@ fn build(file: &str, columns: &[Column], mut values: Vec<Vec<f64>>) -> Result<Re
         record = record.with_ambient_k(ambient_k)?;
     }
     for (column, values) in columns.iter().zip(values) {
-        if column.quantity == Quantity::Channel {
+        let holds_words = (format.has_mapping() || column.name == FLAGS) && values.iter().all(|v| !v.is_finite());
+        if column.quantity == Quantity::Channel && !holds_words {
             record = record.with_channel(Channel { name: column.name.clone(), values })?;
         }
     }
@@ -411,13 +309,13 @@ mod tests {
 
     #[test]
     fn a_header_with_a_wrong_unit_or_a_name_twice_says_what_was_expected() {
-        let faults = parse_record("x.csv", "time_s,temperature_f,rate_deg_per_h,v,v\n").unwrap_err();
+        let faults = parse_record("x.csv", "time_s,temperature_r,rate_deg_per_h,v,v\n").unwrap_err();
         let messages: Vec<&str> = faults.faults.iter().map(|f| f.message.as_str()).collect();
         assert_eq!(
             messages,
             [
                 "column v is there twice: give each column a name of its own",
-                "column temperature_c is missing: expected one of temperature_c, temperature_k, found temperature_f",
+                "column temperature_c is missing: expected one of temperature_c, temperature_k, temperature_f, found temperature_r",
             ]
         );
     }
@@ -430,9 +328,58 @@ mod tests {
     }
 
     #[test]
-    fn a_file_of_comments_and_one_of_semicolons_are_named_as_such() {
+    fn a_file_of_comments_is_named_as_such() {
         assert!(parse_record("x", "# only\n").unwrap_err().faults[0].message.contains("comments only"));
-        let semicolons = parse_record("x", "time_s;temperature_c;rate_deg_per_h\n0;1;2\n").unwrap_err();
-        assert!(semicolons.faults[0].note.as_deref().unwrap().contains("commas"));
+    }
+
+    /// The same record as loggers of other habits write it.
+    #[test]
+    fn other_separators_units_stamps_and_names_give_the_same_record() {
+        let plain =
+            parse_record("x", "time_s,temperature_c,rate_deg_per_h\n0,20,3.6\n60,21.5,7.2\n180,25,-3.6\n").unwrap();
+        let cases = [
+            ("", "time_min;temperature_k;rate_deg_per_s\n0;293,15;0,001\n1;294,65;0,002\n3;298,15;-0,001\n"),
+            ("", "time_s\ttemperature_f\trate_arcsec_per_s\n0\t68\t3.6\n60\t70.7\t7.2\n180\t77\t-3.6\n"),
+            (
+                "time=Zeit,temperature=T1,rate=Omega",
+                "Status;Zeit;T1;Omega\nOK;0;20;3,6\nOK;60;21,5;7,2\nAUS;180;25;-3,6\n",
+            ),
+            (
+                "time=stamp:iso,temperature=T [K],rate=F:counts,scale=10",
+                "stamp,T [K],F\n2026-03-01T10:00:00Z,293.15,36\n2026-03-01T10:01:00Z,294.65,72\n2026-03-01T10:03:00Z,298.15,-36\n",
+            ),
+            (
+                "time=t:epoch_ms,temperature=T1:c,rate=w:rad_per_s",
+                "t,T1,w\n1760000000000,20,1.7453292519943295e-5\n1760000060000,21.5,3.490658503988659e-5\n1760000180000,25,-1.7453292519943295e-5\n",
+            ),
+            ("rate=u:mv,scale=0.5", "time_h,temperature_c,u\n0,20,1.8\n0.016666666666666666,21.5,3.6\n0.05,25,-1.8\n"),
+        ];
+        for (mapping, text) in cases {
+            let mut format = RecordFormat::default();
+            format.map_all(mapping).unwrap();
+            let read = parse_record_as("x", text, &format).unwrap().record;
+            let columns = [
+                (read.times_s(), plain.times_s()),
+                (read.temperature_k(), plain.temperature_k()),
+                (read.rate_rad_per_s(), plain.rate_rad_per_s()),
+            ];
+            for (found, expected) in columns {
+                for (a, b) in found.iter().zip(expected) {
+                    assert!((a - b).abs() <= 1e-9 * b.abs().max(1e-12), "{text}: {a} {b}");
+                }
+            }
+            assert!(read.channels().is_empty(), "{text}");
+        }
+    }
+
+    #[test]
+    fn averaged_rows_end_at_the_last_stamp_and_leave_out_what_spans_a_gap() {
+        let mut text = "time_s,temperature_c,rate_deg_per_h\n".to_owned();
+        for i in (0..12).filter(|i| *i != 5) {
+            text += &format!("{i},20,{i}\n");
+        }
+        let format = RecordFormat { average_rows: 2, ..RecordFormat::default() };
+        let record = parse_record_as("x", &text, &format).unwrap().record;
+        assert_eq!(record.times_s(), [1.0, 3.0, 8.0, 10.0]);
     }
 }

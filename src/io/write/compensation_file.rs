@@ -8,7 +8,9 @@ use serde::Serialize;
 use crate::compensate::Compensator;
 use crate::compensate::stream::{Compensated, Flag, Reading, Stream};
 use crate::io::fault::{Fault, Faults};
-use crate::io::read::record_file::{Column, Quantity, read_header};
+use crate::io::json::metrics::RecordMetricsJson;
+use crate::io::read::record_columns::{Column, Division, Quantity, RecordFormat, read_header};
+use crate::metrics::Metrics;
 use crate::numeric::statistics::RunningDeviation;
 use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s};
 
@@ -54,6 +56,7 @@ struct Line {
 /// Which fields of a line are needed.
 struct Places {
     count: usize,
+    separator: char,
     columns: Vec<(usize, Column)>,
     /// Of each further column that the compensator reads, its place among `columns`.
     channels: Vec<usize>,
@@ -65,6 +68,7 @@ struct Places {
 /// A header that lacks what is needed; an input or output that fails.
 pub fn compensate_lines(
     compensator: &Compensator,
+    format: &RecordFormat,
     name: &str,
     input: impl Read,
     output: impl Write,
@@ -83,8 +87,10 @@ pub fn compensate_lines(
             sink.plain(line);
             continue;
         }
-        let places = places(name, line, compensator)?;
-        sink.plain(&format!("{line},{ADDED_COLUMNS}"));
+        let places = places(name, line, format, compensator)?;
+        let separator = places.separator;
+        sink.separator = separator;
+        sink.plain(&format!("{line}{separator}{}", ADDED_COLUMNS.replace(',', &separator.to_string())));
         break places;
     };
     let mut channels = vec![None; places.columns.len()];
@@ -123,9 +129,11 @@ fn next_line(input: &mut impl BufRead, bytes: &mut Vec<u8>) -> Result<bool, Stre
     Ok(read > 0)
 }
 
-fn places(name: &str, header: &str, compensator: &Compensator) -> Result<Places, Faults> {
-    let fields: Vec<&str> = header.split(',').map(|f| f.trim().trim_matches('"')).collect();
-    let columns = read_header(&fields).map_err(|faults| Faults {
+fn places(name: &str, header: &str, format: &RecordFormat, compensator: &Compensator) -> Result<Places, Faults> {
+    let division = Division::of_header(header);
+    let separator = char::from(division.separator);
+    let fields: Vec<&str> = header.split(separator).map(|f| f.trim().trim_matches('"')).collect();
+    let columns = read_header(&fields, format, division).map_err(|faults| Faults {
         file: name.to_owned(),
         source: header.to_owned(),
         faults: faults
@@ -146,7 +154,7 @@ fn places(name: &str, header: &str, compensator: &Compensator) -> Result<Places,
         found.ok_or_else(|| Faults::of_file(name, format!("the model reads the column {wanted}, which is not there")))
     };
     let channels = names.iter().map(place).collect::<Result<_, _>>()?;
-    Ok(Places { count, columns, channels })
+    Ok(Places { count, separator, columns, channels })
 }
 
 /// None where the fields are not as many as the header's or the time is no number; `channels` is room for the further columns.
@@ -160,7 +168,7 @@ fn reading(line: &str, places: &Places, compensator: &Compensator, channels: &mu
     };
     let mut count = 0;
     let mut next = 0;
-    for field in line.split(',') {
+    for field in line.split(places.separator) {
         if let Some((place, column)) = places.columns.get(next)
             && *place == count
         {
@@ -189,6 +197,7 @@ struct Sink<W: Write> {
     before: RunningDeviation,
     after: RunningDeviation,
     text: String,
+    separator: char,
     failed: Option<std::io::Error>,
 }
 
@@ -200,6 +209,7 @@ impl<W: Write> Sink<W> {
             before: RunningDeviation::default(),
             after: RunningDeviation::default(),
             text: String::new(),
+            separator: ',',
             failed: None,
         }
     }
@@ -232,17 +242,22 @@ impl<W: Write> Sink<W> {
         }
         self.summary.rows += 1;
         self.text.clear();
-        if row.flags.contains(&Flag::Malformed) && row.tag.text.split(',').count() != columns {
+        if row.flags.contains(&Flag::Malformed) && row.tag.text.split(self.separator).count() != columns {
             // As one quoted field, so that the output stays a table and nothing is lost.
-            let _ = write!(self.text, "\"{}\"{}", row.tag.text.replace('"', "\"\""), ",".repeat(columns - 1));
+            let _ = write!(
+                self.text,
+                "\"{}\"{}",
+                row.tag.text.replace('"', "\"\""),
+                self.separator.to_string().repeat(columns - 1)
+            );
         } else {
             self.text.push_str(&row.tag.text);
         }
-        self.text.push(',');
+        self.text.push(self.separator);
         if let Some(rate) = row.rate_rad_per_s {
             let _ = write!(self.text, "{:.8}", deg_per_h_from_rad_per_s(rate));
         }
-        self.text.push(',');
+        self.text.push(self.separator);
         for (i, flag) in row.flags.iter().enumerate() {
             if i > 0 {
                 self.text.push('|');
@@ -277,6 +292,51 @@ pub struct MethodJson {
     pub rms_deg_per_h: Option<f64>,
     pub delay_rows: Option<usize>,
     pub reason: Option<String>,
+    /// What is left, measured as `metrics` measures it.
+    pub measures: Option<MeasuresJson>,
+}
+
+/// The measures of a rate, before or after.
+#[derive(Debug, Clone, Serialize)]
+pub struct MeasuresJson {
+    pub bias_deg_per_h: f64,
+    pub bias_stability_deg_per_h: Option<f64>,
+    pub bias_instability_deg_per_h: Option<f64>,
+    pub angle_random_walk_deg_per_sqrt_h: Option<f64>,
+    pub temperature_sensitivity_deg_per_h_per_c: Option<f64>,
+    pub peak_to_peak_deg_per_h: f64,
+    pub averaged_peak_to_peak_deg_per_h: f64,
+    pub drift_angle_deg: f64,
+}
+
+impl MeasuresJson {
+    pub fn new(metrics: &Metrics) -> Self {
+        let all = RecordMetricsJson::new("", metrics, Vec::new(), 0);
+        Self {
+            bias_deg_per_h: all.bias_deg_per_h,
+            bias_stability_deg_per_h: all.bias_stability_deg_per_h,
+            bias_instability_deg_per_h: all.bias_instability_deg_per_h,
+            angle_random_walk_deg_per_sqrt_h: all.angle_random_walk_deg_per_sqrt_h,
+            temperature_sensitivity_deg_per_h_per_c: all.temperature_sensitivity_deg_per_h_per_c,
+            peak_to_peak_deg_per_h: all.peak_to_peak_deg_per_h,
+            averaged_peak_to_peak_deg_per_h: all.averaged_peak_to_peak_deg_per_h,
+            drift_angle_deg: all.drift_angle_deg,
+        }
+    }
+
+    /// Name, unit and value of each.
+    pub fn all(&self) -> [(&'static str, &'static str, Option<f64>); 8] {
+        [
+            ("bias", "°/h", Some(self.bias_deg_per_h)),
+            ("bias stability, means over 10 s", "°/h", self.bias_stability_deg_per_h),
+            ("bias instability (Allan minimum)", "°/h", self.bias_instability_deg_per_h),
+            ("angle random walk", "°/√h", self.angle_random_walk_deg_per_sqrt_h),
+            ("temperature sensitivity", "°/h/°C", self.temperature_sensitivity_deg_per_h_per_c),
+            ("peak to peak", "°/h", Some(self.peak_to_peak_deg_per_h)),
+            ("peak to peak of the means", "°/h", Some(self.averaged_peak_to_peak_deg_per_h)),
+            ("drift angle", "°", Some(self.drift_angle_deg)),
+        ]
+    }
 }
 
 #[derive(Debug, Serialize)]
@@ -285,6 +345,8 @@ pub struct CompensateJson {
     pub method: &'static str,
     pub summary: Option<StreamSummary>,
     pub noise_floor_deg_per_h: Option<f64>,
+    /// Of the record as it is, where all methods were asked for.
+    pub before: Option<MeasuresJson>,
     /// All methods on the hold-out, where that was asked for.
     pub methods: Vec<MethodJson>,
     pub lines: Vec<BiasLineJson>,

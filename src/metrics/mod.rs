@@ -13,9 +13,10 @@
 //! | m | the test point nearest to room temperature, 20 °C | `REFERENCE_TEMPERATURE_K` |
 //! | τ | averaging time, or one row where rows are further apart | `average_s` |
 //!
-//! Angle random walk is read off the Allan deviation's slope of −½; rate random walk, quantisation and flicker are fitted
-//! to the whole curve ([`crate::numeric::allan`]). The bias instability is the Allan deviation's minimum as it is, not divided by 0.664. The
-//! Allan deviation needs regular sampling: it is that of the longest stretch without a gap.
+//! White noise (angle random walk), flicker, random walk of the rate, quantisation and ramp come with intervals that hold together
+//! with 95 %, from all octaves at once ([`crate::numeric::coloured`]); what follows the temperature ([`thermal`]) is not taken for
+//! noise. The bias instability is the Allan deviation's minimum as it is, not divided by 0.664. The Allan deviation needs regular
+//! sampling: it is that of the longest stretch without a gap; the noises are of all rows.
 //!
 //! Leaves out scale-factor errors and everything that needs a turntable.
 //!
@@ -23,10 +24,16 @@
 //! Thesis chapter on FOG drift compensation (2021), Eqs. (3-1) to (3-7), which leave open which test point m is: the
 //! standards for gyros (GJB 2426A, IEEE Std 952) take room temperature. Bs there is the deviation of the output itself.
 
+mod meter;
+pub mod thermal;
+
 use thiserror::Error;
 
-use crate::numeric::allan::{self, AllanPoint, NoiseModel};
-use crate::numeric::statistics::{mean, standard_deviation};
+pub use meter::Meter;
+
+use crate::numeric::allan::AllanPoint;
+use crate::numeric::coloured::NoiseStrengths;
+use crate::numeric::statistics::standard_deviation;
 use crate::record::Record;
 use crate::units::REFERENCE_TEMPERATURE_K;
 
@@ -35,6 +42,11 @@ use crate::units::REFERENCE_TEMPERATURE_K;
 pub struct Metrics {
     pub rows: usize,
     pub duration_s: f64,
+    /// The usual one.
+    pub interval_s: f64,
+    pub gaps: usize,
+    /// Steps that differ from the usual interval.
+    pub irregular_steps: usize,
     pub bias_rad_per_s: f64,
     /// None where there are not two means.
     pub bias_stability_rad_per_s: Option<f64>,
@@ -43,10 +55,15 @@ pub struct Metrics {
     pub peak_to_peak_rad_per_s: f64,
     /// Of the means over `average_s`.
     pub averaged_peak_to_peak_rad_per_s: f64,
+    /// The rate integrated over the record, each value standing for the time before it.
+    pub drift_angle_rad: f64,
+    pub temperature_range_k: f64,
     /// None where the record holds one test point only.
     pub temperature_sensitivity_rad_per_s_per_k: Option<f64>,
     pub temperature_points: Vec<TemperaturePoint>,
     pub allan: Option<Allan>,
+    /// None for a record too short to tell noises apart.
+    pub noises: Option<NoiseStrengths>,
 }
 
 /// Mean rate over a band of temperature.
@@ -61,11 +78,6 @@ pub struct TemperaturePoint {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Allan {
     pub points: Vec<AllanPoint>,
-    /// Angle random walk, read off the slope of −½ [rad/√s]; an upper bound where there is no such slope.
-    pub white_rad_per_sqrt_s: f64,
-    pub has_white_slope: bool,
-    /// Fitted to the whole curve; in rad/s and powers of seconds.
-    pub noises: NoiseModel,
     /// The point with the smallest deviation.
     pub minimum: AllanPoint,
     /// Of the stretch without a gap that it was computed from.
@@ -77,6 +89,8 @@ pub struct Allan {
 pub enum MetricsError {
     #[error("the averaging time must be positive, found {found_s} s")]
     Average { found_s: f64 },
+    #[error("a record needs at least {needed} rows, found {found}")]
+    TooShort { needed: usize, found: usize },
     #[error("there is no record to measure")]
     Nothing,
 }
@@ -85,34 +99,14 @@ pub enum MetricsError {
 const POINT_WIDTH_K: f64 = 5.0;
 /// Share of the rows that a test point needs.
 const POINT_SHARE: f64 = 0.02;
-/// Intervals that differ less than this from the usual one are regular.
-const REGULAR: f64 = 0.01;
-/// Fewer regular rows have no Allan deviation worth the name.
-const MIN_ALLAN_ROWS: usize = 16;
 
 impl Metrics {
     /// # Errors
     /// An averaging time that is not positive.
     pub fn of(record: &Record, average_s: f64) -> Result<Self, MetricsError> {
-        if !(average_s > 0.0 && average_s.is_finite()) {
-            return Err(MetricsError::Average { found_s: average_s });
-        }
-        let rates = record.rate_rad_per_s();
-        let per_mean = ((average_s / record.interval_s()).round() as usize).max(1);
-        let means: Vec<f64> = means_over(record, per_mean);
-        let points = temperature_points(record);
-        Ok(Self {
-            rows: record.rows(),
-            duration_s: record.times_s()[record.rows() - 1] - record.times_s()[0],
-            bias_rad_per_s: mean(rates),
-            bias_stability_rad_per_s: Some(standard_deviation(&means)).filter(|s| s.is_finite()),
-            average_s: per_mean as f64 * record.interval_s(),
-            peak_to_peak_rad_per_s: peak_to_peak(rates),
-            averaged_peak_to_peak_rad_per_s: peak_to_peak(&means),
-            temperature_sensitivity_rad_per_s_per_k: temperature_sensitivity(&points),
-            temperature_points: points,
-            allan: Allan::of(record),
-        })
+        let mut meter = Meter::new(average_s)?;
+        record.each_row().for_each(|row| meter.push(row));
+        meter.finish()
     }
 }
 
@@ -128,45 +122,6 @@ pub fn repeatability_rad_per_s(records: &[Metrics]) -> Result<Option<f64>, Metri
     Ok(Some(standard_deviation(&biases)).filter(|s| s.is_finite()))
 }
 
-fn peak_to_peak(values: &[f64]) -> f64 {
-    let (low, high) =
-        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
-    if high >= low { high - low } else { 0.0 }
-}
-
-/// Means of `per_mean` rows each that follow each other without a gap; what is left over at an end is dropped.
-fn means_over(record: &Record, per_mean: usize) -> Vec<f64> {
-    let mut breaks: Vec<usize> = record.gaps().into_iter().map(|(row, _)| row).collect();
-    breaks.push(record.rows());
-    let mut from = 0;
-    let mut means = Vec::new();
-    for to in breaks {
-        means.extend(record.rate_rad_per_s()[from..to].chunks_exact(per_mean).map(mean));
-        from = to;
-    }
-    means
-}
-
-fn temperature_points(record: &Record) -> Vec<TemperaturePoint> {
-    let mut bands: std::collections::BTreeMap<i64, (f64, f64, usize)> = std::collections::BTreeMap::new();
-    for (temperature_k, rate) in record.temperature_k().iter().zip(record.rate_rad_per_s()) {
-        // Room temperature is the middle of a band.
-        let band = ((temperature_k - REFERENCE_TEMPERATURE_K) / POINT_WIDTH_K).round() as i64;
-        let sums = bands.entry(band).or_default();
-        *sums = (sums.0 + temperature_k, sums.1 + rate, sums.2 + 1);
-    }
-    let least = (POINT_SHARE * record.rows() as f64).max(1.0);
-    bands
-        .into_values()
-        .filter(|(_, _, rows)| *rows as f64 >= least)
-        .map(|(temperature, rate, rows)| TemperaturePoint {
-            temperature_k: temperature / rows as f64,
-            bias_rad_per_s: rate / rows as f64,
-            rows,
-        })
-        .collect()
-}
-
 fn temperature_sensitivity(points: &[TemperaturePoint]) -> Option<f64> {
     let from_room = |p: &TemperaturePoint| (p.temperature_k - REFERENCE_TEMPERATURE_K).abs();
     let reference = points.iter().min_by(|a, b| from_room(a).total_cmp(&from_room(b)))?;
@@ -177,41 +132,6 @@ fn temperature_sensitivity(points: &[TemperaturePoint]) -> Option<f64> {
             (p.bias_rad_per_s - reference.bias_rad_per_s).abs() / (p.temperature_k - reference.temperature_k).abs()
         })
         .max_by(f64::total_cmp)
-}
-
-impl Allan {
-    /// None where no stretch is long and regular enough.
-    pub fn of(record: &Record) -> Option<Self> {
-        let interval_s = record.interval_s();
-        let times_s = record.times_s();
-        let (mut best, mut from) = (0..0, 0);
-        for row in 1..=times_s.len() {
-            let broken =
-                row == times_s.len() || (times_s[row] - times_s[row - 1] - interval_s).abs() > REGULAR * interval_s;
-            if broken {
-                if row - from > best.len() {
-                    best = from..row;
-                }
-                from = row;
-            }
-        }
-        if best.len() < MIN_ALLAN_ROWS {
-            return None;
-        }
-        let rates = &record.rate_rad_per_s()[best];
-        let points = allan::overlapping(rates, interval_s, &allan::factors(rates.len()));
-        let minimum = *points.iter().min_by(|a, b| a.deviation.total_cmp(&b.deviation))?;
-        let (white_rad_per_sqrt_s, has_white_slope) = allan::white_by_slope(&points)?;
-        Some(Self {
-            white_rad_per_sqrt_s,
-            has_white_slope,
-            noises: NoiseModel::fit(&points),
-            minimum,
-            rows: rates.len(),
-            interval_s,
-            points,
-        })
-    }
 }
 
 #[cfg(test)]
@@ -230,10 +150,10 @@ mod tests {
         let white: Vec<f64> = times_s.iter().map(|_| normal.inverse_cdf(random.random::<f64>())).collect();
         let still = Record::new("x", times_s.clone(), vec![300.0; 40_000], white.clone()).unwrap();
         let metrics = Metrics::of(&still, 10.0).unwrap();
-        let allan = metrics.allan.unwrap();
+        let walk = metrics.noises.unwrap().white;
         // N = σ √τ0, and means over 20 rows are √20 quieter.
-        println!("white {:.4e} of {:.4e}", allan.white_rad_per_sqrt_s, 1e-6 * 0.5f64.sqrt());
-        assert!((allan.white_rad_per_sqrt_s / (1e-6 * 0.5f64.sqrt()) - 1.0).abs() < 0.03);
+        println!("white {walk:?} of {:.4e}", 1e-6 * 0.5f64.sqrt());
+        assert!((walk.value / (1e-6 * 0.5f64.sqrt()) - 1.0).abs() < 0.03);
         assert!((metrics.bias_stability_rad_per_s.unwrap() / (1e-6 / 20f64.sqrt()) - 1.0).abs() < 0.05);
         assert_eq!(metrics.temperature_sensitivity_rad_per_s_per_k, None);
 

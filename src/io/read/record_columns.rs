@@ -1,0 +1,551 @@
+//! What the columns of a record hold: which quantity, in which unit, under which name, with which decimal sign.
+//!
+//! A name's ending says its unit (`temperature_k`), and so does a unit in brackets (`Omega [deg/s]`, `T1 (°F)`); a mapping
+//! (`time=Zeit:min,rate=Omega`, or `[record]` in a model file) says which column is which and overrides both.
+
+use crate::units::{
+    celsius_from_fahrenheit, kelvin_from_celsius, rad_per_s_from_arcsec_per_s, rad_per_s_from_deg_per_h,
+    rad_per_s_from_deg_per_s, s_from_days, s_from_h, s_from_min, s_from_ms, s_from_ns, s_from_us,
+};
+
+use crate::io::fault::Fault;
+
+use super::toml_reader::{Limits, TableReader, TomlReader, nearest};
+
+/// What a column holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    Time,
+    Temperature,
+    Rate,
+    InnerTemperature,
+    AmbientTemperature,
+    /// Anything else, by its name.
+    Channel,
+}
+
+impl Quantity {
+    /// As a mapping names it.
+    const ROLES: [(&'static str, Quantity); 5] = [
+        ("time", Quantity::Time),
+        ("temperature", Quantity::Temperature),
+        ("rate", Quantity::Rate),
+        ("inner", Quantity::InnerTemperature),
+        ("ambient", Quantity::AmbientTemperature),
+    ];
+
+    /// The names before the unit that a header may have without a mapping.
+    const STEMS: [(&'static str, Quantity); 5] = [
+        ("time", Quantity::Time),
+        ("temperature", Quantity::Temperature),
+        ("rate", Quantity::Rate),
+        ("temperature_inner", Quantity::InnerTemperature),
+        ("temperature_ambient", Quantity::AmbientTemperature),
+    ];
+
+    fn is_temperature(self) -> bool {
+        matches!(self, Quantity::Temperature | Quantity::InnerTemperature | Quantity::AmbientTemperature)
+    }
+
+    fn default_unit(self) -> &'static str {
+        match self {
+            Quantity::Time => "s",
+            Quantity::Rate => "deg_per_h",
+            Quantity::Channel => "",
+            _ => "c",
+        }
+    }
+}
+
+/// How a cell's number becomes SI.
+#[derive(Debug, Clone, Copy)]
+enum Conversion {
+    By(fn(f64) -> f64),
+    /// A date and time of day.
+    Stamp,
+    /// Raw output, so many of them a degree an hour.
+    Raw,
+}
+
+impl Conversion {
+    fn is_stamp(self) -> bool {
+        matches!(self, Conversion::Stamp)
+    }
+
+    fn is_raw(self) -> bool {
+        matches!(self, Conversion::Raw)
+    }
+}
+
+/// A unit that a column may be in.
+struct Unit {
+    /// As a name ends with it.
+    key: &'static str,
+    /// As it may stand in brackets.
+    written: &'static [&'static str],
+    of: Kind,
+    conversion: Conversion,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Time,
+    Temperature,
+    Rate,
+}
+
+const fn unit(key: &'static str, written: &'static [&'static str], of: Kind, conversion: Conversion) -> Unit {
+    Unit { key, written, of, conversion }
+}
+
+fn as_it_is(value: f64) -> f64 {
+    value
+}
+
+fn kelvin_from_fahrenheit(value: f64) -> f64 {
+    kelvin_from_celsius(celsius_from_fahrenheit(value))
+}
+
+fn rad_per_s_from_mdeg_per_h(value: f64) -> f64 {
+    rad_per_s_from_deg_per_h(value / 1000.0)
+}
+
+const UNITS: &[Unit] = &[
+    unit("s", &["sec", "seconds", "epoch_s"], Kind::Time, Conversion::By(as_it_is)),
+    unit("ms", &["msec", "epoch_ms"], Kind::Time, Conversion::By(s_from_ms)),
+    unit("us", &["µs", "μs", "epoch_us"], Kind::Time, Conversion::By(s_from_us)),
+    unit("ns", &["epoch_ns"], Kind::Time, Conversion::By(s_from_ns)),
+    unit("min", &["minutes"], Kind::Time, Conversion::By(s_from_min)),
+    unit("h", &["hr", "hours"], Kind::Time, Conversion::By(s_from_h)),
+    unit("d", &["days"], Kind::Time, Conversion::By(s_from_days)),
+    unit("iso", &["iso8601", "utc"], Kind::Time, Conversion::Stamp),
+    unit("c", &["°c", "degc", "celsius"], Kind::Temperature, Conversion::By(kelvin_from_celsius)),
+    unit("k", &["kelvin"], Kind::Temperature, Conversion::By(as_it_is)),
+    unit("f", &["°f", "degf", "fahrenheit"], Kind::Temperature, Conversion::By(kelvin_from_fahrenheit)),
+    unit("deg_per_h", &["°/h", "deg/h", "deg/hr", "°/hr"], Kind::Rate, Conversion::By(rad_per_s_from_deg_per_h)),
+    unit("mdeg_per_h", &["m°/h", "mdeg/h"], Kind::Rate, Conversion::By(rad_per_s_from_mdeg_per_h)),
+    unit("deg_per_s", &["°/s", "deg/s", "dps"], Kind::Rate, Conversion::By(rad_per_s_from_deg_per_s)),
+    unit("rad_per_s", &["rad/s"], Kind::Rate, Conversion::By(as_it_is)),
+    unit("arcsec_per_s", &["arcsec/s", "\"/s", "″/s"], Kind::Rate, Conversion::By(rad_per_s_from_arcsec_per_s)),
+    unit("counts", &["bit", "bits", "lsb"], Kind::Rate, Conversion::Raw),
+    unit("mv", &[], Kind::Rate, Conversion::Raw),
+    unit("v", &["volt", "volts"], Kind::Rate, Conversion::Raw),
+];
+
+impl Kind {
+    fn of(quantity: Quantity) -> Option<Self> {
+        match quantity {
+            Quantity::Time => Some(Kind::Time),
+            Quantity::Rate => Some(Kind::Rate),
+            Quantity::Channel => None,
+            _ => Some(Kind::Temperature),
+        }
+    }
+
+    fn unit(self, text: &str) -> Option<&'static Unit> {
+        let text = text.trim().to_lowercase();
+        UNITS.iter().find(|u| u.of == self && (u.key == text || u.written.contains(&text.as_str())))
+    }
+
+    fn accepted(self) -> String {
+        UNITS.iter().filter(|u| u.of == self).map(|u| u.key).collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// Every name that a header may have without a mapping, quantity by quantity.
+pub fn accepted_names() -> Vec<String> {
+    let names = Quantity::STEMS.iter().flat_map(|(stem, quantity)| {
+        let of = Kind::of(*quantity);
+        UNITS
+            .iter()
+            .filter(move |u| Some(u.of) == of && !u.conversion.is_raw())
+            .map(move |u| format!("{stem}_{}", u.key))
+    });
+    names.collect()
+}
+
+/// One column that a mapping names.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Mapped {
+    quantity: Quantity,
+    name: String,
+    unit: Option<&'static str>,
+}
+
+/// Which column is which, and what to do with rows that are none.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordFormat {
+    pub(super) mapped: Vec<Mapped>,
+    /// Raw outputs a degree an hour.
+    pub(super) scale: Option<f64>,
+    /// Rows with a missing cell, or with a stamp that repeats or jumps back, are skipped and counted instead of refused.
+    pub skips_bad_rows: bool,
+    /// So many rows are averaged into one.
+    pub average_rows: usize,
+    /// A compensated rate, where there is one, is the rate.
+    pub compensated: bool,
+}
+
+impl Default for RecordFormat {
+    fn default() -> Self {
+        Self { mapped: Vec::new(), scale: None, skips_bad_rows: false, average_rows: 1, compensated: false }
+    }
+}
+
+impl RecordFormat {
+    /// Adds `role=column[:unit]` or `scale=number`; a role that is there already is replaced.
+    ///
+    /// # Errors
+    /// What is wrong with it, in words.
+    pub fn map(&mut self, role: &str, target: &str) -> Result<(), String> {
+        let (role, target) = (role.trim(), target.trim());
+        if role == "scale" {
+            let scale = target.replace(',', ".").parse::<f64>().ok().filter(|s| s.is_finite() && *s != 0.0);
+            self.scale = Some(scale.ok_or_else(|| {
+                format!("scale: expected how many raw units are one degree an hour, not 0, found \"{target}\"")
+            })?);
+            return Ok(());
+        }
+        let Some((_, quantity)) = Quantity::ROLES.iter().find(|(name, _)| *name == role) else {
+            let known: Vec<&str> = Quantity::ROLES.iter().map(|(name, _)| *name).chain(["scale"]).collect();
+            return Err(format!("expected one of {}, found \"{role}\"", known.join(", ")));
+        };
+        let (name, unit) = match target.rsplit_once(':') {
+            Some((name, unit)) if Kind::of(*quantity).is_some_and(|k| k.unit(unit).is_some()) => (name, Some(unit)),
+            Some((_, unit)) => {
+                let accepted = Kind::of(*quantity).map(Kind::accepted).unwrap_or_default();
+                return Err(format!("{role}: expected a unit of {accepted} behind the colon, found \"{unit}\""));
+            }
+            None => (target, None),
+        };
+        if name.trim().is_empty() {
+            return Err(format!("{role}: expected a column's name, found nothing"));
+        }
+        let unit = unit.and_then(|u| Kind::of(*quantity)?.unit(u)).map(|u| u.key);
+        self.mapped.retain(|m| m.quantity != *quantity);
+        self.mapped.push(Mapped { quantity: *quantity, name: name.trim().to_owned(), unit });
+        Ok(())
+    }
+
+    /// As [`RecordFormat::map`], of a whole list.
+    ///
+    /// # Errors
+    /// What is wrong with the first part that is none.
+    pub fn map_all(&mut self, list: &str) -> Result<(), String> {
+        for part in list.split(',').filter(|p| !p.trim().is_empty()) {
+            let Some((role, target)) = part.split_once('=') else {
+                return Err(format!("expected role=column, such as time=Zeit, found \"{part}\""));
+            };
+            self.map(role, target)?;
+        }
+        Ok(())
+    }
+
+    /// Whether columns that are not mapped may hold words.
+    pub fn has_mapping(&self) -> bool {
+        !self.mapped.is_empty()
+    }
+}
+
+/// The `[record]` table of a model file: roles as keys, `scale`, `bad_rows`, `average_rows`.
+pub(super) fn read_format(r: &mut TomlReader, table: &mut TableReader<'_>) -> RecordFormat {
+    let mut format = RecordFormat::default();
+    for (role, _) in Quantity::ROLES {
+        if let Some(target) = table.text(r, role)
+            && let Err(message) = format.map(role, target)
+        {
+            r.fault(Fault::new(format!("record.{message}"), table.span_of(role)));
+        }
+    }
+    if let Some(scale) = table.number(r, "scale", Limits::between(-1e300, 1e300)) {
+        if scale == 0.0 {
+            let message = "record.scale: expected how many raw units are one degree an hour, found 0";
+            r.fault(Fault::new(message, table.span_of("scale")));
+        }
+        format.scale = Some(scale);
+    }
+    format.skips_bad_rows = table.word(r, "bad_rows", &["refuse", "skip"]) == Some(1);
+    format.average_rows = table.integer(r, "average_rows", 1, 1_000_000).map_or(1, |rows| rows as usize);
+    format
+}
+
+/// One column of a record file.
+#[derive(Debug, Clone)]
+pub struct Column {
+    pub name: String,
+    pub quantity: Quantity,
+    conversion: Conversion,
+    scale: f64,
+    decimal_comma: bool,
+    /// What was assumed about its unit, for a reader.
+    assumed: Option<&'static str>,
+}
+
+/// The compensated rate's column, and the one that says what happened to a row.
+pub const COMPENSATED: &str = "rate_compensated_deg_per_h";
+pub const FLAGS: &str = "flags";
+
+impl Column {
+    fn new(name: &str, format: &RecordFormat, decimal_comma: bool) -> Result<Self, String> {
+        let mapped = format.mapped.iter().find(|m| m.name == name);
+        let (bare, bracketed) = unbracketed(name);
+        let of_name = Quantity::STEMS.iter().find_map(|(stem, quantity)| {
+            let ending = bare.strip_prefix(stem)?.strip_prefix('_');
+            let kind = Kind::of(*quantity)?;
+            match ending {
+                Some(ending) => kind.unit(ending).filter(|u| u.key == ending).map(|u| (*quantity, u)),
+                None => bracketed.and_then(|b| kind.unit(b)).map(|u| (*quantity, u)),
+            }
+        });
+        // A quantity that is mapped elsewhere does not come from this name.
+        let of_name =
+            of_name.filter(|(quantity, _)| mapped.is_some() || format.mapped.iter().all(|m| m.quantity != *quantity));
+        let quantity = mapped.map_or_else(|| of_name.map_or(Quantity::Channel, |(q, _)| q), |m| m.quantity);
+        let mut assumed = None;
+        let conversion = match Kind::of(quantity) {
+            None => Conversion::By(as_it_is),
+            Some(kind) => {
+                let stated = mapped.and_then(|m| m.unit).and_then(|u| kind.unit(u));
+                let ending = || {
+                    let fits = |u: &&Unit| u.of == kind && bare.ends_with(&format!("_{}", u.key));
+                    UNITS.iter().filter(fits).max_by_key(|u| u.key.len())
+                };
+                let known = stated.or_else(|| bracketed.and_then(|b| kind.unit(b))).or_else(ending);
+                if known.is_none() {
+                    assumed = Some(quantity.default_unit());
+                }
+                known.or_else(|| kind.unit(quantity.default_unit())).map_or(Conversion::By(as_it_is), |u| u.conversion)
+            }
+        };
+        let scale = match (conversion, format.scale) {
+            (Conversion::Raw, None) => {
+                return Err(format!(
+                    "column {name} holds raw output: expected how many of its units are one degree an hour, as scale=12.5 in --columns or [record]"
+                ));
+            }
+            (_, scale) => scale.unwrap_or(1.0),
+        };
+        Ok(Self { name: name.to_owned(), quantity, conversion, scale, decimal_comma, assumed })
+    }
+
+    /// A field as a number in SI.
+    ///
+    /// # Errors
+    /// What was found instead, in words.
+    pub fn value(&self, field: &str) -> Result<f64, String> {
+        let found = || match field.is_empty() {
+            true => "nothing".to_owned(),
+            false => format!("\"{}\"", field.chars().take(40).collect::<String>()),
+        };
+        if self.conversion.is_stamp() || (self.quantity == Quantity::Time && field.contains(':')) {
+            return seconds_of_stamp(field).ok_or_else(|| format!("no date and time: {}", found()));
+        }
+        let number = if self.decimal_comma && field.matches(',').count() == 1 && !field.contains('.') {
+            field.replace(',', ".").parse::<f64>()
+        } else {
+            field.parse::<f64>()
+        };
+        let value = number.ok().filter(|v| v.is_finite()).ok_or_else(found)?;
+        Ok(match self.conversion {
+            Conversion::By(to_si) => to_si(value),
+            Conversion::Raw => rad_per_s_from_deg_per_h(value / self.scale),
+            Conversion::Stamp => value,
+        })
+    }
+
+    /// Whether it must hold a number in every row.
+    pub fn is_needed(&self) -> bool {
+        matches!(self.quantity, Quantity::Time | Quantity::Temperature | Quantity::Rate)
+    }
+
+    pub fn is_temperature(&self) -> bool {
+        self.quantity.is_temperature()
+    }
+
+    /// The unit that was taken because nothing stated one.
+    pub fn assumed_unit(&self) -> Option<&'static str> {
+        self.assumed
+    }
+}
+
+/// A name without a unit in brackets at its end, and that unit.
+fn unbracketed(name: &str) -> (&str, Option<&str>) {
+    for (open, close) in [('[', ']'), ('(', ')')] {
+        if let Some(inside) = name.strip_suffix(close)
+            && let Some((bare, unit)) = inside.rsplit_once(open)
+        {
+            return (bare.trim(), Some(unit.trim()));
+        }
+    }
+    (name, None)
+}
+
+/// Seconds since 1970 of an ISO 8601 stamp; without a zone it is taken as UTC, which cancels in a record.
+fn seconds_of_stamp(field: &str) -> Option<f64> {
+    let nanoseconds = match field.parse::<jiff::Timestamp>() {
+        Ok(stamp) => stamp.as_nanosecond(),
+        Err(_) => field
+            .parse::<jiff::civil::DateTime>()
+            .ok()?
+            .to_zoned(jiff::tz::TimeZone::UTC)
+            .ok()?
+            .timestamp()
+            .as_nanosecond(),
+    };
+    Some(s_from_ns(nanoseconds as f64))
+}
+
+/// How a file's cells are divided.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Division {
+    pub separator: u8,
+    pub decimal_comma: bool,
+}
+
+impl Division {
+    /// As the header shows it: semicolons or tabs where there are any, then decimals may have commas.
+    pub fn of_header(line: &str) -> Self {
+        let count = |separator: char| line.matches(separator).count();
+        let separator = match (count(';'), count('\t')) {
+            (0, 0) => b',',
+            (0, _) => b'\t',
+            _ => b';',
+        };
+        Self { separator, decimal_comma: separator != b',' }
+    }
+}
+
+/// What the header of a record says, faults included.
+///
+/// # Errors
+/// Every fault of the header, as a message and a remedy.
+pub fn read_header(
+    fields: &[&str],
+    format: &RecordFormat,
+    division: Division,
+) -> Result<Vec<Column>, Vec<(String, Option<String>)>> {
+    let mut faults = Vec::new();
+    let mut columns: Vec<Column> = Vec::with_capacity(fields.len());
+    for field in fields {
+        match Column::new(field, format, division.decimal_comma) {
+            Ok(column) => columns.push(column),
+            Err(message) => faults.push((message, None)),
+        }
+    }
+    if !faults.is_empty() {
+        return Err(faults);
+    }
+    if format.compensated && format.mapped.iter().all(|m| m.quantity != Quantity::Rate) {
+        prefer_compensated(&mut columns);
+    }
+    for mapped in format.mapped.iter().filter(|m| columns.iter().all(|c| c.name != m.name)) {
+        let meant = nearest(&mapped.name, fields).map(|near| format!("did you mean {near}?"));
+        let found = fields.join(", ");
+        faults.push((format!("column {} is mapped, but the header has {found}", mapped.name), meant));
+    }
+    for (i, column) in columns.iter().enumerate() {
+        if column.name.is_empty() {
+            faults.push((format!("column {} has no name: expected one such as supply_v", i + 1), None));
+        } else if columns[..i].iter().any(|c| c.name == column.name) {
+            faults.push((format!("column {} is there twice: give each column a name of its own", column.name), None));
+        } else if column.quantity != Quantity::Channel
+            && let Some(other) = columns[..i].iter().find(|c| c.quantity == column.quantity)
+        {
+            faults.push((format!("columns {} and {} hold the same: leave one out", other.name, column.name), None));
+        }
+    }
+    faults.extend(missing(&columns));
+    if faults.is_empty() { Ok(columns) } else { Err(faults) }
+}
+
+/// The compensated rate takes the place of the raw one.
+fn prefer_compensated(columns: &mut [Column]) {
+    let Some(place) = columns.iter().position(|c| c.name == COMPENSATED) else { return };
+    for column in columns.iter_mut().filter(|c| c.quantity == Quantity::Rate) {
+        column.quantity = Quantity::Channel;
+        column.conversion = Conversion::By(as_it_is);
+    }
+    columns[place].quantity = Quantity::Rate;
+    columns[place].conversion = Conversion::By(rad_per_s_from_deg_per_h);
+}
+
+fn missing(columns: &[Column]) -> Vec<(String, Option<String>)> {
+    let mut faults = Vec::new();
+    for (quantity, wanted) in
+        [(Quantity::Time, "time_s"), (Quantity::Temperature, "temperature_c"), (Quantity::Rate, "rate_deg_per_h")]
+    {
+        if columns.iter().any(|c| c.quantity == quantity) {
+            continue;
+        }
+        let stem = wanted.split('_').next().unwrap_or(wanted);
+        let own: Vec<String> = accepted_names()
+            .into_iter()
+            .filter(|n| {
+                n.starts_with(stem) && !n.starts_with("temperature_inner") && !n.starts_with("temperature_ambient")
+            })
+            .collect();
+        let accepted: Vec<&str> = own.iter().map(String::as_str).collect();
+        let others = columns.iter().filter(|c| c.quantity == Quantity::Channel);
+        let meant = others.map(|c| c.name.as_str()).find(|n| n.starts_with(stem) || nearest(n, &accepted).is_some());
+        let found = meant.map_or_else(|| "none of them".to_owned(), str::to_owned);
+        let message = format!("column {wanted} is missing: expected one of {}, found {found}", accepted.join(", "));
+        let remedy = meant.unwrap_or("its name");
+        faults.push((message, Some(format!("say which column it is: --columns {stem}={remedy}"))));
+    }
+    faults
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn value(header: &str, mapping: &str, cell: &str) -> f64 {
+        let mut format = RecordFormat::default();
+        format.map_all(mapping).unwrap();
+        Column::new(header, &format, true).unwrap().value(cell).unwrap()
+    }
+
+    #[test]
+    fn units_come_from_the_mapping_the_brackets_or_the_ending() {
+        assert_eq!(value("Zeit", "time=Zeit:min", "2,5"), 150.0);
+        assert_eq!(value("Zeit [h]", "time=Zeit [h]", "2"), 7200.0);
+        assert!((value("T1 (°F)", "temperature=T1 (°F)", "68") - 293.15).abs() < 1e-12);
+        assert!((value("temperature_f", "", "-40") - 233.15).abs() < 1e-12);
+        assert!((value("w", "rate=w:arcsec_per_s", "1") / 1f64.to_radians() * 3600.0 - 1.0).abs() < 1e-12);
+        assert!((value("F", "rate=F:counts,scale=12.5", "25") / rad_per_s_from_deg_per_h(2.0) - 1.0).abs() < 1e-12);
+        assert_eq!(value("t", "time=t:epoch_ms", "1500"), 1.5);
+    }
+
+    #[test]
+    fn stamps_with_and_without_a_zone_are_seconds() {
+        let at = |text: &str| value("stamp", "time=stamp:iso", text);
+        assert_eq!(at("2026-01-02T00:00:00Z") - at("2026-01-01T23:59:58.5Z"), 1.5);
+        assert_eq!(at("2026-01-02 01:00:00+01:00"), at("2026-01-02T00:00:00"));
+    }
+
+    #[test]
+    fn what_cannot_be_mapped_is_said() {
+        let mut format = RecordFormat::default();
+        for (list, wanted) in [
+            ("tmie=x", "expected one of time"),
+            ("time", "expected role=column"),
+            ("rate=x:furlongs", "expected a unit of deg_per_h"),
+            ("scale=0", "not 0"),
+        ] {
+            assert!(format.map_all(list).unwrap_err().contains(wanted), "{list}");
+        }
+        assert!(
+            Column::new(
+                "F [mV]",
+                &{
+                    let mut f = RecordFormat::default();
+                    f.map_all("rate=F [mV]").unwrap();
+                    f
+                },
+                false
+            )
+            .unwrap_err()
+            .contains("scale")
+        );
+    }
+}

@@ -1,0 +1,397 @@
+//! Rows of a record file one by one: what a row must be, what is skipped, what looks odd; and a record that passes by as a stream.
+
+use std::io::{BufRead, BufReader, Read};
+use std::ops::Range;
+
+use csv::{ReaderBuilder, StringRecord, Trim};
+
+use crate::io::fault::{Fault, Faults};
+use crate::numeric::statistics::median;
+use crate::record::{MIN_ROWS, Row};
+use crate::units::celsius_from_kelvin;
+
+use super::record_columns::{Column, Division, FLAGS, Quantity, RecordFormat, read_header};
+
+/// A coil that is mostly outside of this is in other units than its header says.
+pub(super) const PLAUSIBLE_C: Range<f64> = -150.0..200.0;
+/// Room temperature as °F, when °C is stated.
+const ROOM_AS_FAHRENHEIT: Range<f64> = 62.0..86.0;
+/// No chamber is faster: 30 °C/min.
+const FASTEST_K_PER_S: f64 = 0.5;
+/// Of temperature, below which nothing is said of how fast it changes.
+const LEAST_SWING_K: f64 = 5.0;
+/// Times above this are seconds of a calendar; they count from the first row.
+const CALENDAR_S: f64 = 1e8;
+/// Rows of a stream that are handed on together.
+const CHUNK: usize = 65_536;
+const MOST_FAULTS: usize = 50;
+
+/// What is wrong with a row, or with one of its cells.
+#[derive(Debug)]
+pub(super) struct CellFault {
+    pub message: String,
+    pub place: Option<usize>,
+    pub note: Option<&'static str>,
+}
+
+/// What became of a row; its numbers are in [`Cells::numbers`].
+#[derive(Debug)]
+pub(super) enum CellsRead {
+    Row,
+    Skipped,
+    Faults(Vec<CellFault>),
+}
+
+/// Turns the cells of each row into numbers in SI.
+#[derive(Debug)]
+pub(super) struct Cells<'c> {
+    columns: &'c [Column],
+    skips: bool,
+    /// Further columns may hold words.
+    lax: bool,
+    numbers: Vec<f64>,
+    last_s: Option<f64>,
+    origin_s: Option<f64>,
+    line_offset: u64,
+}
+
+impl<'c> Cells<'c> {
+    pub(super) fn new(columns: &'c [Column], format: &RecordFormat) -> Self {
+        let is_compensated = format.compensated && columns.iter().any(|c| c.name == FLAGS);
+        Self {
+            columns,
+            skips: format.skips_bad_rows || is_compensated,
+            lax: format.has_mapping() || format.skips_bad_rows,
+            numbers: Vec::with_capacity(columns.len()),
+            last_s: None,
+            origin_s: None,
+            line_offset: 0,
+        }
+    }
+
+    /// Of the row that was read last; NaN where there is no number.
+    pub(super) fn numbers(&self) -> &[f64] {
+        &self.numbers
+    }
+
+    pub(super) fn read(&mut self, row: &StringRecord) -> CellsRead {
+        self.numbers.clear();
+        let line = row.position().map_or(0, csv::Position::line) + self.line_offset;
+        if row.len() != self.columns.len() {
+            if self.skips {
+                return CellsRead::Skipped;
+            }
+            let message =
+                format!("line {line}: expected {} columns as in the header, found {}", self.columns.len(), row.len());
+            return CellsRead::Faults(vec![CellFault { message, place: None, note: None }]);
+        }
+        let mut faults = Vec::new();
+        for (place, (column, field)) in self.columns.iter().zip(row.iter()).enumerate() {
+            let number = match column.value(field) {
+                Ok(value) if column.quantity == Quantity::Time => match self.time(value) {
+                    Ok(value) => value,
+                    Err(before_s) => {
+                        faults.push(CellFault {
+                            message: format!(
+                                "line {line}, column {}: times must increase strictly, found {field} after {before_s} s",
+                                column.name
+                            ),
+                            place: Some(place),
+                            note: Some("sort the rows, or skip those that repeat or jump back: --bad-rows skip"),
+                        });
+                        value
+                    }
+                },
+                Ok(value) => value,
+                Err(_) if column.quantity == Quantity::Channel && (self.lax || column.name == FLAGS) => f64::NAN,
+                Err(found) => {
+                    faults.push(CellFault {
+                        message: format!(
+                            "line {line}, column {}: expected a finite number, found {found}",
+                            column.name
+                        ),
+                        place: Some(place),
+                        note: Some("leave out rows in which a sensor failed, or skip them: --bad-rows skip"),
+                    });
+                    f64::NAN
+                }
+            };
+            self.numbers.push(number);
+        }
+        if !faults.is_empty() {
+            return if self.skips { CellsRead::Skipped } else { CellsRead::Faults(faults) };
+        }
+        if let Some(place) = self.columns.iter().position(|c| c.quantity == Quantity::Time) {
+            self.last_s = Some(self.numbers[place]);
+        }
+        CellsRead::Row
+    }
+
+    /// Since the first row where it is a calendar's; the time before where it does not increase.
+    fn time(&mut self, value: f64) -> Result<f64, f64> {
+        let origin_s = *self.origin_s.get_or_insert(if value > CALENDAR_S { value } else { 0.0 });
+        let value = value - origin_s;
+        let before = self.last_s.filter(|before| value <= *before);
+        if !self.skips {
+            self.last_s = Some(value);
+        }
+        before.map_or(Ok(value), Err)
+    }
+}
+
+/// Of `rows` rows each; the stamp is that of the last, since a rate's mean ends at its stamp.
+pub(super) fn average(columns: &[Column], values: Vec<Vec<f64>>, rows: usize) -> Vec<Vec<f64>> {
+    if rows <= 1 {
+        return values;
+    }
+    let mean = |chunk: &[f64]| chunk.iter().sum::<f64>() / chunk.len() as f64;
+    let Some(times) = columns.iter().position(|c| c.quantity == Quantity::Time).map(|place| values[place].clone())
+    else {
+        return values;
+    };
+    let steps: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
+    let usual_s = median(&steps);
+    // A mean across a gap is a mean over another time: it is left out.
+    let is_whole = |from: usize| times[from + rows - 1] - times[from] < (rows as f64 - 0.5) * usual_s;
+    let starts: Vec<usize> = (0..times.len() / rows).map(|i| i * rows).filter(|from| is_whole(*from)).collect();
+    let reduced = |column: &Column, values: &[f64]| -> Vec<f64> {
+        let last = column.quantity == Quantity::Time;
+        starts.iter().map(|f| if last { values[f + rows - 1] } else { mean(&values[*f..f + rows]) }).collect()
+    };
+    columns.iter().zip(&values).map(|(column, values)| reduced(column, values)).collect()
+}
+
+/// Units that nothing stated, and how cells are divided where that is not by commas.
+pub(super) fn assumptions(columns: &[Column], division: Division) -> Vec<String> {
+    let mut said = Vec::new();
+    if division.separator != b',' {
+        let name = if division.separator == b';' { "semicolons" } else { "tabs" };
+        said.push(format!("{name} between columns; a comma inside a number is a decimal comma"));
+    }
+    for column in columns {
+        if let Some(unit) = column.assumed_unit() {
+            said.push(format!("column {} states no unit: taken as {unit}", column.name));
+        }
+    }
+    said
+}
+
+/// What does not look like what it is said to be.
+pub(super) fn suspicions(times_s: &[f64], temperature_k: &[f64]) -> Vec<String> {
+    let mut said = Vec::new();
+    let (Some(first), Some(last)) = (times_s.first(), times_s.last()) else { return said };
+    let first_c = temperature_k.first().map_or(f64::NAN, |k| celsius_from_kelvin(*k));
+    if ROOM_AS_FAHRENHEIT.contains(&first_c) {
+        said.push(format!(
+            "the record begins at {first_c:.1} °C: if that is room temperature, the column is in °F (temperature_f, or --columns temperature=NAME:f)"
+        ));
+    }
+    let (low, high) = temperature_k.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    let duration_s = last - first;
+    if high - low > LEAST_SWING_K && high - low > FASTEST_K_PER_S * duration_s {
+        said.push(format!(
+            "the temperature changes by {:.0} °C within {duration_s} s: if times are in minutes or hours, say so (time_min, time_h, or --columns time=NAME:h)",
+            high - low
+        ));
+    }
+    said
+}
+
+/// A stamp that contradicts what the model says of how rates are averaged; None where it does not.
+pub fn contradicts_mean(interval_s: f64, rate_mean_s: f64) -> Option<String> {
+    let is_odd = rate_mean_s > 0.0 && (rate_mean_s > 1.01 * interval_s || rate_mean_s < 0.5 * interval_s);
+    is_odd.then(|| {
+        format!(
+            "rows are {interval_s} s apart, but sensor.rate_mean_s = {rate_mean_s}: is each rate really the mean over {rate_mean_s} s before its stamp?"
+        )
+    })
+}
+
+/// What a stream was, beside its rows.
+#[derive(Debug, Default)]
+pub struct StreamNoticed {
+    pub rows: usize,
+    pub skipped_rows: usize,
+    pub remarks: Vec<String>,
+}
+
+/// Reads a record row by row and hands them on in chunks, in memory that does not grow.
+///
+/// # Errors
+/// All faults of the input at once, with line and column.
+pub fn stream_rows(
+    name: &str,
+    input: impl Read,
+    format: &RecordFormat,
+    mut sink: impl FnMut(&[Row]),
+) -> Result<StreamNoticed, Faults> {
+    let mut input = BufReader::with_capacity(1 << 18, input);
+    let (header, lines) = header_line(name, &mut input)?;
+    let division = Division::of_header(&header);
+    let mut reader = ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .delimiter(division.separator)
+        .comment(Some(b'#'))
+        .trim(Trim::All)
+        .from_reader(input);
+    let mut head = ReaderBuilder::new()
+        .has_headers(false)
+        .delimiter(division.separator)
+        .trim(Trim::All)
+        .from_reader(header.as_bytes());
+    let mut row = StringRecord::new();
+    let _ = head.read_record(&mut row);
+    let fields: Vec<&str> = row.iter().collect();
+    let as_faults = |faults: Vec<(String, Option<String>)>| Faults {
+        file: name.to_owned(),
+        source: header.clone(),
+        faults: faults
+            .into_iter()
+            .map(|(message, note)| Fault { message, span: Some(0..header.len()), note })
+            .collect(),
+    };
+    let columns = read_header(&fields, format, division).map_err(as_faults)?;
+    let place = |quantity: Quantity| columns.iter().position(|c| c.quantity == quantity).unwrap_or(0);
+    let (time, temperature, rate) = (place(Quantity::Time), place(Quantity::Temperature), place(Quantity::Rate));
+    let mut cells = Cells::new(&columns, format);
+    cells.line_offset = lines;
+    let mut noticed = StreamNoticed { remarks: assumptions(&columns, division), ..StreamNoticed::default() };
+    let (mut faults, mut uncounted) = (Vec::new(), 0);
+    let mut chunk: Vec<Row> = Vec::with_capacity(CHUNK);
+    loop {
+        match reader.read_record(&mut row) {
+            Ok(true) => {}
+            Ok(false) => break,
+            Err(error) => {
+                faults.push(Fault::new(format!("no CSV: {error}"), None));
+                break;
+            }
+        }
+        match cells.read(&row) {
+            CellsRead::Row if faults.is_empty() => {
+                let numbers = cells.numbers();
+                chunk.push(Row {
+                    time_s: numbers[time],
+                    temperature_k: numbers[temperature],
+                    rate_rad_per_s: numbers[rate],
+                });
+                noticed.rows += 1;
+                if chunk.len() == CHUNK {
+                    look(&chunk, noticed.rows == CHUNK, &columns[temperature], &mut noticed.remarks, &mut faults);
+                    sink(&chunk);
+                    chunk.clear();
+                }
+            }
+            CellsRead::Row => {}
+            CellsRead::Skipped => noticed.skipped_rows += 1,
+            CellsRead::Faults(found) if faults.len() < MOST_FAULTS => {
+                faults.extend(found.into_iter().map(|f| Fault {
+                    message: f.message,
+                    span: None,
+                    note: f.note.map(str::to_owned),
+                }));
+            }
+            CellsRead::Faults(found) => uncounted += found.len(),
+        }
+    }
+    if faults.is_empty() && noticed.rows < MIN_ROWS {
+        let message = format!("expected at least {MIN_ROWS} rows of numbers, found {}", noticed.rows);
+        faults.push(Fault::new(message, None));
+    }
+    look(
+        &chunk,
+        noticed.rows <= CHUNK && noticed.rows == chunk.len(),
+        &columns[temperature],
+        &mut noticed.remarks,
+        &mut faults,
+    );
+    if !faults.is_empty() {
+        if uncounted > 0 {
+            faults.push(Fault::new(format!("{uncounted} further faults of the same kinds"), None));
+        }
+        return Err(Faults { file: name.to_owned(), source: String::new(), faults });
+    }
+    if !chunk.is_empty() {
+        sink(&chunk);
+    }
+    Ok(noticed)
+}
+
+/// The first rows show whether the units are what they are said to be.
+fn look(chunk: &[Row], is_first: bool, temperature: &Column, remarks: &mut Vec<String>, faults: &mut Vec<Fault>) {
+    if !is_first || chunk.is_empty() {
+        return;
+    }
+    let times_s: Vec<f64> = chunk.iter().map(|r| r.time_s).collect();
+    let temperature_k: Vec<f64> = chunk.iter().map(|r| r.temperature_k).collect();
+    remarks.extend(suspicions(&times_s, &temperature_k));
+    let middle_c = celsius_from_kelvin(median(&temperature_k));
+    if !PLAUSIBLE_C.contains(&middle_c) {
+        faults.push(implausible(temperature, middle_c, None));
+    }
+}
+
+/// A column whose numbers are no coil's temperature in its unit.
+pub(super) fn implausible(column: &Column, middle_c: f64, span: Option<Range<usize>>) -> Fault {
+    let message = format!(
+        "column {}: expected a coil's temperature between {} and {} °C, found a median of {middle_c:.2} °C",
+        column.name, PLAUSIBLE_C.start, PLAUSIBLE_C.end
+    );
+    Fault::new(message, span).with_note("a name that ends in _c holds degrees Celsius, one that ends in _k kelvin")
+}
+
+/// The first line that is no comment, and how many lines came before the next.
+fn header_line(name: &str, input: &mut impl BufRead) -> Result<(String, u64), Faults> {
+    let mut lines = 0;
+    loop {
+        let mut bytes = Vec::new();
+        let read = input.by_ref().take(1 << 20).read_until(b'\n', &mut bytes);
+        if read.map_err(|e| Faults::of_file(name, format!("cannot be read: {e}")))? == 0 {
+            let message = "the file holds comments only: expected a header such as time_s,temperature_c,rate_deg_per_h";
+            return Err(Faults::of_file(name, message));
+        }
+        lines += 1;
+        let text = String::from_utf8(bytes)
+            .map_err(|_| Faults::of_file(name, "expected text in UTF-8, found other bytes: is it the right file?"))?;
+        let line = text.trim_start_matches('\u{feff}').trim_end();
+        if !line.is_empty() && !line.starts_with('#') {
+            return Ok((line.to_owned(), lines));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(text: &str, format: &RecordFormat) -> Result<(Vec<Row>, StreamNoticed), Faults> {
+        let mut found = Vec::new();
+        let noticed = stream_rows("x", text.as_bytes(), format, |chunk| found.extend_from_slice(chunk))?;
+        Ok((found, noticed))
+    }
+
+    #[test]
+    fn bad_rows_are_refused_with_their_lines_or_skipped_and_counted() {
+        let text =
+            "# a\ntime_s,temperature_c,rate_deg_per_h\n0,20,1\n1,,1\n2,20,1\n2,20,1\n1,20,1\n3,20,1\n4,20\n5,20,1\n";
+        let faults = rows(text, &RecordFormat::default()).unwrap_err();
+        let messages: Vec<&str> = faults.faults.iter().map(|f| f.message.as_str()).collect();
+        assert_eq!(messages[0], "line 4, column temperature_c: expected a finite number, found nothing");
+        assert_eq!(messages.len(), 4, "{messages:?}");
+        let format = RecordFormat { skips_bad_rows: true, ..RecordFormat::default() };
+        let (found, noticed) = rows(text, &format).unwrap();
+        assert_eq!(found.iter().map(|r| r.time_s).collect::<Vec<_>>(), [0.0, 2.0, 3.0, 5.0]);
+        assert_eq!(noticed.skipped_rows, 4);
+    }
+
+    #[test]
+    fn what_looks_like_other_units_is_said() {
+        let times: Vec<f64> = (0..100).map(|i| 0.01 * f64::from(i)).collect();
+        let ramp: Vec<f64> = (0..100).map(|i| 341.0 + 0.4 * f64::from(i)).collect();
+        let said = suspicions(&times, &ramp).join("\n");
+        assert!(said.contains("°F") && said.contains("time_h"), "{said}");
+        assert!(suspicions(&[0.0, 3600.0], &[293.0, 333.0]).is_empty());
+        assert!(contradicts_mean(1.0, 10.0).is_some() && contradicts_mean(10.0, 10.0).is_none());
+    }
+}

@@ -1,0 +1,410 @@
+//! The likelihood of the octaves and how it is maximised; equations in the module's head.
+
+use std::f64::consts::{LN_2, PI};
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::numeric::pyramid::Level;
+
+use super::STRAY;
+
+/// Quantisation, white, flicker as averaged, flicker as sampled, random walk as averaged, random walk as sampled.
+pub(super) const COMPONENTS: usize = 6;
+
+/// Haar variance of Hosking's flicker beside that of averaged flicker, octave by octave; from octave 9 on 1 to 1e-5.
+const HOSKING: [f64; 8] = [
+    std::f64::consts::LOG2_E,
+    1.154_156_032_712,
+    1.050_001_425_699,
+    1.015_412_937_271,
+    1.004_584_566_927,
+    1.001_329_178_918,
+    1.000_378_067_334,
+    1.000_105_962_730,
+];
+/// Sums of the squared correlations of a coefficient of flicker with those so many octaves below it.
+const FLICKER_CORRELATION: [f64; 8] = [1.0364, 0.1275, 0.1654, 0.1139, 0.0659, 0.0352, 0.0181, 0.0091];
+/// The ramp may be anything: this many of its usual sizes.
+const LOOSE: f64 = 1e6;
+/// A column whose square sum is less than this part of the largest does not vary.
+const STILL: f64 = 1e-20;
+/// Variances set out from no less than this part of the largest that an octave allows.
+const FAINT: f64 = 1e-3;
+const MOST_ROUNDS: usize = 60;
+const INNER_ROUNDS: usize = 300;
+/// Of −2 log L: what does not matter beside a quantile of 6.6.
+const SETTLED: f64 = 2e-3;
+
+/// Where the likelihood was looked at.
+#[derive(Debug, Clone)]
+pub(super) struct Point {
+    pub variances: [f64; COMPONENTS],
+    /// Of the columns, by group.
+    group_variances: Vec<f64>,
+    pub minus_two_log_likelihood: f64,
+}
+
+#[derive(Debug)]
+struct Octave {
+    n: f64,
+    weight: f64,
+    yy: f64,
+    xy: DVector<f64>,
+    xx: DMatrix<f64>,
+    units: [f64; COMPONENTS],
+}
+
+#[derive(Debug)]
+pub(super) struct Likelihood {
+    octaves: Vec<Octave>,
+    /// Which group each column is in; None for the ramp.
+    groups: Vec<Option<usize>>,
+    group_count: usize,
+    y_scale: f64,
+    ramp_scale: Option<f64>,
+}
+
+/// What is left of y at given variances.
+struct Rest {
+    /// Square sums by octave, with what is uncertain in β.
+    squares: Vec<f64>,
+    beta: DVector<f64>,
+    covariance: DMatrix<f64>,
+    minus_two_log_likelihood: f64,
+}
+
+impl Likelihood {
+    pub(super) fn new(levels: &[(usize, Level)], interval_s: f64, groups: &[usize]) -> Option<Self> {
+        let rows: f64 = levels.iter().map(|(_, l)| l.count).sum();
+        let total = |column: usize| -> f64 {
+            levels.iter().filter(|(_, l)| column < l.columns).map(|(_, l)| l.product(column, column)).sum()
+        };
+        let y_scale = (total(0) / rows).sqrt();
+        if !(y_scale > 0.0 && y_scale.is_finite()) {
+            return None;
+        }
+        let mut kinds = vec![None];
+        groups.iter().enumerate().for_each(|(g, size)| kinds.extend(std::iter::repeat_n(Some(g), *size)));
+        let largest = (2..=kinds.len()).map(total).fold(0.0, f64::max);
+        let kept: Vec<usize> = (1..=kinds.len())
+            .filter(|c| total(*c) > if *c == 1 { 0.0 } else { STILL * largest } && total(*c).is_finite())
+            .collect();
+        let scales: Vec<f64> = kept.iter().map(|c| (total(*c) / rows).sqrt()).collect();
+        let octaves = levels
+            .iter()
+            .map(|(number, level)| {
+                let has_columns = level.columns > 1;
+                let p = kept.len();
+                let product = |a: usize, b: usize| level.product(a.min(b), a.max(b));
+                Octave {
+                    n: level.count,
+                    weight: 1.0,
+                    yy: level.product(0, 0) / (y_scale * y_scale),
+                    xy: DVector::from_fn(p, |i, _| {
+                        if has_columns { product(0, kept[i]) / (scales[i] * y_scale) } else { 0.0 }
+                    }),
+                    xx: DMatrix::from_fn(p, p, |i, j| {
+                        if has_columns { product(kept[i], kept[j]) / (scales[i] * scales[j]) } else { 0.0 }
+                    }),
+                    units: units(*number, interval_s),
+                }
+            })
+            .collect();
+        Some(Self {
+            octaves,
+            groups: kept.iter().map(|c| kinds[c - 1]).collect(),
+            group_count: groups.len(),
+            y_scale,
+            ramp_scale: (kept.first() == Some(&1)).then(|| scales[0]),
+        })
+    }
+
+    /// One unit of the likelihood in units of y.
+    pub(super) fn scale(&self) -> f64 {
+        self.y_scale
+    }
+
+    /// Every noise as large as the quietest octave allows.
+    pub(super) fn start(&self) -> Point {
+        let variances = std::array::from_fn(|c| {
+            let most = |o: &Octave| o.yy / o.n / o.units[c];
+            let least = self.octaves.iter().map(most).fold(f64::INFINITY, f64::min);
+            let usual = self.octaves.iter().map(most).sum::<f64>() / self.octaves.len() as f64;
+            least + FAINT * usual
+        });
+        Point { variances, group_variances: vec![1.0; self.group_count], minus_two_log_likelihood: f64::INFINITY }
+    }
+
+    /// A variance so small that no octave shows it.
+    pub(super) fn least_visible(&self, parts: &[usize]) -> f64 {
+        let most = |o: &Octave| o.yy / o.n / parts.iter().map(|p| o.units[*p]).fold(0.0, f64::max);
+        FAINT * self.octaves.iter().map(most).fold(f64::INFINITY, f64::min).max(f64::MIN_POSITIVE)
+    }
+
+    fn model(&self, variances: &[f64; COMPONENTS]) -> Vec<f64> {
+        let sum = |o: &Octave| variances.iter().zip(o.units).map(|(v, u)| v * u).sum::<f64>();
+        self.octaves.iter().map(|o| sum(o).max(f64::MIN_POSITIVE)).collect()
+    }
+
+    fn prior(&self, column: usize, group_variances: &[f64]) -> f64 {
+        self.groups[column].map_or(LOOSE, |g| group_variances[g])
+    }
+
+    fn rest(&self, variances: &[f64; COMPONENTS], group_variances: &[f64]) -> Option<Rest> {
+        let model = self.model(variances);
+        let p = self.groups.len();
+        let mut precision = DMatrix::zeros(p, p);
+        let mut right = DVector::zeros(p);
+        let mut minus_two_log_likelihood = 0.0;
+        for (octave, s) in self.octaves.iter().zip(&model) {
+            let by = octave.weight / s;
+            precision += &octave.xx * by;
+            right += &octave.xy * by;
+            minus_two_log_likelihood += octave.weight * octave.n * s.ln() + by * octave.yy;
+        }
+        for column in 0..p {
+            let prior = self.prior(column, group_variances);
+            precision[(column, column)] += 1.0 / prior;
+            minus_two_log_likelihood += prior.ln();
+        }
+        let root = precision.cholesky()?;
+        minus_two_log_likelihood += 2.0 * root.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+        let beta = root.solve(&right);
+        minus_two_log_likelihood -= beta.dot(&right);
+        let covariance = root.inverse();
+        let squares = self
+            .octaves
+            .iter()
+            .map(|o| {
+                let fit = o.yy - 2.0 * beta.dot(&o.xy) + beta.dot(&(&o.xx * &beta));
+                fit.max(0.0) + o.xx.component_mul(&covariance).sum()
+            })
+            .collect();
+        minus_two_log_likelihood.is_finite().then_some(Rest { squares, beta, covariance, minus_two_log_likelihood })
+    }
+
+    /// From `start` uphill; `held` keeps the sum of some components at a value.
+    pub(super) fn maximised(&self, start: &Point, held: Option<(&[usize], f64)>) -> Point {
+        let mut point = start.clone();
+        if let Some((parts, sum)) = held {
+            let before: f64 = parts.iter().map(|p| point.variances[*p]).sum();
+            for part in parts {
+                let share = if before > 0.0 { point.variances[*part] / before } else { 1.0 / parts.len() as f64 };
+                point.variances[*part] = sum * share;
+            }
+            // What was zero can grow again once something else has to give way.
+            for component in (0..COMPONENTS).filter(|c| !parts.contains(c)) {
+                let faint = 1e-3 * self.least_visible(&[component]);
+                point.variances[component] = point.variances[component].max(faint);
+            }
+        }
+        let mut last = f64::INFINITY;
+        for round in 0..MOST_ROUNDS {
+            let Some(rest) = self.rest(&point.variances, &point.group_variances) else { break };
+            point.minus_two_log_likelihood = rest.minus_two_log_likelihood;
+            if last - rest.minus_two_log_likelihood < SETTLED && round > 2 {
+                break;
+            }
+            last = rest.minus_two_log_likelihood;
+            self.climb(&mut point.variances, &rest.squares, held);
+            if !self.groups.is_empty() {
+                self.regroup(&mut point.group_variances, &rest);
+            }
+        }
+        point
+    }
+
+    /// Majorising steps with the residual squares as they are.
+    fn climb(&self, variances: &mut [f64; COMPONENTS], squares: &[f64], held: Option<(&[usize], f64)>) {
+        for round in 0..INNER_ROUNDS {
+            let model = self.model(variances);
+            let (mut pull, mut push) = ([0.0; COMPONENTS], [0.0; COMPONENTS]);
+            for ((octave, s), square) in self.octaves.iter().zip(&model).zip(squares) {
+                for component in 0..COMPONENTS {
+                    let by = octave.weight * octave.units[component] / s;
+                    pull[component] += by * square / s;
+                    push[component] += by * octave.n;
+                }
+            }
+            let mut most: f64 = 0.0;
+            let before = *variances;
+            for component in 0..COMPONENTS {
+                variances[component] = before[component] * (pull[component] / push[component]).sqrt();
+            }
+            if let Some((parts, sum)) = held {
+                hold(variances, &before, parts, sum, &pull, &push);
+            }
+            for component in 0..COMPONENTS {
+                // Only what shows in some octave matters.
+                let shows = self
+                    .octaves
+                    .iter()
+                    .zip(&model)
+                    .map(|(o, s)| {
+                        (variances[component] - before[component]).abs() * o.units[component] / s * o.n.sqrt()
+                    })
+                    .fold(0.0, f64::max);
+                most = most.max(shows);
+            }
+            if most < 1e-4 && round > 5 {
+                break;
+            }
+        }
+    }
+
+    fn regroup(&self, group_variances: &mut [f64], rest: &Rest) {
+        for (group, variance) in group_variances.iter_mut().enumerate() {
+            let members = || (0..self.groups.len()).filter(|c| self.groups[*c] == Some(group));
+            let count = members().count();
+            if count > 0 {
+                let sum: f64 = members().map(|c| rest.beta[c].powi(2) + rest.covariance[(c, c)]).sum();
+                *variance = (sum / count as f64).max(1e-12);
+            }
+        }
+    }
+
+    /// Weights the octaves by what the others don't tell.
+    pub(super) fn weigh(&mut self, point: &Point) {
+        let model = self.model(&point.variances);
+        let share = |o: &Octave, s: f64, parts: [usize; 2]| {
+            parts.iter().map(|p| point.variances[*p] * o.units[*p]).sum::<f64>() / s
+        };
+        let shares: Vec<(f64, f64, f64)> =
+            self.octaves.iter().zip(&model).map(|(o, s)| (o.n, share(o, *s, [2, 3]), share(o, *s, [4, 5]))).collect();
+        let weights: Vec<f64> = shares
+            .iter()
+            .enumerate()
+            .map(|(j, (n, flicker, walk))| {
+                let told: f64 = shares
+                    .iter()
+                    .enumerate()
+                    .map(|(k, (other_n, other_flicker, other_walk))| {
+                        let apart = j.abs_diff(k);
+                        let of_flicker = FLICKER_CORRELATION.get(apart).copied().unwrap_or(0.0);
+                        if apart == 0 {
+                            return n * (1.0 + flicker * flicker * (of_flicker - 1.0));
+                        }
+                        let of_walk = 0.75 * (1.0 - 0.25f64.powi(apart as i32));
+                        let amplitude =
+                            (flicker * other_flicker * of_flicker).sqrt() + (walk * other_walk * of_walk).sqrt();
+                        n.min(*other_n) * amplitude * amplitude
+                    })
+                    .sum();
+                let stray = n * n * STRAY * STRAY * (flicker * flicker + walk * walk) / 2.0;
+                n / (told + stray)
+            })
+            .collect();
+        self.octaves.iter_mut().zip(weights).for_each(|(o, w)| o.weight = w);
+    }
+
+    /// The ramp's slope, its standard error and the degrees of freedom of that, in units of y a second.
+    pub(super) fn slope(&self, point: &Point) -> (f64, f64, f64) {
+        let (Some(ramp_scale), Some(rest)) = (self.ramp_scale, self.rest(&point.variances, &point.group_variances))
+        else {
+            return (0.0, 0.0, 1.0);
+        };
+        let model = self.model(&point.variances);
+        // What each octave says of the slope, and how much of that its random walk says in common with others.
+        let told: Vec<(f64, f64, f64)> = self
+            .octaves
+            .iter()
+            .zip(&model)
+            .map(|(o, s)| {
+                let walk = (point.variances[4] * o.units[4] + point.variances[5] * o.units[5]) / s;
+                (o.weight * o.xx[(0, 0)] / s, walk, o.n)
+            })
+            .collect();
+        let alone: f64 = told.iter().map(|t| t.0).sum();
+        let mut common: f64 = 0.0;
+        for (j, (info, walk, n)) in told.iter().enumerate() {
+            common += info * self.octaves[j].weight;
+            for (k, (other, other_walk, other_n)) in told.iter().enumerate().filter(|(k, _)| *k != j) {
+                // Σ corr over the finer one's coefficients below one of the coarser: ¾ √(2^d); x is constant in an octave.
+                let apart = j.abs_diff(k) as i32;
+                let correlation = 0.75 * 2f64.powi(apart).sqrt() * (walk * other_walk).sqrt();
+                let weights = (self.octaves[j].weight * self.octaves[k].weight).sqrt();
+                common += weights * (info * other).sqrt() * correlation * n.min(*other_n) / (n * other_n).sqrt();
+            }
+        }
+        let inflation = if alone > 0.0 { (common / alone).max(1.0) } else { 1.0 };
+        let freedom = alone * alone / told.iter().map(|t| t.0 * t.0 / t.2.max(1.0)).sum::<f64>().max(f64::MIN_POSITIVE);
+        let by = self.y_scale / ramp_scale;
+        (by * rest.beta[0], by * (rest.covariance[(0, 0)] * inflation).sqrt(), freedom)
+    }
+
+    /// Root mean square of what the further columns explain, in units of y.
+    pub(super) fn explained(&self, point: &Point) -> f64 {
+        let Some(rest) = self.rest(&point.variances, &point.group_variances) else { return 0.0 };
+        let mut beta = rest.beta;
+        if self.ramp_scale.is_some() {
+            beta[0] = 0.0;
+        }
+        let square: f64 = self.octaves.iter().map(|o| beta.dot(&(&o.xx * &beta))).sum();
+        let rows: f64 = self.octaves.iter().map(|o| o.n).sum();
+        self.y_scale * (square.max(0.0) / rows).sqrt()
+    }
+}
+
+/// The step that keeps a sum: the same majorant under a multiplier, found by bisection.
+fn hold(
+    variances: &mut [f64; COMPONENTS],
+    before: &[f64; COMPONENTS],
+    parts: &[usize],
+    sum: f64,
+    pull: &[f64; COMPONENTS],
+    push: &[f64; COMPONENTS],
+) {
+    if let [one] = parts {
+        variances[*one] = sum;
+        return;
+    }
+    let least = parts.iter().map(|p| push[*p]).fold(f64::INFINITY, f64::min);
+    let step = |multiplier: f64| -> Vec<f64> {
+        parts.iter().map(|p| before[*p] * (pull[*p] / (push[*p] - least + multiplier)).sqrt()).collect()
+    };
+    let (mut low, mut high) = (1e-14 * least, 1e14 * least);
+    for _ in 0..100 {
+        let middle = (low * high).sqrt();
+        if step(middle).iter().sum::<f64>() > sum { low = middle } else { high = middle }
+    }
+    let found = step(high);
+    let total: f64 = found.iter().sum();
+    for (part, value) in parts.iter().zip(found) {
+        variances[*part] = if total > 0.0 { value * sum / total } else { sum / parts.len() as f64 };
+    }
+}
+
+/// Haar variance of a unit of each component at an octave, 1 being the finest.
+fn units(octave: usize, interval_s: f64) -> [f64; COMPONENTS] {
+    let m = 2f64.powi(octave as i32 - 1);
+    let flicker = m * 2.0 * LN_2 / PI;
+    let walk = m * m * interval_s / 3.0;
+    [
+        3.0 / (m * interval_s * interval_s),
+        1.0 / interval_s,
+        flicker,
+        flicker * HOSKING.get(octave - 1).copied().unwrap_or(1.0),
+        walk,
+        walk + interval_s / 6.0,
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sampled_flickers_haar_variance_is_the_integral_of_its_spectrum() {
+        // S = 1/(2π) · π/sin πf for B = 1; |H|² = 4 sin⁴(π f W/2)/(W sin² πf).
+        for (octave, ratio) in HOSKING.iter().enumerate() {
+            let (width, nodes) = (2f64.powi(octave as i32 + 1), 1 << 17);
+            let mean = (0..nodes).map(|i| {
+                let x = PI * (f64::from(i) + 0.5) / (2.0 * f64::from(nodes));
+                0.5 / x.sin() * 4.0 * (x * width / 2.0).sin().powi(4) / (width * x.sin().powi(2))
+            });
+            let variance = mean.sum::<f64>() / f64::from(nodes);
+            let found = variance / units(octave + 1, 1.0)[2];
+            assert!((found / ratio - 1.0).abs() < 1e-5, "{octave}: {found}");
+        }
+    }
+}

@@ -1,0 +1,467 @@
+//! The thesis chapter on drift compensation: its numbers beside what a record simulated from its stated numbers gives.
+//!
+//! ```text
+//! R = K T + R0 in three lines;   B0 = F̄/S_n (3-1);   B_t = max |B_i − B_m|/|T_i − T_m| (3-4);   ARW = RMS/√W (3-5)
+//! δθ = ARW √t (3-6);   B_s²(τ) = a0 + a1/τ + a2/τ², ARW = √a1 (3-7);   G(z) = 5 (z + 1)/(13 z − 3)
+//! ```
+//!
+//! The chapter gives no record. This one follows its text: sums over 1 s of outputs at 100 Hz, a slow warming from 14 to 42 °C,
+//! the lines of Eq. (3-11) with the printed break points, and white noise so large that what is left has the printed band. It
+//! shows whether the printed numbers belong together, not that the chapter's gyro behaved so.
+//!
+//! # Source
+//! Master's thesis on a line-of-sight stabilisation with a fibre-optic gyro (2021), chapter 3, Eqs. (3-1) to (3-11). The text is
+//! scrambled where equations stand: G(z) is the one first-order filter of unit gain that its digits allow, and its time constant
+//! of 4 s is the printed 0.04 Hz.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use statrs::distribution::{ContinuousCDF, Normal};
+use thiserror::Error;
+
+use crate::compensate::CompensateError;
+use crate::compensate::empirical::PiecewiseBias;
+use crate::metrics::{Metrics, MetricsError};
+use crate::numeric::spectrum::{Density, power_spectral_density};
+use crate::numeric::statistics::{line, mean, rms, standard_deviation};
+use crate::record::{Record, RecordError};
+use crate::units::{
+    celsius_from_kelvin, kelvin_from_celsius, percent_from_fraction, rad_per_s_from_deg_per_h,
+    rad_per_s_from_deg_per_s, s_from_h,
+};
+
+pub const TITLE: &str = "Master's thesis on a line-of-sight stabilisation with a fibre-optic gyro (2021), chapter 3: \
+                         temperature drift of the gyro and its compensation";
+
+/// Slope [bit/°C] and value at 0 °C [bit] of Eq. (3-11), and where each line ends [°C]; 100 outputs a second.
+pub const LINES: [(f64, f64, f64); 3] =
+    [(0.3386, -7.3229, 23.6), (0.1045, -2.0033, 30.0), (0.4082, -11.492, f64::INFINITY)];
+/// What is left after compensation [bit], and the same in °/s: the only place where the two units meet.
+pub const BAND_BIT: f64 = 2.5;
+pub const BAND_DEG_PER_S: f64 = 0.0076;
+const RANGE_C: (f64, f64) = (14.0, 42.0);
+const ROWS: usize = 18_000;
+/// Of one row [bit]: with it 3600 filtered means stay within the printed band.
+const NOISE_BIT: f64 = 2.5;
+/// Rows in a mean.
+const MEAN_ROWS: usize = 5;
+/// The offset of another start-up.
+const TURN_ON_DEG_PER_H: f64 = 1.0;
+/// Filtered means that tell a start-up's offset: ten minutes.
+const TURN_ON_MEANS: usize = 120;
+/// Of rows of one second.
+const BANDWIDTH_HZ: f64 = 1.0;
+const SEED: u64 = 2021;
+const STRETCH: usize = 2048;
+
+/// A printed number beside the computed one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Comparison {
+    pub place: &'static str,
+    pub what: &'static str,
+    pub unit: &'static str,
+    /// None where the chapter gives the equation, but no number.
+    pub published: Option<f64>,
+    pub computed: f64,
+    pub explanation: &'static str,
+}
+
+/// Everything that the chapter shows, computed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reproduction {
+    pub comparisons: Vec<Comparison>,
+    /// Of the filtered means: time, temperature [°C], rate before and after [°/s].
+    pub rows: Vec<[f64; 4]>,
+    pub spectrum: Vec<Density>,
+    pub errata: &'static [(&'static str, &'static str, &'static str)],
+}
+
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum ThesisError {
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    #[error(transparent)]
+    Compensate(#[from] CompensateError),
+    #[error(transparent)]
+    Metrics(#[from] MetricsError),
+}
+
+/// Place, what is printed, what is used.
+pub const ERRATA: &[(&str, &str, &str)] = &[
+    (
+        "break points, text before Eq. (3-11)",
+        "the three lines are said to meet at 23.6 and 30 °C; those that are printed meet at 22.72 and 31.24 °C",
+        "the printed break points, at which the lines jump by 0.21 and 0.38 bit",
+    ),
+    (
+        "peak to peak after compensation",
+        "0.00163 °/s, a reduction by 96 %; but Fig. 3-4 and the text leave ±2.5 bit = ±0.0076 °/s, which is 0.0152 °/s: \
+         a decimal place (0.0163 °/s, a reduction by 59 %)",
+        "±2.5 bit",
+    ),
+    (
+        "Fig. 3-4 and text",
+        "±2.5 (±0.0076 °/s) is the only place where bits and °/s meet: S_n = 329 bit/(°/s)",
+        "that scale factor for everything",
+    ),
+    ("Eq. (3-6)", "δθ = RMS and √t with a factor that the text garbles", "δθ = ARW √t"),
+];
+
+/// °/s of one bit.
+fn deg_per_s(bits: f64) -> f64 {
+    bits * BAND_DEG_PER_S / BAND_BIT
+}
+
+fn bias_bit(temperature_c: f64) -> f64 {
+    let (slope, at_zero, _) =
+        LINES.iter().find(|(_, _, until_c)| temperature_c <= *until_c).copied().unwrap_or(LINES[2]);
+    slope * temperature_c + at_zero
+}
+
+/// Temperature [°C] and rate [°/s] of one start-up, row by row.
+fn raw(seed: u64, offset_deg_per_s: f64) -> Vec<(f64, f64)> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let normal = Normal::standard();
+    (0..ROWS)
+        .map(|i| {
+            let temperature_c = RANGE_C.0 + (RANGE_C.1 - RANGE_C.0) * i as f64 / (ROWS - 1) as f64;
+            let noise = NOISE_BIT * normal.inverse_cdf(random.random::<f64>());
+            (temperature_c, offset_deg_per_s + deg_per_s(bias_bit(temperature_c) + noise))
+        })
+        .collect()
+}
+
+/// Means over five rows through G(z), as a record.
+fn filtered(raw: &[(f64, f64)]) -> Result<Record, RecordError> {
+    let means: Vec<(f64, f64)> = raw
+        .chunks_exact(MEAN_ROWS)
+        .map(|rows| {
+            let of = |value: fn(&(f64, f64)) -> f64| mean(&rows.iter().map(value).collect::<Vec<_>>());
+            (of(|r| r.0), of(|r| r.1))
+        })
+        .collect();
+    let (mut before, mut out) = (means[0].1, means[0].1);
+    let rates = means
+        .iter()
+        .map(|(_, rate)| {
+            out = (3.0 * out + 5.0 * (rate + before)) / 13.0;
+            before = *rate;
+            rad_per_s_from_deg_per_s(out)
+        })
+        .collect();
+    let times_s = (1..=means.len()).map(|i| (i * MEAN_ROWS) as f64).collect();
+    Record::new("thesis2021", times_s, means.iter().map(|m| kelvin_from_celsius(m.0)).collect(), rates)
+}
+
+fn in_deg_per_s(rate_rad_per_s: f64) -> f64 {
+    rate_rad_per_s / rad_per_s_from_deg_per_s(1.0)
+}
+
+/// The record without what the lines say.
+fn compensated(record: &Record, lines: &PiecewiseBias) -> Result<Record, RecordError> {
+    let left = record.each_row().map(|r| r.rate_rad_per_s - lines.bias_rad_per_s(r.temperature_k)).collect();
+    Record::new("thesis2021", record.times_s().to_vec(), record.temperature_k().to_vec(), left)
+}
+
+/// √a1 of Eq. (3-7), over averaging times that double.
+fn walk_by_fit(rates: &[f64], interval_s: f64) -> f64 {
+    let mut points = Vec::new();
+    let mut rows = 1;
+    while rates.len() / rows >= 32 {
+        let means: Vec<f64> = rates.chunks_exact(rows).map(mean).collect();
+        points.push((1.0 / (rows as f64 * interval_s), standard_deviation(&means).powi(2)));
+        rows *= 2;
+    }
+    // With the weights of equal relative error the quadratic term does not show in white noise; the slope at long times is a1.
+    let long: Vec<(f64, f64)> = points.iter().skip(1).copied().collect();
+    line(long.into_iter()).map_or(f64::NAN, |(_, slope)| slope.max(0.0).sqrt())
+}
+
+/// # Errors
+/// None that the chapter's own numbers lead to.
+pub fn reproduce() -> Result<Reproduction, ThesisError> {
+    let raw_rows = raw(SEED, 0.0);
+    let record = filtered(&raw_rows)?;
+    let lines = PiecewiseBias::fit(&record)?;
+    let after = compensated(&record, &lines)?;
+    let interval_s = record.interval_s();
+    let (measured, left) = (Metrics::of(&record, interval_s)?, Metrics::of(&after, interval_s)?);
+    // Another start-up: step 1 takes off what its first minutes show.
+    let other =
+        compensated(&filtered(&raw(SEED + 1, in_deg_per_s(rad_per_s_from_deg_per_h(TURN_ON_DEG_PER_H))))?, &lines)?;
+    let rates: Vec<f64> = other.rate_rad_per_s().iter().map(|r| in_deg_per_s(*r)).collect();
+    let shift = mean(&rates[TURN_ON_MEANS..]);
+    let removed = shift - mean(&rates[..TURN_ON_MEANS]);
+
+    let noise: Vec<f64> = raw_rows.iter().map(|(t, rate)| rate - deg_per_s(bias_bit(*t))).collect();
+    let crossing = |a: usize, b: usize| (LINES[b].1 - LINES[a].1) / (LINES[a].0 - LINES[b].0);
+    // A row a second holds white noise up to 1 Hz, counted on both sides of zero.
+    let walk = rms(&noise) / BANDWIDTH_HZ.sqrt();
+    let comparisons = comparisons(&Found {
+        measured: &measured,
+        left: &left,
+        lines: &lines,
+        crossings_c: [crossing(0, 1), crossing(1, 2)],
+        walk,
+        walk_by_fit: walk_by_fit(&noise, 1.0),
+        shifts: [shift, removed],
+    });
+    let all: Vec<f64> = raw_rows.iter().map(|r| r.1).collect();
+    let rows = record
+        .each_row()
+        .zip(after.each_row())
+        .map(|(b, a)| {
+            [
+                b.time_s,
+                celsius_from_kelvin(b.temperature_k),
+                in_deg_per_s(b.rate_rad_per_s),
+                in_deg_per_s(a.rate_rad_per_s),
+            ]
+        })
+        .collect();
+    Ok(Reproduction { comparisons, rows, spectrum: power_spectral_density(&all, 1.0, STRETCH, 60), errata: ERRATA })
+}
+
+struct Found<'f> {
+    measured: &'f Metrics,
+    left: &'f Metrics,
+    lines: &'f PiecewiseBias,
+    crossings_c: [f64; 2],
+    walk: f64,
+    walk_by_fit: f64,
+    shifts: [f64; 2],
+}
+
+fn comparisons(found: &Found) -> Vec<Comparison> {
+    let row = |place, what, unit, published: Option<f64>, computed, explanation| Comparison {
+        place,
+        what,
+        unit,
+        published,
+        computed,
+        explanation,
+    };
+    let sensitivity = |m: &Metrics| m.temperature_sensitivity_rad_per_s_per_k.map_or(f64::NAN, in_deg_per_s);
+    let (before, after) =
+        (in_deg_per_s(found.measured.peak_to_peak_rad_per_s), in_deg_per_s(found.left.peak_to_peak_rad_per_s));
+    let bit = |value: f64| value * BAND_BIT / BAND_DEG_PER_S;
+    let slope = |i: usize| found.lines.lines.get(i).map_or(f64::NAN, |l| bit(in_deg_per_s(l.slope_rad_per_s_k)));
+    let until = |i: usize| found.lines.lines.get(i).map_or(f64::NAN, |l| celsius_from_kelvin(l.until_k));
+    let simulated = "simulated from the printed lines and band; the fit finds them again as far as the noise lets it";
+    vec![
+        row(
+            "(3-1)",
+            "scale factor S_n",
+            "bit/(°/s)",
+            None,
+            BAND_BIT / BAND_DEG_PER_S,
+            "from ±2.5 bit = ±0.0076 °/s; no number is printed",
+        ),
+        row(
+            "(3-1)",
+            "bias over the whole warming",
+            "°/s",
+            None,
+            in_deg_per_s(found.measured.bias_rad_per_s),
+            "no number is printed",
+        ),
+        row(
+            "(3-2)",
+            "bias stability before",
+            "°/s",
+            None,
+            found.measured.bias_stability_rad_per_s.map_or(f64::NAN, in_deg_per_s),
+            "of the filtered means; no number is printed",
+        ),
+        row(
+            "(3-2)",
+            "bias stability after",
+            "°/s",
+            None,
+            found.left.bias_stability_rad_per_s.map_or(f64::NAN, in_deg_per_s),
+            "no number is printed",
+        ),
+        row(
+            "Fig. 3-2",
+            "peak to peak before",
+            "°/s",
+            Some(0.04),
+            before,
+            "the lines' swing of 8.2 bit and the band of 5 bit: the printed numbers belong together",
+        ),
+        row(
+            "(3-4)",
+            "temperature sensitivity before",
+            "°/s/°C",
+            Some(0.00089),
+            sensitivity(found.measured),
+            "against the point at 20 °C; the chapter does not say which point m is",
+        ),
+        row(
+            "(3-5)",
+            "angle random walk, RMS/√W",
+            "°/√s",
+            None,
+            found.walk,
+            "white noise of one row over W = 1 Hz; no number is printed",
+        ),
+        row(
+            "(3-7)",
+            "angle random walk, fit of B_s²",
+            "°/√s",
+            None,
+            found.walk_by_fit,
+            "the same noise; no number is printed",
+        ),
+        row(
+            "(3-6)",
+            "angle by random walk in an hour",
+            "°",
+            None,
+            found.walk * s_from_h(1.0).sqrt(),
+            "ARW √t; no number is printed",
+        ),
+        row(
+            "(3-6)",
+            "drift angle over the warming, before",
+            "°",
+            None,
+            found.measured.drift_angle_rad / rad_per_s_from_deg_per_s(1.0),
+            "the rate integrated; no number is printed",
+        ),
+        row(
+            "(3-6)",
+            "drift angle over the warming, after",
+            "°",
+            None,
+            found.left.drift_angle_rad / rad_per_s_from_deg_per_s(1.0),
+            "no number is printed",
+        ),
+        row(
+            "3.3",
+            "bandwidth of G(z)",
+            "Hz",
+            Some(0.04),
+            1.0 / (std::f64::consts::TAU * 4.0),
+            "G is Tustin's form of a time constant of 4 s at 5 s",
+        ),
+        row(
+            "3.3 step 1",
+            "shift of another start-up, not removed",
+            "°/s",
+            None,
+            found.shifts[0],
+            "simulated with 1 °/h; no number is printed",
+        ),
+        row(
+            "3.3 step 1",
+            "shift of another start-up, removed",
+            "°/s",
+            None,
+            found.shifts[1],
+            "the mean of its first ten minutes is taken off",
+        ),
+        row("(3-11)", "slope of the lower line", "bit/°C", Some(LINES[0].0), slope(0), simulated),
+        row("(3-11)", "slope of the middle line", "bit/°C", Some(LINES[1].0), slope(1), simulated),
+        row("(3-11)", "slope of the upper line", "bit/°C", Some(LINES[2].0), slope(2), simulated),
+        row(
+            "(3-11)",
+            "lower break point, of the lines",
+            "°C",
+            Some(23.6),
+            found.crossings_c[0],
+            "erratum: the printed lines meet elsewhere",
+        ),
+        row(
+            "(3-11)",
+            "upper break point, of the lines",
+            "°C",
+            Some(30.0),
+            found.crossings_c[1],
+            "erratum: the printed lines meet elsewhere",
+        ),
+        row(
+            "(3-11)",
+            "lower break point, fitted",
+            "°C",
+            Some(23.6),
+            until(0),
+            "the record jumps at the printed places; the noise hides where",
+        ),
+        row(
+            "(3-11)",
+            "upper break point, fitted",
+            "°C",
+            Some(30.0),
+            until(1),
+            "the record jumps at the printed places; the noise hides where",
+        ),
+        row(
+            "Fig. 3-4",
+            "band after, half of peak to peak",
+            "°/s",
+            Some(BAND_DEG_PER_S),
+            0.5 * after,
+            "the noise was chosen for it",
+        ),
+        row(
+            "3.3",
+            "peak to peak after",
+            "°/s",
+            Some(0.00163),
+            after,
+            "erratum: contradicts the printed band of ±0.0076 °/s; 0.0163 is meant",
+        ),
+        row(
+            "3.3",
+            "reduction of peak to peak",
+            "%",
+            Some(96.0),
+            percent_from_fraction(1.0 - after / before),
+            "follows from the erratum: 59 % of 0.0163 °/s",
+        ),
+        row(
+            "(3-4)",
+            "temperature sensitivity after",
+            "°/s/°C",
+            Some(0.000_107),
+            sensitivity(found.left),
+            "what noise leaves in points of 5 °C; the chapter's points are finer, or its lines fit less well",
+        ),
+        row("Fig. 3-6", "drift rate before", "°/s", Some(0.02), 0.5 * before, "half of peak to peak"),
+        row("Fig. 3-5", "drift rate after", "°/s", Some(0.008), 0.5 * after, "half of peak to peak"),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_printed_numbers_belong_together_but_for_the_errata() {
+        let found = reproduce().unwrap();
+        for c in &found.comparisons {
+            println!("{:12} {:45} {:>12?} {:>12.6} {}", c.place, c.what, c.published, c.computed, c.unit);
+            assert!(c.computed.is_finite(), "{}", c.what);
+        }
+        let ratio = |what: &str| {
+            let c = found.comparisons.iter().find(|c| c.what == what).unwrap();
+            c.computed / c.published.unwrap()
+        };
+        for what in [
+            "peak to peak before",
+            "temperature sensitivity before",
+            "band after, half of peak to peak",
+            "bandwidth of G(z)",
+        ] {
+            assert!((ratio(what) - 1.0).abs() < 0.1, "{what}: {}", ratio(what));
+        }
+        assert!(ratio("peak to peak after") > 8.0);
+        let of = |what: &str| found.comparisons.iter().find(|c| c.what == what).unwrap().computed;
+        assert!((of("lower break point, of the lines") - 22.72).abs() < 0.01);
+        assert!((of("upper break point, of the lines") - 31.24).abs() < 0.01);
+        assert!(of("shift of another start-up, removed").abs() < 0.3 * of("shift of another start-up, not removed"));
+        let (walk, fit) = (of("angle random walk, RMS/√W"), of("angle random walk, fit of B_s²"));
+        assert!((fit / walk - 1.0).abs() < 0.1, "{walk} {fit}");
+    }
+}
