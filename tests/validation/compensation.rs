@@ -14,6 +14,7 @@ use coilwright::compensate::physical::USUAL_HYPOTHESES;
 use coilwright::compensate::{CompensateError, Compensator, Method};
 use coilwright::io::model::ModelFile;
 use coilwright::io::read::model_file::read_model;
+use coilwright::io::read::record_columns::RecordFormat;
 use coilwright::io::write::compensation_file::compensate_lines;
 use coilwright::io::write::difference_equation::DifferenceEquation;
 use coilwright::numeric::piecewise::PiecewiseLinear;
@@ -90,7 +91,7 @@ fn a_channel_of_the_model_is_taken_from_its_column_and_held_where_it_drops_out()
         writeln!(input, "{},20.0,{},{column}", 10 * i, 0.5 + 2.0 * volts).unwrap();
     }
     let mut output = Vec::new();
-    let summary = compensate_lines(&compensator, "x", input.as_bytes(), &mut output).unwrap();
+    let summary = compensate_lines(&compensator, &RecordFormat::default(), "x", input.as_bytes(), &mut output).unwrap();
     assert_eq!((summary.rows, summary.channel_held), (100, 1));
     for (row, line) in String::from_utf8(output).unwrap().lines().skip(1).enumerate() {
         let fields: Vec<&str> = line.split(',').collect();
@@ -98,8 +99,13 @@ fn a_channel_of_the_model_is_taken_from_its_column_and_held_where_it_drops_out()
         let expected = if row == 50 { 0.5 + 2.0 * 0.01 } else { 0.5 };
         assert!((rate - expected).abs() < 1e-7, "{line}");
     }
-    let lacking =
-        compensate_lines(&compensator, "x", "time_s,temperature_c,rate_deg_per_h\n0,20,1\n".as_bytes(), Vec::new());
+    let lacking = compensate_lines(
+        &compensator,
+        &RecordFormat::default(),
+        "x",
+        "time_s,temperature_c,rate_deg_per_h\n0,20,1\n".as_bytes(),
+        Vec::new(),
+    );
     assert!(lacking.unwrap_err().to_string().contains("supply_v"));
 }
 
@@ -168,7 +174,8 @@ fn however_a_stream_is_damaged_every_line_comes_out_in_order() {
             lines.extend(vec![fields.join(","); copies]);
         }
         let mut output = Vec::new();
-        compensate_lines(&compensator, "x", lines.join("\n").as_bytes(), &mut output).unwrap();
+        compensate_lines(&compensator, &RecordFormat::default(), "x", lines.join("\n").as_bytes(), &mut output)
+            .unwrap();
         let output = String::from_utf8(output).unwrap();
         assert_eq!(output.lines().count(), lines.len(), "seed {seed}");
         for (line, found) in lines.iter().zip(output.lines()) {
@@ -199,7 +206,8 @@ fn stream_and_batch_agree_to_the_last_digit_and_no_line_is_lost() {
     let compensator = fitted("a-control", Method::Physical);
     let text = std::fs::read_to_string(folder("a-control").join("validation.csv")).unwrap();
     let mut output = Vec::new();
-    let summary = compensate_lines(&compensator, "validation", text.as_bytes(), &mut output).unwrap();
+    let summary =
+        compensate_lines(&compensator, &RecordFormat::default(), "validation", text.as_bytes(), &mut output).unwrap();
     let output = String::from_utf8(output).unwrap();
     assert_eq!(output.lines().count(), text.lines().count());
     let batch = compensator.batch(&record("a-control", "validation.csv"));
@@ -229,7 +237,7 @@ fn faults_in_a_stream_are_flagged_in_order_and_the_stream_goes_on() {
         }
     }
     let mut output = Vec::new();
-    let summary = compensate_lines(&compensator, "x", input.as_bytes(), &mut output).unwrap();
+    let summary = compensate_lines(&compensator, &RecordFormat::default(), "x", input.as_bytes(), &mut output).unwrap();
     let output = String::from_utf8(output).unwrap();
     assert_eq!(output.lines().count(), input.lines().count());
     let flagged: Vec<(usize, &str)> = output
