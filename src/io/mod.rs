@@ -7,4 +7,5 @@ pub mod files;
 pub mod json;
 pub mod model;
 pub mod read;
+pub mod record_format;
 pub mod write;

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::io::read::record_columns::RecordFormat;
+use crate::io::record_format::RecordFormat;
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::profile::ProfileSpec;

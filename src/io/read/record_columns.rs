@@ -3,249 +3,12 @@
 //! A name's ending says its unit (`temperature_k`), and so does a unit in brackets (`Omega [deg/s]`, `T1 (°F)`); a mapping
 //! (`time=Zeit:min,rate=Omega`, or `[record]` in a model file) says which column is which and overrides both.
 
-use crate::units::{
-    celsius_from_fahrenheit, kelvin_from_celsius, rad_per_s_from_arcsec_per_s, rad_per_s_from_deg_per_h,
-    rad_per_s_from_deg_per_s, s_from_days, s_from_h, s_from_min, s_from_ms, s_from_ns, s_from_us,
-};
-
 use crate::io::fault::Fault;
+use crate::io::record_format::{Conversion, Kind, UNITS, Unit, accepted_names};
+pub use crate::io::record_format::{Quantity, RecordFormat};
+use crate::units::{rad_per_s_from_deg_per_h, s_from_ns};
 
 use super::toml_reader::{Limits, TableReader, TomlReader, nearest};
-
-/// What a column holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
-    Time,
-    Temperature,
-    Rate,
-    InnerTemperature,
-    AmbientTemperature,
-    /// Anything else, by its name.
-    Channel,
-}
-
-impl Quantity {
-    /// As a mapping names it.
-    const ROLES: [(&'static str, Quantity); 5] = [
-        ("time", Quantity::Time),
-        ("temperature", Quantity::Temperature),
-        ("rate", Quantity::Rate),
-        ("inner", Quantity::InnerTemperature),
-        ("ambient", Quantity::AmbientTemperature),
-    ];
-
-    /// The names before the unit that a header may have without a mapping.
-    const STEMS: [(&'static str, Quantity); 5] = [
-        ("time", Quantity::Time),
-        ("temperature", Quantity::Temperature),
-        ("rate", Quantity::Rate),
-        ("temperature_inner", Quantity::InnerTemperature),
-        ("temperature_ambient", Quantity::AmbientTemperature),
-    ];
-
-    fn is_temperature(self) -> bool {
-        matches!(self, Quantity::Temperature | Quantity::InnerTemperature | Quantity::AmbientTemperature)
-    }
-
-    fn default_unit(self) -> &'static str {
-        match self {
-            Quantity::Time => "s",
-            Quantity::Rate => "deg_per_h",
-            Quantity::Channel => "",
-            _ => "c",
-        }
-    }
-}
-
-/// How a cell's number becomes SI.
-#[derive(Debug, Clone, Copy)]
-enum Conversion {
-    By(fn(f64) -> f64),
-    /// A date and time of day.
-    Stamp,
-    /// Raw output, so many of them a degree an hour.
-    Raw,
-}
-
-impl Conversion {
-    fn is_stamp(self) -> bool {
-        matches!(self, Conversion::Stamp)
-    }
-
-    fn is_raw(self) -> bool {
-        matches!(self, Conversion::Raw)
-    }
-}
-
-/// A unit that a column may be in.
-struct Unit {
-    /// As a name ends with it.
-    key: &'static str,
-    /// As it may stand in brackets.
-    written: &'static [&'static str],
-    of: Kind,
-    conversion: Conversion,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Time,
-    Temperature,
-    Rate,
-}
-
-const fn unit(key: &'static str, written: &'static [&'static str], of: Kind, conversion: Conversion) -> Unit {
-    Unit { key, written, of, conversion }
-}
-
-fn as_it_is(value: f64) -> f64 {
-    value
-}
-
-fn kelvin_from_fahrenheit(value: f64) -> f64 {
-    kelvin_from_celsius(celsius_from_fahrenheit(value))
-}
-
-fn rad_per_s_from_mdeg_per_h(value: f64) -> f64 {
-    rad_per_s_from_deg_per_h(value / 1000.0)
-}
-
-const UNITS: &[Unit] = &[
-    unit("s", &["sec", "seconds", "epoch_s"], Kind::Time, Conversion::By(as_it_is)),
-    unit("ms", &["msec", "epoch_ms"], Kind::Time, Conversion::By(s_from_ms)),
-    unit("us", &["µs", "μs", "epoch_us"], Kind::Time, Conversion::By(s_from_us)),
-    unit("ns", &["epoch_ns"], Kind::Time, Conversion::By(s_from_ns)),
-    unit("min", &["minutes"], Kind::Time, Conversion::By(s_from_min)),
-    unit("h", &["hr", "hours"], Kind::Time, Conversion::By(s_from_h)),
-    unit("d", &["days"], Kind::Time, Conversion::By(s_from_days)),
-    unit("iso", &["iso8601", "utc"], Kind::Time, Conversion::Stamp),
-    unit("c", &["°c", "degc", "celsius"], Kind::Temperature, Conversion::By(kelvin_from_celsius)),
-    unit("k", &["kelvin"], Kind::Temperature, Conversion::By(as_it_is)),
-    unit("f", &["°f", "degf", "fahrenheit"], Kind::Temperature, Conversion::By(kelvin_from_fahrenheit)),
-    unit("deg_per_h", &["°/h", "deg/h", "deg/hr", "°/hr"], Kind::Rate, Conversion::By(rad_per_s_from_deg_per_h)),
-    unit("mdeg_per_h", &["m°/h", "mdeg/h"], Kind::Rate, Conversion::By(rad_per_s_from_mdeg_per_h)),
-    unit("deg_per_s", &["°/s", "deg/s", "dps"], Kind::Rate, Conversion::By(rad_per_s_from_deg_per_s)),
-    unit("rad_per_s", &["rad/s"], Kind::Rate, Conversion::By(as_it_is)),
-    unit("arcsec_per_s", &["arcsec/s", "\"/s", "″/s"], Kind::Rate, Conversion::By(rad_per_s_from_arcsec_per_s)),
-    unit("counts", &["bit", "bits", "lsb"], Kind::Rate, Conversion::Raw),
-    unit("mv", &[], Kind::Rate, Conversion::Raw),
-    unit("v", &["volt", "volts"], Kind::Rate, Conversion::Raw),
-];
-
-impl Kind {
-    fn of(quantity: Quantity) -> Option<Self> {
-        match quantity {
-            Quantity::Time => Some(Kind::Time),
-            Quantity::Rate => Some(Kind::Rate),
-            Quantity::Channel => None,
-            _ => Some(Kind::Temperature),
-        }
-    }
-
-    fn unit(self, text: &str) -> Option<&'static Unit> {
-        let text = text.trim().to_lowercase();
-        UNITS.iter().find(|u| u.of == self && (u.key == text || u.written.contains(&text.as_str())))
-    }
-
-    fn accepted(self) -> String {
-        UNITS.iter().filter(|u| u.of == self).map(|u| u.key).collect::<Vec<_>>().join(", ")
-    }
-}
-
-/// Every name that a header may have without a mapping, quantity by quantity.
-pub fn accepted_names() -> Vec<String> {
-    let names = Quantity::STEMS.iter().flat_map(|(stem, quantity)| {
-        let of = Kind::of(*quantity);
-        UNITS
-            .iter()
-            .filter(move |u| Some(u.of) == of && !u.conversion.is_raw())
-            .map(move |u| format!("{stem}_{}", u.key))
-    });
-    names.collect()
-}
-
-/// One column that a mapping names.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Mapped {
-    quantity: Quantity,
-    name: String,
-    unit: Option<&'static str>,
-}
-
-/// Which column is which, and what to do with rows that are none.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RecordFormat {
-    pub(super) mapped: Vec<Mapped>,
-    /// Raw outputs a degree an hour.
-    pub(super) scale: Option<f64>,
-    /// Rows with a missing cell, or with a stamp that repeats or jumps back, are skipped and counted instead of refused.
-    pub skips_bad_rows: bool,
-    /// So many rows are averaged into one.
-    pub average_rows: usize,
-    /// A compensated rate, where there is one, is the rate.
-    pub compensated: bool,
-}
-
-impl Default for RecordFormat {
-    fn default() -> Self {
-        Self { mapped: Vec::new(), scale: None, skips_bad_rows: false, average_rows: 1, compensated: false }
-    }
-}
-
-impl RecordFormat {
-    /// Adds `role=column[:unit]` or `scale=number`; a role that is there already is replaced.
-    ///
-    /// # Errors
-    /// What is wrong with it, in words.
-    pub fn map(&mut self, role: &str, target: &str) -> Result<(), String> {
-        let (role, target) = (role.trim(), target.trim());
-        if role == "scale" {
-            let scale = target.replace(',', ".").parse::<f64>().ok().filter(|s| s.is_finite() && *s != 0.0);
-            self.scale = Some(scale.ok_or_else(|| {
-                format!("scale: expected how many raw units are one degree an hour, not 0, found \"{target}\"")
-            })?);
-            return Ok(());
-        }
-        let Some((_, quantity)) = Quantity::ROLES.iter().find(|(name, _)| *name == role) else {
-            let known: Vec<&str> = Quantity::ROLES.iter().map(|(name, _)| *name).chain(["scale"]).collect();
-            return Err(format!("expected one of {}, found \"{role}\"", known.join(", ")));
-        };
-        let (name, unit) = match target.rsplit_once(':') {
-            Some((name, unit)) if Kind::of(*quantity).is_some_and(|k| k.unit(unit).is_some()) => (name, Some(unit)),
-            Some((_, unit)) => {
-                let accepted = Kind::of(*quantity).map(Kind::accepted).unwrap_or_default();
-                return Err(format!("{role}: expected a unit of {accepted} behind the colon, found \"{unit}\""));
-            }
-            None => (target, None),
-        };
-        if name.trim().is_empty() {
-            return Err(format!("{role}: expected a column's name, found nothing"));
-        }
-        let unit = unit.and_then(|u| Kind::of(*quantity)?.unit(u)).map(|u| u.key);
-        self.mapped.retain(|m| m.quantity != *quantity);
-        self.mapped.push(Mapped { quantity: *quantity, name: name.trim().to_owned(), unit });
-        Ok(())
-    }
-
-    /// As [`RecordFormat::map`], of a whole list.
-    ///
-    /// # Errors
-    /// What is wrong with the first part that is none.
-    pub fn map_all(&mut self, list: &str) -> Result<(), String> {
-        for part in list.split(',').filter(|p| !p.trim().is_empty()) {
-            let Some((role, target)) = part.split_once('=') else {
-                return Err(format!("expected role=column, such as time=Zeit, found \"{part}\""));
-            };
-            self.map(role, target)?;
-        }
-        Ok(())
-    }
-
-    /// Whether columns that are not mapped may hold words.
-    pub fn has_mapping(&self) -> bool {
-        !self.mapped.is_empty()
-    }
-}
 
 /// The `[record]` table of a model file: roles as keys, `scale`, `bad_rows`, `average_rows`.
 pub(super) fn read_format(r: &mut TomlReader, table: &mut TableReader<'_>) -> RecordFormat {
@@ -303,7 +66,7 @@ impl Column {
         let quantity = mapped.map_or_else(|| of_name.map_or(Quantity::Channel, |(q, _)| q), |m| m.quantity);
         let mut assumed = None;
         let conversion = match Kind::of(quantity) {
-            None => Conversion::By(as_it_is),
+            None => Conversion::By(|value| value),
             Some(kind) => {
                 let stated = mapped.and_then(|m| m.unit).and_then(|u| kind.unit(u));
                 let ending = || {
@@ -314,7 +77,9 @@ impl Column {
                 if known.is_none() {
                     assumed = Some(quantity.default_unit());
                 }
-                known.or_else(|| kind.unit(quantity.default_unit())).map_or(Conversion::By(as_it_is), |u| u.conversion)
+                known
+                    .or_else(|| kind.unit(quantity.default_unit()))
+                    .map_or(Conversion::By(|value| value), |u| u.conversion)
             }
         };
         let scale = match (conversion, format.scale) {
@@ -463,7 +228,7 @@ fn prefer_compensated(columns: &mut [Column]) {
     let Some(place) = columns.iter().position(|c| c.name == COMPENSATED) else { return };
     for column in columns.iter_mut().filter(|c| c.quantity == Quantity::Rate) {
         column.quantity = Quantity::Channel;
-        column.conversion = Conversion::By(as_it_is);
+        column.conversion = Conversion::By(|value| value);
     }
     columns[place].quantity = Quantity::Rate;
     columns[place].conversion = Conversion::By(rad_per_s_from_deg_per_h);
