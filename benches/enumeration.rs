@@ -18,7 +18,7 @@ use coilwright::search::cost::columns::{Columns, Norm};
 use coilwright::search::cost::samples::SampleMatrix;
 use coilwright::search::cost::signs::{segments_of_signs, sign_columns};
 use coilwright::search::cost::worst_case::SolvedProfiles;
-use coilwright::search::proof::{Task, prove, starting_patterns};
+use coilwright::search::proof::{Goal, Task, prove, starting_patterns};
 use coilwright::units::deg_per_h_from_rad_per_s;
 
 /// Patterns between two comparisons with the reference.
@@ -89,7 +89,7 @@ fn compare(path: &Path) {
     println!("  smallest sampled {:.9} deg/h, pattern {:?}", deg_per_h_from_rad_per_s(smallest[0].0), best.1);
 
     let started = Instant::now();
-    let task = Task { model, solved: &solved, class };
+    let task = Task { model, solved: &solved, class, goal: Goal::WorstRate };
     let starts = starting_patterns(&task, file.search.seed).expect("the search can begin");
     let proof = prove(&task, &starts, &|_| ControlFlow::Continue(())).expect("the proof can begin");
     println!(

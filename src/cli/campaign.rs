@@ -1,8 +1,8 @@
 //! `campaign`: a grid of searches, in parts and with interruptions, with one table at the end.
 
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-use super::optimise::evaluator_of;
 use super::progress::StopFlag;
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
@@ -11,11 +11,11 @@ use crate::io::read::campaign_file::{
     CampaignFile, CampaignJson, Cell, CellJson, cell_path, read_campaign, read_cell, summary_csv,
 };
 use crate::report::plot::{Axis, Chart, Series};
-use crate::search::anneal::rounds::{DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Plan, Rules};
-use crate::search::cost::guaranteed::UnitStep;
+use crate::search::anneal::rounds::{DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Plan, Rounds, Rules};
+use crate::search::answer::Ended;
 use crate::search::cost::objective::Objective;
-use crate::search::cost::worst_case::SolvedProfiles;
-use crate::search::evaluator::improvement_over_qua;
+use crate::search::run::{Halt, RunError};
+use crate::search::{self, Observer};
 use crate::units::deg_per_h_from_rad_per_s;
 
 /// A grid of searches (coils, layer counts, classes, objectives, seeds)
@@ -106,9 +106,6 @@ fn search(
     stop: &StopFlag,
 ) -> Result<Option<CellJson>, CliError> {
     let (model, layers) = (&cell.file.model, cell.file.model.coil.layers());
-    let solved = SolvedProfiles::new(model, &cell.file.profiles.profiles())?;
-    let unit_step = UnitStep::new(model, cell.file.profiles.max_rate_k_per_s).ok();
-    let evaluator = evaluator_of(&cell.file, &solved, cell.objective, unit_step.as_ref());
     let plan = Plan {
         seed: cell.seed,
         restarts_per_round: DEFAULT_RESTARTS_PER_ROUND,
@@ -123,19 +120,25 @@ fn search(
         },
         starts: Vec::new(),
     };
-    let mut optimisation = evaluator.search(cell.class, plan, None)?.expect("nothing was saved that might not fit");
-    while optimisation.advance() {
-        if stop.is_set() {
-            return Ok(None);
-        }
-    }
-    let baselines = evaluator.baselines()?;
-    let found = &optimisation.state().found;
-    let best = match evaluator.best(cell.class, found, &baselines)? {
-        Some(best) => Some(evaluator.improved(cell.class, best, found, None)?.0),
-        None => None,
+    let request = search::Request {
+        model,
+        profiles: &cell.file.profiles,
+        tolerance: cell.file.tolerance.as_ref(),
+        objective: cell.objective,
+        class: cell.class,
+        plan,
+        saved: None,
+        former: None,
+        prove: false,
+        recommend: false,
     };
-    Ok(best.map(|best| CellJson {
+    let answer = match search::run(&request, &mut UntilStopped(stop)) {
+        Ok(answer) => answer.filter(|answer| answer.ended != Ended::Signal),
+        Err(RunError::Judge(error)) => return Err(error.into()),
+        // Nothing was saved that might not fit.
+        Err(RunError::Resume) => None,
+    };
+    Ok(answer.map(|answer| CellJson {
         cell: index + 1,
         fingerprint,
         model: model.name.clone(),
@@ -143,14 +146,27 @@ fn search(
         windability: cell.class.to_string(),
         objective: cell.objective.key().to_owned(),
         seed: cell.seed,
-        worst_rate_deg_per_h: deg_per_h_from_rad_per_s(best.worst.rate_rad_per_s.abs()),
+        worst_rate_deg_per_h: deg_per_h_from_rad_per_s(answer.best.worst.rate_rad_per_s.abs()),
         objective_deg_per_h: (cell.objective != Objective::WorstPhase)
-            .then(|| deg_per_h_from_rad_per_s(best.objective_rad_per_s)),
-        improvement_over_qua: improvement_over_qua(&best, &baselines),
-        evaluations: optimisation.evaluations(),
-        stopped_by: optimisation.state().stop.map_or("rounds", |s| s.key()).to_owned(),
-        segments: best.pattern.segments().to_vec(),
+            .then(|| deg_per_h_from_rad_per_s(answer.best.objective_rad_per_s)),
+        improvement_over_qua: answer.improvement_over_qua,
+        evaluations: answer.evaluations,
+        stopped_by: answer.ended.key().to_owned(),
+        segments: answer.best.pattern.segments().to_vec(),
     }))
+}
+
+/// Ends a search as soon as a signal comes.
+struct UntilStopped<'a>(&'a StopFlag);
+
+impl Observer for UntilStopped<'_> {
+    fn advanced(&mut self, _search: &dyn Rounds) -> ControlFlow<Halt> {
+        if self.0.is_set() { ControlFlow::Break(Halt::Signal) } else { ControlFlow::Continue(()) }
+    }
+
+    fn goes_on(&self) -> bool {
+        !self.0.is_set()
+    }
 }
 
 /// The worst rate of every cell, one series a class.

@@ -7,6 +7,7 @@ use super::{CliError, Ending};
 use crate::io::fault::Faults;
 use crate::io::json::{CheckJson, FaultJson};
 use crate::io::read::model_file::read_model;
+use crate::io::read::plausibility::advice;
 
 /// All faults of a model file at once
 #[derive(Debug, clap::Args)]
@@ -20,7 +21,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = arguments.model.display().to_string();
     match read_model(&arguments.model) {
         Ok(found) => {
-            let advice = found.advice.iter().map(ToString::to_string).collect();
+            let advice = advice(&found).iter().map(ToString::to_string).collect();
             screen.answer(CheckJson { file, faults: Vec::new(), advice }, |body| {
                 let notes: String = body.advice.iter().map(|a| format!("note: {a}\n")).collect();
                 format!("{}: no faults\n{notes}", body.file)

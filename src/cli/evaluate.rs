@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
+use crate::effect::FILM;
 use crate::io::files::write_atomically;
 use crate::io::json::{EvaluateJson, PatternJson};
-use crate::io::model::{ModelFile, NamedPattern};
+use crate::io::model::{Advice, ModelFile, NamedPattern};
 use crate::io::read::model_file::read_model;
 use crate::io::read::pattern_file::resolve_pattern;
 use crate::io::read::profile_file::read_profile_file;
@@ -79,6 +80,9 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         write_atomically(path, listed.as_bytes())?;
         screen.note(&format!("{} profiles listed in {}", extremes.len(), path.display()));
     }
+    if file.model.prescribes_outermost_layer() && holds_a_tie(&answers) {
+        screen.note(&format!("note: {}", Advice::PrescribedBoundary { film: FILM.spec.kind }));
+    }
     let body = EvaluateJson { model: file.model.name.clone(), patterns: answers };
     screen.answer(body, |body| {
         let rows = body.patterns.iter().map(|p| {
@@ -100,6 +104,16 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         )
     })?;
     Ok(Ending::Done)
+}
+
+/// Whether two different windings have the same guaranteed worst rate.
+fn holds_a_tie(answers: &[PatternJson]) -> bool {
+    const SAME: f64 = 1e-6;
+    let bound = |p: &PatternJson| p.guaranteed_worst_rate_deg_per_h;
+    answers.iter().enumerate().any(|(i, a)| {
+        let ties = |b: &PatternJson| bound(a).zip(bound(b)).is_some_and(|(x, y)| (x - y).abs() <= SAME * x.abs());
+        answers[..i].iter().any(|b| b.segments != a.segments && ties(b))
+    })
 }
 
 /// Profiles end with their last piece; the error may still grow while the pack settles.

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use super::budget::parse_duration;
+use super::optimise::parse_objective;
 use super::progress::StopFlag;
 use super::screen::Screen;
 use super::{CliError, Ending};
@@ -20,14 +21,16 @@ use crate::pattern::classic::Classic;
 use crate::pattern::windability::WindabilityClass;
 use crate::rate::{RateError, RateModel};
 use crate::search::cost::guaranteed::UnitStep;
+use crate::search::cost::objective::Objective;
 use crate::search::cost::worst_case::SolvedProfiles;
-use crate::search::proof::{Progress, Status, Task, prove, starting_patterns};
+use crate::search::evaluator::JudgeError;
+use crate::search::proof::{Goal, Progress, Status, Task, prove, starting_patterns};
 use crate::units::deg_per_h_from_rad_per_s;
 
 /// The best winding of a class with a proof, or a lower bound on what any winding can reach
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "The proof holds for the worst rate over all times of the model's profiles. \"optimal\": no winding of the class is\n\
+    after_help = "The proof holds for the worst rate over all times of the model's profiles, or for another --objective. \"optimal\": no winding of the class is\n\
     better by more than one part in 10^9; \"gap\": none is better than the lower bound.\n\n\
     Examples:\n  coilwright exact examples/paper-200m.toml\n  \
     coilwright exact examples/paper-200m.toml --windability any --budget 5m -o best.toml"
@@ -38,6 +41,9 @@ pub struct Arguments {
     /// What can be wound: standard, captive:K or any; without it, the model's own
     #[arg(long, value_name = "CLASS", value_parser = parse_class)]
     windability: Option<WindabilityClass>,
+    /// What is proved to be small: worst-rate, rms or guaranteed-rate; without it, worst-rate
+    #[arg(long, value_name = "WHAT", value_parser = parse_objective)]
+    objective: Option<Objective>,
     /// Gives up after this time, e.g. 30s or 5m, with the lower bound reached until then
     #[arg(long, value_name = "TIME", default_value = "60s", value_parser = parse_duration)]
     budget: Duration,
@@ -71,7 +77,18 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let (model, layers) = (&file.model, file.model.coil.layers());
     let solved = SolvedProfiles::new(model, &file.profiles.profiles())?;
     let class = arguments.windability.unwrap_or(file.search.windability);
-    let task = Task { model, solved: &solved, class };
+    let step = UnitStep::new(model, file.profiles.max_rate_k_per_s);
+    let objective = arguments.objective.unwrap_or(Objective::WorstRate);
+    let goal = match objective {
+        Objective::WorstRate | Objective::WorstPhase => Goal::WorstRate,
+        Objective::RootMeanSquare => Goal::RootMeanSquare,
+        Objective::GuaranteedRate => Goal::Guaranteed(step.as_ref().map_err(|error| JudgeError::from(error.clone()))?),
+        Objective::P95 => {
+            let message = "proofs are of worst, guaranteed and rms rates, not of p95".to_owned();
+            return Err(CliError::Option { option: "--objective", message });
+        }
+    };
+    let task = Task { model, solved: &solved, class, goal };
     let own = file.pattern.iter().map(|named| named.pattern.clone());
     let stated = arguments.pattern.iter().map(|stated| Ok(resolve_pattern(stated, layers, None)?.pattern));
     let mut starts = own.map(Ok).chain(stated).collect::<Result<Vec<Pattern>, CliError>>()?;
@@ -96,12 +113,14 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let pattern = &certificate.pattern;
     let worst = solved.worst_case(model, pattern)?;
     let phase_rad = RateModel::new(model, pattern, &[])?.phase_rad(worst.rate_rad_per_s);
-    let bound = UnitStep::new(model, file.profiles.max_rate_k_per_s).and_then(|s| s.guaranteed(model, pattern)).ok();
+    let bound = step.and_then(|s| s.guaranteed(model, pattern)).ok();
     let name = name_of(pattern);
     let body = ExactJson {
         model: model.name.clone(),
         windability: class.to_string(),
+        objective: objective.key().to_owned(),
         best: PatternJson::new(&name, pattern, &worst, phase_rad, bound.map(|b| b.rate_rad_per_s)),
+        best_objective_deg_per_h: deg_per_h_from_rad_per_s(certificate.best_rad_per_s),
         proof: ProofJson::of(&certificate),
         nodes: certificate.nodes,
         judged: certificate.judged,
@@ -161,12 +180,17 @@ fn text(body: &ExactJson) -> String {
         (_, Some(bound)) => format!(
             "gap: no winding of the class {} is below {bound:.6} °/h, {:.1} % under the best known",
             body.windability,
-            100.0 * (1.0 - bound / best.worst_rate_deg_per_h)
+            100.0 * (1.0 - bound / body.best_objective_deg_per_h)
         ),
         _ => "none: nothing is proved; give a longer --budget".to_owned(),
     };
+    let what = if body.objective == Objective::WorstRate.key() {
+        String::new()
+    } else {
+        format!("proof is of the {}\n", body.objective)
+    };
     format!(
-        "best     {}: {}\nworst    {:.6} °/h, under {} at {:.2} s\nproof    {proof}\n\
+        "{what}best     {}: {}\nworst    {:.6} °/h, under {} at {:.2} s\nproof    {proof}\n\
          effort   {} nodes, {} windings judged in full, {:.2} s\n",
         best.name,
         segments.join(" "),

@@ -12,6 +12,7 @@ mod evaluate;
 mod exact;
 mod extend;
 mod former;
+mod improve;
 mod man;
 mod metrics;
 mod new;
@@ -19,7 +20,6 @@ mod optimise;
 mod pareto;
 mod patterns;
 pub mod progress;
-mod prove;
 mod records;
 mod report;
 mod reproduce;
@@ -29,6 +29,7 @@ pub mod screen;
 mod temperatures;
 mod tolerance;
 mod verify;
+mod watch;
 
 use std::process::ExitCode;
 
@@ -119,6 +120,7 @@ enum Command {
     Metrics(metrics::Arguments),
     Diagnose(diagnose::Arguments),
     Extend(extend::Arguments),
+    Improve(improve::Arguments),
     Schema(schema::Arguments),
     Completions(completions::Arguments),
     Man(man::Arguments),
@@ -221,31 +223,7 @@ pub fn run() -> ExitCode {
     let cli = Cli::parse();
     let screen = Screen::new(&cli.output);
     let started = std::time::Instant::now();
-    let ending = match &cli.command {
-        Command::Evaluate(arguments) => evaluate::run(arguments, &screen),
-        Command::Exact(arguments) => exact::run(arguments, &screen),
-        Command::Effects(arguments) => effects::run(arguments, &screen),
-        Command::Temperatures(arguments) => temperatures::run(arguments, &screen),
-        Command::Tolerance(arguments) => tolerance::run(arguments, &screen),
-        Command::Patterns(arguments) => patterns::run(arguments, &screen),
-        Command::Check(arguments) => check::run(arguments, &screen),
-        Command::New(arguments) => new::run(arguments, &screen),
-        Command::Reproduce(arguments) => reproduce::run(arguments, &screen),
-        Command::Optimise(arguments) => optimise::run(arguments, &screen),
-        Command::Campaign(arguments) => campaign::run(arguments, &screen),
-        Command::Pareto(arguments) => pareto::run(arguments, &screen),
-        Command::Schedule(arguments) => schedule::run(arguments, &screen),
-        Command::Compare(arguments) => compare::run(arguments, &screen),
-        Command::Compensate(arguments) => compensate::run(arguments, &screen),
-        Command::Metrics(arguments) => metrics::run(arguments, &screen),
-        Command::Diagnose(arguments) => diagnose::run(arguments, &screen),
-        Command::Extend(arguments) => extend::run(arguments, &screen),
-        Command::Schema(arguments) => schema::run(arguments, &screen),
-        Command::Completions(arguments) => completions::run(arguments, &screen),
-        Command::Man(arguments) => man::run(arguments, &screen),
-        Command::Verify(arguments) => verify::run(arguments, &screen),
-        Command::Report(arguments) => report::run(arguments, &screen),
-    };
+    let ending = carry_out(&cli.command, &screen);
     if cli.output.verbose {
         let (version, threads) = (env!("CARGO_PKG_VERSION"), rayon::current_num_threads());
         let seconds = started.elapsed().as_secs_f64();
@@ -261,5 +239,45 @@ pub fn run() -> ExitCode {
             eprintln!("{}", error.to_string().trim_end());
             ExitCode::from(2)
         }
+    }
+}
+
+/// Carries out another command for its files; its answer and its notes are not shown.
+///
+/// # Errors
+/// As the command's.
+fn silently(arguments: &[impl AsRef<str>]) -> Result<Ending, CliError> {
+    let words = std::iter::once("coilwright").chain(arguments.iter().map(AsRef::as_ref));
+    let cli = Cli::try_parse_from(words)
+        .map_err(|error| CliError::Option { option: "improve", message: error.to_string() })?;
+    carry_out(&cli.command, &Screen::silent())
+}
+
+fn carry_out(command: &Command, screen: &Screen) -> Result<Ending, CliError> {
+    match command {
+        Command::Evaluate(arguments) => evaluate::run(arguments, screen),
+        Command::Exact(arguments) => exact::run(arguments, screen),
+        Command::Effects(arguments) => effects::run(arguments, screen),
+        Command::Temperatures(arguments) => temperatures::run(arguments, screen),
+        Command::Tolerance(arguments) => tolerance::run(arguments, screen),
+        Command::Patterns(arguments) => patterns::run(arguments, screen),
+        Command::Check(arguments) => check::run(arguments, screen),
+        Command::New(arguments) => new::run(arguments, screen),
+        Command::Reproduce(arguments) => reproduce::run(arguments, screen),
+        Command::Optimise(arguments) => optimise::run(arguments, screen),
+        Command::Campaign(arguments) => campaign::run(arguments, screen),
+        Command::Pareto(arguments) => pareto::run(arguments, screen),
+        Command::Schedule(arguments) => schedule::run(arguments, screen),
+        Command::Compare(arguments) => compare::run(arguments, screen),
+        Command::Compensate(arguments) => compensate::run(arguments, screen),
+        Command::Metrics(arguments) => metrics::run(arguments, screen),
+        Command::Diagnose(arguments) => diagnose::run(arguments, screen),
+        Command::Extend(arguments) => extend::run(arguments, screen),
+        Command::Improve(arguments) => improve::run(arguments, screen),
+        Command::Schema(arguments) => schema::run(arguments, screen),
+        Command::Completions(arguments) => completions::run(arguments, screen),
+        Command::Man(arguments) => man::run(arguments, screen),
+        Command::Verify(arguments) => verify::run(arguments, screen),
+        Command::Report(arguments) => report::run(arguments, screen),
     }
 }

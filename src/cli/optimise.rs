@@ -4,28 +4,27 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use super::budget::parse_duration;
-use super::former::{compare_with_former, former_pattern};
+use super::former::former_pattern;
 use super::progress::StopFlag;
-use super::prove::{prove_best, words};
 use super::screen::{Screen, table};
+use super::watch::Watch;
 use super::{CliError, Ending, report, schedule};
 use crate::io::fault::Faults;
 use crate::io::files::write_atomically;
-use crate::io::json::{PatternJson, ProofJson};
+use crate::io::json::search::OptimiseJson;
 use crate::io::model::{ModelFile, NamedPattern};
 use crate::io::read::model_file::read_model;
 use crate::io::read::pattern_file::resolve_pattern;
-use crate::io::write::checkpoint::{CHECKPOINT_FILE, read_checkpoint, write_checkpoint};
-use crate::io::write::run_directory::{
-    BestFoundJson, GridCheckJson, OptimiseJson, Request, write_request, write_results,
-};
+use crate::io::write::checkpoint::{CHECKPOINT_FILE, read_checkpoint};
+use crate::io::write::run_directory::{Request, write_results};
 use crate::pattern::windability::WindabilityClass;
-use crate::search::anneal::rounds::{DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Plan, Rounds, Rules, Stop};
-use crate::search::cost::guaranteed::UnitStep;
+use crate::search;
+use crate::search::Answer;
+use crate::search::anneal::rounds::{DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Plan, Rules, State};
+use crate::search::answer::Ended;
 use crate::search::cost::objective::Objective;
-use crate::search::cost::worst_case::SolvedProfiles;
-use crate::search::evaluator::{Evaluator, Judged, improvement_over_qua};
-use crate::units::{deg_per_h_from_rad_per_s, rad_per_s_from_deg_per_h};
+use crate::search::run::RunError;
+use crate::units::rad_per_s_from_deg_per_h;
 
 /// Search the winding pattern with the smallest error
 #[derive(Debug, Clone, clap::Args)]
@@ -47,7 +46,7 @@ pub struct Arguments {
     pub(super) search: SearchOptions,
     /// Writes the run's results and checkpoints into this folder
     #[arg(long, short, value_name = "DIR")]
-    output: Option<PathBuf>,
+    pub(super) output: Option<PathBuf>,
     /// Takes up the interrupted run in the output folder; begins one if there is none
     #[arg(long, requires = "output", conflicts_with = "fresh")]
     resume: bool,
@@ -60,10 +59,10 @@ pub struct Arguments {
     compare_with: Option<String>,
     /// Tries for so long to prove that the best pattern is the best of its class
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
-    prove: Option<Duration>,
+    pub(super) prove: Option<Duration>,
     /// Writes a checkpoint when the last one is older than this
     #[arg(long, value_name = "TIME", default_value = "1s", value_parser = parse_duration)]
-    checkpoint_every: Duration,
+    pub(super) checkpoint_every: Duration,
     /// Threads to use; without it, as many as there are processors
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -113,7 +112,7 @@ fn parse_class(text: &str) -> Result<WindabilityClass, String> {
         .ok_or_else(|| format!("expected standard, captive:K with a number K, or any, found \"{text}\""))
 }
 
-fn parse_objective(text: &str) -> Result<Objective, String> {
+pub(super) fn parse_objective(text: &str) -> Result<Objective, String> {
     Objective::from_key(text).ok_or_else(|| {
         let keys: Vec<&str> = Objective::ALL.iter().map(|o| o.key()).collect();
         format!("expected one of {}, found \"{text}\"", keys.join(", "))
@@ -192,8 +191,8 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let former = arguments.compare_with.as_ref().or(options.init.as_ref());
     let former = former.map(|stated| former_pattern(stated, file.model.coil.layers())).transpose()?;
     let request = Request { file: &file, class, objective, plan: &plan, budget: options.budget.as_deref() };
-    if arguments.prove.is_some() && !matches!(objective, Objective::WorstRate | Objective::WorstPhase) {
-        let message = format!("proofs are of the worst rate and the worst phase, not of {}", objective.key());
+    if arguments.prove.is_some() && objective == Objective::P95 {
+        let message = format!("proofs are of worst, guaranteed and rms rates, not of {}", objective.key());
         return Err(CliError::Option { option: "--prove", message });
     }
     let folder = arguments.output.as_deref();
@@ -203,110 +202,41 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     };
 
     let started = Instant::now();
-    let solved = SolvedProfiles::new(&file.model, &file.profiles.profiles())?;
-    let unit_step = UnitStep::new(&file.model, file.profiles.max_rate_k_per_s).ok();
-    let evaluator = evaluator_of(&file, &solved, objective, unit_step.as_ref());
-    let baselines = evaluator.baselines()?;
-    let mut search = evaluator
-        .search(class, plan.clone(), saved)?
-        .ok_or_else(|| CliError::Checkpoint { path: folder.map(|f| f.join(CHECKPOINT_FILE)).unwrap_or_default() })?;
-    if let Some(folder) = folder.filter(|f| !(arguments.resume && f.join(CHECKPOINT_FILE).exists())) {
-        write_request(folder, &request)?;
-        write_checkpoint(folder, &request.fingerprint(), search.state())?;
-    }
-    let evaluated_before = search.evaluations();
-    let checkpoint = folder.map(|folder| Checkpointing {
-        folder,
-        fingerprint: request.fingerprint(),
-        every: arguments.checkpoint_every,
-    });
-    let target = plan.rules.target;
-    let is_good_enough = |judged: &Judged| target.is_some_and(|target| judged.objective_rad_per_s <= target);
-    let mut concluded = None;
-    let mut conclusion = |search: &dyn Rounds| -> Result<Option<Stop>, CliError> {
-        let found = &search.state().found;
-        let Some(best) = evaluator.best(class, found, &baselines)?.filter(|_| evaluator.is_provable(class)) else {
-            return Ok(None);
-        };
-        let (best, is_optimal) = evaluator.improved(class, best, found, target)?;
-        let stop = if is_optimal { Some(Stop::Proved) } else { is_good_enough(&best).then_some(Stop::Target) };
-        concluded = stop.map(|_| best);
-        Ok(stop)
+    let searched = search::Request {
+        model: &file.model,
+        profiles: &file.profiles,
+        tolerance: file.tolerance.as_ref(),
+        objective,
+        class,
+        plan: plan.clone(),
+        saved,
+        former: former.map(|former| (former.name, former.pattern)),
+        prove: arguments.prove.is_some(),
+        recommend: true,
     };
-    let (ended, found_s) = anneal(search.as_mut(), &mut conclusion, budget, started, &stop, checkpoint, screen)?;
-
-    let Some(best) = evaluator.best(class, &search.state().found, &baselines)? else {
+    let is_taken_up = folder.is_some_and(|f| arguments.resume && f.join(CHECKPOINT_FILE).exists());
+    let mut watch = Watch::new(arguments, &request, budget, started, &stop, screen, is_taken_up);
+    let answer = search::run(&searched, &mut watch);
+    watch.fault.take().map_or(Ok(()), Err)?;
+    let (found_s, seconds) = (watch.found_s, started.elapsed().as_secs_f64());
+    let Some(answer) = answer.map_err(|error| of_run(error, folder))? else {
         screen.note("interrupted before anything was found");
         return Ok(Ending::Interrupted);
     };
-    // A target may have been reached at the samples and not between them.
-    let is_unhurried = ended == Ended::Rule && !is_good_enough(&best);
-    let annealed = best.pattern.clone();
-    let best = match concluded {
-        Some(concluded) => concluded,
-        None if is_unhurried => evaluator.improved(class, best, &search.state().found, target)?.0,
-        None => best,
-    };
-    let seconds = started.elapsed().as_secs_f64();
-    let best_found = if best.pattern != annealed {
-        BestFoundJson { by: "bounds", evaluations: search.evaluations(), seconds: Some(seconds) }
-    } else if baselines.iter().any(|b| b.pattern == best.pattern) {
-        BestFoundJson { by: "classic", evaluations: 0, seconds: Some(0.0) }
-    } else {
-        let evaluations = search.state().first_with_best().map_or(0, |record| record.evaluations);
-        BestFoundJson { by: "annealing", evaluations, seconds: Some(found_s) }
-    };
-    let nothing_proved = (ProofJson::none(), false);
-    let (best, (proof, proof_cut_short)) = match arguments.prove.filter(|_| ended != Ended::Signal) {
-        None => (best, nothing_proved),
-        Some(time) => {
-            let (best, proof, cut) = prove_best(&evaluator, class, best, &baselines, time, &stop, screen)?;
-            (best, (proof, cut))
-        }
-    };
-    let grid_check = if ended == Ended::Signal { None } else { evaluator.grid_check(&best, &baselines)? };
-    let grid_check = grid_check.as_ref().map(GridCheckJson::of);
-    let caution = grid_check.as_ref().and_then(|check| check.caution.clone());
-    let compared_with = former.map(|f| compare_with_former(&evaluator, class, &best, &f)).transpose()?;
-    let judged_now = (search.evaluations() - evaluated_before) as f64;
-    let answer = OptimiseJson {
-        model: file.model.name.clone(),
-        objective: objective.key().to_owned(),
-        windability: class.to_string(),
-        seed: plan.seed,
-        best: PatternJson::of(&best),
-        baselines: baselines.iter().map(PatternJson::of).collect(),
-        improvement_over_qua: improvement_over_qua(&best, &baselines),
-        statement: evaluator.statement(&best, &baselines, class)
-            + &words(&proof)
-            + &caution.map_or_else(String::new, |caution| format!(" {caution}")),
-        grid_check,
-        compared_with,
-        proof,
-        evaluations: search.evaluations(),
-        evaluations_per_s: Some(judged_now / seconds),
-        seconds: Some(seconds),
-        best_found,
-        rounds: search.state().round,
-        stopped_by: ended.words(search.as_ref()).to_owned(),
-        reproducible: ended == Ended::Rule && !proof_cut_short,
-    };
+    let document = OptimiseJson::of(&file.model.name, &searched, &answer, seconds, found_s);
     if let Some(folder) = folder {
-        write_folder(folder, &file, &answer, &best, search.as_ref(), screen)?;
+        write_folder(folder, &file, &document, &answer, screen)?;
     }
-    screen.answer(answer, text)?;
-    Ok(if ended == Ended::Signal { Ending::Interrupted } else { Ending::Done })
+    screen.answer(document, text)?;
+    Ok(if answer.ended == Ended::Signal { Ending::Interrupted } else { Ending::Done })
 }
 
-/// What patterns of a model are judged by.
-pub(super) fn evaluator_of<'a>(
-    file: &'a ModelFile,
-    solved: &'a SolvedProfiles,
-    objective: Objective,
-    unit_step: Option<&'a UnitStep>,
-) -> Evaluator<'a> {
-    let ModelFile { model, profiles, tolerance, .. } = file;
-    Evaluator { model, solved, objective, unit_step, profiles, tolerance: tolerance.as_ref() }
+/// A saved state that fits no search is the checkpoint's fault.
+fn of_run(error: RunError, folder: Option<&Path>) -> CliError {
+    match error {
+        RunError::Judge(error) => error.into(),
+        RunError::Resume => CliError::Checkpoint { path: folder.map(|f| f.join(CHECKPOINT_FILE)).unwrap_or_default() },
+    }
 }
 
 /// The state to go on from; refuses to write over an unfinished run unasked.
@@ -315,7 +245,7 @@ fn saved_state(
     folder: &Path,
     request: &Request,
     screen: &Screen,
-) -> Result<Option<crate::search::anneal::rounds::State>, CliError> {
+) -> Result<Option<State>, CliError> {
     if arguments.fresh {
         return Ok(None);
     }
@@ -344,101 +274,21 @@ fn saved_state(
     Ok(None)
 }
 
-/// How a search came to its end.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Ended {
-    Rule,
-    Clock,
-    Signal,
-}
-
-impl Ended {
-    fn words(self, search: &dyn Rounds) -> &'static str {
-        match self {
-            Ended::Rule => search.state().stop.map_or("rounds", |stop| stop.key()),
-            Ended::Clock => "clock",
-            Ended::Signal => "interrupted",
-        }
-    }
-}
-
-/// Where checkpoints go, what they belong to, and how often they are written.
-struct Checkpointing<'a> {
-    folder: &'a Path,
-    fingerprint: String,
-    every: Duration,
-}
-
-/// Advances a search to its end, writing checkpoints and showing progress. After its first round `conclusion` is asked
-/// whether what was found can be made good enough or the best there is. Also answers the seconds until the best was found.
-fn anneal(
-    search: &mut dyn Rounds,
-    conclusion: &mut impl FnMut(&dyn Rounds) -> Result<Option<Stop>, CliError>,
-    budget: Option<Duration>,
-    started: Instant,
-    stop: &StopFlag,
-    checkpoint: Option<Checkpointing>,
-    screen: &Screen,
-) -> Result<(Ended, f64), CliError> {
-    let total = search.plan().rules.moves;
-    let progress = screen.progress("optimise", total);
-    let mut last_checkpoint = Instant::now();
-    let mut asked = false;
-    let (mut best_cost, mut found_s) = (f64::INFINITY, 0.0);
-    let ended = loop {
-        let goes_on = search.advance();
-        if let Some(best) = search.best().filter(|best| best.cost < best_cost) {
-            (best_cost, found_s) = (best.cost, started.elapsed().as_secs_f64());
-        }
-        if !goes_on {
-            break Ended::Rule;
-        }
-        if search.state().round == 1
-            && !std::mem::replace(&mut asked, true)
-            && let Some(stop) = conclusion(search)?
-        {
-            search.conclude(stop);
-            break Ended::Rule;
-        }
-        if let Some(Checkpointing { folder, fingerprint, every }) = &checkpoint
-            && last_checkpoint.elapsed() >= *every
-        {
-            write_checkpoint(folder, fingerprint, search.state())?;
-            last_checkpoint = Instant::now();
-        }
-        let message = search.best().map_or_else(String::new, |best| {
-            format!("round {}, best {:.4} °/h", search.state().round + 1, deg_per_h_from_rad_per_s(best.cost))
-        });
-        progress.at(search.evaluations(), &message);
-        if stop.is_set() {
-            break Ended::Signal;
-        }
-        if budget.is_some_and(|budget| started.elapsed() >= budget) {
-            break Ended::Clock;
-        }
-    };
-    if let Some(Checkpointing { folder, fingerprint, .. }) = &checkpoint {
-        write_checkpoint(folder, fingerprint, search.state())?;
-    }
-    search.gather();
-    Ok((ended, found_s))
-}
-
 fn write_folder(
     folder: &Path,
     file: &ModelFile,
-    answer: &OptimiseJson,
-    best: &Judged,
-    search: &dyn Rounds,
+    document: &OptimiseJson,
+    answer: &Answer,
     screen: &Screen,
 ) -> Result<(), CliError> {
+    let best = &answer.best;
     let named = NamedPattern { name: best.name.clone(), pattern: best.pattern.clone() };
-    let (_, document) = schedule::plan(file, &named)?;
-    let json = serde_json::to_string_pretty(&document).map_err(|e| CliError::Stdout(e.into()))? + "\n";
-    let csv = document.csv().map_err(|e| CliError::Stdout(e.into()))?;
+    let (_, schedule) = schedule::plan(file, &named)?;
+    let json = serde_json::to_string_pretty(&schedule).map_err(|e| CliError::Stdout(e.into()))? + "\n";
+    let csv = schedule.csv().map_err(|e| CliError::Stdout(e.into()))?;
     write_atomically(&folder.join("schedule.csv"), csv.as_bytes())?;
     write_atomically(&folder.join("schedule.json"), json.as_bytes())?;
-    write_results(folder, answer, best, search.state())?;
+    write_results(folder, document, best, &answer.state)?;
     report::write_report(folder, &folder.join("report.html"))?;
     screen.note(&format!("wrote {}", folder.display()));
     Ok(())
@@ -469,13 +319,18 @@ fn text(answer: &OptimiseJson) -> String {
     let header = shown(header.map(str::to_owned).to_vec());
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
     let rows = rows.map(shown);
-    let segments: Vec<String> = answer.best.segments.iter().map(ToString::to_string).collect();
+    let joined = |segments: &[usize]| segments.iter().map(ToString::to_string).collect::<Vec<String>>().join(" ");
+    let recommendation = answer.recommendation.as_ref().map_or_else(String::new, |recommendation| {
+        let reasons: String = recommendation.reasons.iter().map(|reason| format!("  {reason}\n")).collect();
+        let segments = joined(&recommendation.segments);
+        format!("{}\n{reasons}  segments, innermost layer first: {segments}\n\n", recommendation.sentence)
+    });
     format!(
-        "{}\n{}\n{}\nbest pattern, innermost layer first: {}\n{} moves judged in {} rounds, ended by: {}{}\n",
+        "{recommendation}{}\n{}\n{}\nbest pattern, innermost layer first: {}\n{} moves judged in {} rounds, ended by: {}{}\n",
         answer.statement,
         answer.compared_with.as_ref().map_or_else(String::new, |former| former.statement.clone() + "\n"),
         table(&header, rows),
-        segments.join(" "),
+        joined(&answer.best.segments),
         answer.evaluations,
         answer.rounds,
         answer.stopped_by,

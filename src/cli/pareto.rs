@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use super::optimise::evaluator_of;
 use super::progress::StopFlag;
 use super::screen::{Screen, table};
 use super::{CliError, Ending};
@@ -63,7 +62,14 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let seed = arguments.seed.unwrap_or(file.search.seed);
     let solved = SolvedProfiles::new(&file.model, &file.profiles.profiles())?;
     let unit_step = crate::search::cost::guaranteed::UnitStep::new(&file.model, file.profiles.max_rate_k_per_s).ok();
-    let evaluator = evaluator_of(&file, &solved, Objective::WorstRate, unit_step.as_ref());
+    let evaluator = Evaluator {
+        model: &file.model,
+        solved: &solved,
+        objective: Objective::WorstRate,
+        unit_step: unit_step.as_ref(),
+        profiles: &file.profiles,
+        tolerance: file.tolerance.as_ref(),
+    };
     let mut judged = evaluator.baselines()?;
     let captive = (1..=usize::from(arguments.most_captive)).map(WindabilityClass::Captive);
     let classes: Vec<WindabilityClass> =
@@ -136,6 +142,9 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     Ok(Ending::Done)
 }
 
+/// Points shown besides the knees.
+const MOST_OTHERS: usize = 8;
+
 /// Largest climbs that are searched one by one; any climb is searched besides.
 const CLIMBS: [usize; 6] = [2, 3, 4, 5, 6, 8];
 
@@ -204,13 +213,20 @@ fn candidates(
         rules: Rules { rounds, patience: rounds, moves: None, target: None },
         starts: Vec::new(),
     };
-    let mut search = evaluator.search(class, plan, None)?.expect("nothing was saved that might not fit");
+    let shared = evaluator.companions(class, &plan, &|| !stop.is_set())?;
+    let Some(mut search) = evaluator.search(class, plan, None)? else { return Ok(None) };
     while search.advance() {
         if stop.is_set() {
             return Ok(None);
         }
     }
-    Ok(Some(patterns(&search.state().found)))
+    let found = &search.state().found;
+    let mut patterns = patterns(found);
+    if let Some(best) = evaluator.best(class, found, &[])? {
+        patterns.push(evaluator.improved(class, best, found, None)?.0.pattern);
+    }
+    patterns.extend(shared);
+    Ok((!stop.is_set()).then_some(patterns))
 }
 
 /// What a search within limits found; none if a signal came first.
@@ -296,8 +312,24 @@ fn chart(
     chart.svg()
 }
 
+/// A point with at most this share of the error of all that are easier to wind is a knee.
+const KNEE: f64 = 0.8;
+
+/// Whether the point buys much: its error is well below that of every point that asks no more of the winding shop.
+fn is_knee(point: &PointJson, points: &[PointJson]) -> bool {
+    let effort = |p: &PointJson| [p.pattern.windability.captive, p.pattern.windability.max_climb, p.long_crossovers];
+    let error = |p: &PointJson| p.pattern.worst_rate_deg_per_h;
+    let is_easier = |p: &&PointJson| {
+        effort(p) != effort(point) && effort(p).iter().zip(effort(point)).all(|(theirs, mine)| *theirs <= mine)
+    };
+    points.iter().filter(is_easier).all(|p| error(point) <= KNEE * error(p))
+}
+
 fn text(answer: &ParetoJson) -> String {
-    let rows = answer.points.iter().map(|p| {
+    let (knees, others): (Vec<&PointJson>, Vec<&PointJson>) =
+        answer.points.iter().partition(|point| is_knee(point, &answer.points));
+    let mut shown: Vec<Vec<String>> = Vec::new();
+    let row = |p: &PointJson| {
         vec![
             p.pattern.name.clone(),
             format!("{:.4}", p.pattern.worst_rate_deg_per_h),
@@ -306,10 +338,25 @@ fn text(answer: &ParetoJson) -> String {
             p.pattern.windability.max_climb.to_string(),
             p.long_crossovers.to_string(),
         ]
-    });
+    };
+    let mut merged = 0;
+    for row in knees.iter().map(|p| row(p)).chain(others.iter().take(MOST_OTHERS).map(|p| row(p))) {
+        // The same but for the name.
+        if shown.iter().any(|known| known[1..] == row[1..]) {
+            merged += 1;
+        } else {
+            shown.push(row);
+        }
+    }
+    let left_out = merged + others.len().saturating_sub(MOST_OTHERS);
+    let more = if left_out > 0 {
+        format!("\n{left_out} further points are in --format json and, with -o, in pareto.csv\n")
+    } else {
+        String::new()
+    };
     format!(
-        "{}: what no other pattern beats in every respect\n\n{}",
+        "{}: the best found; none of these is beaten in every respect by another known one\n\n{}{more}",
         answer.model,
-        table(&["pattern", "worst °/h", "P95 °/h", "captive", "climb", "crossovers > 1"], rows)
+        table(&["pattern", "worst °/h", "P95 °/h", "captive", "climb", "crossovers > 1"], shown)
     )
 }

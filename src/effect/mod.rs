@@ -348,6 +348,12 @@ impl DeclaredEffect {
         }
     }
 
+    /// The ambient air behind a film at the outer surface.
+    pub fn film(film_w_per_m2_k: f64) -> Self {
+        let spec = &surface_film::SPEC;
+        Self { spec, values: vec![film_w_per_m2_k], choices: Vec::new(), subject: Subject::None }
+    }
+
     /// Linear in a further column of the record.
     pub fn channel(name: impl Into<String>, gain_rad_per_s_per_unit: f64) -> Self {
         let subject = Subject::Channel(name.into());

@@ -1,5 +1,6 @@
 //! What a model file states, understood: read by `read`, answered about by `json` and `write`.
 
+use std::fmt;
 use std::path::PathBuf;
 
 use crate::io::record_format::RecordFormat;
@@ -27,6 +28,8 @@ pub struct ModelFile {
     /// How its records are to be read.
     pub record: RecordFormat,
     pub advice: Vec<Advice>,
+    /// winding.length_m, where it is stated.
+    pub stated_length_m: Option<f64>,
 }
 
 /// A pattern under the name by which it was asked for.
@@ -44,7 +47,7 @@ pub struct SearchSettings {
 }
 
 /// What a reader of the results should know, though it is no fault.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Advice {
     #[error("[profiles] is absent: profiles of up to 60 °C/h are sampled, 64 of 4 ramps over 6000 s, seed 1")]
     DefaultProfiles,
@@ -58,4 +61,31 @@ pub enum Advice {
     AmbientWithoutFilm { film: &'static str },
     #[error("{effect} changes nothing where thermal.model is \"pack\" already")]
     ChangesNothing { effect: String },
+    #[error("{0}")]
+    Unusual(Unusual),
+    #[error(
+        "winding.length_m = {stated_m} is not what turns and radii make: {used_m:.2} m is used; correct one of them, or leave length_m out"
+    )]
+    LengthNotUsed { stated_m: f64, used_m: f64 },
+    #[error(
+        "the outermost layer's temperature is prescribed: the first instant of a ramp then heats that layer alone, and windings that put the same pieces of fibre there, such as dip and qua, tie; where air surrounds the coil declare the effect {film} with sensor.location = \"ambient\""
+    )]
+    PrescribedBoundary { film: &'static str },
+}
+
+/// A value outside the range in which it usually lies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unusual {
+    pub key: &'static str,
+    pub found: f64,
+    pub low: f64,
+    pub high: f64,
+    pub unit: &'static str,
+}
+
+impl fmt::Display for Unusual {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { key, found, low, high, unit } = self;
+        write!(f, "{key} = {found} is unusual: expected between {low} and {high}{unit}; check the unit")
+    }
 }

@@ -5,6 +5,7 @@ pub mod comparison;
 pub mod compensation;
 pub mod cross_section;
 pub mod diagnosis;
+pub mod improvement;
 pub mod ladder;
 pub mod measurement;
 mod page;

@@ -40,7 +40,13 @@ pub fn search_page(run: &Run) -> Result<String, ReportError> {
     let title = format!("Winding pattern for {}", summary.model);
     let body = html! {
         h1 { (title) }
-        p.big { (summary.statement) }
+        @if let Some(recommendation) = &summary.recommendation {
+            p.big { (recommendation.sentence) }
+            ul { @for reason in &recommendation.reasons { li { (reason) } } }
+            p { (summary.statement) }
+        } @else {
+            p.big { (summary.statement) }
+        }
         @if let Some(former) = &summary.compared_with { p { b { (former.statement) } } }
         (facts(run))
         h2 { "Patterns compared" }

@@ -14,6 +14,8 @@ use super::evaluator::{Evaluator, JudgeError};
 use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
 use crate::pattern::windability::WindabilityClass;
+use crate::rate::LayerWeights;
+use crate::search::cost::worst_case::SearchError;
 
 /// Whose worst case a search is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,6 +54,15 @@ impl Evaluator<'_> {
                 (objective, _) => objective.of_profiles(self.model, self.solved)?,
             };
             let cost = SampleCost::new(matrix, class, self.objective.norm());
+            let cost =
+                match Classic::Qua.pattern(self.model.coil.layers()).or(Classic::Dip.pattern(self.model.coil.layers()))
+                {
+                    Ok(near) => cost.frozen_at(
+                        &LayerWeights::new(&self.model.wound_coil().map_err(SearchError::from)?, &near)
+                            .map_err(SearchError::from)?,
+                    ),
+                    Err(_) => cost,
+                };
             return Ok(begun(cost, plan, saved));
         };
         Ok(begun(QuantileCost::new(coils, class), plan, saved))

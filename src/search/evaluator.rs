@@ -7,13 +7,13 @@ use crate::pattern::classic::Classic;
 use crate::pattern::windability::WindabilityClass;
 use crate::profile::{Profile, ProfileSpec};
 use crate::rate::{CoilModel, RateModel};
-use crate::search::anneal::rounds::Found;
+use crate::search::anneal::rounds::{Found, MOST_FOUND};
 use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
 use crate::search::cost::objective::Objective;
 use crate::search::cost::tolerance::{Coils, ToleranceError, ToleranceSpec};
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles, WorstCase};
 use crate::search::proof::permutation_tree::MOST_LAYERS;
-use crate::search::proof::{Effort, Improvement, Task, improve};
+use crate::search::proof::{Effort, Goal, Improvement, Task, improve};
 use crate::thermal::{Extent, Location};
 use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
 
@@ -217,17 +217,33 @@ impl Evaluator<'_> {
         Ok(Some(GridCheck { cells_per_layer: path.cells_per_layer, finer_cells_per_layer, patterns }))
     }
 
+    /// What a proof for the objective is about; `None` for a quantile over built coils, and for a guaranteed worst case
+    /// that the model has not.
+    pub fn goal(&self) -> Option<Goal<'_>> {
+        match self.objective {
+            Objective::WorstRate | Objective::WorstPhase => Some(Goal::WorstRate),
+            Objective::RootMeanSquare => Some(Goal::RootMeanSquare),
+            Objective::GuaranteedRate => self.unit_step.map(Goal::Guaranteed),
+            Objective::P95 => None,
+        }
+    }
+
+    /// What a proof for the objective is about, in a class; `None` as for [`Evaluator::goal`].
+    pub fn task(&self, class: WindabilityClass) -> Option<Task<'_>> {
+        self.goal().map(|goal| Task { model: self.model, solved: self.solved, class, goal })
+    }
+
     /// Whether [`Evaluator::improved`] can be expected to prove what is best, so that a search may try it early.
     pub fn is_provable(&self, class: WindabilityClass) -> bool {
         let layers = self.model.coil.layers();
         let lengths_m = self.model.coil.layer_lengths_m();
         let has_equal_layers = lengths_m.iter().all(|l| *l == lengths_m[0]);
-        self.can_improve(class) && has_equal_layers && layers <= PROVABLE_LAYERS
+        let is_of_worst = matches!(self.objective, Objective::WorstRate | Objective::WorstPhase);
+        is_of_worst && self.can_improve(class) && has_equal_layers && layers <= PROVABLE_LAYERS
     }
 
     fn can_improve(&self, class: WindabilityClass) -> bool {
-        let is_of_worst = matches!(self.objective, Objective::WorstRate | Objective::WorstPhase);
-        is_of_worst
+        self.goal().is_some()
             && class != WindabilityClass::Standard
             && (FEWEST_LAYERS..=MOST_LAYERS).contains(&self.model.coil.layers())
     }
@@ -245,14 +261,11 @@ impl Evaluator<'_> {
         found: &[Found],
         good_enough_rad_per_s: Option<f64>,
     ) -> Result<(Judged, bool), JudgeError> {
-        if !self.can_improve(class) {
-            return Ok((best, false));
-        }
+        let Some(task) = self.task(class).filter(|_| self.can_improve(class)) else { return Ok((best, false)) };
         let others = found.iter().take(MOST_STARTS);
         let others = others.map(|f| Pattern::new(f.segments.clone()).expect("a walk visits permutations only"));
         let starts: Vec<Pattern> = std::iter::once(best.pattern.clone()).chain(others).collect();
         let most_nodes = if self.is_provable(class) { PROVING_NODES } else { IMPROVING_NODES };
-        let task = Task { model: self.model, solved: self.solved, class };
         let beam_width = if self.model.coil.layers() > PROVABLE_LAYERS { BEAM_WIDTH } else { 0 };
         let good_enough_rad_per_s = good_enough_rad_per_s.unwrap_or(0.0);
         let effort = Effort { most_nodes, beam_width, good_enough_rad_per_s };
@@ -306,7 +319,7 @@ impl Evaluator<'_> {
 
     /// Built coils are worth being solved for several patterns at once.
     fn judged_at_once(&self) -> usize {
-        if self.objective == Objective::P95 { 6 } else { 1 }
+        if self.objective == Objective::P95 { MOST_FOUND } else { 1 }
     }
 
     /// In words: how much better than QUA, under which class, boundary and objective.

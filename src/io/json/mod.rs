@@ -5,11 +5,13 @@ pub mod diagnosis;
 pub mod effects;
 pub mod experiment;
 pub mod further_schemas;
+pub mod improve;
 pub mod inputs;
 pub mod metrics;
 pub mod pareto;
 pub mod schedule;
 pub mod schema;
+pub mod search;
 pub mod temperatures;
 pub mod tolerance;
 
@@ -132,7 +134,11 @@ impl ProofJson {
 pub struct ExactJson {
     pub model: String,
     pub windability: String,
+    /// What the proof is about.
+    pub objective: String,
     pub best: PatternJson,
+    /// What the proof's lower bound is to be compared with.
+    pub best_objective_deg_per_h: f64,
     pub proof: ProofJson,
     /// Nodes whose bound was computed; the same on every machine unless the clock ended the proof.
     pub nodes: u64,

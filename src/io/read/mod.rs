@@ -9,6 +9,7 @@ pub mod machine_program;
 pub mod model_file;
 mod page_reader;
 pub mod pattern_file;
+pub mod plausibility;
 mod production_table;
 pub mod profile_file;
 mod profile_tables;

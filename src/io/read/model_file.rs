@@ -14,7 +14,7 @@ use crate::pattern::windability::WindabilityClass;
 use crate::rate::CoilModel;
 use crate::search::cost::objective::Objective;
 use crate::thermal::{self, DEFAULT_CELLS_PER_LAYER, Extent, Location, Material};
-use crate::units::{m_from_mm, m_from_nm, m_from_um};
+use crate::units::{m_from_mm, m_from_nm, m_from_um, um_from_m};
 
 use super::effect_tables::read_effects;
 use super::pattern_file::resolve_pattern;
@@ -60,6 +60,8 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
     fibre_table.finish(r);
     let layers = read_layers(r, &mut winding);
     let coil = read_coil(r, &mut winding, layers, fibre);
+    let stated_length_m =
+        if winding.has("length_m") { winding.number(r, "length_m", Limits::between(0.1, 1e6)) } else { None };
     let pattern = read_pattern(r, &mut winding, layers, path);
     winding.finish(r);
     let thermal_parts = read_thermal(r, &mut thermal);
@@ -135,6 +137,7 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
             tolerance,
             record,
             advice,
+            stated_length_m,
         }
     });
     reader.finish(value)
@@ -178,6 +181,9 @@ fn read_layers(r: &mut TomlReader, table: &mut TableReader) -> Option<usize> {
     }
     Some(layers)
 }
+
+/// Two micrometres that are the same may differ by so much.
+const PITCH_ROUNDING: f64 = 1e-9;
 
 fn read_coil(r: &mut TomlReader, table: &mut TableReader, layers: Option<usize>, fibre: Option<Fibre>) -> Option<Coil> {
     let pitch = Limits::between(10.0, 10_000.0);
@@ -234,6 +240,16 @@ fn read_coil(r: &mut TomlReader, table: &mut TableReader, layers: Option<usize>,
         length_m,
         fibre,
     };
+    // Fibre cannot be pressed into less than its own diameter.
+    if spec.radial_pitch_m < spec.fibre.outer_diameter_m * (1.0 - PITCH_ROUNDING) {
+        let message = format!(
+            "winding.radial_pitch_um must be at least fibre.outer_diameter_um = {}, found {}: layers cannot lie closer than the fibre is thick",
+            um_from_m(spec.fibre.outer_diameter_m),
+            um_from_m(spec.radial_pitch_m)
+        );
+        r.fault(Fault::new(message, table.span_of("radial_pitch_um")));
+        return None;
+    }
     match Coil::new(spec) {
         Ok(coil) => Some(coil),
         Err(error) => {

@@ -24,6 +24,8 @@ pub struct RunSummary {
     #[serde(default)]
     pub statement: String,
     #[serde(default)]
+    pub recommendation: Option<RunRecommendation>,
+    #[serde(default)]
     pub compared_with: Option<RunFormer>,
     pub proof: RunProof,
     pub evaluations: u64,
@@ -31,6 +33,13 @@ pub struct RunSummary {
     pub rounds: u64,
     #[serde(default)]
     pub stopped_by: String,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct RunRecommendation {
+    pub sentence: String,
+    #[serde(default)]
+    pub reasons: Vec<String>,
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]

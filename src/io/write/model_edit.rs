@@ -50,6 +50,32 @@ pub fn with_effect(file: &str, source: &str, effect: &DeclaredEffect, remarks: &
     Ok(document.to_string())
 }
 
+/// The source with another sensor location, where one is given, and another winding pattern.
+///
+/// # Errors
+/// A source that is no TOML or whose `sensor` or `winding` is no table.
+pub fn with_sensor_and_pattern(
+    file: &str,
+    source: &str,
+    location: Option<&str>,
+    pattern: &str,
+) -> Result<String, Faults> {
+    let mut document: DocumentMut = source
+        .parse()
+        .map_err(|e: toml_edit::TomlError| Faults::one(file, source, Fault::new(e.message(), e.span())))?;
+    let stated = [("sensor", "location", location), ("winding", "pattern", Some(pattern))];
+    for (section, key, stated) in stated {
+        let Some(stated) = stated else { continue };
+        let item = document.entry(section).or_insert_with(|| Item::Table(Table::new()));
+        let Some(table) = item.as_table_like_mut() else {
+            let message = format!("{section} must be written as a [{section}] table to be changed");
+            return Err(Faults::one(file, source, Fault::new(message, None)));
+        };
+        table.insert(key, value(stated));
+    }
+    Ok(document.to_string())
+}
+
 /// The source with further listed profiles.
 ///
 /// # Errors

@@ -5,121 +5,16 @@
 
 use std::path::Path;
 
-use serde::Serialize;
-
 use crate::io::files::{WriteError, sha256_hex, write_atomically};
-use crate::io::json::{Document, PatternJson, ProofJson};
+use crate::io::json::search::{BestFoundJson, OptimiseJson};
+use crate::io::json::{Document, PatternJson};
 use crate::io::model::{ModelFile, NamedPattern};
 use crate::io::read::pattern_file::print_pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::search::anneal::rounds::{Plan, RoundRecord, State};
 use crate::search::cost::objective::Objective;
-use crate::search::evaluator::{GridCheck, Judged};
-use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
-
-impl PatternJson {
-    /// Of a pattern that was judged by the reference.
-    pub fn of(judged: &Judged) -> Self {
-        let Judged { name, pattern, worst, phase_rad, guaranteed_rad_per_s, .. } = judged;
-        Self {
-            p95_rate_deg_per_h: judged.p95_rad_per_s.map(deg_per_h_from_rad_per_s),
-            ..Self::new(name, pattern, worst, *phase_rad, *guaranteed_rad_per_s)
-        }
-    }
-}
-
-/// The answer of `optimise`.
-#[derive(Debug, Clone, Serialize)]
-pub struct OptimiseJson {
-    pub model: String,
-    pub objective: String,
-    pub windability: String,
-    pub seed: u64,
-    pub best: PatternJson,
-    pub baselines: Vec<PatternJson>,
-    /// QUA's objective over the best pattern's; null where QUA does not fit the layer count.
-    pub improvement_over_qua: Option<f64>,
-    pub statement: String,
-    /// Null where the temperature has no grid or the search was interrupted.
-    pub grid_check: Option<GridCheckJson>,
-    /// Null where no former pattern was stated.
-    pub compared_with: Option<FormerJson>,
-    pub proof: ProofJson,
-    pub evaluations: u64,
-    /// On the screen only: files don't depend on the clock.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub evaluations_per_s: Option<f64>,
-    /// On the screen only: the whole search, without reading the model.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub seconds: Option<f64>,
-    pub best_found: BestFoundJson,
-    pub rounds: u64,
-    /// "proved", "no improvement", "rounds", "moves", "target", "clock" or "interrupted".
-    pub stopped_by: String,
-    /// False where the clock or a signal ended the search: the same request may then end elsewhere.
-    pub reproducible: bool,
-}
-
-/// Worst rates on a grid twice as fine.
-#[derive(Debug, Clone, Serialize)]
-pub struct GridCheckJson {
-    pub cells_per_layer: usize,
-    pub finer_cells_per_layer: usize,
-    /// The best pattern, then QUA.
-    pub patterns: Vec<GridCheckedJson>,
-    /// Null where the grid changes little.
-    pub caution: Option<String>,
-}
-
-#[derive(Debug, Clone, Serialize)]
-pub struct GridCheckedJson {
-    pub name: String,
-    pub worst_rate_deg_per_h: f64,
-    pub finer_worst_rate_deg_per_h: f64,
-    pub change_percent: f64,
-}
-
-impl GridCheckJson {
-    pub fn of(check: &GridCheck) -> Self {
-        let patterns = check.patterns.iter().map(|checked| GridCheckedJson {
-            name: checked.name.clone(),
-            worst_rate_deg_per_h: deg_per_h_from_rad_per_s(checked.rate_rad_per_s),
-            finer_worst_rate_deg_per_h: deg_per_h_from_rad_per_s(checked.finer_rad_per_s),
-            change_percent: percent_from_fraction(checked.change()),
-        });
-        Self {
-            cells_per_layer: check.cells_per_layer,
-            finer_cells_per_layer: check.finer_cells_per_layer,
-            patterns: patterns.collect(),
-            caution: check.caution(),
-        }
-    }
-}
-
-/// When the best pattern was come upon.
-#[derive(Debug, Clone, Serialize)]
-pub struct BestFoundJson {
-    /// "classic", "annealing", or "bounds" where the search by bounds at the end found better.
-    pub by: &'static str,
-    /// Moves judged by then.
-    pub evaluations: u64,
-    /// On the screen only.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub seconds: Option<f64>,
-}
-
-/// A former pattern under the model of this search.
-#[derive(Debug, Clone, Serialize)]
-pub struct FormerJson {
-    #[serde(flatten)]
-    pub pattern: PatternJson,
-    /// Whether the best pattern of this search is better by more than rounding.
-    pub best_changed: bool,
-    /// The former pattern's objective, and as a multiple of the best one's.
-    pub cost_deg_per_h: f64,
-    pub cost_factor: Option<f64>,
-    pub statement: String,
-}
+use crate::search::evaluator::Judged;
+use crate::units::deg_per_h_from_rad_per_s;
 
 /// A request, as far as the search's course depends on it.
 #[derive(Debug, Clone)]

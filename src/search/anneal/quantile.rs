@@ -16,9 +16,13 @@
 use rand_chacha::ChaCha8Rng;
 
 use super::limits::{Limits, draw, neighbour};
+use super::restart::generator;
 use crate::search::cost::columns::Work;
 use crate::search::cost::sampled_coils::{QuantileWorst, SampledCoils};
 use crate::search::cost::{Cost, InFull, Pace, Position, Proposal};
+
+/// Coils that the rounds of a search run on; what they find is refined and judged on all of them.
+const COILS_THAT_TELL: usize = 40;
 
 /// Moves of a restart for a layer count.
 pub fn default_moves_per_restart(layers: usize) -> u64 {
@@ -89,7 +93,7 @@ impl Cost for QuantileCost {
     }
 
     fn samples(&self) -> usize {
-        self.coils.samples()
+        self.coils.count()
     }
 
     fn admits(&self, segments: &[usize]) -> bool {
@@ -114,12 +118,23 @@ impl Cost for QuantileCost {
         InFull { cost: self.coils.cost(segments), segments: segments.to_vec(), joining: Vec::new() }
     }
 
-    fn select(&self, _working: &[usize]) -> Self {
-        self.clone()
+    fn select(&self, working: &[usize]) -> Self {
+        Self { coils: self.coils.select(working), ..*self }
     }
 
-    fn first_working_set(&self, _seed: u64, _starts: &[Vec<usize>]) -> Vec<usize> {
-        Vec::new()
+    /// Where there are many coils, every so many-th of them in the order of how badly a typical pattern does in them:
+    /// their quantile then follows that of all, which has the last word.
+    fn first_working_set(&self, seed: u64, starts: &[Vec<usize>]) -> Vec<usize> {
+        let stride = self.coils.count() / COILS_THAT_TELL;
+        if stride < 2 {
+            return Vec::new();
+        }
+        let mut random = generator(seed, 0);
+        let typical = starts.first().cloned().unwrap_or_else(|| self.draw(&mut random));
+        let mut working: Vec<usize> =
+            self.coils.by_worst(&typical).into_iter().skip(stride / 2).step_by(stride).collect();
+        working.sort_unstable();
+        working
     }
 
     fn order_working_set(&self, _best: &[&[usize]], _working: &mut [usize]) {}

@@ -196,6 +196,15 @@ pub trait Rounds {
 
     fn plan(&self) -> &Plan;
 
+    /// Whether the rounds run on something that is only near to the cost.
+    fn is_approximated(&self) -> bool;
+
+    /// A pattern judged on all samples.
+    fn judged(&self, segments: &[usize]) -> Found;
+
+    /// What short restarts find that begin, hardly warm, at given patterns: each judged on all samples.
+    fn refined(&self, starts: &[Vec<usize>], moves: u64) -> Vec<Found>;
+
     /// The best pattern so far, if a round has ended or a start was given.
     fn best(&self) -> Option<&Found> {
         self.state().found.first()
@@ -336,7 +345,34 @@ impl<C: Cost> Rounds for Optimisation<C> {
     fn plan(&self) -> &Plan {
         &self.plan
     }
+
+    fn is_approximated(&self) -> bool {
+        self.full.is_approximated()
+    }
+
+    fn judged(&self, segments: &[usize]) -> Found {
+        let InFull { cost, segments, .. } = self.full.in_full(segments, &self.state.working);
+        Found { cost, segments }
+    }
+
+    fn refined(&self, starts: &[Vec<usize>], moves: u64) -> Vec<Found> {
+        let refine = |(index, start): (usize, &Vec<usize>)| {
+            let hot = WARMTH * self.full.in_full(start, &[]).cost;
+            let cooling = Cooling { hot, cold: hot * COLD_OVER_WARM, moves };
+            // Streams far from those of the rounds' restarts.
+            let mut restart = Restart::new(&self.full, self.plan.seed, u64::MAX / 2 + index as u64, Some(start));
+            while !restart.is_done(&cooling) {
+                restart.advance(&self.full, &cooling);
+            }
+            self.judged(&restart.best_segments)
+        };
+        starts.par_iter().enumerate().map(refine).collect()
+    }
 }
+
+/// Start of a refinement's cooling over the cost where it begins, and its end over its start.
+const WARMTH: f64 = 0.05;
+const COLD_OVER_WARM: f64 = 1e-2;
 
 #[cfg(test)]
 mod tests {

@@ -10,6 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use super::restart::generator;
 use super::walk::{Space, Walk};
 use crate::pattern::windability::WindabilityClass;
+use crate::rate::LayerWeights;
 use crate::search::cost::columns::{BLOCK, Norm, Values, Work};
 use crate::search::cost::samples::SampleMatrix;
 use crate::search::cost::{Cost, InFull, Pace, Position, Proposal};
@@ -19,11 +20,25 @@ use crate::search::cost::{Cost, InFull, Pace, Position, Proposal};
 pub struct SampleCost {
     space: Space,
     norm: Norm,
+    /// What the rounds run on instead, where it costs a dozen times less to walk over.
+    frozen: Option<SampleMatrix>,
 }
 
 impl SampleCost {
     pub fn new(matrix: SampleMatrix, class: WindabilityClass, norm: Norm) -> Self {
-        Self { space: Space::new(matrix, class), norm }
+        Self { space: Space::new(matrix, class), norm, frozen: None }
+    }
+
+    /// Where the class is `standard` but the error is not linear in its signs, lets the rounds run on what it is near a
+    /// pattern, where it is linear. What they find is refined and judged as it is.
+    #[must_use]
+    pub fn frozen_at(mut self, weights: &LayerWeights) -> Self {
+        let layout = self.space.matrix().layout;
+        let is_curved = !layout.halves_alike || layout.axial;
+        if self.space.class() == WindabilityClass::Standard && is_curved {
+            self.frozen = Some(self.space.matrix().frozen_at(weights));
+        }
+        self
     }
 
     fn values(&self, segments: &[usize]) -> Vec<f64> {
@@ -117,7 +132,12 @@ impl Cost for SampleCost {
     }
 
     fn select(&self, working: &[usize]) -> Self {
-        Self { space: Space::new(self.space.matrix().select(working), self.space.class()), norm: self.norm }
+        let matrix = self.frozen.as_ref().unwrap_or(self.space.matrix()).select(working);
+        Self { space: Space::new(matrix, self.space.class()), norm: self.norm, frozen: None }
+    }
+
+    fn is_approximated(&self) -> bool {
+        self.frozen.is_some()
     }
 
     /// A thinned grid and the samples that bind random patterns; all samples where they are few or all of them count.

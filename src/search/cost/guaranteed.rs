@@ -212,7 +212,7 @@ impl UnitStep {
     ///
     /// # Errors
     /// Effects that leave a layer no turns.
-    pub fn parts(&self, model: &CoilModel, stride: usize) -> Result<BoundParts, GuaranteedError> {
+    pub fn parts(&self, model: &CoilModel, stride: usize) -> Result<BoundParts, SearchError> {
         let rate_model = any_rate_model(model)?;
         let limit = self.times_s.len();
         let rows: Vec<usize> = (0..limit).step_by(stride).chain([limit]).collect();

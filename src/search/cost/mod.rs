@@ -78,6 +78,11 @@ pub trait Cost: Clone + Send + Sync + std::fmt::Debug {
     /// The samples that a search begins with; empty for all of them in their own order.
     fn first_working_set(&self, seed: u64, starts: &[Vec<usize>]) -> Vec<usize>;
 
+    /// Whether what the rounds run on is only near to the cost, so that what they find wants to be refined.
+    fn is_approximated(&self) -> bool {
+        false
+    }
+
     /// Puts those samples first that bind the best patterns.
     fn order_working_set(&self, best: &[&[usize]], working: &mut [usize]);
 }

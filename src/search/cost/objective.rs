@@ -74,7 +74,8 @@ impl Objective {
         }
     }
 
-    /// The samples of the declared profiles whose norm is the objective, in rad/s.
+    /// The samples of the declared profiles whose norm is the objective, in rad/s; for the rms no more of them than
+    /// columns.
     ///
     /// # Errors
     /// Rates that are not finite.
@@ -85,7 +86,7 @@ impl Objective {
         }
         let samples = origins.len() as f64;
         let factors: Vec<f64> = time_shares(solved).iter().map(|share| (share * samples).sqrt()).collect();
-        Ok(matrix.scaled(&factors))
+        Ok(matrix.scaled(&factors).of_same_mean_square())
     }
 }
 

@@ -28,7 +28,7 @@ use crate::profile::ProfileSpec;
 use crate::rate::{CoilModel, WeightResponse, segment_weights_m2};
 use crate::search::cost::guaranteed::UnitStep;
 use crate::search::cost::samples::{SampleMatrix, any_rate_model};
-use crate::search::cost::tolerance::{Coils, Measure, ToleranceError, quantile};
+use crate::search::cost::tolerance::{Coils, Measure, ToleranceError};
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
 use crate::thermal::{Drive, Instant, solve};
 use crate::units::REFERENCE_TEMPERATURE_K;
@@ -286,6 +286,21 @@ impl SampledCoils {
         self.layers
     }
 
+    /// Coils.
+    pub fn count(&self) -> usize {
+        self.coils.len()
+    }
+
+    /// Some of the coils.
+    pub fn select(&self, coils: &[usize]) -> Self {
+        Self { coils: coils.iter().map(|&i| self.coils[i].clone()).collect(), ..*self }
+    }
+
+    /// The coils in the order of their worst cases with a pattern, largest first.
+    pub fn by_worst(&self, segments: &[usize]) -> Vec<usize> {
+        QuantileWorst::new(self, segments).order
+    }
+
     /// Numbers held for all coils together.
     pub fn samples(&self) -> usize {
         let rows = |build: &SampledCoil| match &build.worst {
@@ -432,6 +447,14 @@ impl QuantileWorst {
         let worst = &self.worst;
         self.order.sort_by(|&a, &b| worst[b].total_cmp(&worst[a]).then(a.cmp(&b)));
     }
+}
+
+/// The value that a share of ascending values does not exceed, between the order statistics.
+pub(in crate::search) fn quantile(ascending: &[f64], share: f64) -> f64 {
+    let place = share.clamp(0.0, 1.0) * (ascending.len() - 1) as f64;
+    let (below, above) = (place.floor() as usize, place.ceil() as usize);
+    let (a, b) = (ascending[below], ascending[above]);
+    a + (b - a) * (place - below as f64)
 }
 
 fn quantile_of(worst: &[f64], share: f64) -> f64 {

@@ -144,6 +144,74 @@ impl SampleMatrix {
         Self { layout, columns: Columns::new(&constant, &columns), lengths_m: self.lengths_m.clone() }
     }
 
+    /// The same matrix where a pattern's weights are near given ones, as if the halves responded alike and nothing varied
+    /// along the axis: what these add is taken as it is at the given weights.
+    ///
+    /// ```text
+    /// A w^A + B w^B + X x ≈ S (w^A + w^B) + { D (w^A − w^B) + X x } at the given weights,   S = (A + B)/2,  D = (A − B)/2
+    /// ```
+    pub fn frozen_at(&self, weights: &LayerWeights) -> Self {
+        let Layout { layers, axial, .. } = self.layout;
+        let column = |k: usize| self.columns.column(k);
+        let mut constant = self.columns.constant().to_vec();
+        let mut means = Vec::with_capacity(layers);
+        for j in 0..layers {
+            let (a, b) = (column(self.layout.column_a(j)), column(self.layout.column_b(j)));
+            let curved_m2 = weights.half_a_m2[j] - weights.half_b_m2[j];
+            for ((c, a), b) in constant.iter_mut().zip(a).zip(b) {
+                *c += 0.5 * (a - b) * curved_m2;
+            }
+            if axial {
+                for (c, x) in constant.iter_mut().zip(column(self.layout.column_axial(j))) {
+                    *c += x * weights.axial_m2[j];
+                }
+            }
+            means.push(a.iter().zip(b).map(|(a, b)| 0.5 * (a + b)).collect());
+        }
+        let layout = Layout { layers, halves_alike: true, axial: false };
+        Self { layout, columns: Columns::new(&constant, &means), lengths_m: self.lengths_m.clone() }
+    }
+
+    /// The same matrix with the samples of another behind its own.
+    pub fn joined(&self, other: &Self) -> Self {
+        let both = |a: &[f64], b: &[f64]| [a, b].concat();
+        let columns: Vec<Vec<f64>> =
+            (0..self.columns.count()).map(|k| both(self.columns.column(k), other.columns.column(k))).collect();
+        let columns = Columns::new(&both(self.columns.constant(), other.columns.constant()), &columns);
+        Self { layout: self.layout, columns, lengths_m: self.lengths_m.clone() }
+    }
+
+    /// New samples, each a sum of this matrix's times weights.
+    pub fn combined(&self, weights: &[Vec<(usize, f64)>]) -> Self {
+        let sums = |column: &[f64]| -> Vec<f64> {
+            weights.iter().map(|weights| weights.iter().map(|&(s, y)| y * column[s]).sum()).collect()
+        };
+        let columns: Vec<Vec<f64>> = (0..self.columns.count()).map(|k| sums(self.columns.column(k))).collect();
+        let columns = Columns::new(&sums(self.columns.constant()), &columns);
+        Self { layout: self.layout, columns, lengths_m: self.lengths_m.clone() }
+    }
+
+    /// No more samples than columns, with the same root of the mean square for every pattern.
+    ///
+    /// ```text
+    /// ‖D x + c‖ = ‖R (x, 1)‖,   [D c] = Q R
+    /// ```
+    pub fn of_same_mean_square(&self) -> Self {
+        let (samples, count) = (self.samples(), self.columns.count());
+        if samples <= count + 1 {
+            return self.clone();
+        }
+        let entry = |s: usize, k: usize| {
+            if k < count { self.columns.column(k)[s] } else { self.columns.constant()[s] }
+        };
+        let r = nalgebra::DMatrix::from_fn(samples, count + 1, entry).qr().unpack_r();
+        let factor = (r.nrows() as f64 / samples as f64).sqrt();
+        let column = |k: usize| r.column(k).iter().map(|v| v * factor).collect::<Vec<f64>>();
+        let columns: Vec<Vec<f64>> = (0..count).map(column).collect();
+        let columns = Columns::new(&column(count), &columns);
+        Self { layout: self.layout, columns, lengths_m: self.lengths_m.clone() }
+    }
+
     /// The same matrix with every sample multiplied by its own factor.
     pub fn scaled(&self, factors: &[f64]) -> Self {
         let scale = |column: &[f64]| column.iter().zip(factors).map(|(v, f)| v * f).collect::<Vec<f64>>();

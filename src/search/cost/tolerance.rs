@@ -33,6 +33,7 @@ use crate::pattern::Pattern;
 use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;
 use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
+use crate::search::cost::sampled_coils::quantile;
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
 
 /// Spreads of what is built, as standard deviations; zero: exact.
@@ -118,14 +119,6 @@ impl Distribution {
     pub fn p99_rad_per_s(&self) -> f64 {
         self.quantile_rad_per_s(0.99)
     }
-}
-
-/// The value that a share of ascending values does not exceed, between the order statistics.
-pub(super) fn quantile(ascending: &[f64], share: f64) -> f64 {
-    let place = share.clamp(0.0, 1.0) * (ascending.len() - 1) as f64;
-    let (below, above) = (place.floor() as usize, place.ceil() as usize);
-    let (a, b) = (ascending[below], ascending[above]);
-    a + (b - a) * (place - below as f64)
 }
 
 impl Spread {
@@ -253,11 +246,20 @@ impl<'a> Coils<'a> {
     /// # Errors
     /// A pattern of another layer count.
     pub fn p95_rad_per_s(&self, patterns: &[Pattern]) -> Result<Vec<f64>, SearchError> {
+        Ok(self.p95_and_yield(patterns)?.into_iter().map(|(p95, _)| p95).collect())
+    }
+
+    /// The 95 % quantile of each pattern, and the share of coils within the limit if there is one.
+    ///
+    /// # Errors
+    /// A pattern of another layer count.
+    pub fn p95_and_yield(&self, patterns: &[Pattern]) -> Result<Vec<(f64, Option<f64>)>, SearchError> {
         let worst = self.worst(&self.active, patterns)?;
         let of = |p: usize| {
             let mut ascending: Vec<f64> = worst.iter().map(|coil| coil[p]).collect();
             ascending.sort_by(f64::total_cmp);
-            quantile(&ascending, crate::search::cost::sampled_coils::SHARE)
+            let within = |limit: f64| ascending.partition_point(|w| *w <= limit) as f64 / ascending.len() as f64;
+            (quantile(&ascending, super::sampled_coils::SHARE), self.spec.limit_rad_per_s.map(within))
         };
         Ok((0..patterns.len()).map(of).collect())
     }

@@ -4,16 +4,19 @@ use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
-use super::{Outcome, Watch};
+use super::support::Support;
+use super::{Goal, Outcome, Task, Watch};
 use crate::coil::Coil;
 use crate::pattern::Pattern;
-use crate::rate::{CoilModel, LayerWeights, RateError, RateModel};
+use crate::rate::{LayerWeights, RateError, RateModel};
 use crate::search::cost::columns::{BLOCK, Norm};
+use crate::search::cost::guaranteed::GuaranteedError;
+use crate::search::cost::objective::rms_rad_per_s;
 use crate::search::cost::samples::{SampleMatrix, any_rate_model};
-use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
+use crate::search::cost::worst_case::SearchError;
 use crate::thermal::Instant;
 
-/// A pattern and its worst rate by the reference, refined in time.
+/// A pattern and its cost by the reference, refined in time where it is a worst rate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
     pub rate_rad_per_s: f64,
@@ -28,11 +31,13 @@ impl Candidate {
     }
 }
 
-/// A time of a profile.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Peak {
-    pub profile: usize,
-    pub time_s: f64,
+/// What shows that a pattern is not below the limit although no sample so far does; it becomes a sample.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Witness {
+    /// A time of a profile.
+    Instant { profile: usize, time_s: f64 },
+    /// The pattern's own norm: the sample in which it shows.
+    Pattern(Vec<usize>),
 }
 
 /// What was found out about a pattern.
@@ -43,7 +48,7 @@ pub enum Finding {
         sample: usize,
     },
     /// It is not below the limit, but only between samples.
-    RefutedBetween(Peak),
+    RefutedBetween(Witness),
     Better(Candidate),
 }
 
@@ -54,14 +59,15 @@ const SAME_INSTANT: f64 = 1e-7;
 /// samples exceeds them by a few per cent only, as the reference takes it too.
 const PEAK_OVER_SAMPLES: f64 = 0.9;
 
-/// Every sample of the solved profiles, and the reference behind them.
+/// Every sample of the solved profiles, or the samples that a norm has been asked for, and the reference behind them.
 #[derive(Debug)]
 pub struct Judge<'a> {
-    model: &'a CoilModel,
-    solved: &'a SolvedProfiles,
+    task: Task<'a>,
     coil: Coil,
-    /// Instants between the profiles' own samples, in the order of the samples that they became.
-    peaks: Vec<Peak>,
+    /// None where the goal is a largest value of samples already.
+    support: Option<Support>,
+    /// What became samples besides those that were there at first, in their order.
+    witnesses: Vec<Witness>,
     matrix: SampleMatrix,
     /// The profile of each of the profiles' own samples.
     profile_of: Vec<usize>,
@@ -73,14 +79,21 @@ pub struct Judge<'a> {
 impl<'a> Judge<'a> {
     /// # Errors
     /// Effects that leave a layer no turns; rates that are not finite.
-    pub fn new(model: &'a CoilModel, solved: &'a SolvedProfiles) -> Result<Self, SearchError> {
-        let (matrix, origins) = SampleMatrix::of_profiles(model, solved)?;
+    pub fn new(task: &Task<'a>) -> Result<Self, SearchError> {
+        let support = Support::new(task)?;
+        let (matrix, profile_of) = match &support {
+            Some(support) => (support.first_samples(), Vec::new()),
+            None => {
+                let (matrix, origins) = SampleMatrix::of_profiles(task.model, task.solved)?;
+                (matrix, origins.iter().map(|origin| origin.profile).collect())
+            }
+        };
         Ok(Self {
-            model,
-            solved,
-            coil: model.wound_coil()?,
-            peaks: Vec::new(),
-            profile_of: origins.iter().map(|origin| origin.profile).collect(),
+            task: *task,
+            coil: task.model.wound_coil()?,
+            support,
+            witnesses: Vec::new(),
+            profile_of,
             order: (0..matrix.samples()).collect(),
             ordered: matrix.clone(),
             matrix,
@@ -102,44 +115,85 @@ impl<'a> Judge<'a> {
         layout.halves_alike && !layout.axial && self.matrix.columns.constant().iter().all(|c| *c == 0.0)
     }
 
-    /// The worst rate by the reference, and when it occurs.
+    /// The cost by the reference, and what shows it.
     ///
     /// # Errors
     /// A pattern of another layer count.
-    pub fn candidate_and_peak(&self, pattern: &Pattern) -> Result<(Candidate, Peak), SearchError> {
-        let worst = self.solved.worst_case(self.model, pattern)?;
-        let candidate = Candidate { rate_rad_per_s: worst.rate_rad_per_s.abs(), segments: pattern.segments().to_vec() };
-        Ok((candidate, Peak { profile: worst.profile_index, time_s: worst.time_s }))
+    pub fn candidate_and_witness(&self, pattern: &Pattern) -> Result<(Candidate, Witness), SearchError> {
+        let Task { model, solved, goal, .. } = self.task;
+        let segments = pattern.segments().to_vec();
+        let (rate_rad_per_s, witness) = match goal {
+            Goal::WorstRate => {
+                let worst = solved.worst_case(model, pattern)?;
+                let witness = Witness::Instant { profile: worst.profile_index, time_s: worst.time_s };
+                (worst.rate_rad_per_s.abs(), witness)
+            }
+            Goal::RootMeanSquare => {
+                let rate_model = RateModel::new(model, pattern, &[])?;
+                (rms_rad_per_s(&rate_model, solved), Witness::Pattern(segments.clone()))
+            }
+            Goal::Guaranteed(step) => {
+                let bound = match step.guaranteed(model, pattern) {
+                    Ok(found) => found.rate_rad_per_s,
+                    Err(GuaranteedError::Search(error)) => return Err(error),
+                    // A model without a bound has no unit step.
+                    Err(GuaranteedError::Effect { .. }) => f64::INFINITY,
+                };
+                (bound, Witness::Pattern(segments.clone()))
+            }
+        };
+        Ok((Candidate { rate_rad_per_s, segments }, witness))
     }
 
-    /// The largest |Ω| over the samples.
+    /// The largest size over the samples, or the norm of all of them.
     pub fn sampled_worst_rad_per_s(&self, segments: &[usize]) -> f64 {
-        let pattern = Pattern::new(segments.to_vec()).expect("a search makes permutations only");
-        Norm::Largest.of(&self.matrix.columns.values(&self.coefficients(&pattern)))
+        let coefficients = self.coefficients_of(segments);
+        match &self.support {
+            Some(support) => support.value(&coefficients),
+            None => Norm::Largest.of(&self.matrix.columns.values(&coefficients)),
+        }
     }
 
-    /// Makes samples of instants; false if none of them is new.
-    pub fn add_peaks(&mut self, peaks: &[Peak]) -> bool {
-        let any = any_rate_model(self.model).expect("the model was compiled before");
-        let mut responses = Vec::new();
-        for peak in peaks {
-            let solved = &self.solved.profiles()[peak.profile];
-            let same_s = SAME_INSTANT * solved.profile.duration_s();
-            let is_known = |known: &Peak| known.profile == peak.profile && (known.time_s - peak.time_s).abs() <= same_s;
-            if !self.peaks.iter().any(is_known) {
-                self.peaks.push(*peak);
-                let history = solved.field.at(&[Instant::after(peak.time_s)]);
-                responses.push(any.weight_response(&any.state(&history, 0, &[])));
+    /// Makes samples of what refuted patterns; false if none of them is new.
+    pub fn add_witnesses(&mut self, witnesses: &[Witness]) -> bool {
+        let any = any_rate_model(self.task.model).expect("the model was compiled before");
+        let (mut responses, mut attaining) = (Vec::new(), Vec::new());
+        for witness in witnesses {
+            if self.witnesses.iter().any(|known| self.is_same(known, witness)) {
+                continue;
+            }
+            self.witnesses.push(witness.clone());
+            match witness {
+                Witness::Instant { profile, time_s } => {
+                    let history = self.task.solved.profiles()[*profile].field.at(&[Instant::after(*time_s)]);
+                    responses.push(any.weight_response(&any.state(&history, 0, &[])));
+                }
+                Witness::Pattern(segments) => attaining.push(self.coefficients_of(segments)),
             }
         }
-        if responses.is_empty() {
+        let from = self.matrix.samples();
+        if !responses.is_empty() {
+            self.matrix = self.matrix.extended(&responses);
+        }
+        if let Some(support) = self.support.as_ref().filter(|_| !attaining.is_empty()) {
+            self.matrix = self.matrix.joined(&support.attaining(&attaining));
+        }
+        let added: Vec<usize> = (from..self.matrix.samples()).collect();
+        if added.is_empty() {
             return false;
         }
-        let from = self.matrix.samples();
-        self.matrix = self.matrix.extended(&responses);
-        let added: Vec<usize> = (from..self.matrix.samples()).collect();
         self.try_first(&added);
         true
+    }
+
+    fn is_same(&self, known: &Witness, other: &Witness) -> bool {
+        match (known, other) {
+            (Witness::Instant { profile, time_s }, Witness::Instant { profile: p, time_s: t }) => {
+                let same_s = SAME_INSTANT * self.task.solved.profiles()[*profile].profile.duration_s();
+                profile == p && (time_s - t).abs() <= same_s
+            }
+            _ => known == other,
+        }
     }
 
     /// Whether a pattern's worst rate is below a limit: first by the samples, then by the reference.
@@ -167,16 +221,25 @@ impl<'a> Judge<'a> {
                 return Finding::Refuted { sample: self.order[from + at] };
             }
         }
-        self.refined(&pattern, limit_rad_per_s)
+        match &self.support {
+            Some(support) if support.value(&coefficients) >= limit_rad_per_s => {
+                Finding::RefutedBetween(Witness::Pattern(segments.to_vec()))
+            }
+            Some(_) => match self.candidate_and_witness(&pattern) {
+                Ok((candidate, _)) if candidate.rate_rad_per_s < limit_rad_per_s => Finding::Better(candidate),
+                _ => Finding::RefutedBetween(Witness::Pattern(segments.to_vec())),
+            },
+            None => self.refined(&pattern, limit_rad_per_s),
+        }
     }
 
     /// The worst rate refined in time, over the profiles in the order of their worst samples, until one is not below the
     /// limit or none that is left can be worse.
     fn refined(&self, pattern: &Pattern, limit_rad_per_s: f64) -> Finding {
         let rate_model =
-            RateModel::new(self.model, pattern, &[]).expect("a search makes patterns of the coil's layers");
+            RateModel::new(self.task.model, pattern, &[]).expect("a search makes patterns of the coil's layers");
         let values = self.matrix.columns.values(&self.coefficients(pattern));
-        let mut largest = vec![0.0_f64; self.solved.profiles().len()];
+        let mut largest = vec![0.0_f64; self.task.solved.profiles().len()];
         for (&profile, v) in self.profile_of.iter().zip(&values) {
             largest[profile] = largest[profile].max(v.abs());
         }
@@ -187,13 +250,17 @@ impl<'a> Judge<'a> {
             if largest[profile] < PEAK_OVER_SAMPLES * worst_rad_per_s {
                 break;
             }
-            let (rate_rad_per_s, time_s) = self.solved.profiles()[profile].worst(&rate_model);
+            let (rate_rad_per_s, time_s) = self.task.solved.profiles()[profile].worst(&rate_model);
             worst_rad_per_s = worst_rad_per_s.max(rate_rad_per_s.abs());
             if worst_rad_per_s >= limit_rad_per_s {
-                return Finding::RefutedBetween(Peak { profile, time_s });
+                return Finding::RefutedBetween(Witness::Instant { profile, time_s });
             }
         }
         Finding::Better(Candidate { rate_rad_per_s: worst_rad_per_s, segments: pattern.segments().to_vec() })
+    }
+
+    fn coefficients_of(&self, segments: &[usize]) -> Vec<f64> {
+        self.coefficients(&Pattern::new(segments.to_vec()).expect("a search makes permutations only"))
     }
 
     fn coefficients(&self, pattern: &Pattern) -> Vec<f64> {
@@ -202,7 +269,16 @@ impl<'a> Judge<'a> {
     }
 
     /// The samples at which given patterns are worst, the most frequent first, no two next to each other.
-    pub fn binding_samples(&self, patterns: &[Vec<usize>], most: usize) -> Vec<usize> {
+    pub fn binding_samples(&mut self, patterns: &[Vec<usize>], most: usize) -> Vec<usize> {
+        if self.support.is_some() {
+            // Each pattern's own sample: of the first and then of every so many-th.
+            let stride = patterns.len().div_ceil(most).max(1);
+            let from = self.matrix.samples();
+            let chosen: Vec<Witness> =
+                patterns.iter().step_by(stride).map(|segments| Witness::Pattern(segments.clone())).collect();
+            self.add_witnesses(&chosen);
+            return (from..self.matrix.samples()).take(most).collect();
+        }
         let worst: Vec<usize> = patterns
             .par_iter()
             .map(|segments| {
@@ -258,7 +334,7 @@ impl Outcome {
             }
             Finding::Refuted { sample } if self.refuting.len() < MOST_REFUTING => self.refuting.push(sample),
             Finding::Refuted { .. } => {}
-            Finding::RefutedBetween(peak) => self.between.push(peak),
+            Finding::RefutedBetween(witness) => self.between.push(witness),
         }
     }
 

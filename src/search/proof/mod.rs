@@ -22,7 +22,8 @@
 //! Where nothing tells the halves of the fibre apart and nothing is added outside the coil, a pattern and its mirror
 //! image s → N+1−s have opposite errors and one of the two is searched.
 //!
-//! Holds for the worst rate (and so the worst phase, a fixed multiple of it). Leaves out the rms objective.
+//! Holds for the worst rate (and so the worst phase, a fixed multiple of it), the rms rate and the guaranteed worst
+//! rate, which are largest values of samples too ([`support`]). Leaves out the quantile over built coils.
 
 pub mod beam;
 pub mod box_join;
@@ -35,6 +36,7 @@ mod sampling;
 pub mod sign_search;
 pub mod simd_bounds;
 mod starts;
+pub mod support;
 pub mod surrogates;
 #[cfg(test)]
 mod tests;
@@ -44,14 +46,26 @@ pub use starts::starting_patterns;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use candidates::{Candidate, Judge, Peak};
+use candidates::{Candidate, Judge, Witness};
 use rows::Row;
 use sampling::Proof;
 
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::rate::CoilModel;
+use crate::search::cost::guaranteed::UnitStep;
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
+
+/// What is to be made small.
+#[derive(Debug, Clone, Copy)]
+pub enum Goal<'a> {
+    /// The largest |Ω| over all profiles and times.
+    WorstRate,
+    /// √(mean Ω²) over time and profiles.
+    RootMeanSquare,
+    /// The largest |Ω| over all profiles within the largest rate.
+    Guaranteed(&'a UnitStep),
+}
 
 /// What is to be proved.
 #[derive(Debug, Clone, Copy)]
@@ -59,6 +73,7 @@ pub struct Task<'a> {
     pub model: &'a CoilModel,
     pub solved: &'a SolvedProfiles,
     pub class: WindabilityClass,
+    pub goal: Goal<'a>,
 }
 
 /// How much of the proof is done.
@@ -240,12 +255,12 @@ fn begin<'a>(task: &Task<'a>, starts: &[Pattern], good_enough_rad_per_s: f64) ->
     if layers > permutation_tree::MOST_LAYERS {
         return Err(SearchError::TooManyLayers { found: layers, most: permutation_tree::MOST_LAYERS });
     }
-    let mut judge = Judge::new(task.model, task.solved)?;
+    let mut judge = Judge::new(task)?;
     let mut best: Option<Candidate> = None;
-    let mut peaks = Vec::new();
+    let mut witnesses = Vec::new();
     for start in starts.iter().filter(|p| task.class.admits(p)) {
-        let (candidate, peak) = judge.candidate_and_peak(start)?;
-        peaks.push(peak);
+        let (candidate, witness) = judge.candidate_and_witness(start)?;
+        witnesses.push(witness);
         // Of starts that are equally good, the first: it may be one that has a name.
         let is_better = |b: &Candidate| candidate.rate_rad_per_s < b.rate_rad_per_s * (1.0 - RELATIVE_TOLERANCE);
         if best.as_ref().is_none_or(is_better) {
@@ -253,7 +268,7 @@ fn begin<'a>(task: &Task<'a>, starts: &[Pattern], good_enough_rad_per_s: f64) ->
         }
     }
     let mut best = best.ok_or(SearchError::NoStart { class: task.class })?;
-    judge.add_peaks(&peaks);
+    judge.add_witnesses(&witnesses);
     let proof = Proof::new(task.class, &mut judge, starts, &mut best, good_enough_rad_per_s);
     Ok(Begun { judge, best, proof })
 }
@@ -324,7 +339,7 @@ pub struct Outcome {
     /// Samples that refuted what was judged.
     pub refuting: Vec<usize>,
     /// Instants between samples that refuted what no sample did.
-    pub between: Vec<Peak>,
+    pub between: Vec<Witness>,
 }
 
 impl Default for Outcome {

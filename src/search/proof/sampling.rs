@@ -189,7 +189,7 @@ impl Proof {
     fn join(&mut self, judge: &mut Judge, outcome: &Outcome) -> bool {
         let first_new = judge.matrix().samples();
         let mut joining: Vec<usize> = Vec::new();
-        if judge.add_peaks(&outcome.between) {
+        if judge.add_witnesses(&outcome.between) {
             joining.extend(first_new..judge.matrix().samples());
         }
         let has_new_instants = !joining.is_empty();

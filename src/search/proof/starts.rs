@@ -1,6 +1,6 @@
 //! Patterns that a proof begins with: the classics of the class and what a short search finds.
 
-use super::Task;
+use super::{Goal, Task};
 use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
 use crate::search::anneal::rounds::{
@@ -8,6 +8,7 @@ use crate::search::anneal::rounds::{
 };
 use crate::search::anneal::sample_cost::SampleCost;
 use crate::search::cost::columns::Norm;
+use crate::search::cost::objective::Objective;
 use crate::search::cost::samples::SampleMatrix;
 use crate::search::cost::worst_case::SearchError;
 
@@ -31,7 +32,11 @@ pub fn starting_patterns(task: &Task, seed: u64) -> Result<Vec<Pattern>, SearchE
     if layers < 4 {
         return Ok(classics);
     }
-    let (matrix, _) = SampleMatrix::of_profiles(task.model, task.solved)?;
+    let (matrix, norm) = match task.goal {
+        Goal::WorstRate => (Objective::WorstRate.of_profiles(task.model, task.solved)?, Norm::Largest),
+        Goal::RootMeanSquare => (Objective::RootMeanSquare.of_profiles(task.model, task.solved)?, Norm::RootMeanSquare),
+        Goal::Guaranteed(step) => (SampleMatrix::new(task.model, &step.parts(task.model, 1)?.changes)?, Norm::Sum),
+    };
     let plan = Plan {
         seed,
         restarts_per_round: DEFAULT_RESTARTS_PER_ROUND,
@@ -39,7 +44,7 @@ pub fn starting_patterns(task: &Task, seed: u64) -> Result<Vec<Pattern>, SearchE
         rules: Rules { rounds: u64::MAX, patience: PATIENCE, moves: None, target: None },
         starts: Vec::new(),
     };
-    let mut search = Optimisation::new(SampleCost::new(matrix, task.class, Norm::Largest), plan);
+    let mut search = Optimisation::new(SampleCost::new(matrix, task.class, norm), plan);
     while search.advance() {}
     let found = search.state().found.iter().take(MOST_FOUND);
     let found = found.map(|f| Pattern::new(f.segments.clone()).expect("a walk visits permutations only"));

@@ -59,7 +59,7 @@ fn go_on(_: Progress) -> ControlFlow<()> {
 fn check(class: WindabilityClass, layers: usize, layer_length: LayerLength, effects: &[&str]) -> Certificate {
     let model = model(layers, layer_length, effects);
     let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
-    let task = Task { model: &model, solved: &solved, class };
+    let task = Task { model: &model, solved: &solved, class, goal: Goal::WorstRate };
     let start = Pattern::new((1..=layers).collect()).unwrap();
     let found = prove(&task, &[start], &go_on).unwrap();
     let smallest = smallest_by_enumeration(&task);
@@ -120,7 +120,7 @@ fn a_proof_looks_at_a_small_part_of_the_space() {
 fn of_the_half_of_twelve_factorial_permutations_a_proof_looks_at_fewer_than_one_in_five_hundred() {
     let model = model(12, LayerLength::Equal, &[]);
     let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
-    let task = Task { model: &model, solved: &solved, class: WindabilityClass::Any };
+    let task = Task { model: &model, solved: &solved, class: WindabilityClass::Any, goal: Goal::WorstRate };
     let found = prove(&task, &[Pattern::new((1..=12).collect()).unwrap()], &go_on).unwrap();
     assert_eq!(found.status, Status::Optimal);
     assert!(found.nodes + found.judged < 239_500_800 / 500, "{} {}", found.nodes, found.judged);
@@ -132,7 +132,7 @@ fn a_proof_that_is_stopped_at_once_says_that_nothing_is_known_and_keeps_its_star
     let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
     let start = Pattern::new((1..=12).collect()).unwrap();
     for class in [WindabilityClass::Standard, WindabilityClass::Any] {
-        let task = Task { model: &model, solved: &solved, class };
+        let task = Task { model: &model, solved: &solved, class, goal: Goal::WorstRate };
         let found = prove(&task, std::slice::from_ref(&start), &|_| ControlFlow::Break(())).unwrap();
         let known = solved.worst_case(&model, &start).unwrap().rate_rad_per_s.abs();
         assert!(found.best_rad_per_s <= known && found.lower_bound_rad_per_s <= found.best_rad_per_s);
@@ -145,7 +145,7 @@ fn one_thread_and_two_find_the_same_pattern_bound_and_nodes() {
     let model = model(10, LayerLength::Actual, &[]);
     let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
     for class in [WindabilityClass::Standard, WindabilityClass::Captive(1)] {
-        let task = Task { model: &model, solved: &solved, class };
+        let task = Task { model: &model, solved: &solved, class, goal: Goal::WorstRate };
         let on = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| prove(&task, &starting_patterns(&task, 1).unwrap(), &go_on).unwrap())
@@ -158,11 +158,38 @@ fn one_thread_and_two_find_the_same_pattern_bound_and_nodes() {
 fn a_start_of_another_class_is_refused_in_words() {
     let model = model(6, LayerLength::Equal, &[]);
     let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
-    let task = Task { model: &model, solved: &solved, class: WindabilityClass::Standard };
+    let task = Task { model: &model, solved: &solved, class: WindabilityClass::Standard, goal: Goal::WorstRate };
     let start = Pattern::new(vec![1, 6, 2, 5, 3, 4]).unwrap();
     let error = prove(&task, &[start], &go_on).unwrap_err();
     assert_eq!(
         error.to_string(),
         "a proof must begin with a pattern of the class standard, found none: give one of that class"
     );
+}
+
+#[test]
+fn the_guaranteed_and_the_rms_rate_are_proved_as_enumeration_finds_them_also_with_a_heated_bore() {
+    let max_rate_k_per_s = 0.003;
+    for (class, layers) in
+        [(WindabilityClass::Standard, 8), (WindabilityClass::Captive(1), 6), (WindabilityClass::Any, 6)]
+    {
+        for effects in [&["surface_film"][..], &["surface_film", "strain_mismatch"], &["surface_film", "self_heating"]]
+        {
+            let model = model(layers, LayerLength::Actual, effects);
+            let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
+            let step = UnitStep::new(&model, max_rate_k_per_s).unwrap();
+            for goal in [Goal::Guaranteed(&step), Goal::RootMeanSquare] {
+                let task = Task { model: &model, solved: &solved, class, goal };
+                let judge = Judge::new(&task).unwrap();
+                let cost = |p: &Pattern| judge.candidate_and_witness(p).unwrap().0.rate_rad_per_s;
+                let smallest = patterns_of(class, layers).iter().map(cost).fold(f64::INFINITY, f64::min);
+                let found = prove(&task, &[Pattern::new((1..=layers).collect()).unwrap()], &go_on).unwrap();
+                let context = format!("{class} {layers} {effects:?} {goal:?}");
+                assert_eq!(found.status, Status::Optimal, "{context}");
+                let best = found.best_rad_per_s;
+                assert!((best / smallest - 1.0).abs() < 1e-8, "{context}: {best} {smallest}");
+                assert!(found.lower_bound_rad_per_s <= smallest, "{context}");
+            }
+        }
+    }
 }

@@ -1,0 +1,151 @@
+//! Watches a search: progress, checkpoints, the clock and the wish to stop.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+
+use super::CliError;
+use super::optimise::Arguments;
+use super::progress::{Progress, StopFlag};
+use super::screen::Screen;
+use crate::io::files::WriteError;
+use crate::io::write::checkpoint::write_checkpoint;
+use crate::io::write::run_directory::{Request, write_request};
+use crate::search::Observer;
+use crate::search::anneal::rounds::Rounds;
+use crate::search::proof;
+use crate::search::run::Halt;
+use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
+
+/// Steps of the proof's bar, one a per cent.
+const BAR_STEPS: u64 = 100;
+
+/// Work besides the search's own slices may take this part of a budget: one in so many.
+const SIDE_WORK: u32 = 4;
+
+/// Where checkpoints go, and what they belong to.
+struct Checkpoints<'a> {
+    folder: &'a Path,
+    request: &'a Request<'a>,
+    fingerprint: String,
+    every: Duration,
+    last: Instant,
+    is_taken_up: bool,
+}
+
+/// Told how a search of the command line goes.
+pub(super) struct Watch<'a> {
+    budget: Option<Duration>,
+    proof_time: Option<Duration>,
+    started: Instant,
+    stop: &'a StopFlag,
+    screen: &'a Screen,
+    checkpoints: Option<Checkpoints<'a>>,
+    progress: Option<Progress>,
+    proof_progress: OnceLock<(Progress, Instant)>,
+    best_cost: f64,
+    /// Seconds until the best pattern was found.
+    pub found_s: f64,
+    /// A file that could not be written; the search ends with it.
+    pub fault: Option<CliError>,
+}
+
+impl<'a> Watch<'a> {
+    pub fn new(
+        arguments: &'a Arguments,
+        request: &'a Request,
+        budget: Option<Duration>,
+        started: Instant,
+        stop: &'a StopFlag,
+        screen: &'a Screen,
+        is_taken_up: bool,
+    ) -> Self {
+        let checkpoints = arguments.output.as_deref().map(|folder| Checkpoints {
+            folder,
+            request,
+            fingerprint: request.fingerprint(),
+            every: arguments.checkpoint_every,
+            last: started,
+            is_taken_up,
+        });
+        Self {
+            budget,
+            proof_time: arguments.prove,
+            started,
+            stop,
+            screen,
+            checkpoints,
+            progress: None,
+            proof_progress: OnceLock::new(),
+            best_cost: f64::INFINITY,
+            found_s: 0.0,
+            fault: None,
+        }
+    }
+
+    fn keep(&mut self, written: Option<Result<(), WriteError>>) {
+        if let Some(Err(error)) = written {
+            self.fault.get_or_insert(error.into());
+        }
+    }
+}
+
+impl Observer for Watch<'_> {
+    fn begun(&mut self, search: &dyn Rounds) {
+        self.progress = Some(self.screen.progress("optimise", search.plan().rules.moves));
+        let written = self.checkpoints.as_ref().filter(|c| !c.is_taken_up).map(|c| {
+            write_request(c.folder, c.request).and_then(|()| write_checkpoint(c.folder, &c.fingerprint, search.state()))
+        });
+        self.keep(written);
+    }
+
+    fn advanced(&mut self, search: &dyn Rounds) -> ControlFlow<Halt> {
+        if let Some(best) = search.best().filter(|best| best.cost < self.best_cost) {
+            (self.best_cost, self.found_s) = (best.cost, self.started.elapsed().as_secs_f64());
+        }
+        let written = self.checkpoints.as_mut().filter(|c| c.last.elapsed() >= c.every).map(|c| {
+            c.last = Instant::now();
+            write_checkpoint(c.folder, &c.fingerprint, search.state())
+        });
+        self.keep(written);
+        let message = search.best().map_or_else(String::new, |best| {
+            format!("round {}, best {:.4} °/h", search.state().round + 1, deg_per_h_from_rad_per_s(best.cost))
+        });
+        if let Some(progress) = &self.progress {
+            progress.at(search.evaluations(), &message);
+        }
+        if self.stop.is_set() || self.fault.is_some() {
+            return ControlFlow::Break(Halt::Signal);
+        }
+        if self.budget.is_some_and(|budget| self.started.elapsed() >= budget) {
+            return ControlFlow::Break(Halt::Clock);
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn ended(&mut self, search: &dyn Rounds) {
+        let written = self.checkpoints.as_ref().map(|c| write_checkpoint(c.folder, &c.fingerprint, search.state()));
+        self.keep(written);
+        self.progress = None;
+    }
+
+    fn goes_on(&self) -> bool {
+        !self.stop.is_set() && self.budget.is_none_or(|budget| self.started.elapsed() < budget / SIDE_WORK)
+    }
+
+    fn proving(&self, at: proof::Progress) -> ControlFlow<()> {
+        let (bar, began) =
+            self.proof_progress.get_or_init(|| (self.screen.progress("prove", Some(BAR_STEPS)), Instant::now()));
+        bar.at(
+            percent_from_fraction(at.share_done) as u64,
+            &format!(
+                "best {:.4} °/h, lower bound {:.4} °/h",
+                deg_per_h_from_rad_per_s(at.best_rad_per_s),
+                deg_per_h_from_rad_per_s(at.lower_bound_rad_per_s)
+            ),
+        );
+        let is_over = self.stop.is_set() || self.proof_time.is_some_and(|time| began.elapsed() >= time);
+        if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}

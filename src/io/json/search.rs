@@ -1,0 +1,223 @@
+//! The answer of `optimise` as a document.
+
+use serde::Serialize;
+
+use super::{PatternJson, ProofJson};
+use crate::search::Request;
+use crate::search::answer::{Answer, Former, FoundBy, Proof};
+use crate::search::evaluator::{GridCheck, Judged};
+use crate::search::proof::Status;
+use crate::search::recommendation::Recommendation;
+use crate::search::validation::Validation;
+use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
+
+impl PatternJson {
+    /// Of a pattern that was judged by the reference.
+    pub fn of(judged: &Judged) -> Self {
+        let Judged { name, pattern, worst, phase_rad, guaranteed_rad_per_s, .. } = judged;
+        Self {
+            p95_rate_deg_per_h: judged.p95_rad_per_s.map(deg_per_h_from_rad_per_s),
+            ..Self::new(name, pattern, worst, *phase_rad, *guaranteed_rad_per_s)
+        }
+    }
+}
+
+/// The answer of `optimise`.
+#[derive(Debug, Clone, Serialize)]
+pub struct OptimiseJson {
+    pub model: String,
+    pub objective: String,
+    pub windability: String,
+    pub seed: u64,
+    pub best: PatternJson,
+    pub baselines: Vec<PatternJson>,
+    /// QUA's objective over the best pattern's; null where QUA does not fit the layer count.
+    pub improvement_over_qua: Option<f64>,
+    pub statement: String,
+    /// What to wind; null where the search was interrupted.
+    pub recommendation: Option<RecommendationJson>,
+    /// The best pattern and QUA on profiles that were not searched; null where the search was interrupted.
+    pub validation: Option<ValidationJson>,
+    /// Null where the temperature has no grid or the search was interrupted.
+    pub grid_check: Option<GridCheckJson>,
+    /// Null where no former pattern was stated.
+    pub compared_with: Option<FormerJson>,
+    pub proof: ProofJson,
+    pub evaluations: u64,
+    /// On the screen only: files don't depend on the clock.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub evaluations_per_s: Option<f64>,
+    /// On the screen only: the whole search, without reading the model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seconds: Option<f64>,
+    pub best_found: BestFoundJson,
+    pub rounds: u64,
+    /// "proved", "no improvement", "rounds", "moves", "target", "clock" or "interrupted".
+    pub stopped_by: String,
+    /// False where the clock or a signal ended the search: the same request may then end elsewhere.
+    pub reproducible: bool,
+}
+
+/// Worst rates on a grid twice as fine.
+#[derive(Debug, Clone, Serialize)]
+pub struct GridCheckJson {
+    pub cells_per_layer: usize,
+    pub finer_cells_per_layer: usize,
+    /// The best pattern, then QUA.
+    pub patterns: Vec<GridCheckedJson>,
+    /// Null where the grid changes little.
+    pub caution: Option<String>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct GridCheckedJson {
+    pub name: String,
+    pub worst_rate_deg_per_h: f64,
+    pub finer_worst_rate_deg_per_h: f64,
+    pub change_percent: f64,
+}
+
+impl GridCheckJson {
+    pub fn of(check: &GridCheck) -> Self {
+        let patterns = check.patterns.iter().map(|checked| GridCheckedJson {
+            name: checked.name.clone(),
+            worst_rate_deg_per_h: deg_per_h_from_rad_per_s(checked.rate_rad_per_s),
+            finer_worst_rate_deg_per_h: deg_per_h_from_rad_per_s(checked.finer_rad_per_s),
+            change_percent: percent_from_fraction(checked.change()),
+        });
+        Self {
+            cells_per_layer: check.cells_per_layer,
+            finer_cells_per_layer: check.finer_cells_per_layer,
+            patterns: patterns.collect(),
+            caution: check.caution(),
+        }
+    }
+}
+
+/// When the best pattern was come upon.
+#[derive(Debug, Clone, Serialize)]
+pub struct BestFoundJson {
+    /// "classic", "annealing", "shared" where a search for another objective found it, or "bounds" where the search by
+    /// bounds at the end found better.
+    pub by: &'static str,
+    /// Moves judged by then.
+    pub evaluations: u64,
+    /// On the screen only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seconds: Option<f64>,
+}
+
+/// A former pattern under the model of this search.
+#[derive(Debug, Clone, Serialize)]
+pub struct FormerJson {
+    #[serde(flatten)]
+    pub pattern: PatternJson,
+    /// Whether the best pattern of this search is better by more than rounding.
+    pub best_changed: bool,
+    /// The former pattern's objective, and as a multiple of the best one's.
+    pub cost_deg_per_h: f64,
+    pub cost_factor: Option<f64>,
+    pub statement: String,
+}
+
+/// What to wind, in one sentence with its reasons.
+#[derive(Debug, Clone, Serialize)]
+pub struct RecommendationJson {
+    /// Its name.
+    pub pattern: String,
+    pub segments: Vec<usize>,
+    pub sentence: String,
+    pub reasons: Vec<String>,
+}
+
+impl RecommendationJson {
+    pub fn of(recommendation: &Recommendation) -> Self {
+        Self {
+            pattern: recommendation.name.clone(),
+            segments: recommendation.pattern.segments().to_vec(),
+            sentence: recommendation.sentence.clone(),
+            reasons: recommendation.reasons.clone(),
+        }
+    }
+}
+
+/// Worst rates on profiles that were not searched.
+#[derive(Debug, Clone, Serialize)]
+pub struct ValidationJson {
+    pub profiles: usize,
+    pub seed: u64,
+    pub best_worst_rate_deg_per_h: f64,
+    /// Null where QUA does not fit the layer count.
+    pub qua_worst_rate_deg_per_h: Option<f64>,
+}
+
+impl ValidationJson {
+    pub fn of(validation: &Validation) -> Self {
+        Self {
+            profiles: validation.profiles,
+            seed: validation.seed,
+            best_worst_rate_deg_per_h: deg_per_h_from_rad_per_s(validation.best_rad_per_s),
+            qua_worst_rate_deg_per_h: validation.qua_rad_per_s.map(deg_per_h_from_rad_per_s),
+        }
+    }
+}
+
+impl ProofJson {
+    /// Of a search's proof.
+    pub fn of_search(proof: &Proof) -> Self {
+        let bound = deg_per_h_from_rad_per_s(proof.lower_bound_rad_per_s);
+        let lower_bound_deg_per_h = (proof.status != Status::None).then_some(bound);
+        Self { status: proof.status.to_string(), lower_bound_deg_per_h }
+    }
+}
+
+impl OptimiseJson {
+    /// Of a search of a model by its name; `seconds`: of the whole search, and until the best was found.
+    pub fn of(model: &str, request: &Request, answer: &Answer, seconds: f64, found_s: f64) -> Self {
+        let found_s = match answer.found_by {
+            FoundBy::Classic => 0.0,
+            FoundBy::Annealing => found_s,
+            FoundBy::Shared | FoundBy::Bounds => seconds,
+        };
+        Self {
+            model: model.to_owned(),
+            objective: request.objective.key().to_owned(),
+            windability: request.class.to_string(),
+            seed: request.plan.seed,
+            best: PatternJson::of(&answer.best),
+            baselines: answer.baselines.iter().map(PatternJson::of).collect(),
+            improvement_over_qua: answer.improvement_over_qua,
+            statement: answer.statement.clone(),
+            recommendation: answer.recommendation.as_ref().map(RecommendationJson::of),
+            validation: answer.validation.as_ref().map(ValidationJson::of),
+            grid_check: answer.grid_check.as_ref().map(GridCheckJson::of),
+            compared_with: answer.compared_with.as_ref().map(|former| FormerJson::of(former, &answer.best)),
+            proof: ProofJson::of_search(&answer.proof),
+            evaluations: answer.evaluations,
+            evaluations_per_s: Some(answer.evaluations_now as f64 / seconds),
+            seconds: Some(seconds),
+            best_found: BestFoundJson {
+                by: answer.found_by.key(),
+                evaluations: answer.evaluations_when_found,
+                seconds: Some(found_s),
+            },
+            rounds: answer.state.round,
+            stopped_by: answer.ended.key().to_owned(),
+            reproducible: answer.is_reproducible(),
+        }
+    }
+}
+
+impl FormerJson {
+    fn of(former: &Former, best: &Judged) -> Self {
+        let (new_cost, old_cost) = (best.objective_rad_per_s, former.judged.objective_rad_per_s);
+        Self {
+            best_changed: former.best_changed,
+            cost_deg_per_h: deg_per_h_from_rad_per_s(old_cost),
+            // A pattern without any error has no multiple.
+            cost_factor: (new_cost > 0.0).then(|| old_cost / new_cost),
+            pattern: PatternJson::of(&former.judged),
+            statement: former.statement.clone(),
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! What a search answers: the best pattern beside the classics, what is known about it, and what to wind.
+
+use super::anneal::rounds::{State, Stop};
+use super::evaluator::{GridCheck, Judged};
+use super::proof::{Certificate, Status};
+use super::recommendation::Recommendation;
+use super::validation::Validation;
+use crate::units::deg_per_h_from_rad_per_s;
+
+/// How a search came to its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ended {
+    /// By a rule of its plan, or because nothing better exists.
+    Rule(Option<Stop>),
+    /// Its time was over.
+    Clock,
+    /// It was interrupted.
+    Signal,
+}
+
+impl Ended {
+    /// As written in results.
+    pub fn key(self) -> &'static str {
+        match self {
+            Ended::Rule(stop) => stop.map_or("rounds", Stop::key),
+            Ended::Clock => "clock",
+            Ended::Signal => "interrupted",
+        }
+    }
+}
+
+/// What came upon the best pattern.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FoundBy {
+    Classic,
+    Annealing,
+    /// A search for another objective.
+    Shared,
+    /// The search by bounds at the end.
+    Bounds,
+}
+
+impl FoundBy {
+    /// As written in results.
+    pub fn key(self) -> &'static str {
+        match self {
+            FoundBy::Classic => "classic",
+            FoundBy::Annealing => "annealing",
+            FoundBy::Shared => "shared",
+            FoundBy::Bounds => "bounds",
+        }
+    }
+}
+
+/// What is proved about the best pattern.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Proof {
+    pub status: Status,
+    /// No pattern of the class is below this; zero where nothing is proved.
+    pub lower_bound_rad_per_s: f64,
+    /// The time was over before the proof was.
+    pub was_cut_short: bool,
+}
+
+impl Proof {
+    pub const NONE: Proof = Proof { status: Status::None, lower_bound_rad_per_s: 0.0, was_cut_short: false };
+
+    pub fn of(certificate: &Certificate) -> Self {
+        let Certificate { status, lower_bound_rad_per_s, .. } = *certificate;
+        Self { status, lower_bound_rad_per_s, was_cut_short: status != Status::Optimal }
+    }
+
+    /// To be said after how good the best pattern is; `what` is the objective in words.
+    pub fn words(&self, what: &str) -> String {
+        match self.status {
+            Status::Optimal => format!(" Proved: no pattern of the class has a smaller {what} at any time."),
+            Status::Gap => format!(
+                " Proved: no pattern of the class has a {what} below {:.4} °/h.",
+                deg_per_h_from_rad_per_s(self.lower_bound_rad_per_s)
+            ),
+            Status::None => String::new(),
+        }
+    }
+}
+
+/// A former pattern under the model of this search.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Former {
+    pub judged: Judged,
+    /// Whether the best pattern of this search is better by more than rounding.
+    pub best_changed: bool,
+    pub statement: String,
+}
+
+/// The answer of [`super::run`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Answer {
+    pub best: Judged,
+    /// The classics that fit the layer count.
+    pub baselines: Vec<Judged>,
+    /// QUA's objective over the best pattern's; none where QUA does not fit the layer count or the error is zero.
+    pub improvement_over_qua: Option<f64>,
+    pub statement: String,
+    /// None where the temperature has no grid or the search was interrupted.
+    pub grid_check: Option<GridCheck>,
+    /// None where no former pattern was given.
+    pub compared_with: Option<Former>,
+    pub proof: Proof,
+    pub found_by: FoundBy,
+    /// Moves judged in all, by when the best was known, and in this run.
+    pub evaluations: u64,
+    pub evaluations_when_found: u64,
+    pub evaluations_now: u64,
+    pub state: State,
+    pub ended: Ended,
+    /// None where the search was interrupted.
+    pub validation: Option<Validation>,
+    pub recommendation: Option<Recommendation>,
+}
+
+impl Answer {
+    /// Whether the same request ends here on every machine.
+    pub fn is_reproducible(&self) -> bool {
+        matches!(self.ended, Ended::Rule(_)) && !self.proof.was_cut_short
+    }
+}

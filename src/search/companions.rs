@@ -1,0 +1,112 @@
+//! Starts that searches share: patterns found under one objective or in a narrower class, judged under another.
+//!
+//! What makes the worst rate small makes the guaranteed worst rate small as well, but an annealer that begins anew
+//! under each objective ends in another valley each time. So every search first asks, briefly, for what the others
+//! would find, with the look-ahead of the proof where the class has one, and judges it by its own objective.
+
+use super::anneal::rounds::{Found, Plan, Rounds, Rules};
+use super::cost::objective::Objective;
+use super::evaluator::{Evaluator, JudgeError};
+use crate::pattern::Pattern;
+use crate::pattern::windability::WindabilityClass;
+
+/// Rounds of a short search.
+const ROUNDS: u64 = 2;
+
+/// Patterns of a short search that are shared.
+const SHARED: usize = 8;
+
+/// Patterns from which a search is refined at its end.
+const REFINED: usize = 4;
+
+/// A refinement takes this part of a restart's moves.
+const REFINING_SHARE: u64 = 2;
+
+impl<'a> Evaluator<'a> {
+    /// The same model judged by another objective.
+    pub fn under(&self, objective: Objective) -> Evaluator<'a> {
+        Evaluator { objective, ..*self }
+    }
+
+    /// Patterns that short searches for other objectives and in narrower classes come upon; `goes_on` is asked between
+    /// their slices.
+    ///
+    /// # Errors
+    /// Rates that are not finite.
+    pub fn companions(
+        &self,
+        class: WindabilityClass,
+        plan: &Plan,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Result<Vec<Pattern>, JudgeError> {
+        let has_bound = self.unit_step.is_some();
+        let others: &[Objective] = match self.objective {
+            Objective::WorstRate | Objective::WorstPhase => &[Objective::GuaranteedRate],
+            Objective::GuaranteedRate => &[Objective::WorstRate],
+            Objective::RootMeanSquare | Objective::P95 => &[Objective::WorstRate, Objective::GuaranteedRate],
+        };
+        let mut shared = Vec::new();
+        for &objective in others.iter().filter(|o| has_bound || **o != Objective::GuaranteedRate) {
+            shared.extend(self.under(objective).short(class, plan, goes_on)?);
+        }
+        let is_wider = !matches!(class, WindabilityClass::Standard | WindabilityClass::Captive(0 | 1));
+        if is_wider {
+            shared.extend(self.under(Objective::WorstRate).short(WindabilityClass::Captive(1), plan, goes_on)?);
+        }
+        let mut seen = std::collections::BTreeSet::new();
+        shared.retain(|pattern| seen.insert(pattern.segments().to_vec()));
+        Ok(shared)
+    }
+
+    /// What a short search finds, the best of it improved by bounds.
+    fn short(
+        &self,
+        class: WindabilityClass,
+        plan: &Plan,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Result<Vec<Pattern>, JudgeError> {
+        let layers = self.model.coil.layers();
+        let plan = Plan {
+            seed: plan.seed,
+            restarts_per_round: plan.restarts_per_round,
+            moves_per_restart: plan.moves_per_restart.min(self.objective.default_moves_per_restart(layers)),
+            rules: Rules { rounds: ROUNDS, patience: ROUNDS, moves: None, target: None },
+            starts: Vec::new(),
+        };
+        let Some(mut search) = self.search(class, plan, None)? else { return Ok(Vec::new()) };
+        while goes_on() && search.advance() {}
+        search.gather();
+        let found = &search.state().found;
+        let mut patterns: Vec<Pattern> =
+            found.iter().take(SHARED).filter_map(|f| Pattern::new(f.segments.clone()).ok()).collect();
+        if goes_on()
+            && let Some(best) = self.best(class, found, &[])?
+        {
+            patterns.push(self.improved(class, best, found, None)?.0.pattern);
+        }
+        Ok(patterns)
+    }
+
+    /// What a search found and what was shared with it, the best refined from where they are; best first.
+    pub(super) fn gathered(
+        &self,
+        search: &dyn Rounds,
+        class: WindabilityClass,
+        shared: &[Pattern],
+        refine: bool,
+    ) -> Vec<Found> {
+        let admitted = shared.iter().filter(|pattern| class.admits(pattern));
+        let judged: Vec<Found> = admitted.map(|pattern| search.judged(pattern.segments())).collect();
+        let mut found: Vec<Found> = search.state().found.iter().cloned().chain(judged).collect();
+        let order = |a: &Found, b: &Found| a.cost.total_cmp(&b.cost).then_with(|| a.segments.cmp(&b.segments));
+        found.sort_by(order);
+        found.dedup_by(|a, b| a.segments == b.segments);
+        if refine {
+            let starts: Vec<Vec<usize>> = found.iter().take(REFINED).map(|f| f.segments.clone()).collect();
+            found.extend(search.refined(&starts, search.plan().moves_per_restart / REFINING_SHARE));
+            found.sort_by(order);
+            found.dedup_by(|a, b| a.segments == b.segments);
+        }
+        found
+    }
+}

@@ -1,0 +1,163 @@
+//! What lies beside a recommendation: one more captive reel, the workshop's spreads, the other boundary.
+
+use super::cost::guaranteed::UnitStep;
+use super::cost::tolerance::{Measure, ToleranceSpec, measure, study};
+use super::cost::worst_case::{SearchError, SolvedProfiles};
+use super::evaluator::{Evaluator, JudgeError};
+use super::proof::permutation_tree::MOST_LAYERS;
+use super::proof::{Effort, Goal, Task, improve};
+use super::recommendation::{TIE, Weighed};
+use crate::effect::DeclaredEffect;
+use crate::pattern::Pattern;
+use crate::pattern::windability::WindabilityClass;
+use crate::profile::Profile;
+use crate::rate::CoilModel;
+use crate::thermal::{Extent, Location};
+use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
+
+/// Below this a look at another class is not worth its words.
+const WORTH_A_REEL: f64 = 0.5;
+
+/// Coils that are drawn to see which spread matters most: shares need fewer than quantiles.
+const COILS_FOR_SHARES: usize = 48;
+
+/// A quantile this much above the declared coil's worst case is the workshop's doing.
+const MOSTLY_SPREAD: f64 = 1.5;
+
+/// Still air in a gyro's housing, for models that prescribe the outermost layer \[W/(m²K)\].
+const STILL_AIR_W_PER_M2_K: f64 = 20.0;
+
+impl Evaluator<'_> {
+    /// What one captive reel would buy.
+    pub(super) fn captive_reason(
+        &self,
+        class: WindabilityClass,
+        recommended: &Weighed,
+    ) -> Result<Option<String>, JudgeError> {
+        let layers = self.model.coil.layers();
+        if class != WindabilityClass::Standard || !(4..=MOST_LAYERS).contains(&layers) {
+            return Ok(None);
+        }
+        let (goal, what) = match self.unit_step {
+            Some(step) => (Goal::Guaranteed(step), "guaranteed worst rate error"),
+            None => (Goal::WorstRate, "worst rate error"),
+        };
+        let task = Task { model: self.model, solved: self.solved, class: WindabilityClass::Captive(1), goal };
+        let effort = Effort { most_nodes: 0, beam_width: 0, good_enough_rad_per_s: 0.0 };
+        let pattern = improve(&task, std::slice::from_ref(&recommended.judged.pattern), effort)?.pattern;
+        let judged = self.under(super::cost::objective::Objective::WorstRate).judge("captive-1", &pattern)?;
+        let now = recommended.judged.guaranteed_rad_per_s.unwrap_or(recommended.judged.worst.rate_rad_per_s.abs());
+        let then = judged.guaranteed_rad_per_s.unwrap_or(judged.worst.rate_rad_per_s.abs());
+        let shown = deg_per_h_from_rad_per_s;
+        Ok((then < WORTH_A_REEL * now).then(|| {
+            format!(
+                "one captive reel (--windability captive:1) would bring the {what} from {:.4} to {:.4} °/h or less",
+                shown(now),
+                shown(then)
+            )
+        }))
+    }
+
+    /// That a spread and not the pattern is what to work on next.
+    pub(super) fn spread_reason(&self, recommended: &Weighed) -> Result<Option<String>, JudgeError> {
+        let (Some(declared), Some(p95)) = (self.tolerance, recommended.p95_rad_per_s) else { return Ok(None) };
+        let spec = ToleranceSpec { samples: declared.samples.min(COILS_FOR_SHARES), ..declared.clone() };
+        let pattern = recommended.judged.pattern.clone();
+        let found = study(self.model, self.profiles, &spec, &[pattern])?;
+        let Some(distribution) = found.first().filter(|d| p95 > MOSTLY_SPREAD * d.nominal_rad_per_s) else {
+            return Ok(None);
+        };
+        let which = match measure(self.model, self.profiles.max_rate_k_per_s)? {
+            Measure::Guaranteed => "guaranteed ",
+            Measure::Sampled => "",
+        };
+        let shares = distribution.variance_shares.iter().take(2);
+        let shares: Vec<String> =
+            shares.map(|(s, share)| format!("{} {:.0} %", s.key(), percent_from_fraction(*share))).collect();
+        Ok(Some(format!(
+            "a spread and not the pattern is what to work on next: as built 95 % of coils stay below {:.4} °/h, as declared \
+             the {which}worst is {:.4}; of the variance {}",
+            deg_per_h_from_rad_per_s(p95),
+            deg_per_h_from_rad_per_s(distribution.nominal_rad_per_s),
+            shares.join(", ")
+        )))
+    }
+
+    /// What the candidates would cost with the other boundary: behind a film, or with the outermost layer prescribed.
+    pub(super) fn boundary_reason(
+        &self,
+        recommended: &Weighed,
+        weighed: &[Weighed],
+    ) -> Result<Option<String>, JudgeError> {
+        let Some((model, words)) = other_boundary(self.model)? else { return Ok(None) };
+        let patterns: Vec<Pattern> = weighed.iter().map(|w| w.judged.pattern.clone()).collect();
+        let profiles: Vec<Profile> = self.solved.profiles().iter().map(|p| p.profile.clone()).collect();
+        let costs = costs(&model, self.profiles.max_rate_k_per_s, &profiles, &patterns)?;
+        let of = |w: &Weighed| weighed.iter().position(|o| o.judged.pattern == w.judged.pattern);
+        let Some(mine) = of(recommended).map(|i| costs[i]) else { return Ok(None) };
+        let Some((least, name)) = costs
+            .iter()
+            .zip(weighed)
+            .map(|(cost, w)| (*cost, w.judged.name.as_str()))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+        else {
+            return Ok(None);
+        };
+        let shown = deg_per_h_from_rad_per_s;
+        Ok(Some(if mine > least * (1.0 + TIE) {
+            format!(
+                "the answer hangs on the boundary: {words} it would cost {:.4} °/h and {name} {:.4}",
+                shown(mine),
+                shown(least)
+            )
+        } else {
+            format!(
+                "{words} it would cost {:.4} °/h, and none of these patterns less by more than {:.0} %",
+                shown(mine),
+                percent_from_fraction(TIE)
+            )
+        }))
+    }
+}
+
+/// The guaranteed worst rate of patterns, or where there is none the worst over profiles.
+fn costs(
+    model: &CoilModel,
+    max_rate_k_per_s: f64,
+    profiles: &[Profile],
+    patterns: &[Pattern],
+) -> Result<Vec<f64>, JudgeError> {
+    match UnitStep::new(model, max_rate_k_per_s) {
+        Ok(step) => patterns.iter().map(|p| Ok(step.guaranteed(model, p)?.rate_rad_per_s)).collect(),
+        Err(_) => {
+            let solved = SolvedProfiles::new(model, profiles)?;
+            patterns.iter().map(|p| Ok(solved.worst_case(model, p)?.rate_rad_per_s.abs())).collect()
+        }
+    }
+}
+
+/// The model with the boundary that it has not, and how to say so; `None` for a half space.
+fn other_boundary(model: &CoilModel) -> Result<Option<(CoilModel, String)>, SearchError> {
+    if model.extent == Extent::HalfSpace {
+        return Ok(None);
+    }
+    let path = model.heat_path()?;
+    if path.film_w_per_m2_k.is_none() {
+        if model.location != Location::OuterLayer {
+            return Ok(None);
+        }
+        let behind = model.with_effect(DeclaredEffect::film(STILL_AIR_W_PER_M2_K));
+        let behind = CoilModel { location: Location::Ambient, ..behind };
+        return Ok(Some((behind, format!("behind a film of {STILL_AIR_W_PER_M2_K:.0} W/(m²K)"))));
+    }
+    let coil = model.wound_coil()?;
+    let makes_a_film = |effect: &DeclaredEffect| {
+        let mut bare = path.clone();
+        bare.film_w_per_m2_k = None;
+        effect.bind(&coil, &[]).change_heat_path(&mut bare);
+        bare.film_w_per_m2_k.is_some()
+    };
+    let effects = model.effects.iter().filter(|e| !makes_a_film(e)).cloned().collect();
+    let prescribed = CoilModel { effects, location: Location::OuterLayer, ..model.clone() };
+    Ok(Some((prescribed, "with the outermost layer's temperature prescribed".to_owned())))
+}

@@ -1,0 +1,415 @@
+//! The use case: search, early conclusion, proof, check on a finer grid, unseen profiles, recommendation.
+
+use std::ops::ControlFlow;
+
+use thiserror::Error;
+
+use super::anneal::rounds::{Plan, Rounds, State, Stop};
+use super::answer::{Answer, Ended, Former, FoundBy, Proof};
+use super::cost::guaranteed::UnitStep;
+use super::cost::objective::Objective;
+use super::cost::tolerance::ToleranceSpec;
+use super::cost::worst_case::{SearchError, SolvedProfiles};
+use super::evaluator::{EQUALLY_GOOD, Evaluator, JudgeError, Judged, improvement_over_qua};
+use super::proof::{self, Progress, prove};
+use super::recommendation::Context;
+use crate::pattern::Pattern;
+use crate::pattern::windability::WindabilityClass;
+use crate::profile::ProfileSpec;
+use crate::rate::CoilModel;
+use crate::units::deg_per_h_from_rad_per_s;
+
+/// What is to be searched.
+#[derive(Debug, Clone)]
+pub struct Request<'a> {
+    pub model: &'a CoilModel,
+    pub profiles: &'a ProfileSpec,
+    /// How much what is built spreads; needed for the objective P95.
+    pub tolerance: Option<&'a ToleranceSpec>,
+    pub objective: Objective,
+    pub class: WindabilityClass,
+    pub plan: Plan,
+    /// Where an interrupted search of the same request was.
+    pub saved: Option<State>,
+    /// A pattern to compare with, by its name.
+    pub former: Option<(String, Pattern)>,
+    /// Whether to prove that the best pattern is the best of its class, for as long as the observer lets it.
+    pub prove: bool,
+    /// Whether to judge what was found on unseen profiles and say what to wind.
+    pub recommend: bool,
+}
+
+/// Why an observer ends a search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Halt {
+    Clock,
+    Signal,
+}
+
+/// Told how a search goes; the only one who knows the time. Every method's default is to let it go on.
+pub trait Observer: Sync {
+    /// Before the first slice.
+    fn begun(&mut self, _search: &dyn Rounds) {}
+
+    /// After each slice.
+    fn advanced(&mut self, _search: &dyn Rounds) -> ControlFlow<Halt> {
+        ControlFlow::Continue(())
+    }
+
+    /// After the last slice; the state is then what a later run goes on from.
+    fn ended(&mut self, _search: &dyn Rounds) {}
+
+    /// Whether work besides the search's own slices may go on.
+    fn goes_on(&self) -> bool {
+        true
+    }
+
+    /// From time to time during the proof.
+    fn proving(&self, _at: Progress) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+}
+
+/// Lets everything go on to its end.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Unobserved;
+
+impl Observer for Unobserved {}
+
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum RunError {
+    #[error(transparent)]
+    Judge(#[from] JudgeError),
+    #[error("the saved state is of another search: begin anew")]
+    Resume,
+}
+
+impl From<SearchError> for RunError {
+    fn from(error: SearchError) -> Self {
+        Self::Judge(error.into())
+    }
+}
+
+/// Searches; `None` if the observer ended it before anything was found.
+///
+/// # Errors
+/// A model that cannot be solved, an objective that it has not; a saved state of another search.
+pub fn run(request: &Request, observer: &mut dyn Observer) -> Result<Option<Answer>, RunError> {
+    let solved = SolvedProfiles::new(request.model, &request.profiles.profiles())?;
+    let unit_step = UnitStep::new(request.model, request.profiles.max_rate_k_per_s).ok();
+    let evaluator = request.evaluator(&solved, unit_step.as_ref());
+    let (class, target) = (request.class, request.plan.rules.target);
+    let baselines = evaluator.baselines()?;
+    let mut search = evaluator.search(class, request.plan.clone(), request.saved.clone())?.ok_or(RunError::Resume)?;
+    observer.begun(search.as_ref());
+    let before = search.evaluations();
+    // Where the best can be proved at once, nothing needs to be shared.
+    let shared = if evaluator.is_provable(class) {
+        Vec::new()
+    } else {
+        evaluator.companions(class, &request.plan, &|| observer.goes_on())?
+    };
+    let Annealed { ended, concluded } = anneal(&evaluator, class, &baselines, search.as_mut(), observer)?;
+    observer.ended(search.as_ref());
+    search.gather();
+    let is_over = ended == Ended::Signal;
+    let is_refined = matches!(ended, Ended::Rule(_))
+        && concluded.is_none()
+        && target.is_none()
+        && (request.is_refined() || search.is_approximated());
+    let found = evaluator.gathered(search.as_ref(), class, &shared, is_refined);
+    let Some(best) = evaluator.best(class, &found, &baselines)? else { return Ok(None) };
+    let is_good_enough = |judged: &Judged| target.is_some_and(|target| judged.objective_rad_per_s <= target);
+    let annealed = best.pattern.clone();
+    // A target may have been reached at the samples and not between them.
+    let is_unhurried = matches!(ended, Ended::Rule(_)) && !is_good_enough(&best);
+    let best = match concluded {
+        Some(concluded) => concluded,
+        None if is_unhurried => evaluator.improved(class, best, &found, target)?.0,
+        None => best,
+    };
+    let found_by = found_by(&best, &annealed, &baselines, search.state(), &shared);
+    let (best, proof) = match evaluator.task(class).filter(|_| request.prove && !is_over) {
+        Some(task) => proved(&evaluator, &task, best, &baselines, observer)?,
+        None => (best, Proof::NONE),
+    };
+    let grid_check = if is_over { None } else { evaluator.grid_check(&best, &baselines)? };
+    let compared_with =
+        request.former.as_ref().map(|f| compare_with_former(&evaluator, class, &best, f)).transpose()?;
+    let (validation, recommendation) = if is_over || !request.recommend {
+        (None, None)
+    } else {
+        let context = Context { class, best: &best, baselines: &baselines, proof: &proof };
+        let (validation, recommendation) = evaluator.recommended(&context, &found, &shared)?;
+        (Some(validation), Some(recommendation))
+    };
+    let caution = grid_check.as_ref().and_then(|check| check.caution()).map(|words| format!(" {words}"));
+    let on_unseen = validation.as_ref().map(|v| evaluator.words_on_unseen(v, &best, &baselines));
+    let statement = evaluator.statement(&best, &baselines, class)
+        + &on_unseen.unwrap_or_default()
+        + &proof.words(request.objective.title())
+        + &caution.unwrap_or_default();
+    let first = search.state().first_with_best().map_or(0, |record| record.evaluations);
+    Ok(Some(Answer {
+        improvement_over_qua: improvement_over_qua(&best, &baselines),
+        statement,
+        grid_check,
+        compared_with,
+        proof,
+        evaluations_when_found: match found_by {
+            FoundBy::Classic => 0,
+            FoundBy::Annealing => first,
+            FoundBy::Shared | FoundBy::Bounds => search.evaluations(),
+        },
+        found_by,
+        evaluations: search.evaluations(),
+        evaluations_now: search.evaluations() - before,
+        state: search.state().clone(),
+        ended,
+        validation,
+        recommendation,
+        best,
+        baselines,
+    }))
+}
+
+impl<'a> Request<'a> {
+    /// What the request's patterns are judged by.
+    pub fn evaluator(&self, solved: &'a SolvedProfiles, unit_step: Option<&'a UnitStep>) -> Evaluator<'a> {
+        let Request { model, profiles, tolerance, objective, .. } = *self;
+        Evaluator { model, solved, objective, unit_step, profiles, tolerance }
+    }
+
+    /// A largest value over samples has its working set instead, and bounds where the class has them.
+    fn is_refined(&self) -> bool {
+        !matches!(self.objective, Objective::WorstRate | Objective::WorstPhase)
+    }
+}
+
+/// How the rounds came to their end.
+struct Annealed {
+    ended: Ended,
+    /// A pattern that was proved to be the best, or made good enough, after the first round.
+    concluded: Option<Judged>,
+}
+
+/// Advances a search to its end. After its first round what was found is tried by bounds, where those can be expected to
+/// settle the search.
+fn anneal(
+    evaluator: &Evaluator,
+    class: WindabilityClass,
+    baselines: &[Judged],
+    search: &mut dyn Rounds,
+    observer: &mut dyn Observer,
+) -> Result<Annealed, RunError> {
+    let mut concluded = None;
+    let mut asked = false;
+    let ended = loop {
+        let goes_on = search.advance();
+        let halt = observer.advanced(search);
+        if !goes_on {
+            break Ended::Rule(search.state().stop);
+        }
+        if search.state().round == 1 && !std::mem::replace(&mut asked, true) {
+            concluded = conclusion(evaluator, class, baselines, search)?;
+            if concluded.is_some() {
+                break Ended::Rule(search.state().stop);
+            }
+        }
+        match halt {
+            ControlFlow::Break(Halt::Clock) => break Ended::Clock,
+            ControlFlow::Break(Halt::Signal) => break Ended::Signal,
+            ControlFlow::Continue(()) => {}
+        }
+    };
+    Ok(Annealed { ended, concluded })
+}
+
+/// The pattern that needs no further search, if bounds show one.
+fn conclusion(
+    evaluator: &Evaluator,
+    class: WindabilityClass,
+    baselines: &[Judged],
+    search: &mut dyn Rounds,
+) -> Result<Option<Judged>, RunError> {
+    if !evaluator.is_provable(class) {
+        return Ok(None);
+    }
+    let found = search.state().found.clone();
+    let Some(best) = evaluator.best(class, &found, baselines)? else { return Ok(None) };
+    let target = search.plan().rules.target;
+    let (best, is_optimal) = evaluator.improved(class, best, &found, target)?;
+    let is_good_enough = target.is_some_and(|target| best.objective_rad_per_s <= target);
+    let stop = if is_optimal { Some(Stop::Proved) } else { is_good_enough.then_some(Stop::Target) };
+    Ok(stop.map(|stop| {
+        search.conclude(stop);
+        best
+    }))
+}
+
+fn found_by(best: &Judged, annealed: &Pattern, baselines: &[Judged], state: &State, shared: &[Pattern]) -> FoundBy {
+    let was_annealed = state.found.iter().any(|f| f.segments == best.pattern.segments());
+    if best.pattern != *annealed {
+        FoundBy::Bounds
+    } else if baselines.iter().any(|b| b.pattern == best.pattern) {
+        FoundBy::Classic
+    } else if !was_annealed && !shared.is_empty() {
+        FoundBy::Shared
+    } else {
+        FoundBy::Annealing
+    }
+}
+
+/// Tries to prove that the best pattern is the best of its class; a better one that the proof comes upon takes its place.
+fn proved(
+    evaluator: &Evaluator,
+    task: &proof::Task,
+    best: Judged,
+    others: &[Judged],
+    observer: &dyn Observer,
+) -> Result<(Judged, Proof), RunError> {
+    let starts: Vec<Pattern> = std::iter::once(&best).chain(others).map(|judged| judged.pattern.clone()).collect();
+    let certificate = prove(task, &starts, &|at| observer.proving(at))?;
+    let best = if certificate.best_rad_per_s < best.objective_rad_per_s {
+        evaluator.judge(&best.name, &certificate.pattern)?
+    } else {
+        best
+    };
+    Ok((best, Proof::of(&certificate)))
+}
+
+/// The former pattern judged under the model of the search, beside the best one found.
+fn compare_with_former(
+    evaluator: &Evaluator,
+    class: WindabilityClass,
+    best: &Judged,
+    (name, pattern): &(String, Pattern),
+) -> Result<Former, RunError> {
+    let old = evaluator.judge(name, pattern)?;
+    let (new_cost, old_cost) = (best.objective_rad_per_s, old.objective_rad_per_s);
+    let best_changed = new_cost < old_cost * (1.0 - EQUALLY_GOOD);
+    let what = evaluator.objective.key();
+    let shown = |cost: f64| format!("{:.4} °/h", deg_per_h_from_rad_per_s(cost));
+    let (old_shown, new_shown) = (shown(old_cost), shown(new_cost));
+    let statement = if best_changed {
+        format!(
+            "The best pattern changed: under this model the former one, {name}, costs {old_shown} ({what}), {:.2} times the {new_shown} of the new one, {}.",
+            old_cost / new_cost,
+            best.name
+        )
+    } else if old_cost < new_cost * (1.0 - EQUALLY_GOOD) {
+        let why = if class.admits(pattern) {
+            "search longer, or begin with it (--init)".to_owned()
+        } else {
+            format!("it is not of the class {class}")
+        };
+        format!(
+            "The former pattern, {name}, is better than what was found: it costs {old_shown} ({what}) under this model, the new one {new_shown}; {why}."
+        )
+    } else {
+        format!(
+            "The best pattern did not change: under this model the former one, {name}, costs {old_shown} ({what}), and nothing better was found."
+        )
+    };
+    Ok(Former { judged: old, best_changed, statement })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coil::LayerLength;
+    use crate::search::anneal::rounds::Rules;
+    use crate::search::cost::samples::tests::{model, profiles};
+    use crate::search::cost::signs::segments_of_signs;
+
+    fn request<'a>(
+        model: &'a CoilModel,
+        profiles: &'a ProfileSpec,
+        tolerance: &'a ToleranceSpec,
+        objective: Objective,
+    ) -> Request<'a> {
+        Request {
+            model,
+            profiles,
+            tolerance: Some(tolerance),
+            objective,
+            class: WindabilityClass::Standard,
+            plan: Plan {
+                seed: 1,
+                restarts_per_round: 4,
+                moves_per_restart: 400,
+                rules: Rules { rounds: 4, patience: 2, moves: None, target: None },
+                starts: Vec::new(),
+            },
+            saved: None,
+            former: None,
+            prove: false,
+            recommend: true,
+        }
+    }
+
+    fn spread() -> ToleranceSpec {
+        ToleranceSpec {
+            turns_per_layer_sd: 0.5,
+            radial_pitch_sd: 0.01,
+            midpoint_offset_sd_m: 0.01,
+            diffusivity_sd: 0.1,
+            film_sd: 0.2,
+            mismatch_sd: 0.0,
+            samples: 12,
+            seed: 5,
+            limit_rad_per_s: None,
+        }
+    }
+
+    fn spec(listed: usize) -> ProfileSpec {
+        let listed = profiles()[..listed].to_vec();
+        ProfileSpec { max_rate_k_per_s: 0.003, count: 4, segments: 3, duration_s: 400.0, seed: 1, listed }
+    }
+
+    #[test]
+    fn under_every_objective_the_answer_is_the_best_of_all_standard_patterns_also_where_the_halves_differ() {
+        let (profiles, tolerance) = (spec(1), spread());
+        for effects in [&["surface_film"][..], &["surface_film", "strain_mismatch"]] {
+            let model = model(8, LayerLength::Actual, effects);
+            let solved = SolvedProfiles::new(&model, &profiles.profiles()).unwrap();
+            let step = UnitStep::new(&model, profiles.max_rate_k_per_s).ok();
+            for objective in Objective::ALL {
+                let request = request(&model, &profiles, &tolerance, objective);
+                let answer = run(&request, &mut Unobserved).unwrap().unwrap();
+                let evaluator = request.evaluator(&solved, step.as_ref());
+                let all: Vec<(String, Pattern)> = (0..1u32 << 7)
+                    .map(|bits| {
+                        let high: Vec<bool> = (0..7).map(|m| bits >> m & 1 == 1).collect();
+                        (String::new(), Pattern::new(segments_of_signs(&high)).unwrap())
+                    })
+                    .collect();
+                let judged = evaluator.judge_all(&all).unwrap();
+                let least = judged.iter().map(|j| j.objective_rad_per_s).fold(f64::INFINITY, f64::min);
+                let found = answer.best.objective_rad_per_s;
+                assert!((found / least - 1.0).abs() < 1e-6, "{effects:?} {}: {found} {least}", objective.key());
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_recommended_is_never_much_worse_than_the_best_classic_on_profiles_that_nobody_has_seen() {
+        let tolerance = spread();
+        for layers in [8, 12] {
+            let model = model(layers, LayerLength::Actual, &["surface_film"]);
+            for seed in 1..=3 {
+                let profiles = ProfileSpec { seed, ..spec(0) };
+                let request =
+                    Request { tolerance: None, ..request(&model, &profiles, &tolerance, Objective::WorstRate) };
+                let answer = run(&request, &mut Unobserved).unwrap().unwrap();
+                let recommended = answer.recommendation.unwrap().pattern;
+                let fresh = ProfileSpec { seed: 1000 + seed, count: 40, ..profiles.clone() };
+                let solved = SolvedProfiles::new(&model, &fresh.profiles()).unwrap();
+                let worst = |p: &Pattern| solved.worst_case(&model, p).unwrap().rate_rad_per_s.abs();
+                let classic = answer.baselines.iter().map(|b| worst(&b.pattern)).fold(f64::INFINITY, f64::min);
+                let mine = worst(&recommended);
+                assert!(mine <= 1.02 * classic, "{layers} {seed}: {mine} {classic}");
+            }
+        }
+    }
+}

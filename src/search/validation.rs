@@ -1,0 +1,89 @@
+//! Patterns judged on profiles that no search has seen.
+//!
+//! A search makes use of whatever its profiles have in common by chance. What it found is judged here on sets of
+//! profiles drawn with another seed, each as large as the searched one, so that what is left of a gain shows, and how
+//! much it depends on the draw.
+
+use super::cost::worst_case::{SearchError, SolvedProfiles};
+use super::evaluator::Evaluator;
+use crate::pattern::Pattern;
+use crate::profile::ProfileSpec;
+
+/// Sets that are drawn.
+const SETS: usize = 8;
+
+/// Profiles of a set: as many as were searched, within these.
+const FEWEST_PROFILES: usize = 32;
+const MOST_PROFILES: usize = 64;
+
+/// From the searched profiles' seed to the unseen ones'.
+const SEED_STEP: u64 = 1_000_003;
+
+/// The best pattern and QUA on unseen profiles.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Validation {
+    /// Unseen ones; the listed profiles count besides.
+    pub profiles: usize,
+    pub seed: u64,
+    pub best_rad_per_s: f64,
+    /// None where QUA does not fit the layer count.
+    pub qua_rad_per_s: Option<f64>,
+}
+
+/// The worst rate of patterns on each set of unseen profiles and the listed ones.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unseen {
+    pub profiles: usize,
+    pub seed: u64,
+    /// # Shapes
+    /// Patterns × sets.
+    worst_rad_per_s: Vec<Vec<f64>>,
+}
+
+impl Unseen {
+    /// The worst rate of a pattern over all sets.
+    pub fn worst_rad_per_s(&self, pattern: usize) -> f64 {
+        self.worst_rad_per_s[pattern].iter().copied().fold(0.0, f64::max)
+    }
+
+    /// The largest worst rate of a pattern over that of the best of others on the same set.
+    pub fn largest_ratio(&self, pattern: usize, others: &[usize]) -> Option<f64> {
+        let sets = 0..self.worst_rad_per_s[pattern].len();
+        let ratio = |set: usize| {
+            let least = others.iter().map(|&o| self.worst_rad_per_s[o][set]).reduce(f64::min)?;
+            Some(if least > 0.0 { self.worst_rad_per_s[pattern][set] / least } else { f64::INFINITY })
+        };
+        sets.filter_map(ratio).reduce(f64::max)
+    }
+}
+
+impl Evaluator<'_> {
+    /// What the unseen profiles are: the model's own, drawn with another seed.
+    fn unseen_spec(&self) -> ProfileSpec {
+        let of_set = self.profiles.count.clamp(FEWEST_PROFILES, MOST_PROFILES);
+        // Seeds stay numbers that JSON can hold.
+        let seed = (self.profiles.seed % (1 << 52)) + SEED_STEP;
+        ProfileSpec { count: SETS * of_set, seed, ..self.profiles.clone() }
+    }
+
+    /// # Errors
+    /// None that a model which could be solved would cause.
+    pub fn unseen(&self, patterns: &[Pattern]) -> Result<Unseen, SearchError> {
+        let spec = self.unseen_spec();
+        let profiles = spec.profiles();
+        let (listed, drawn) = profiles.split_at(spec.listed.len());
+        let worst_of = |profiles: &[crate::profile::Profile]| -> Result<Vec<f64>, SearchError> {
+            if profiles.is_empty() {
+                return Ok(vec![0.0; patterns.len()]);
+            }
+            let solved = SolvedProfiles::new(self.model, profiles)?;
+            let worst = |pattern: &Pattern| Ok(solved.worst_case(self.model, pattern)?.rate_rad_per_s.abs());
+            patterns.iter().map(worst).collect()
+        };
+        let on_listed = worst_of(listed)?;
+        let sets: Vec<Vec<f64>> = drawn.chunks(drawn.len() / SETS).map(worst_of).collect::<Result<_, _>>()?;
+        let worst_rad_per_s =
+            (0..patterns.len()).map(|p| sets.iter().map(|set| set[p].max(on_listed[p])).collect()).collect();
+        Ok(Unseen { profiles: spec.count, seed: spec.seed, worst_rad_per_s })
+    }
+}
