@@ -228,7 +228,6 @@ impl Evaluator<'_> {
             return format!(" On {profiles} unseen profiles its worst rate error is {:.4} °/h.", shown(qua_rad_per_s));
         }
         let bound = qua.and_then(|qua| qua.guaranteed_rad_per_s).zip(best.guaranteed_rad_per_s);
-        let is_worse = best_rad_per_s > qua_rad_per_s || bound.is_some_and(|(qua, best)| best > qua);
         let guaranteed = bound.map_or_else(String::new, |(qua, best)| {
             format!(", guaranteed for all {:.4} against {:.4}", shown(best), shown(qua))
         });
@@ -236,7 +235,13 @@ impl Evaluator<'_> {
             " On {profiles} unseen profiles its worst rate error is {:.4} °/h against QUA's {:.4}{guaranteed}{}",
             shown(best_rad_per_s),
             shown(qua_rad_per_s),
-            if is_worse { ": it wins only on what it was searched on." } else { "." }
+            if best_rad_per_s > qua_rad_per_s {
+                ": it wins only on what it was searched on."
+            } else if bound.is_some_and(|(qua, best)| best > qua) {
+                ": it wins only on profiles like those that it was searched on."
+            } else {
+                "."
+            }
         )
     }
 
