@@ -350,7 +350,7 @@ impl DeclaredEffect {
 
     /// The ambient air behind a film at the outer surface.
     pub fn film(film_w_per_m2_k: f64) -> Self {
-        let spec = &surface_film::SPEC;
+        let spec = FILM.spec;
         Self { spec, values: vec![film_w_per_m2_k], choices: Vec::new(), subject: Subject::None }
     }
 
