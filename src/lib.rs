@@ -19,6 +19,7 @@ pub mod thermal;
 pub mod rate;
 // Floor 4: what is done with it.
 pub mod boundary;
+pub mod chamber;
 pub mod compare;
 pub mod compensate;
 pub mod diagnose;

@@ -11,6 +11,7 @@ mod history;
 mod modal;
 mod network;
 pub mod pack;
+pub mod reduced;
 mod slope;
 mod stepped;
 

@@ -1,0 +1,185 @@
+//! What a fitted model says of a record: its rate, its noise told apart, and its score where nothing is fitted.
+
+use super::filter::{Innovation, RATE};
+use super::fit::{Fit, log_likelihood};
+use super::point::CoilSide;
+use super::prior::Quantity;
+use super::system::Numbers;
+use super::{Chamber, ChamberError};
+
+/// What the rate of a record consists of beside the coil [rad/s].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Of one value as logged.
+    pub white_rad_per_s: f64,
+    pub white_standard_error_rad_per_s: f64,
+    /// Slow wander of the gyro, drift and cycle included.
+    pub wander_rad_per_s: f64,
+    /// What the air does that the sensor cannot see, on a row of the chamber.
+    pub unresolved_air_rad_per_s: f64,
+    /// Root mean square of the innovations of the rate in units of their expected deviation: 1 for a right model.
+    pub whiteness: f64,
+}
+
+/// What a model says a record's rate was, from its readings alone or from everything.
+///
+/// # Shapes
+/// One entry a row of the chamber; NaN where a row has no rate.
+#[derive(Debug, Clone)]
+pub struct Prediction {
+    pub rate_rad_per_s: Vec<f64>,
+    /// Variance that the model expects of measured less predicted, white noise and wander included.
+    pub variance_rad2_per_s2: Vec<f64>,
+    /// Measured less predicted.
+    pub residual_rad_per_s: Vec<f64>,
+}
+
+impl Chamber<'_> {
+    /// Log likelihood of a record that was not fitted, with everything frozen but its offset and its start.
+    ///
+    /// # Errors
+    /// A model that cannot be solved for this record.
+    pub fn held_out(&self, fit: &Fit, record: usize) -> Result<f64, ChamberError> {
+        let numbers = self.numbers_for(fit, record);
+        let (_, innovations) = self.pass(fit, &numbers, record, true)?;
+        Ok(log_likelihood(&innovations))
+    }
+
+    /// White noise, wander and unresolved air of a fitted record.
+    ///
+    /// # Errors
+    /// As [`Chamber::held_out`].
+    pub fn noise(&self, fit: &Fit, record: usize) -> Result<Noise, ChamberError> {
+        let numbers = self.numbers_for(fit, record);
+        let white = numbers.get(Quantity::RateNoise);
+        let place = super::Place::Quantity { quantity: Quantity::RateNoise, record: Some(record) };
+        let error = fit.value(place).map_or(f64::NAN, |(_, error)| error);
+        let mut wander = (white * numbers.get(Quantity::WanderShare)).powi(2);
+        if fit.assumed.drift {
+            wander += numbers.get(Quantity::DriftSize).powi(2);
+        }
+        if fit.assumed.cycle {
+            wander += numbers.get(Quantity::CycleSize).powi(2);
+        }
+        let prediction = self.prediction(fit, record, false)?;
+        let own = white * white / self.averaged(record) as f64 + wander;
+        let (mut air, mut count) = (0.0, 0);
+        for variance in prediction.variance_rad2_per_s2.iter().skip(SETTLING_ROWS).filter(|v| v.is_finite()) {
+            air += (variance - own).max(0.0);
+            count += 1;
+        }
+        let (rows, innovations) = self.pass(fit, &numbers, record, true)?;
+        let (mut squares, mut rates) = (0.0, 0);
+        for ((_, measurement), i) in rows.iter().zip(&innovations) {
+            if *measurement == RATE {
+                squares += i.value * i.value / i.variance;
+                rates += 1;
+            }
+        }
+        Ok(Noise {
+            white_rad_per_s: white,
+            white_standard_error_rad_per_s: error,
+            wander_rad_per_s: wander.sqrt(),
+            unresolved_air_rad_per_s: (air / count.max(1) as f64).sqrt(),
+            whiteness: (squares / rates.max(1) as f64).sqrt(),
+        })
+    }
+
+    /// The rate that readings imply (`with_rates` false: the gyro's own rates are only compared), or that everything up to
+    /// the row before implies (true), the offset fitted to the whole record.
+    ///
+    /// # Errors
+    /// As [`Chamber::held_out`].
+    pub fn prediction(&self, fit: &Fit, record: usize, with_rates: bool) -> Result<Prediction, ChamberError> {
+        let numbers = self.numbers_for(fit, record);
+        let rows = self.times_s(record).len();
+        let mut prediction = Prediction {
+            rate_rad_per_s: vec![f64::NAN; rows],
+            variance_rad2_per_s2: vec![f64::NAN; rows],
+            residual_rad_per_s: vec![f64::NAN; rows],
+        };
+        let (places, innovations) = self.pass(fit, &numbers, record, with_rates)?;
+        for ((row, measurement), i) in places.into_iter().zip(innovations) {
+            if measurement == RATE {
+                let measured = self.observed[record].series.values[RATE][row];
+                prediction.rate_rad_per_s[row] = measured - i.value;
+                prediction.variance_rad2_per_s2[row] = i.variance;
+                prediction.residual_rad_per_s[row] = i.value;
+            }
+        }
+        if !with_rates {
+            prediction.fit_offset();
+        }
+        Ok(prediction)
+    }
+
+    /// The numbers for a record: its own where it was fitted, the first fitted record's elsewhere.
+    pub(super) fn numbers_for(&self, fit: &Fit, record: usize) -> Numbers {
+        let first = fit.records.first().copied().unwrap_or(record);
+        fit.numbers[if fit.records.contains(&record) { record } else { first }]
+    }
+
+    /// The innovations of a record, and of each its row and which measurement it is.
+    fn pass(
+        &self,
+        fit: &Fit,
+        numbers: &Numbers,
+        record: usize,
+        with_rates: bool,
+    ) -> Result<(Vec<(usize, usize)>, Vec<Innovation>), ChamberError> {
+        let observed = &self.observed[record];
+        let (assumed, film) = (&fit.assumed, numbers.get(Quantity::Film));
+        let side = CoilSide::new(assumed, film, self.modes, observed)?;
+        let mut course = fit.courses[record].clone();
+        if course.is_none() && side.needs_reference() {
+            for _ in 0..2 {
+                course = Some(super::point::smoothed(&side, assumed, numbers, observed, record, course.as_ref())?);
+            }
+        }
+        let values = side.values(assumed, observed, record, course.as_ref().filter(|_| side.needs_reference()))?;
+        let mut rows = observed.series.rows.clone();
+        let mut system = super::system::system(&side.parts(assumed), numbers, &observed.series);
+        if !with_rates {
+            // Rates are looked at, not taken in: their gain is as good as zero.
+            system.variances[RATE] += BLIND_RAD2_PER_S2;
+            system.forget_offset(&side.parts(assumed), observed.series.averaged > 1);
+        }
+        let trace = super::filter::forward(&system, &rows, &values, false);
+        let mut places = Vec::with_capacity(trace.innovations.len());
+        for (k, row) in rows.iter_mut().enumerate() {
+            places.extend(row.measured.iter().enumerate().filter(|(_, m)| m.is_some()).map(|(m, _)| (k, m)));
+        }
+        let mut innovations = trace.innovations;
+        if !with_rates {
+            for ((_, measurement), i) in places.iter().zip(&mut innovations) {
+                if *measurement == RATE {
+                    i.variance -= BLIND_RAD2_PER_S2 / observed.series.averaged as f64;
+                }
+            }
+        }
+        Ok((places, innovations))
+    }
+}
+
+/// A rate with this variance says nothing beside any gyro's [(rad/s)²].
+const BLIND_RAD2_PER_S2: f64 = 1e-2;
+/// Rows after which the start is forgotten.
+const SETTLING_ROWS: usize = 30;
+
+impl Prediction {
+    /// Moves the prediction by the offset that leaves the least.
+    fn fit_offset(&mut self) {
+        let (mut weights, mut sum) = (0.0, 0.0);
+        for (residual, variance) in self.residual_rad_per_s.iter().zip(&self.variance_rad2_per_s2) {
+            if residual.is_finite() && *variance > 0.0 {
+                weights += 1.0 / variance;
+                sum += residual / variance;
+            }
+        }
+        if weights > 0.0 {
+            let offset = sum / weights;
+            self.rate_rad_per_s.iter_mut().for_each(|r| *r += offset);
+            self.residual_rad_per_s.iter_mut().for_each(|r| *r -= offset);
+        }
+    }
+}

@@ -1,0 +1,563 @@
+//! The maximum of the posterior over the numbers of chamber, gyro and effects, by Fisher scoring with damping.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::filter::{Innovation, Values};
+use super::known::Reference;
+use super::parameter::{Free, Parameter, Place, write};
+use super::point::{CoilSide, quantities, run, smoothed};
+use super::prior::Quantity;
+use super::system::Numbers;
+use super::{Assumption, Chamber, ChamberError};
+
+/// How much work a fit may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Effort {
+    pub iterations: usize,
+    /// A step that gains less ends the fit.
+    pub tolerance: f64,
+    /// Times that the course is smoothed again where the model is not linear.
+    pub rounds: usize,
+}
+
+impl Effort {
+    /// To a tenth of a unit of log likelihood.
+    pub const FULL: Self = Self { iterations: 25, tolerance: 0.1, rounds: 2 };
+    /// Enough to rank starts.
+    pub const SHORT: Self = Self { iterations: 3, tolerance: 3.0, rounds: 1 };
+}
+
+/// A model fitted to records.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    pub assumed: Assumption,
+    pub free: Vec<Free>,
+    /// Places of the fitted records in the chamber.
+    pub records: Vec<usize>,
+    pub parameters: Vec<Parameter>,
+    /// In the order of the parameters.
+    pub coordinates: Vec<f64>,
+    /// Of the coordinates, from the information at the maximum.
+    pub standard_errors: Vec<f64>,
+    pub log_likelihood: f64,
+    pub log_prior: f64,
+    /// Natural logarithm of the evidence.
+    pub evidence: f64,
+    /// Information of data and prior.
+    pub(super) information: DMatrix<f64>,
+    /// Of every record of the chamber.
+    pub(super) numbers: Vec<Numbers>,
+    /// The smoothed course of every fitted record; None elsewhere.
+    pub(super) courses: Vec<Option<Reference>>,
+}
+
+/// All that a likelihood is computed from.
+pub(super) struct Place0<'a> {
+    pub assumed: Assumption,
+    pub numbers: Vec<Numbers>,
+    pub sides: Vec<Option<CoilSide>>,
+    pub values: Vec<Option<Values>>,
+    pub courses: &'a [Option<Reference>],
+}
+
+impl Fit {
+    /// The parameter's value and its standard error, both in SI; that of a logarithm is relative.
+    pub fn value(&self, place: Place) -> Option<(f64, f64)> {
+        let at = self.parameters.iter().position(|p| p.place == place)?;
+        let value = self.parameters[at].value(self.coordinates[at]);
+        let error = match self.parameters[at].scale {
+            super::Scale::Logarithm => value * self.standard_errors[at],
+            super::Scale::Linear => self.standard_errors[at],
+        };
+        Some((value, error))
+    }
+
+    /// A number of the chamber, of one of its records.
+    pub fn number(&self, quantity: Quantity, record: usize) -> f64 {
+        self.numbers[record].get(quantity)
+    }
+
+    /// The smoothed course of a fitted record.
+    pub fn course(&self, record: usize) -> Option<&Reference> {
+        self.courses.get(record)?.as_ref()
+    }
+
+    pub fn effects(&self) -> usize {
+        self.assumed.model.effects.len()
+    }
+}
+
+impl Chamber<'_> {
+    /// Fits an assumption to records of the chamber; what is `free` of its effects, all amplitudes of inputs and all
+    /// numbers of the chamber are fitted. Numbers begin with those of `from`, if there is one.
+    ///
+    /// # Errors
+    /// A model that cannot be solved where the fit begins.
+    pub fn fit(
+        &self,
+        assumed: &Assumption,
+        free: &[Free],
+        records: &[usize],
+        from: Option<&Fit>,
+        effort: Effort,
+    ) -> Result<Fit, ChamberError> {
+        let numbers = match from {
+            Some(fit) => self.completed(fit, records),
+            None => self.observed.iter().map(|o| Numbers::medians(&o.series)).collect(),
+        };
+        let mut courses = from.map_or_else(|| vec![None; self.records()], |f| f.courses.clone());
+        courses.resize(self.records(), None);
+        let parameters = self.parameters(assumed, free, records)?;
+        self.settle_courses(assumed, &numbers, records, &mut courses)?;
+        let mut state = self.scored(assumed, &parameters, &numbers, records, &courses, effort)?;
+        let curved = records.iter().any(|&r| state.place.sides[r].as_ref().is_some_and(CoilSide::needs_reference));
+        for _ in 1..if curved { effort.rounds.max(1) } else { 1 } {
+            let (assumed, numbers) = (state.place.assumed.clone(), state.place.numbers.clone());
+            self.settle_courses(&assumed, &numbers, records, &mut courses)?;
+            state = self.scored(&assumed, &parameters, &numbers, records, &courses, effort)?;
+        }
+        let (assumed, numbers) = (state.place.assumed.clone(), state.place.numbers.clone());
+        let (coordinates, log_likelihood, information) = (state.coordinates, state.log_likelihood, state.information);
+        self.settle_courses(&assumed, &numbers, records, &mut courses)?;
+        Ok(finished(assumed, free, records, parameters, coordinates, log_likelihood, information, numbers, courses))
+    }
+
+    /// As [`Chamber::fit`] from several chambers that differ in their ripple; the best goes on.
+    ///
+    /// # Errors
+    /// As [`Chamber::fit`].
+    pub fn fit_anew(&self, assumed: &Assumption, free: &[Free], records: &[usize]) -> Result<Fit, ChamberError> {
+        let mut base = self.fit(assumed, free, records, None, Effort { iterations: 0, tolerance: 0.0, rounds: 1 })?;
+        base.courses = vec![None; self.records()];
+        let starts: Vec<(f64, f64, f64)> = RIPPLES
+            .iter()
+            .flat_map(|&(period_s, size_k)| RATE_NOISES.iter().map(move |&n| (period_s, size_k, n)))
+            .collect();
+        let tried: Vec<Result<Fit, ChamberError>> = starts
+            .into_par_iter()
+            .map(|(period_s, size_k, noise)| {
+                let mut start = base.clone();
+                for numbers in &mut start.numbers {
+                    numbers.set(Quantity::RipplePeriod, period_s);
+                    numbers.set(Quantity::RippleSize, size_k);
+                    numbers.set(Quantity::RateNoise, noise * numbers.get(Quantity::RateNoise));
+                }
+                self.fit(assumed, free, records, Some(&start), Effort::SHORT)
+            })
+            .collect();
+        let mut best: Option<Fit> = None;
+        for fit in tried.into_iter().flatten() {
+            if best.as_ref().is_none_or(|b| fit.posterior() > b.posterior()) {
+                best = Some(fit);
+            }
+        }
+        let best = best.ok_or(ChamberError::Unsolvable)?;
+        self.fit(&best.assumed.clone(), free, records, Some(&best), Effort::FULL)
+    }
+
+    /// Numbers for all records: those that were not fitted take the first fitted one's, each relative to its own noise.
+    fn completed(&self, fit: &Fit, records: &[usize]) -> Vec<Numbers> {
+        let first = fit.records.first().copied().unwrap_or(0);
+        (0..self.records())
+            .map(|r| {
+                if fit.records.contains(&r) || !records.contains(&r) || fit.records.is_empty() {
+                    fit.numbers.get(r).copied().unwrap_or(fit.numbers[first])
+                } else {
+                    fit.numbers[first]
+                }
+            })
+            .collect()
+    }
+
+    fn parameters(
+        &self,
+        assumed: &Assumption,
+        free: &[Free],
+        records: &[usize],
+    ) -> Result<Vec<Parameter>, ChamberError> {
+        let mut all: Vec<Parameter> = Vec::new();
+        for &record in records {
+            let medians = Numbers::medians(&self.observed[record].series);
+            for quantity in quantities(assumed, &self.observed[record])? {
+                let owner = (!quantity.is_shared()).then_some(record);
+                let parameter = Parameter::of_quantity(quantity, owner, &medians);
+                if !all.iter().any(|p| p.place == parameter.place) {
+                    all.push(parameter);
+                }
+            }
+        }
+        all.extend(free.iter().map(|f| Parameter::of_effect(&assumed.model.effects[f.effect], f)));
+        all.extend(assumed.inputs.iter().enumerate().map(|(i, input)| Parameter::of_input(i, input.deviation)));
+        Ok(all)
+    }
+
+    /// Smooths the courses of records for which the model needs one, or that have none.
+    fn settle_courses(
+        &self,
+        assumed: &Assumption,
+        numbers: &[Numbers],
+        records: &[usize],
+        courses: &mut [Option<Reference>],
+    ) -> Result<(), ChamberError> {
+        let found: Vec<(usize, Result<Reference, ChamberError>)> = records
+            .par_iter()
+            .map(|&r| {
+                let observed = &self.observed[r];
+                let found =
+                    CoilSide::new(assumed, numbers[r].get(Quantity::Film), self.modes, observed).and_then(|side| {
+                        // A course of another number of outputs (a heated flange) is no beginning for this one.
+                        let before = courses[r].as_ref().filter(|c| c.outputs == side.reduced.outputs);
+                        let first = match before {
+                            Some(_) => None,
+                            None => Some(smoothed(&side, assumed, &numbers[r], observed, r, None)?),
+                        };
+                        smoothed(&side, assumed, &numbers[r], observed, r, before.or(first.as_ref()))
+                    });
+                (r, found)
+            })
+            .collect();
+        for (r, course) in found {
+            courses[r] = Some(course?);
+        }
+        Ok(())
+    }
+
+    /// Everything at one point; only the `records` are computed.
+    pub(super) fn place<'c>(
+        &self,
+        assumed: Assumption,
+        numbers: Vec<Numbers>,
+        records: &[usize],
+        courses: &'c [Option<Reference>],
+    ) -> Result<Place0<'c>, ChamberError> {
+        let mut sides: Vec<Option<CoilSide>> = (0..self.records()).map(|_| None).collect();
+        let mut values: Vec<Option<Values>> = (0..self.records()).map(|_| None).collect();
+        for &r in records {
+            let observed = &self.observed[r];
+            let side = CoilSide::new(&assumed, numbers[r].get(Quantity::Film), self.modes, observed)?;
+            let reference = if side.needs_reference() {
+                courses[r].as_ref().filter(|c| c.outputs == side.reduced.outputs)
+            } else {
+                None
+            };
+            values[r] = Some(side.values(&assumed, observed, r, reference)?);
+            sides[r] = Some(side);
+        }
+        Ok(Place0 { assumed, numbers, sides, values, courses })
+    }
+
+    pub(super) fn innovations(&self, place: &Place0, record: usize) -> Result<Vec<Innovation>, ChamberError> {
+        let (Some(side), Some(values)) = (&place.sides[record], &place.values[record]) else {
+            return Err(ChamberError::Unsolvable);
+        };
+        Ok(run(side, &place.assumed, &place.numbers[record], &self.observed[record], values))
+    }
+
+    /// The innovations of one record with one coordinate moved.
+    fn moved(
+        &self,
+        place: &Place0,
+        parameter: &Parameter,
+        coordinate: f64,
+        record: usize,
+    ) -> Result<Vec<Innovation>, ChamberError> {
+        let mut numbers = place.numbers.clone();
+        let mut assumed = place.assumed.clone();
+        if !write(std::slice::from_ref(parameter), &[coordinate], &mut assumed, &mut numbers) {
+            return Err(ChamberError::Unsolvable);
+        }
+        if parameter.leaves_coil() {
+            let (Some(side), Some(values)) = (&place.sides[record], &place.values[record]) else {
+                return Err(ChamberError::Unsolvable);
+            };
+            return Ok(run(side, &place.assumed, &numbers[record], &self.observed[record], values));
+        }
+        let there = self.place(assumed, numbers, &[record], place.courses)?;
+        self.innovations(&there, record)
+    }
+
+    /// Score and information of the likelihood at a place whose innovations are known.
+    pub(super) fn derivatives(
+        &self,
+        place: &Place0,
+        parameters: &[Parameter],
+        coordinates: &[f64],
+        records: &[usize],
+        base: &[Vec<Innovation>],
+    ) -> Result<Vec<Derivatives>, ChamberError> {
+        let tasks: Vec<(usize, usize)> = (0..records.len())
+            .flat_map(|i| (0..parameters.len()).map(move |p| (i, p)))
+            .filter(|&(i, p)| parameters[p].concerns(records[i]))
+            .collect();
+        let columns: Vec<Result<(usize, usize, DerivativeColumn), ChamberError>> = tasks
+            .into_par_iter()
+            .map(|(i, p)| {
+                let parameter = &parameters[p];
+                let mut step = parameter.step();
+                if coordinates[p] + step > parameter.upper {
+                    step = -step;
+                }
+                let there = self.moved(place, parameter, coordinates[p] + step, records[i]).or_else(|_| {
+                    step = -step;
+                    self.moved(place, parameter, coordinates[p] + step, records[i])
+                })?;
+                Ok((i, p, DerivativeColumn::new(&base[i], &there, step)))
+            })
+            .collect();
+        let mut all: Vec<Derivatives> = (0..records.len()).map(|_| Derivatives::default()).collect();
+        for column in columns {
+            let (i, p, column) = column?;
+            all[i].parameters.push(p);
+            all[i].columns.push(column);
+        }
+        Ok(all)
+    }
+
+    fn scored<'c>(
+        &self,
+        assumed: &Assumption,
+        parameters: &[Parameter],
+        numbers: &[Numbers],
+        records: &[usize],
+        courses: &'c [Option<Reference>],
+        effort: Effort,
+    ) -> Result<State<'c>, ChamberError> {
+        let coordinates: Vec<f64> = parameters
+            .iter()
+            .map(|p| {
+                let read = p.read(assumed, numbers);
+                if read.is_finite() { read.clamp(p.lower, p.upper) } else { p.mean }
+            })
+            .collect();
+        let mut state = self.state(assumed, numbers, parameters, coordinates, records, courses)?;
+        let mut damping = 1e-3;
+        let mut iteration = 0;
+        loop {
+            let (score, information) = self.slope(&state, parameters, records)?;
+            state.information = information.clone();
+            if iteration >= effort.iterations {
+                return Ok(state);
+            }
+            iteration += 1;
+            let mut gain = 0.0;
+            for _ in 0..7 {
+                let Some(next) = step(parameters, &state.coordinates, &score, &information, damping) else {
+                    damping = f64::max(10.0 * damping, 1e-3);
+                    continue;
+                };
+                let there = self.state(&state.place.assumed, &state.place.numbers, parameters, next, records, courses);
+                match there {
+                    Ok(there) if there.posterior > state.posterior - 1e-9 => {
+                        gain = there.posterior - state.posterior;
+                        state = State { information: information.clone(), ..there };
+                        damping = f64::max(0.1 * damping, 1e-6);
+                        break;
+                    }
+                    _ => damping = f64::max(10.0 * damping, 1e-3),
+                }
+            }
+            if gain < effort.tolerance {
+                if gain > 0.0 && effort.tolerance <= Effort::FULL.tolerance {
+                    let (_, information) = self.slope(&state, parameters, records)?;
+                    state.information = information;
+                }
+                return Ok(state);
+            }
+        }
+    }
+
+    fn state<'c>(
+        &self,
+        assumed: &Assumption,
+        numbers: &[Numbers],
+        parameters: &[Parameter],
+        coordinates: Vec<f64>,
+        records: &[usize],
+        courses: &'c [Option<Reference>],
+    ) -> Result<State<'c>, ChamberError> {
+        let (mut assumed, mut numbers) = (assumed.clone(), numbers.to_vec());
+        if !write(parameters, &coordinates, &mut assumed, &mut numbers) {
+            return Err(ChamberError::Unsolvable);
+        }
+        let place = self.place(assumed, numbers, records, courses)?;
+        let innovations: Result<Vec<_>, _> = records.par_iter().map(|&r| self.innovations(&place, r)).collect();
+        let innovations = innovations?;
+        let log_likelihood: f64 = innovations.iter().map(|i| log_likelihood(i)).sum();
+        let log_prior: f64 = parameters.iter().zip(&coordinates).map(|(p, &c)| p.log_prior(c)).sum();
+        if !log_likelihood.is_finite() {
+            return Err(ChamberError::Unsolvable);
+        }
+        let posterior = log_likelihood + log_prior;
+        let information = DMatrix::zeros(0, 0);
+        Ok(State { place, coordinates, innovations, log_likelihood, posterior, information })
+    }
+
+    /// Gradient and information of the posterior.
+    fn slope(
+        &self,
+        state: &State,
+        parameters: &[Parameter],
+        records: &[usize],
+    ) -> Result<(DVector<f64>, DMatrix<f64>), ChamberError> {
+        let derivatives =
+            self.derivatives(&state.place, parameters, &state.coordinates, records, &state.innovations)?;
+        let count = parameters.len();
+        let mut score = DVector::zeros(count);
+        let mut information = DMatrix::zeros(count, count);
+        for (own, base) in derivatives.iter().zip(&state.innovations) {
+            own.add_to(base, &mut score, &mut information);
+        }
+        for (i, p) in parameters.iter().enumerate() {
+            let precision = p.deviation.powi(-2);
+            score[i] -= (state.coordinates[i] - p.mean) * precision;
+            information[(i, i)] += precision;
+        }
+        Ok((score, information))
+    }
+}
+
+/// Ripples to begin with: period [s] and size [K]; and shares of the noise floor.
+const RIPPLES: [(f64, f64); 4] = [(90.0, 0.08), (160.0, 0.08), (300.0, 0.08), (200.0, 0.005)];
+const RATE_NOISES: [f64; 2] = [1.0, 0.2];
+
+struct State<'c> {
+    place: Place0<'c>,
+    coordinates: Vec<f64>,
+    innovations: Vec<Vec<Innovation>>,
+    log_likelihood: f64,
+    posterior: f64,
+    information: DMatrix<f64>,
+}
+
+impl Fit {
+    /// Logarithm of likelihood times prior.
+    pub fn posterior(&self) -> f64 {
+        self.log_likelihood + self.log_prior
+    }
+}
+
+pub(super) fn log_likelihood(innovations: &[Innovation]) -> f64 {
+    let sum: f64 =
+        innovations.iter().map(|i| i.value * i.value / i.variance + (std::f64::consts::TAU * i.variance).ln()).sum();
+    -0.5 * sum
+}
+
+/// dv and dS of one coordinate.
+#[derive(Debug, Clone)]
+pub(super) struct DerivativeColumn {
+    pub value: Vec<f64>,
+    pub variance: Vec<f64>,
+}
+
+impl DerivativeColumn {
+    fn new(base: &[Innovation], there: &[Innovation], step: f64) -> Self {
+        let over = |f: fn(&Innovation) -> f64| base.iter().zip(there).map(|(b, t)| (f(t) - f(b)) / step).collect();
+        Self { value: over(|i| i.value), variance: over(|i| i.variance) }
+    }
+}
+
+/// The derivatives of one record's innovations.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Derivatives {
+    pub parameters: Vec<usize>,
+    pub columns: Vec<DerivativeColumn>,
+}
+
+impl Derivatives {
+    pub fn add_to(&self, base: &[Innovation], score: &mut DVector<f64>, information: &mut DMatrix<f64>) {
+        let weighted: Vec<(Vec<f64>, Vec<f64>)> = self
+            .columns
+            .iter()
+            .map(|c| {
+                let value = c.value.iter().zip(base).map(|(d, i)| d / i.variance).collect();
+                let variance = c.variance.iter().zip(base).map(|(d, i)| 0.5 * d / (i.variance * i.variance)).collect();
+                (value, variance)
+            })
+            .collect();
+        for (i, &p) in self.parameters.iter().enumerate() {
+            let (value, variance) = &weighted[i];
+            score[p] += base
+                .iter()
+                .zip(value.iter().zip(variance))
+                .map(|(b, (dv, ds))| -dv * b.value + ds * (b.value * b.value - b.variance))
+                .sum::<f64>();
+            for (k, &q) in self.parameters.iter().enumerate().take(i + 1) {
+                let other = &self.columns[k];
+                let sum = dot(value, &other.value) + dot(variance, &other.variance);
+                information[(p, q)] += sum;
+                if p != q {
+                    information[(q, p)] += sum;
+                }
+            }
+        }
+    }
+}
+
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// The damped step, within bounds and strides; None where the information is not positive.
+fn step(
+    parameters: &[Parameter],
+    coordinates: &[f64],
+    score: &DVector<f64>,
+    information: &DMatrix<f64>,
+    damping: f64,
+) -> Option<Vec<f64>> {
+    let mut damped = information.clone();
+    for i in 0..parameters.len() {
+        damped[(i, i)] *= 1.0 + damping;
+    }
+    let mut change = damped.cholesky()?.solve(score);
+    let share = parameters.iter().zip(change.iter()).map(|(p, c)| p.stride() / c.abs().max(1e-300)).fold(1.0, f64::min);
+    change *= share;
+    Some(
+        parameters
+            .iter()
+            .zip(coordinates)
+            .zip(change.iter())
+            .map(|((p, x), c)| (x + c).clamp(p.lower, p.upper))
+            .collect(),
+    )
+}
+
+#[allow(clippy::too_many_arguments)]
+fn finished(
+    assumed: Assumption,
+    free: &[Free],
+    records: &[usize],
+    parameters: Vec<Parameter>,
+    coordinates: Vec<f64>,
+    log_likelihood: f64,
+    information: DMatrix<f64>,
+    numbers: Vec<Numbers>,
+    courses: Vec<Option<Reference>>,
+) -> Fit {
+    let log_prior: f64 = parameters.iter().zip(&coordinates).map(|(p, &c)| p.log_prior(c)).sum();
+    let (standard_errors, log_determinant) = match information.clone().cholesky() {
+        Some(factor) => {
+            let inverse = factor.inverse();
+            let log_determinant = 2.0 * factor.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+            ((0..parameters.len()).map(|i| inverse[(i, i)].sqrt()).collect(), log_determinant)
+        }
+        None => (vec![f64::NAN; parameters.len()], f64::INFINITY),
+    };
+    let evidence =
+        log_likelihood + log_prior + 0.5 * parameters.len() as f64 * std::f64::consts::TAU.ln() - 0.5 * log_determinant;
+    Fit {
+        assumed,
+        free: free.to_vec(),
+        records: records.to_vec(),
+        parameters,
+        coordinates,
+        standard_errors,
+        log_likelihood,
+        log_prior,
+        evidence,
+        information,
+        numbers,
+        courses,
+    }
+}

@@ -1,0 +1,266 @@
+//! What a model adds to readings and rates that the linear system does not hold, worked out along a reference.
+//!
+//! ```text
+//! reading += lag(δT_N),   rate += (c·δT(t) − c·δT(t − W))/W + Ω(T̄, dT̄/dt, …) − c·dT̄/dt
+//! ```
+//!
+//! δT: the bore's heat, and the difference that a conductivity which depends on temperature makes to the layers while the
+//! reference's air drives the pack; Ω: the full rate error at the reference T̄. Both are second order in what the
+//! reference is wrong by, so a reference smoothed from the record itself, and smoothed again after a fit, is enough.
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | T̄, c | the reference's layers; the linear system's rate per kelvin a second | K, rad |
+//! | δT, W | known change of the layers; the rate's window | K, s |
+
+use super::filter::{MEASURED, RATE, Values};
+use super::series::Series;
+use super::system::{Gains, driven_by_air};
+use crate::effect::PackState;
+use crate::rate::RateModel;
+use crate::record::Record;
+use crate::thermal::reduced::Reduced;
+use crate::thermal::{HeatPath, ThermalError};
+use crate::units::REFERENCE_TEMPERATURE_K;
+
+/// The course that a record is linearised about: smoothed air and layers, known changes included.
+///
+/// # Shapes
+/// `outputs_k` row-major rows × outputs: the layers' means, innermost first, then their axial moments.
+#[derive(Debug, Clone)]
+pub struct Reference {
+    pub layers: usize,
+    pub outputs: usize,
+    /// Above the record's `reference_k`.
+    pub air_k: Vec<f64>,
+    pub outputs_k: Vec<f64>,
+}
+
+impl Reference {
+    pub fn row(&self, row: usize) -> &[f64] {
+        &self.outputs_k[row * self.outputs..(row + 1) * self.outputs]
+    }
+
+    /// Change of an output over each row's window, per second; zero at the first row.
+    pub(super) fn window_rates(&self, series: &Series, output: usize) -> Vec<f64> {
+        let mut start = Vec::new();
+        let rate = |k: usize| {
+            if k == 0 {
+                return 0.0;
+            }
+            self.at_window_start(series, k, &mut start);
+            let window_s = series.shapes[series.shape_of(k)].window_s;
+            if window_s > 0.0 {
+                (self.row(k)[output] - start[output]) / window_s
+            } else {
+                (self.row(k)[output] - self.row(k - 1)[output]) / (series.times_s[k] - series.times_s[k - 1])
+            }
+        };
+        (0..series.times_s.len()).map(rate).collect()
+    }
+
+    /// At the beginning of a row's window, between the rows where it lies there.
+    fn at_window_start(&self, series: &Series, row: usize, out: &mut Vec<f64>) -> f64 {
+        let shape = &series.shapes[series.shape_of(row)];
+        let start_s = series.times_s[row] - shape.window_s;
+        let before = series.times_s[..row].partition_point(|&t| t <= start_s + 1e-6).max(1) - 1;
+        let (t0, t1) = (series.times_s[before], series.times_s[before + 1]);
+        let share = ((start_s - t0) / (t1 - t0)).clamp(0.0, 1.0);
+        out.clear();
+        out.extend(self.row(before).iter().zip(self.row(before + 1)).map(|(a, b)| a + share * (b - a)));
+        self.air_k[before] + share * (self.air_k[before + 1] - self.air_k[before])
+    }
+}
+
+/// What a model needs to have worked out.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Asked<'a> {
+    pub path: &'a HeatPath,
+    pub film_w_per_m2_k: f64,
+    pub modes: usize,
+    pub reduced: &'a Reduced,
+    pub gains: &'a Gains,
+    pub rate: &'a RateModel,
+    /// Whether the rate is more than the gains say.
+    pub beyond_linear: bool,
+    pub shows_air: bool,
+    pub lag_s: f64,
+}
+
+impl Asked<'_> {
+    /// Whether there is anything to work out.
+    pub fn is_empty(&self) -> bool {
+        !self.beyond_linear && self.path.bore_heat.is_none() && self.path.conductivity_slope_per_k == 0.0
+    }
+}
+
+/// The known inputs of one record; columns that are empty are zero.
+///
+/// # Errors
+/// A conductivity that is not positive somewhere in the reference.
+pub(super) fn known(
+    asked: &Asked,
+    record: &Record,
+    series: &Series,
+    reference: &Reference,
+) -> Result<Values, ThermalError> {
+    let mut values = Values { of: std::array::from_fn(|_| Vec::new()) };
+    if asked.is_empty() {
+        return Ok(values);
+    }
+    let rows = series.times_s.len();
+    let outputs = asked.reduced.outputs;
+    let mut rates = vec![0.0; rows];
+    if asked.path.bore_heat.is_some() || asked.path.conductivity_slope_per_k != 0.0 {
+        let changes = changes(asked, series, reference)?;
+        let outer: Vec<f64> = (0..rows).map(|k| changes[k * outputs + asked.reduced.layers - 1]).collect();
+        if !asked.shows_air {
+            values.of[0] = lagged(&outer, &series.times_s, asked.lag_s);
+        }
+        values.of[1] = (0..rows).map(|k| changes[k * outputs]).collect();
+        let content: Vec<f64> = (0..rows)
+            .map(|k| changes[k * outputs..(k + 1) * outputs].iter().zip(&asked.gains.outputs).map(|(c, g)| c * g).sum())
+            .collect();
+        for k in 1..rows {
+            rates[k] += (content[k] - content[k - 1]) / (series.times_s[k] - series.times_s[k - 1]);
+        }
+    }
+    if asked.beyond_linear {
+        beyond_linear(asked, record, series, reference, &mut rates);
+    }
+    values.of[RATE] = rates;
+    Ok(values)
+}
+
+fn lagged(values: &[f64], times_s: &[f64], lag_s: f64) -> Vec<f64> {
+    if lag_s <= 0.0 {
+        return values.to_vec();
+    }
+    let mut shown = values[0];
+    let mut out = vec![shown];
+    for k in 1..values.len() {
+        // Exact for an input that is linear between rows.
+        let step = (times_s[k] - times_s[k - 1]) / lag_s;
+        let left = (-step).exp();
+        let slope = (values[k] - values[k - 1]) / step;
+        shown = values[k] - slope + (shown - values[k - 1] + slope) * left;
+        out.push(shown);
+    }
+    out
+}
+
+/// Known changes of the outputs, row-major rows × outputs.
+pub(super) fn changes(asked: &Asked, series: &Series, reference: &Reference) -> Result<Vec<f64>, ThermalError> {
+    let (rows, outputs) = (series.times_s.len(), asked.reduced.outputs);
+    let mut changes = vec![0.0; rows * outputs];
+    for (k, line) in changes.chunks_exact_mut(outputs).enumerate() {
+        if let Some(heat) = asked.reduced.heat_k(series.times_s[k] - series.start_s) {
+            line.copy_from_slice(&heat);
+        }
+    }
+    let slope = asked.path.conductivity_slope_per_k;
+    if slope != 0.0 {
+        let mean = |k: usize| {
+            let layers = &reference.row(k)[..reference.layers];
+            series.reference_k + layers.iter().sum::<f64>() / layers.len() as f64
+        };
+        let temperatures: Vec<f64> = (0..rows).map(mean).collect();
+        let low = temperatures.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = temperatures.iter().copied().fold(f64::NEG_INFINITY, f64::max).max(low + 1.0);
+        // At three temperatures, and between them by the parabola through them: the modes that conductivity moves are
+        // faster than the pack's temperature.
+        let nodes = [low, 0.5 * (low + high), high];
+        let mut fields = Vec::new();
+        for node in nodes {
+            let factor = 1.0 + slope * (node - REFERENCE_TEMPERATURE_K);
+            if !(factor > 0.0) {
+                return Err(ThermalError::ConductivityNotPositive { temperature_k: node, slope_per_k: slope });
+            }
+            let mut path = asked.path.clone();
+            path.material = path.material.scaled(factor);
+            path.bore_heat = None;
+            let (path, _) = driven_by_air(&path, asked.film_w_per_m2_k);
+            let there = Reduced::new(&path, asked.modes, series.shortest_s(), series.duration_s)?;
+            fields.push(driven(&there, series, &reference.air_k));
+        }
+        let here = driven(asked.reduced, series, &reference.air_k);
+        for k in 0..rows {
+            let x = (temperatures[k] - nodes[1]) / (nodes[2] - nodes[1]);
+            let weights = [0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0)];
+            for j in 0..outputs {
+                let place = k * outputs + j;
+                let there: f64 = weights.iter().zip(&fields).map(|(w, f)| w * f[place]).sum();
+                changes[place] += there - here[place];
+            }
+        }
+    }
+    Ok(changes)
+}
+
+/// Outputs while an air drives a pack that was in equilibrium with its first value; linear between rows.
+fn driven(reduced: &Reduced, series: &Series, air_k: &[f64]) -> Vec<f64> {
+    let mut modes = vec![air_k[0]; reduced.modes()];
+    let mut out = Vec::with_capacity(air_k.len() * reduced.outputs);
+    for k in 0..air_k.len() {
+        if k > 0 {
+            let step_s = series.times_s[k] - series.times_s[k - 1];
+            let slope = (air_k[k] - air_k[k - 1]) / step_s;
+            for (x, l) in modes.iter_mut().zip(&reduced.decay_per_s) {
+                let lag = slope / l;
+                *x = air_k[k] - lag + (*x - air_k[k - 1] + lag) * (-l * step_s).exp();
+            }
+        }
+        for j in 0..reduced.outputs {
+            let sum: f64 = reduced.row(j).iter().zip(&modes).map(|(a, x)| a * x).sum();
+            out.push(sum + reduced.residue[j] * air_k[k]);
+        }
+    }
+    out
+}
+
+/// Adds what the full model says at the reference beyond its linear part; NaN where a channel has no value.
+fn beyond_linear(asked: &Asked, record: &Record, series: &Series, reference: &Reference, rates: &mut [f64]) {
+    let layers = reference.layers;
+    let lengths_m = asked.rate.coil().layer_lengths_m();
+    let length_m = asked.rate.coil().length_m();
+    let mean = |values: &[f64]| values.iter().zip(lengths_m).map(|(v, l)| v * l).sum::<f64>() / length_m;
+    let mut channels = vec![0.0; record.channels().len()];
+    let mut start = Vec::new();
+    for k in 1..rates.len() {
+        for (value, channel) in channels.iter_mut().zip(record.channels()) {
+            let (from, to) = series.spans[k];
+            *value = channel.values[from..=to].iter().sum::<f64>() / (to + 1 - from) as f64;
+        }
+        let air_before = reference.at_window_start(series, k, &mut start);
+        let window_s = series.shapes[series.shape_of(k)].window_s;
+        let window_s = if window_s > 0.0 { window_s } else { series.times_s[k] - series.times_s[k - 1] };
+        let end = reference.row(k);
+        let change: Vec<f64> = end.iter().zip(&start).map(|(b, a)| (b - a) / window_s).collect();
+        let temperatures: Vec<f64> =
+            end[..layers].iter().zip(&start).map(|(b, a)| series.reference_k + 0.5 * (a + b)).collect();
+        let air_rate = (reference.air_k[k] - air_before) / window_s;
+        let state = PackState {
+            time_s: series.times_s[k],
+            temperatures_k: &temperatures,
+            rates_k_per_s: &change[..layers],
+            axial_moments_k_per_s: &change[layers..],
+            mean_temperature_k: mean(&temperatures),
+            mean_rate_k_per_s: mean(&change[..layers]),
+            ambient_k: series.reference_k + 0.5 * (reference.air_k[k] + air_before),
+            ambient_rate_k_per_s: air_rate,
+            channels: &channels,
+        };
+        let linear: f64 =
+            change.iter().zip(&asked.gains.outputs).map(|(c, g)| c * g).sum::<f64>() + asked.gains.air * air_rate;
+        rates[k] += asked.rate.rate_error_rad_per_s(&state) - linear;
+    }
+}
+
+/// Takes known inputs off a record's values.
+pub(super) fn taken_off(series: &Series, known: &Values) -> Values {
+    let less = |m: usize| {
+        let own = &series.values[m];
+        if known.of[m].is_empty() { own.clone() } else { own.iter().zip(&known.of[m]).map(|(v, k)| v - k).collect() }
+    };
+    Values { of: std::array::from_fn::<_, MEASURED, _>(less) }
+}

@@ -1,0 +1,205 @@
+//! Chamber, pack, sensor and gyro in one model with one likelihood.
+//!
+//! Readings **and** rates are measurements of one latent state; the gyro itself sees what the sensor is too slow or too
+//! coarse for. Everything that is said about a record — how well a model does, which effect is missing, what the layers'
+//! temperatures were, how much of the rate is noise — comes from the likelihood of this one system (`system` has its
+//! equations, `prior` what is taken to be likely of a chamber).
+//!
+//! ```text
+//! ln E = Σ_k −½ (v_k²/S_k + ln 2πS_k) + ln p(θ̂) + (p/2) ln 2π − ½ ln |I|             evidence at the maximum (Laplace)
+//! g = Σ −v'v/S − S'/2S + S'v²/2S²,   I = Σ v'v'ᵀ/S + S'S'ᵀ/2S²                        Fisher scoring
+//! ```
+//!
+//! # How to use it
+//! 1. [`Chamber::new`] takes records: gross errors are left out and counted, fast rows are averaged to the pack's own time.
+//! 2. An [`Assumption`] says what is assumed: a coil model with its effects, a pattern, and what else may be there (drift,
+//!    cycle, a start that is not at rest, further known inputs to the rate with unknown amplitudes).
+//! 3. [`Chamber::fit`] maximises over the chamber's numbers and whatever of the effects is [`Free`]; the [`Fit`] has the
+//!    evidence, each number with its error, and a smoothed course of every record: layers and air ([`Fit::courses`]).
+//! 4. [`Chamber::held_out`] scores records that were not fitted with everything frozen; [`Chamber::noise`] tells white
+//!    noise, wander and unresolved air apart; [`Chamber::prediction`] is the rate that readings alone, or all, imply.
+//! 5. [`Chamber::score`] says what any further output of the rate would gain, cleared of all that was fitted, without a
+//!    fit: one filter pass a column. To keep one, give it to an assumption as an [`Input`] and fit again.
+//!
+//! Rows of the chamber are not always rows of the record ([`Chamber::times_s`], [`Chamber::span`]): several may be averaged.
+//!
+//! # Source
+//! Durbin and Koopman, Time Series Analysis by State Space Methods (2012), chapters 4 and 7 (filter, smoother, score); Kass
+//! and Raftery, J. Am. Stat. Assoc. 90 (1995) 773 (Laplace's evidence); Rao, Proc. Camb. Phil. Soc. 44 (1948) 50 (score test).
+
+mod course;
+mod discretise;
+mod filter;
+mod fit;
+mod known;
+mod parameter;
+mod point;
+pub mod prior;
+mod score;
+mod series;
+mod sparse;
+mod system;
+
+use thiserror::Error;
+
+use crate::coil::CoilError;
+use crate::pattern::Pattern;
+use crate::rate::{CoilModel, RateError};
+use crate::record::Record;
+use crate::thermal::ThermalError;
+use point::Observed;
+use series::Series;
+use system::driven_by_air;
+
+pub use course::{Noise, Prediction};
+pub use filter::Innovation;
+pub use fit::{Effort, Fit};
+pub use known::Reference;
+pub use parameter::{Free, Parameter, Place, Scale};
+pub use prior::{PRIORS, Prior, Quantity};
+pub use score::{Column, Scores};
+
+/// What is assumed of coil, sensor and gyro; the numbers of chamber and noise are fitted with it.
+#[derive(Debug, Clone)]
+pub struct Assumption {
+    pub model: CoilModel,
+    pub pattern: Pattern,
+    /// Wander beyond what a gyro of this noise should have.
+    pub drift: bool,
+    /// A cycle that nothing in the model makes.
+    pub cycle: bool,
+    /// The record may begin in the middle of a ramp.
+    pub unsteady: bool,
+    pub inputs: Vec<Input>,
+}
+
+impl Assumption {
+    pub fn new(model: CoilModel, pattern: Pattern) -> Self {
+        Self { model, pattern, drift: false, cycle: false, unsteady: false, inputs: Vec::new() }
+    }
+}
+
+/// A known course that adds to the rate with an unknown amplitude.
+///
+/// # Shapes
+/// One course a record of the chamber, with one entry a row of the chamber.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Input {
+    pub name: String,
+    pub rate_rad_per_s: Vec<Vec<f64>>,
+    pub amplitude: f64,
+    /// Prior standard deviation of the amplitude about zero.
+    pub deviation: f64,
+}
+
+/// Records, ready to be explained.
+#[derive(Debug)]
+pub struct Chamber<'a> {
+    observed: Vec<Observed<'a>>,
+    modes: usize,
+}
+
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum ChamberError {
+    #[error(transparent)]
+    Thermal(#[from] ThermalError),
+    #[error(transparent)]
+    Rate(#[from] RateError),
+    #[error(transparent)]
+    Coil(#[from] CoilError),
+    #[error("{record}: the temperature moves by {range_k:.3} K only: the record says nothing about the model")]
+    Constant { record: String, range_k: f64 },
+    #[error("{record}: the rate has no noise at all: is this a measurement?")]
+    NoNoise { record: String },
+    #[error("the model's likelihood cannot be computed for these records")]
+    Unsolvable,
+}
+
+/// Modes of the pack that are states: those that are slower than so many per row, within these counts.
+const MODES_PER_ROW: f64 = 8.0;
+const FEWEST_MODES: usize = 3;
+const MOST_MODES: usize = 6;
+const HALF_SPACE_MODES: usize = 8;
+/// The film and the modes that say how fine rows must be are those of a usual chamber [W/(m²K)].
+const USUAL_FILM_W_PER_M2_K: f64 = 25.0;
+
+impl<'a> Chamber<'a> {
+    /// `model` says how rates are averaged and how fast the pack is; effects may be added later.
+    ///
+    /// # Errors
+    /// A model that cannot be solved; records whose temperature does not change or whose rate has no noise.
+    pub fn new(model: &CoilModel, records: &[&'a Record]) -> Result<Self, ChamberError> {
+        let path = model.heat_path()?;
+        let (driven, _) = driven_by_air(&path, USUAL_FILM_W_PER_M2_K);
+        let thickness_m = path.shape.layers as f64 * path.shape.radial_pitch_m;
+        let pack_s = (thickness_m / std::f64::consts::PI).powi(2) / path.material.diffusivity_m2_per_s();
+        let mut observed: Vec<Observed> = Vec::with_capacity(records.len());
+        for &record in records {
+            let (low, high) = record
+                .temperature_k()
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
+            if !(high > low) {
+                return Err(ChamberError::Constant { record: record.name().to_owned(), range_k: high - low });
+            }
+            let series = Series::new(record, model.rate_mean_s, pack_s);
+            if !(series.noise_floor_rad_per_s > 0.0) {
+                return Err(ChamberError::NoNoise { record: record.name().to_owned() });
+            }
+            let channels = record.channels().iter().map(|c| c.name.clone()).collect();
+            observed.push(Observed { record, mean_k: 0.5 * (low + high), series, channels });
+        }
+        let modes = if path.extent == crate::thermal::Extent::HalfSpace {
+            HALF_SPACE_MODES
+        } else {
+            let row_s = observed.iter().map(|o| o.series.shortest_s()).fold(f64::INFINITY, f64::min);
+            let pack = crate::thermal::pack::Pack::new(&driven)?;
+            let slow = pack.decays_per_s().iter().filter(|l| *l * row_s < MODES_PER_ROW).count();
+            slow.clamp(FEWEST_MODES, MOST_MODES)
+        };
+        Ok(Self { observed, modes })
+    }
+
+    pub fn records(&self) -> usize {
+        self.observed.len()
+    }
+
+    pub fn record(&self, place: usize) -> &'a Record {
+        self.observed[place].record
+    }
+
+    /// Ends of the chamber's rows of one record.
+    pub fn times_s(&self, place: usize) -> &[f64] {
+        &self.observed[place].series.times_s
+    }
+
+    /// The first and last of a record's rows that are in one of the chamber's.
+    pub fn span(&self, place: usize, row: usize) -> (usize, usize) {
+        self.observed[place].series.spans[row]
+    }
+
+    /// What courses count their temperatures from.
+    pub fn reference_k(&self, place: usize) -> f64 {
+        self.observed[place].series.reference_k
+    }
+
+    /// Readings and rates left out as gross errors.
+    pub fn spikes(&self, place: usize) -> usize {
+        self.observed[place].series.spikes
+    }
+
+    /// Rows of a record in one row of the chamber.
+    pub fn averaged(&self, place: usize) -> usize {
+        self.observed[place].series.averaged
+    }
+
+    /// The sensor's resolution; 0 where readings lie on no grid.
+    pub fn resolution_k(&self, place: usize) -> f64 {
+        self.observed[place].series.resolution_k
+    }
+
+    /// The record's noise by windows too short for anything else.
+    pub fn noise_floor_rad_per_s(&self, place: usize) -> f64 {
+        self.observed[place].series.noise_floor_rad_per_s
+    }
+}

@@ -1,0 +1,217 @@
+//! What a fit moves: numbers of the chamber, parameters of effects, amplitudes of inputs; and where they are likely to be.
+
+use super::Assumption;
+use super::prior::Quantity;
+use super::system::Numbers;
+use crate::effect::{DeclaredEffect, ParameterSpec};
+use crate::units::Unit;
+
+/// Which number a parameter is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Place {
+    /// Of one record, or (None) of all.
+    Quantity {
+        quantity: Quantity,
+        record: Option<usize>,
+    },
+    /// Indices of an effect of the model and of its parameter.
+    Effect {
+        effect: usize,
+        parameter: usize,
+    },
+    Input {
+        input: usize,
+    },
+}
+
+/// Which effect's parameters a fit moves, and how firmly what the model states holds them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Free {
+    pub effect: usize,
+    pub parameter: usize,
+    /// Some: the model states the value, which is wrong by this share at the most (one standard deviation); None: the
+    /// prior is that of the effect's description.
+    pub stated_within: Option<f64>,
+}
+
+/// How a number becomes the coordinate in which its prior is normal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scale {
+    Logarithm,
+    Linear,
+}
+
+/// One coordinate of a fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameter {
+    pub place: Place,
+    pub scale: Scale,
+    /// Of the prior, in the coordinate.
+    pub mean: f64,
+    pub deviation: f64,
+    /// Bounds, in the coordinate.
+    pub lower: f64,
+    pub upper: f64,
+}
+
+/// Prior of an effect's parameter by its description.
+///
+/// | parameter | prior | reason |
+/// |---|---|---|
+/// | a factor (1 in the middle of its bounds' ratio) | log-normal about 1, 0.3 | it corrects a declared number |
+/// | positive, with a start | log-normal about its start, 1.0 | only its order is known |
+/// | a temperature in °C | normal about its start, 30 K | the range of a chamber |
+/// | positive or zero | half of a normal of a hundredth of its bound | zero unless something is there |
+/// | anything else | normal about 0, four starts | its start is what matters in practice |
+const FACTOR_DEVIATION: f64 = 0.3;
+const ORDER_DEVIATION: f64 = 1.0;
+const TEMPERATURE_DEVIATION_K: f64 = 30.0;
+const STARTS: f64 = 4.0;
+const SHARE_OF_BOUND: f64 = 0.01;
+
+/// Whether a parameter's description is that of a factor on a declared number.
+pub fn is_factor(spec: &ParameterSpec) -> bool {
+    spec.unit == Unit::One && spec.lower > 0.0 && (spec.lower * spec.upper - 1.0).abs() < 1e-9
+}
+
+impl Parameter {
+    pub(super) fn of_quantity(quantity: Quantity, record: Option<usize>, medians: &Numbers) -> Self {
+        let prior = quantity.prior();
+        let mean = medians.get(quantity).ln();
+        let place = Place::Quantity { quantity, record };
+        Self {
+            place,
+            scale: Scale::Logarithm,
+            mean,
+            deviation: prior.deviation,
+            lower: mean - 12.0,
+            upper: mean + 12.0,
+        }
+    }
+
+    pub(super) fn of_input(input: usize, deviation: f64) -> Self {
+        let (lower, upper) = (f64::NEG_INFINITY, f64::INFINITY);
+        Self { place: Place::Input { input }, scale: Scale::Linear, mean: 0.0, deviation, lower, upper }
+    }
+
+    pub(super) fn of_effect(effect: &DeclaredEffect, free: &Free) -> Self {
+        let place = Place::Effect { effect: free.effect, parameter: free.parameter };
+        let declared = &effect.parameters()[free.parameter];
+        let value = effect.values()[free.parameter];
+        let linear = |mean: f64, deviation: f64| {
+            let (lower, upper) = (declared.lower, declared.upper);
+            Self { place, scale: Scale::Linear, mean, deviation, lower, upper }
+        };
+        let logarithm = |mean: f64, deviation: f64| {
+            let (lower, upper) = (declared.lower.ln(), declared.upper.ln());
+            Self { place, scale: Scale::Logarithm, mean, deviation, lower, upper }
+        };
+        if let Some(share) = free.stated_within {
+            return if declared.lower > 0.0 {
+                logarithm(value.ln(), share)
+            } else {
+                linear(value, (share * value.abs()).max(1e-3 * STARTS * value.abs().max(f64::MIN_POSITIVE)))
+            };
+        }
+        let Some(spec) = effect.spec().parameters.get(free.parameter) else {
+            // A formula's own: nothing is known of it but the value it was given.
+            return linear(0.0, STARTS * value.abs().max(1e-6));
+        };
+        let start = spec.unit.to_si(spec.start);
+        if is_factor(spec) {
+            logarithm(0.0, FACTOR_DEVIATION)
+        } else if spec.unit == Unit::Celsius {
+            linear(start, TEMPERATURE_DEVIATION_K)
+        } else if spec.lower >= 0.0 && start > 0.0 {
+            logarithm(start.ln(), ORDER_DEVIATION)
+        } else if spec.lower == 0.0 {
+            linear(0.0, SHARE_OF_BOUND * declared.upper)
+        } else {
+            linear(0.0, STARTS * start.abs())
+        }
+    }
+
+    pub fn value(&self, coordinate: f64) -> f64 {
+        match self.scale {
+            Scale::Logarithm => coordinate.exp(),
+            Scale::Linear => coordinate,
+        }
+    }
+
+    pub fn coordinate(&self, value: f64) -> f64 {
+        match self.scale {
+            Scale::Logarithm => value.ln(),
+            Scale::Linear => value,
+        }
+    }
+
+    /// Natural logarithm of the prior's density.
+    pub(super) fn log_prior(&self, coordinate: f64) -> f64 {
+        let apart = (coordinate - self.mean) / self.deviation;
+        -0.5 * apart * apart - self.deviation.ln() - 0.5 * std::f64::consts::TAU.ln()
+    }
+
+    /// Step of a difference, in the coordinate.
+    pub(super) fn step(&self) -> f64 {
+        match self.scale {
+            Scale::Logarithm => 0.01,
+            Scale::Linear => 0.01 * self.deviation,
+        }
+    }
+
+    /// Longest step of a fit, in the coordinate.
+    pub(super) fn stride(&self) -> f64 {
+        match self.scale {
+            Scale::Logarithm => 1.0,
+            Scale::Linear => 3.0 * self.deviation,
+        }
+    }
+
+    /// Whether a record's likelihood depends on it.
+    pub(super) fn concerns(&self, record: usize) -> bool {
+        !matches!(self.place, Place::Quantity { record: Some(own), .. } if own != record)
+    }
+
+    /// Whether the coil's side of the model stays as it is.
+    pub(super) fn leaves_coil(&self) -> bool {
+        matches!(self.place, Place::Quantity { quantity, .. } if quantity != Quantity::Film)
+    }
+
+    /// Reads it from what is assumed.
+    pub(super) fn read(&self, assumed: &Assumption, numbers: &[Numbers]) -> f64 {
+        let value = match self.place {
+            Place::Quantity { quantity, record } => numbers[record.unwrap_or(0)].get(quantity),
+            Place::Effect { effect, parameter } => assumed.model.effects[effect].values()[parameter],
+            Place::Input { input } => assumed.inputs[input].amplitude,
+        };
+        self.coordinate(value)
+    }
+}
+
+/// Writes coordinates into what is assumed and its numbers; false if an effect refuses its value.
+pub(super) fn write(
+    parameters: &[Parameter],
+    coordinates: &[f64],
+    assumed: &mut Assumption,
+    numbers: &mut [Numbers],
+) -> bool {
+    for (parameter, &coordinate) in parameters.iter().zip(coordinates) {
+        let value = parameter.value(coordinate);
+        match parameter.place {
+            Place::Quantity { quantity, record } => match record {
+                Some(record) => numbers[record].set(quantity, value),
+                None => numbers.iter_mut().for_each(|n| n.set(quantity, value)),
+            },
+            Place::Effect { effect, parameter } => {
+                let mut values = assumed.model.effects[effect].values().to_vec();
+                values[parameter] = value;
+                match assumed.model.effects[effect].with_values(values) {
+                    Ok(moved) => assumed.model.effects[effect] = moved,
+                    Err(_) => return false,
+                }
+            }
+            Place::Input { input } => assumed.inputs[input].amplitude = value,
+        }
+    }
+    true
+}

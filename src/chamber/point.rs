@@ -1,0 +1,261 @@
+//! A model with all its numbers, and what the filter makes of a record with it.
+
+use super::filter::{self, Innovation, Trace, Values};
+use super::known::{Asked, Reference, known, taken_off};
+use super::prior::Quantity;
+use super::series::Series;
+use super::system::{Gains, Layout, Numbers, Parts, driven_by_air, system};
+use super::{Assumption, ChamberError};
+use crate::effect::PackState;
+use crate::rate::RateModel;
+use crate::record::Record;
+use crate::thermal::reduced::Reduced;
+use crate::thermal::{HeatPath, Location, check};
+
+/// The coil's side of a model: what does not depend on chamber and noise.
+#[derive(Debug)]
+pub(super) struct CoilSide {
+    path: HeatPath,
+    film_w_per_m2_k: f64,
+    modes: usize,
+    pub reduced: Reduced,
+    pub gains: Gains,
+    rate: RateModel,
+    skin_s: Option<f64>,
+    shows_air: bool,
+    lag_s: f64,
+    beyond_linear: bool,
+}
+
+/// A record as the chamber knows it.
+#[derive(Debug)]
+pub(super) struct Observed<'a> {
+    pub record: &'a Record,
+    pub series: Series,
+    pub channels: Vec<String>,
+    pub mean_k: f64,
+}
+
+impl CoilSide {
+    /// # Errors
+    /// A model that cannot be solved.
+    pub fn new(assumed: &Assumption, film: f64, modes: usize, observed: &Observed) -> Result<Self, ChamberError> {
+        let model = &assumed.model;
+        let path = model.heat_path()?;
+        let shows_air = path.location == Location::Ambient;
+        let film_w_per_m2_k = if shows_air { path.film_w_per_m2_k.unwrap_or(f64::INFINITY) } else { film };
+        check(&path)?;
+        let (driven, skin_s) = driven_by_air(&path, film_w_per_m2_k);
+        let reduced = Reduced::new(&driven, modes, observed.series.shortest_s(), observed.series.duration_s.max(1.0))?;
+        let rate = RateModel::new(model, &assumed.pattern, &observed.channels)?;
+        let gains = gains(&rate, &reduced, observed);
+        let beyond_linear = model.effects.iter().any(|e| {
+            let bound = e.bind(&model.coil, &observed.channels);
+            !bound.is_linear() || bound.path_depends_on_temperature() || !e.channels().is_empty()
+        });
+        let lag_s = model.sensor_lag_s();
+        Ok(Self { path, film_w_per_m2_k, modes, reduced, gains, rate, skin_s, shows_air, lag_s, beyond_linear })
+    }
+
+    pub fn parts<'a>(&'a self, assumed: &Assumption) -> Parts<'a> {
+        Parts {
+            reduced: &self.reduced,
+            gains: &self.gains,
+            skin_s: self.skin_s,
+            shows_air: self.shows_air,
+            lag_s: self.lag_s,
+            drift: assumed.drift,
+            cycle: assumed.cycle,
+            unsteady: assumed.unsteady,
+        }
+    }
+
+    fn asked(&self) -> Asked<'_> {
+        Asked {
+            path: &self.path,
+            film_w_per_m2_k: self.film_w_per_m2_k,
+            modes: self.modes,
+            reduced: &self.reduced,
+            gains: &self.gains,
+            rate: &self.rate,
+            beyond_linear: self.beyond_linear,
+            shows_air: self.shows_air,
+            lag_s: self.lag_s,
+        }
+    }
+
+    /// Whether a reference is needed.
+    pub fn needs_reference(&self) -> bool {
+        !self.asked().is_empty()
+    }
+
+    /// The record's values with all known inputs taken off; those of an assumption's inputs included.
+    ///
+    /// # Errors
+    /// A conductivity that is not positive.
+    pub fn values(
+        &self,
+        assumed: &Assumption,
+        observed: &Observed,
+        place: usize,
+        reference: Option<&Reference>,
+    ) -> Result<Values, ChamberError> {
+        let mut values = match reference {
+            Some(reference) => {
+                taken_off(&observed.series, &known(&self.asked(), observed.record, &observed.series, reference)?)
+            }
+            None => Values { of: observed.series.values.clone() },
+        };
+        for input in &assumed.inputs {
+            let Some(course) = input.rate_rad_per_s.get(place) else { continue };
+            values.of[filter::RATE].iter_mut().zip(course).for_each(|(v, c)| *v -= input.amplitude * c);
+        }
+        Ok(values)
+    }
+
+    /// The course that states and known changes make.
+    ///
+    /// # Errors
+    /// A conductivity that is not positive.
+    fn reference(
+        &self,
+        assumed: &Assumption,
+        observed: &Observed,
+        states: &[f64],
+        before: Option<&Reference>,
+    ) -> Result<Reference, ChamberError> {
+        let layout = Layout::new(&self.parts(assumed), observed.series.averaged > 1);
+        let rows = observed.series.times_s.len();
+        let outputs = self.reduced.outputs;
+        let air: Vec<f64> =
+            states.chunks_exact(layout.size).map(|x| layout.air().into_iter().map(|i| x[i]).sum()).collect();
+        let rows_of: Vec<Vec<f64>> = (0..outputs).map(|j| layout.output(&self.reduced, j)).collect();
+        let mut outputs_k = Vec::with_capacity(rows * outputs);
+        for x in states.chunks_exact(layout.size) {
+            outputs_k.extend(rows_of.iter().map(|row| row.iter().zip(x).map(|(a, b)| a * b).sum::<f64>()));
+        }
+        let mut found = Reference { layers: self.reduced.layers, outputs, air_k: air, outputs_k };
+        // Known changes of the layers belong to the course; they were taken off the readings.
+        let asked = self.asked();
+        if asked.path.bore_heat.is_some() || asked.path.conductivity_slope_per_k != 0.0 {
+            let about = before.unwrap_or(&found);
+            let changes = super::known::changes(&asked, &observed.series, about)?;
+            found.outputs_k.iter_mut().zip(changes).for_each(|(o, c)| *o += c);
+        }
+        Ok(found)
+    }
+}
+
+/// Ω by unit rates of each output, at the record's mean temperature.
+fn gains(rate: &RateModel, reduced: &Reduced, observed: &Observed) -> Gains {
+    let temperatures = vec![observed.mean_k; reduced.layers];
+    let lengths_m = rate.coil().layer_lengths_m();
+    let length_m = rate.coil().length_m();
+    let channels = vec![0.0; observed.channels.len()];
+    let of = |rates: &[f64], air: f64| {
+        rate.rate_error_rad_per_s(&PackState {
+            time_s: 0.0,
+            temperatures_k: &temperatures,
+            rates_k_per_s: &rates[..reduced.layers],
+            axial_moments_k_per_s: &rates[reduced.layers..],
+            mean_temperature_k: observed.mean_k,
+            mean_rate_k_per_s: rates.iter().zip(lengths_m).map(|(r, l)| r * l).sum::<f64>() / length_m,
+            ambient_k: observed.mean_k,
+            ambient_rate_k_per_s: air,
+            channels: &channels,
+        })
+    };
+    // Both signs: what depends on the sign of a rate has no linear part in this.
+    let mut unit = vec![0.0; reduced.outputs];
+    let mut outputs = Vec::with_capacity(reduced.outputs);
+    for j in 0..reduced.outputs {
+        unit[j] = 1.0;
+        let up = of(&unit, 0.0);
+        unit[j] = -1.0;
+        outputs.push(0.5 * (up - of(&unit, 0.0)));
+        unit[j] = 0.0;
+    }
+    Gains { outputs, air: 0.5 * (of(&unit, 1.0) - of(&unit, -1.0)) }
+}
+
+/// One record through the filter.
+pub(super) fn run(
+    side: &CoilSide,
+    assumed: &Assumption,
+    numbers: &Numbers,
+    observed: &Observed,
+    values: &Values,
+) -> Vec<Innovation> {
+    let system = system(&side.parts(assumed), numbers, &observed.series);
+    filter::forward(&system, &observed.series.rows, values, false).innovations
+}
+
+/// As [`run`], with everything that the other passes need.
+pub(super) fn run_kept(
+    side: &CoilSide,
+    assumed: &Assumption,
+    numbers: &Numbers,
+    observed: &Observed,
+    values: &Values,
+) -> (filter::System, Trace) {
+    let system = system(&side.parts(assumed), numbers, &observed.series);
+    let trace = filter::forward(&system, &observed.series.rows, values, true);
+    (system, trace)
+}
+
+/// The smoothed course of one record.
+///
+/// # Errors
+/// A conductivity that is not positive.
+pub(super) fn smoothed(
+    side: &CoilSide,
+    assumed: &Assumption,
+    numbers: &Numbers,
+    observed: &Observed,
+    place: usize,
+    before: Option<&Reference>,
+) -> Result<Reference, ChamberError> {
+    let values = side.values(assumed, observed, place, before)?;
+    let (system, trace) = run_kept(side, assumed, numbers, observed, &values);
+    let states = filter::smooth(&system, &observed.series.rows, &trace);
+    side.reference(assumed, observed, &states, before)
+}
+
+/// The film as a number of the chamber, where the model does not state one.
+pub(super) fn film_is_free(assumed: &Assumption) -> Result<bool, ChamberError> {
+    Ok(assumed.model.heat_path()?.location == Location::OuterLayer)
+}
+
+/// All quantities that an assumption has, for each record or for all.
+pub(super) fn quantities(assumed: &Assumption, observed: &Observed) -> Result<Vec<Quantity>, ChamberError> {
+    let mut all = Vec::new();
+    if film_is_free(assumed)? {
+        all.push(Quantity::Film);
+    }
+    all.push(Quantity::ReadingNoise);
+    if observed.record.inner_k().is_some() {
+        all.push(Quantity::InnerNoise);
+    }
+    if observed.record.ambient_k().is_some() {
+        all.push(Quantity::AmbientNoise);
+    }
+    all.extend([
+        Quantity::RateNoise,
+        Quantity::RestNoise,
+        Quantity::BendNoise,
+        Quantity::TurbulenceSize,
+        Quantity::TurbulenceTime,
+        Quantity::RippleSize,
+        Quantity::RipplePeriod,
+        Quantity::RippleCoherence,
+        Quantity::WanderShare,
+        Quantity::WanderTime,
+    ]);
+    if assumed.drift {
+        all.extend([Quantity::DriftSize, Quantity::DriftTime]);
+    }
+    if assumed.cycle {
+        all.extend([Quantity::CycleSize, Quantity::CyclePeriod]);
+    }
+    Ok(all)
+}

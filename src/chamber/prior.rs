@@ -1,0 +1,126 @@
+//! What is taken to be likely of a chamber, a sensor and a gyro before any record is read: one table, a reason each.
+//!
+//! All are positive and have a log-normal prior: a median and the standard deviation of the logarithm.
+
+/// A number that describes the chamber, the sensor or the gyro, not the coil.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Quantity {
+    /// Film between air and pack [W/(m²K)].
+    Film,
+    /// White noise of one reading of the sensor, besides its resolution [K].
+    ReadingNoise,
+    /// … of a thermometer at the bore, and of one in the air [K].
+    InnerNoise,
+    AmbientNoise,
+    /// White noise of one rate [rad/s].
+    RateNoise,
+    /// Density of the noise that drives the air's slope, at rest and where the readings bend [K²/s³].
+    RestNoise,
+    BendNoise,
+    /// Turbulence: an Ornstein–Uhlenbeck process's size [K] and time [s].
+    TurbulenceSize,
+    TurbulenceTime,
+    /// A compressor's ripple: a damped stochastic oscillator's size [K], period and coherence time [s].
+    RippleSize,
+    RipplePeriod,
+    RippleCoherence,
+    /// Slow wander of the gyro itself: its size over that of the white noise of one rate, and its time [s].
+    WanderShare,
+    WanderTime,
+    /// Wander that no gyro of this noise should have: its size [rad/s] and time [s].
+    DriftSize,
+    DriftTime,
+    /// A cycle that no part of the model makes: its size [rad/s] and period [s].
+    CycleSize,
+    CyclePeriod,
+}
+
+/// One line of the table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prior {
+    pub quantity: Quantity,
+    /// In SI; relative to the record's own noise floor where `relative`.
+    pub median: f64,
+    /// Of the natural logarithm.
+    pub deviation: f64,
+    pub relative: bool,
+    pub reason: &'static str,
+}
+
+/// Every prior of the chamber.
+pub const PRIORS: [Prior; 18] = [
+    line(Quantity::Film, 25.0, 0.8, "free to moderately forced convection in a chamber: 8 … 80 W/(m²K)"),
+    line(Quantity::ReadingNoise, 0.005, 1.0, "platinum sensors and their bridges read to a few millikelvin"),
+    line(Quantity::InnerNoise, 0.005, 1.0, "as the sensor"),
+    line(Quantity::AmbientNoise, 0.05, 1.2, "air at one place is not the air everywhere"),
+    relative(
+        Quantity::RateNoise,
+        1.0,
+        1.2,
+        "the floor of short windows, from above: a ripple that the coil sees adds to it",
+    ),
+    line(Quantity::RestNoise, 1e-9, 3.0, "a controlled chamber between changes of its set point"),
+    line(Quantity::BendNoise, 2e-7, 2.0, "ramps of 1 K/min that begin and end within a minute"),
+    line(Quantity::TurbulenceSize, 0.04, 1.2, "hundredths of a kelvin where a fan blows"),
+    line(Quantity::TurbulenceTime, 40.0, 0.8, "eddies of the size of the chamber, tens of seconds"),
+    line(Quantity::RippleSize, 0.08, 1.2, "a tenth of a kelvin from a compressor or a valve"),
+    line(Quantity::RipplePeriod, 200.0, 0.6, "switching periods of one to ten minutes"),
+    line(Quantity::RippleCoherence, 600.0, 1.0, "a few periods: switching depends on the load"),
+    line(Quantity::WanderShare, 0.15, 0.8, "flicker of gyros lies under the white noise of a row of seconds"),
+    line(Quantity::WanderTime, 1500.0, 1.2, "flicker is nearly even over the decades that a record sees"),
+    relative(
+        Quantity::DriftSize,
+        1.0,
+        1.2,
+        "of the size of the noise: smaller is flicker, larger would be seen by eye",
+    ),
+    line(Quantity::DriftTime, 1500.0, 1.2, "as the gyro's wander"),
+    relative(Quantity::CycleSize, 2.0, 1.2, "as the drift"),
+    line(Quantity::CyclePeriod, 5000.0, 0.8, "below a record's length, above what an air conditioning makes"),
+];
+
+const fn line(quantity: Quantity, median: f64, deviation: f64, reason: &'static str) -> Prior {
+    Prior { quantity, median, deviation, relative: false, reason }
+}
+
+const fn relative(quantity: Quantity, median: f64, deviation: f64, reason: &'static str) -> Prior {
+    Prior { quantity, median, deviation, relative: true, reason }
+}
+
+impl Quantity {
+    pub fn prior(self) -> &'static Prior {
+        let found = PRIORS.iter().find(|p| p.quantity == self);
+        found.unwrap_or(&PRIORS[0])
+    }
+
+    /// Whether it is one number for all records.
+    pub fn is_shared(self) -> bool {
+        self == Quantity::Film
+    }
+}
+
+/// Standard deviation of the pack's first temperature about the first reading [K].
+pub(super) const START_K: f64 = 1.0;
+/// … of what pack and sensor differ from the air at the start [K].
+pub(super) const START_APART_K: f64 = 0.1;
+/// … of the air's slope at the start: of a record that begins at rest, and of one that begins anywhere [K/s].
+pub(super) const START_SLOPE_K_PER_S: f64 = 1e-4;
+pub(super) const UNSTEADY_SLOPE_K_PER_S: f64 = 0.02;
+/// … and of pack and air of such a record [K].
+pub(super) const UNSTEADY_APART_K: f64 = 3.0;
+/// … of the rate's offset about the record's median [rad/s]: the earth's rate is 7.3e-5.
+pub(super) const OFFSET_RAD_PER_S: f64 = 2.5e-5;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_quantity_has_one_prior_and_a_reason() {
+        for (place, prior) in PRIORS.iter().enumerate() {
+            assert!(std::ptr::eq(prior.quantity.prior(), &PRIORS[place]) || *prior.quantity.prior() == *prior);
+            assert_eq!(PRIORS.iter().filter(|p| p.quantity == prior.quantity).count(), 1);
+            assert!(prior.median > 0.0 && prior.deviation > 0.0 && prior.reason.len() > 10);
+        }
+    }
+}

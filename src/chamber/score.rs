@@ -1,0 +1,140 @@
+//! What further outputs of the rate would gain, cleared of everything that was fitted: one filter pass a column.
+//!
+//! ```text
+//! v → v − β V,  V the column's own innovations:   g = Σ V v/S,  J = Σ V V/S,  C = Σ V v'/S
+//! g̃ = g + C I⁻¹ s,  J̃ = J − C I⁻¹ Cᵀ,   gain of any combination β: β·g̃ − ½ βᵀ J̃ β, at best ½ g̃ᵀ J̃⁻¹ g̃
+//! ```
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | v, S, v' | innovations of the fit, their variances and derivatives by the fitted coordinates |
+//! | I, s | information and slope of the fitted posterior; s is zero at the maximum |
+//!
+//! # Source
+//! Rao, Proc. Camb. Phil. Soc. 44 (1948) 50; Rosenberg, Ann. Econ. Soc. Meas. 2 (1973) 399 (columns through a filter).
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::filter::{RATE, Values, respond};
+use super::fit::{Derivatives, Fit};
+use super::point::run_kept;
+use super::{Chamber, ChamberError};
+
+/// A course that might add to the rate [rad/s at unit amplitude].
+///
+/// # Shapes
+/// One course a record of the chamber, one entry a row of the chamber; those of records that were not fitted may be empty.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    pub rate_rad_per_s: Vec<Vec<f64>>,
+}
+
+/// Score and information of columns, cleared of what was fitted.
+#[derive(Debug, Clone)]
+pub struct Scores {
+    /// g̃ of each column.
+    pub score: DVector<f64>,
+    /// J̃ between columns.
+    pub information: DMatrix<f64>,
+}
+
+impl Scores {
+    /// By how much the log likelihood would rise with a column at its best amplitude, and that amplitude.
+    pub fn gain(&self, column: usize) -> (f64, f64) {
+        let information = self.information[(column, column)];
+        if !(information > 0.0) {
+            return (0.0, 0.0);
+        }
+        let amplitude = self.score[column] / information;
+        (0.5 * self.score[column] * amplitude, amplitude)
+    }
+
+    /// By how much it would rise with given amplitudes of all columns.
+    pub fn gain_of(&self, amplitudes: &DVector<f64>) -> f64 {
+        amplitudes.dot(&self.score) - 0.5 * amplitudes.dot(&(&self.information * amplitudes))
+    }
+}
+
+impl Chamber<'_> {
+    /// Scores columns against a fit.
+    ///
+    /// # Errors
+    /// A model that cannot be solved.
+    pub fn score(&self, fit: &Fit, columns: &[Column]) -> Result<Scores, ChamberError> {
+        let place = self.place(fit.assumed.clone(), fit.numbers.clone(), &fit.records, &fit.courses)?;
+        let (count, fitted) = (columns.len(), fit.parameters.len());
+        let mut score = DVector::zeros(count);
+        let mut information = DMatrix::zeros(count, count);
+        let mut cross = DMatrix::zeros(count, fitted);
+        let mut slope = DVector::zeros(fitted);
+        for &record in &fit.records {
+            let (Some(side), Some(values)) = (&place.sides[record], &place.values[record]) else {
+                return Err(ChamberError::Unsolvable);
+            };
+            let observed = &self.observed[record];
+            let (system, trace) = run_kept(side, &place.assumed, &place.numbers[record], observed, values);
+            let base = vec![trace.innovations.clone()];
+            let derivatives = self.derivatives(&place, &fit.parameters, &fit.coordinates, &[record], &base)?;
+            let responses: Vec<Vec<f64>> = columns
+                .par_iter()
+                .map(|column| {
+                    let mut inputs = Values { of: std::array::from_fn(|_| Vec::new()) };
+                    inputs.of[RATE] = column.rate_rad_per_s.get(record).cloned().unwrap_or_default();
+                    let mut out = respond(&system, &observed.series.rows, &trace, &inputs);
+                    // In units of the innovations' deviations.
+                    out.iter_mut().zip(&trace.innovations).for_each(|(o, i)| *o /= i.variance.sqrt());
+                    out
+                })
+                .collect();
+            let rows = trace.innovations.len();
+            let v = DVector::from_iterator(rows, trace.innovations.iter().map(|i| i.value / i.variance.sqrt()));
+            let flat: Vec<f64> = responses.concat();
+            let responses = DMatrix::from_vec(rows, count, flat);
+            score += responses.tr_mul(&v);
+            information += responses.tr_mul(&responses);
+            let own = &derivatives[0];
+            own.add_to(&trace.innovations, &mut slope, &mut DMatrix::zeros(fitted, fitted));
+            add_cross(own, &trace.innovations, &responses, &mut cross);
+        }
+        for (i, p) in fit.parameters.iter().enumerate() {
+            slope[i] -= (fit.coordinates[i] - p.mean) * p.deviation.powi(-2);
+        }
+        if let Some(factor) = fit.information.clone().cholesky() {
+            // The innovations fall by V per unit of amplitude: their derivative is −V.
+            let weights = factor.solve(&cross.transpose());
+            score += weights.transpose() * slope;
+            information -= &cross * weights;
+        }
+        Ok(Scores { score, information })
+    }
+
+    /// The rates of each output of the layers' smoothed course over each row's window, as columns: what a change of one
+    /// layer's gain would add to the rate, per unit of gain.
+    ///
+    /// # Shapes
+    /// One column an output: the layers, innermost first, then axial moments.
+    pub fn layer_columns(&self, fit: &Fit) -> Vec<Column> {
+        let outputs = fit.courses.iter().flatten().map(|c| c.outputs).next().unwrap_or(0);
+        (0..outputs)
+            .map(|j| Column {
+                rate_rad_per_s: (0..self.records())
+                    .map(|r| {
+                        fit.courses[r].as_ref().map_or_else(Vec::new, |c| c.window_rates(&self.observed[r].series, j))
+                    })
+                    .collect(),
+            })
+            .collect()
+    }
+}
+
+fn add_cross(own: &Derivatives, base: &[super::Innovation], responses: &DMatrix<f64>, cross: &mut DMatrix<f64>) {
+    for (place, &p) in own.parameters.iter().enumerate() {
+        let scaled = DVector::from_iterator(
+            base.len(),
+            own.columns[place].value.iter().zip(base).map(|(d, i)| d / i.variance.sqrt()),
+        );
+        let mut column = cross.column_mut(p);
+        column += responses.tr_mul(&scaled);
+    }
+}

@@ -1,0 +1,314 @@
+//! A record as rows of a filter: averaged to the pack's own time scale, gross errors and gaps left out.
+//!
+//! ```text
+//! mean of b readings   = those of the window's middle: interpolated between its two ends
+//! mean of b rates      = (c·x(t) − c·x(t − b Δ))/(b Δ), exactly, where each is itself a mean over Δ
+//! ```
+
+use super::filter::{MEASURED, RATE, Row};
+use crate::numeric::noise::white_noise;
+use crate::numeric::statistics::median;
+use crate::record::Record;
+
+/// What the rows of one record are, before any number of the model is known.
+#[derive(Debug, Clone)]
+pub(super) struct Series {
+    /// Ends of the windows [s].
+    pub times_s: Vec<f64>,
+    /// Readings in K above `reference_k` (sensor, bore, air), and the rate in rad/s; NaN where there is none.
+    pub values: [Vec<f64>; MEASURED],
+    pub reference_k: f64,
+    /// One entry a row; `Row::measured` holds places of [`Self::shapes`] times measured.
+    pub rows: Vec<Row>,
+    /// Distinct lengths of steps [s].
+    pub steps_s: Vec<f64>,
+    /// Distinct ways in which a row is measured.
+    pub shapes: Vec<Shape>,
+    /// Of each row, the first and last of the record's rows in it.
+    pub spans: Vec<(usize, usize)>,
+    /// Rows of the record whose reading or rate was left out as a gross error.
+    pub spikes: usize,
+    /// Values in one row.
+    pub averaged: usize,
+    /// Resolution of the sensor [K]; 0 where readings are not on a grid.
+    pub resolution_k: f64,
+    pub noise_floor_rad_per_s: f64,
+    pub duration_s: f64,
+    /// The record's first instant [s].
+    pub start_s: f64,
+    shape_of: Vec<u16>,
+}
+
+/// How a row is measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Shape {
+    /// Length of the rate's window [s]; 0: the rate at an instant.
+    pub window_s: f64,
+    /// Share of the window's end in the readings, the rest being its beginning's.
+    pub end_share: f64,
+}
+
+/// Rows are averaged while they are shorter than this share of the pack's own time …
+const TIME_SHARE: f64 = 0.5;
+/// … and to at most so many seconds, unless there are more rows than this, and then to at most so many.
+const SHORT_ROW_S: f64 = 10.0;
+const MANY_ROWS: f64 = 3000.0;
+const LONG_ROW_S: f64 = 60.0;
+/// More distinct steps than this are put together from binary fractions of the usual one.
+const MOST_STEPS: usize = 12;
+const FINEST_S: f64 = 0.05;
+/// Two times that differ by less are the same [s].
+const SAME_S: f64 = 1e-6;
+/// The air's bends: readings are smoothed over one time, compared over the other, and the air moved earlier than they by
+/// the last [s].
+const SMOOTHED_S: f64 = 210.0;
+const COMPARED_S: f64 = 200.0;
+const EARLIER_S: f64 = 80.0;
+/// A bend of this share of the largest is one.
+const FULL_BEND: f64 = 0.25;
+/// Levels of the trend's noise; between them gains may stay frozen.
+const LEVELS: f64 = 8.0;
+
+impl Series {
+    /// `pack_s`: the shortest time in which the pack evens out that a row should resolve.
+    pub fn new(record: &Record, rate_mean_s: f64, pack_s: f64) -> Self {
+        let mut columns: [Vec<f64>; MEASURED] = [
+            record.temperature_k().to_vec(),
+            record.inner_k().map(<[f64]>::to_vec).unwrap_or_default(),
+            record.ambient_k().map(<[f64]>::to_vec).unwrap_or_default(),
+            record.rate_rad_per_s().to_vec(),
+        ];
+        let gross = record.gross_errors();
+        for error in &gross {
+            columns[if error.column == "rate" { RATE } else { 0 }][error.row] = f64::NAN;
+        }
+        let spikes = gross.len();
+        let times_s = record.times_s();
+        let interval_s = record.interval_s();
+        let duration_s = times_s[times_s.len() - 1] - times_s[0];
+        let reference_k = columns[0].iter().copied().find(|v| v.is_finite()).unwrap_or(0.0);
+        for column in &mut columns[..RATE] {
+            column.iter_mut().for_each(|v| *v -= reference_k);
+        }
+        let resolution_k = resolution(&columns[0]);
+        let row_s = (TIME_SHARE * pack_s).min(SHORT_ROW_S).max((duration_s / MANY_ROWS).min(LONG_ROW_S));
+        let averaged = ((row_s / interval_s) + 1e-9).floor().max(1.0) as usize;
+        let blocks = if averaged > 1 {
+            slots(times_s, &columns, averaged, interval_s)
+        } else {
+            let whole = |i: usize| Block {
+                time_s: times_s[i],
+                values: std::array::from_fn(|m| columns[m].get(i).copied().unwrap_or(f64::NAN)),
+                span: (i, i),
+            };
+            (0..times_s.len()).map(whole).collect()
+        };
+        let mut series = Self {
+            times_s: blocks.iter().map(|b| b.time_s).collect(),
+            values: std::array::from_fn(|m| blocks.iter().map(|b| b.values[m]).collect()),
+            reference_k,
+            rows: Vec::new(),
+            steps_s: Vec::new(),
+            shapes: Vec::new(),
+            spans: blocks.iter().map(|b| b.span).collect(),
+            spikes,
+            averaged,
+            resolution_k,
+            noise_floor_rad_per_s: white_noise(times_s, record.rate_rad_per_s()).deviation,
+            duration_s,
+            start_s: times_s[0],
+            shape_of: Vec::new(),
+        };
+        series.plan(rate_mean_s, averaged as f64 * interval_s);
+        series
+    }
+
+    pub fn shape_of(&self, row: usize) -> usize {
+        self.shape_of[row] as usize
+    }
+
+    /// The usual time between rows [s].
+    pub fn shortest_s(&self) -> f64 {
+        let steps: Vec<f64> = self.times_s.windows(2).map(|w| w[1] - w[0]).collect();
+        median(&steps)
+    }
+
+    /// Steps, windows and bends of all rows.
+    fn plan(&mut self, rate_mean_s: f64, block_s: f64) {
+        let bends = bends(&self.times_s, &self.values[0]);
+        let mut lengths: Vec<(f64, f64)> = Vec::with_capacity(self.times_s.len());
+        for k in 0..self.times_s.len() {
+            let gap_s = if k > 0 { self.times_s[k] - self.times_s[k - 1] } else { 0.0 };
+            let wanted_s = if self.averaged > 1 { block_s } else { rate_mean_s };
+            let window_s = if (gap_s - wanted_s).abs() < 0.05 * wanted_s { gap_s } else { wanted_s.min(gap_s) };
+            lengths.push((gap_s - window_s, window_s));
+        }
+        let steps = StepTable::new(&lengths, block_s);
+        let end_share = if self.averaged > 1 { 0.5 * (self.averaged as f64 + 1.0) / self.averaged as f64 } else { 1.0 };
+        for (k, &(before_s, window_s)) in lengths.iter().enumerate() {
+            // At the first row no window has begun yet.
+            let keeps = k > 0 && window_s > 0.0;
+            let shape = Shape { window_s, end_share: if keeps { end_share } else { 1.0 } };
+            let place = self.shapes.iter().position(|s| same(s, &shape)).unwrap_or_else(|| {
+                self.shapes.push(shape);
+                self.shapes.len() - 1
+            });
+            self.shape_of.push(place as u16);
+            let measured = std::array::from_fn(|m| {
+                let there = self.values[m][k].is_finite() && (m != RATE || k > 0);
+                there.then_some((place * MEASURED + m) as u16)
+            });
+            self.rows.push(Row {
+                before: steps.of(before_s),
+                after: steps.of(window_s),
+                keeps,
+                bend: bends[k],
+                measured,
+                averaged: self.averaged as f64,
+            });
+        }
+        self.steps_s = steps.lengths_s;
+    }
+}
+
+fn same(a: &Shape, b: &Shape) -> bool {
+    (a.window_s - b.window_s).abs() < SAME_S && (a.end_share - b.end_share).abs() < SAME_S
+}
+
+/// Rows that become one.
+struct Block {
+    time_s: f64,
+    values: [f64; MEASURED],
+    span: (usize, usize),
+}
+
+/// Of a slot's rows at least this share must be there.
+const PRESENT: f64 = 0.7;
+
+/// Slots of `count` rows each, that end where their last row should stand.
+fn slots(times_s: &[f64], columns: &[Vec<f64>; MEASURED], count: usize, interval_s: f64) -> Vec<Block> {
+    let slot_s = count as f64 * interval_s;
+    let first_s = times_s[0] - interval_s;
+    let slot_of = |t: f64| ((t - first_s) / slot_s - 1e-6).ceil() as usize;
+    let mut blocks = Vec::new();
+    let mut from = 0;
+    while from < times_s.len() {
+        let slot = slot_of(times_s[from]);
+        let to = from + times_s[from..].partition_point(|&t| slot_of(t) <= slot);
+        let time_s = first_s + slot as f64 * slot_s;
+        let middle_s = time_s - 0.5 * (count as f64 - 1.0) * interval_s;
+        let mut values = [f64::NAN; MEASURED];
+        for (m, column) in columns.iter().enumerate().filter(|(_, c)| !c.is_empty()) {
+            let present: Vec<usize> = (from..to).filter(|&i| column[i].is_finite()).collect();
+            if (present.len() as f64) < PRESENT * count as f64 {
+                continue;
+            }
+            let mean = |f: &dyn Fn(usize) -> f64| present.iter().map(|&i| f(i)).sum::<f64>() / present.len() as f64;
+            let (first, last) = (present[0], present[present.len() - 1]);
+            // Where some are missing, the rest's mean is that of another instant.
+            let slope = if m == RATE || last == first {
+                0.0
+            } else {
+                (column[last] - column[first]) / (times_s[last] - times_s[first])
+            };
+            values[m] = mean(&|i| column[i]) - slope * (mean(&|i| times_s[i]) - middle_s);
+        }
+        if values.iter().any(|v| v.is_finite()) {
+            blocks.push(Block { time_s, values, span: (from, to - 1) });
+        }
+        from = to;
+    }
+    blocks
+}
+
+/// Distinct steps; where there are too many, fractions of one that add up to each.
+struct StepTable {
+    lengths_s: Vec<f64>,
+    /// None where each length stands for itself.
+    finest_s: Option<f64>,
+}
+
+impl StepTable {
+    fn new(lengths: &[(f64, f64)], usual_s: f64) -> Self {
+        let mut lengths_s: Vec<f64> = Vec::new();
+        let mut longest_s = usual_s;
+        for length_s in lengths.iter().flat_map(|l| [l.0, l.1]).filter(|&l| l > SAME_S) {
+            longest_s = longest_s.max(length_s);
+            if lengths_s.len() <= MOST_STEPS && !lengths_s.iter().any(|l| (l - length_s).abs() < SAME_S) {
+                lengths_s.push(length_s);
+            }
+        }
+        if lengths_s.len() <= MOST_STEPS {
+            return Self { lengths_s, finest_s: None };
+        }
+        let finest_s = usual_s / 2.0_f64.powi((usual_s / FINEST_S).log2().ceil().max(0.0) as i32);
+        let mut lengths_s = vec![finest_s];
+        while lengths_s[lengths_s.len() - 1] < longest_s {
+            lengths_s.push(2.0 * lengths_s[lengths_s.len() - 1]);
+        }
+        Self { lengths_s, finest_s: Some(finest_s) }
+    }
+
+    fn of(&self, length_s: f64) -> Vec<u16> {
+        let Some(finest_s) = self.finest_s else {
+            return self
+                .lengths_s
+                .iter()
+                .position(|l| (l - length_s).abs() < SAME_S)
+                .map(|i| i as u16)
+                .into_iter()
+                .collect();
+        };
+        let units = (length_s / finest_s).round().max(0.0) as u64;
+        (0..self.lengths_s.len()).rev().filter(|i| units >> i & 1 == 1).map(|i| i as u16).collect()
+    }
+}
+
+/// The grid that readings lie on, if they do: the smallest difference of two values.
+fn resolution(readings: &[f64]) -> f64 {
+    let mut sorted: Vec<f64> = readings.iter().copied().filter(|v| v.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    let least = sorted.windows(2).map(|w| w[1] - w[0]).filter(|d| *d > 1e-7).fold(f64::INFINITY, f64::min);
+    if least.is_finite() { least } else { 0.0 }
+}
+
+/// How much the readings bend at each row, from 0 to 1 in a few levels, as early as the air does what bends them.
+fn bends(times_s: &[f64], readings: &[f64]) -> Vec<f64> {
+    let known: Vec<(f64, f64)> =
+        times_s.iter().zip(readings).filter(|(_, v)| v.is_finite()).map(|(t, v)| (*t, *v)).collect();
+    if known.len() < 3 {
+        return vec![0.0; times_s.len()];
+    }
+    let steps: Vec<f64> = times_s.windows(2).map(|w| w[1] - w[0]).collect();
+    let grid_s = median(&steps).max(5.0);
+    let start_s = times_s[0];
+    let count = ((times_s[times_s.len() - 1] - start_s) / grid_s).ceil() as usize + 1;
+    let mut place = 0;
+    let on_grid: Vec<f64> = (0..count)
+        .map(|i| {
+            let t = start_s + i as f64 * grid_s;
+            while place + 2 < known.len() && known[place + 1].0 < t {
+                place += 1;
+            }
+            let ((t0, y0), (t1, y1)) = (known[place], known[place + 1]);
+            y0 + (y1 - y0) * ((t - t0) / (t1 - t0)).clamp(0.0, 1.0)
+        })
+        .collect();
+    let at = |values: &[f64], i: isize| values[i.clamp(0, count as isize - 1) as usize];
+    let half = ((0.5 * SMOOTHED_S / grid_s).round() as isize).max(1);
+    let smooth: Vec<f64> = (0..count as isize)
+        .map(|i| (-half..=half).map(|o| at(&on_grid, i + o)).sum::<f64>() / (2 * half + 1) as f64)
+        .collect();
+    let apart = ((COMPARED_S / grid_s).round() as isize).max(1);
+    let earlier = (EARLIER_S / grid_s).round() as isize;
+    let bend = |i: isize| (at(&smooth, i + apart) - 2.0 * at(&smooth, i) + at(&smooth, i - apart)).abs();
+    let raw: Vec<f64> = (0..count as isize).map(|i| bend((i + earlier).min(count as isize - 1))).collect();
+    let full = FULL_BEND * raw.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    times_s
+        .iter()
+        .map(|t| {
+            let share = (raw[(((t - start_s) / grid_s).round() as usize).min(count - 1)] / full).min(1.0);
+            (share * share * LEVELS).round() / LEVELS
+        })
+        .collect()
+}

@@ -1,0 +1,111 @@
+//! Matrices of which most entries are zero, times the few columns that a filter carries.
+
+/// A square block of states; lanes beyond the model's states stay zero.
+pub(super) type Square<const N: usize> = [[f64; N]; N];
+
+/// The entries of a matrix that are not zero, row by row.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Sparse {
+    /// Where each row's entries begin; one more than there are rows.
+    starts: Vec<usize>,
+    entries: Vec<(usize, f64)>,
+}
+
+impl Sparse {
+    /// # Shapes
+    /// `matrix` row-major with `columns` columns.
+    pub fn new(matrix: &[f64], columns: usize) -> Self {
+        let mut sparse = Self { starts: vec![0], entries: Vec::new() };
+        for row in matrix.chunks_exact(columns) {
+            sparse.entries.extend(row.iter().copied().enumerate().filter(|(_, v)| *v != 0.0));
+            sparse.starts.push(sparse.entries.len());
+        }
+        sparse
+    }
+
+    pub fn transposed(matrix: &[f64], n: usize) -> Self {
+        let turned: Vec<f64> = (0..n * n).map(|i| matrix[i % n * n + i / n]).collect();
+        Self::new(&turned, n)
+    }
+
+    #[inline(always)]
+    pub fn rows(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    #[inline(always)]
+    fn row(&self, row: usize) -> &[(usize, f64)] {
+        &self.entries[self.starts[row]..self.starts[row + 1]]
+    }
+
+    /// One row times a vector.
+    #[inline(always)]
+    pub fn dot(&self, row: usize, vector: &[f64]) -> f64 {
+        let mut sum = 0.0;
+        for &(k, v) in self.row(row) {
+            sum += v * vector[k];
+        }
+        sum
+    }
+
+    /// Adds a multiple of one row to a vector.
+    #[inline(always)]
+    pub fn add_to(&self, row: usize, factor: f64, vector: &mut [f64]) {
+        for &(k, v) in self.row(row) {
+            vector[k] += factor * v;
+        }
+    }
+
+    /// M x.
+    #[inline(always)]
+    pub fn times<const N: usize>(&self, vector: &[f64; N]) -> [f64; N] {
+        let mut out = [0.0; N];
+        for row in 0..self.rows() {
+            out[row] = self.dot(row, vector);
+        }
+        out
+    }
+
+    /// Σ_k m_k X_k over one row of M: that row times X.
+    #[inline(always)]
+    pub fn combine<const N: usize>(&self, row: usize, x: &Square<N>) -> [f64; N] {
+        let mut sum = [0.0; N];
+        for &(k, v) in self.row(row) {
+            let line = &x[k];
+            for j in 0..N {
+                sum[j] += v * line[j];
+            }
+        }
+        sum
+    }
+
+    /// M S Mᵀ for a symmetric S.
+    #[inline(always)]
+    pub fn surround<const N: usize>(&self, square: &Square<N>) -> Square<N> {
+        let mut product = [[0.0; N]; N];
+        for row in 0..self.rows() {
+            product[row] = self.combine(row, square);
+        }
+        let mut turned = [[0.0; N]; N];
+        for i in 0..N {
+            for j in 0..N {
+                turned[i][j] = product[j][i];
+            }
+        }
+        for row in 0..self.rows() {
+            product[row] = self.combine(row, &turned);
+        }
+        product
+    }
+
+    /// M X for a row-major X of `columns` columns, without a width known to the compiler.
+    pub fn times_matrix(&self, x: &[f64], columns: usize) -> Vec<f64> {
+        let mut out = vec![0.0; self.rows() * columns];
+        for (row, line) in out.chunks_exact_mut(columns).enumerate() {
+            for &(k, v) in self.row(row) {
+                line.iter_mut().zip(&x[k * columns..(k + 1) * columns]).for_each(|(o, x)| *o += v * x);
+            }
+        }
+        out
+    }
+}

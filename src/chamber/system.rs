@@ -1,0 +1,392 @@
+//! The joint model with numbers in it: chamber, pack, sensor and gyro as one linear system.
+//!
+//! ```text
+//! dx_i = λ_i (a − x_i) dt                     modes of the pack behind the film; a = u + f + o, the air
+//! du = s dt,   ds = √q dW                     trend; q between the noise at rest and that where readings bend
+//! df = −f/τ_f dt + σ_f √(2/τ_f) dW            turbulence
+//! d(o, p) = (−γ, ω; −ω, −γ)(o, p) dt + σ_o √(2γ) dW        ripple
+//! dl = (sensor's place − l)/τ dt              lag
+//! dw = −w/τ_w dt + σ_w √(2/τ_w) dW            wander; drift and cycle likewise where they are asked for
+//! reading = l or the sensor's place + noise,   rate = (c·x(t) − c·x(t − W))/W + b + w + noise
+//! ```
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | x_i, λ_i, c | modes, their decays and the rate per kelvin a second of each | K, 1/s, rad |
+//! | τ, W, b | sensor's lag, the rate's window, offset | s, s, rad/s |
+//!
+//! A half space, or a pack whose heat capacity is unknown, is driven by its outermost layer, which follows the air with the
+//! time that a film over the pack's capacity would have.
+
+use super::discretise::discretise;
+use super::filter::{RATE, Step, System};
+use super::prior::{
+    OFFSET_RAD_PER_S, PRIORS, Quantity, START_APART_K, START_K, START_SLOPE_K_PER_S, UNSTEADY_APART_K,
+    UNSTEADY_SLOPE_K_PER_S,
+};
+use super::series::Series;
+use super::sparse::Sparse;
+use crate::numeric::statistics::median;
+use crate::thermal::reduced::Reduced;
+use crate::thermal::{Extent, HeatPath, Location, Material};
+
+/// Values of the chamber's quantities, by [`Quantity`]; NaN where a model has none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Numbers(pub [f64; PRIORS.len()]);
+
+impl Numbers {
+    pub fn get(&self, quantity: Quantity) -> f64 {
+        self.0[quantity as usize]
+    }
+
+    pub fn set(&mut self, quantity: Quantity, value: f64) {
+        self.0[quantity as usize] = value;
+    }
+
+    /// The medians of the priors, for one record.
+    pub fn medians(series: &Series) -> Self {
+        let mut numbers = Self([f64::NAN; PRIORS.len()]);
+        for prior in &PRIORS {
+            let unit = if prior.relative { series.noise_floor_rad_per_s } else { 1.0 };
+            numbers.set(prior.quantity, prior.median * unit);
+        }
+        numbers
+    }
+}
+
+/// What the coil makes of the outputs' rates, and of the air's [rad/s per K/s].
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Gains {
+    pub outputs: Vec<f64>,
+    pub air: f64,
+}
+
+/// What of a model's structure the system depends on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Parts<'a> {
+    pub reduced: &'a Reduced,
+    pub gains: &'a Gains,
+    /// The drive follows the air with this time [s]; None: the film is in the modes.
+    pub skin_s: Option<f64>,
+    /// The sensor shows the air, not the outermost layer.
+    pub shows_air: bool,
+    pub lag_s: f64,
+    pub drift: bool,
+    pub cycle: bool,
+    pub unsteady: bool,
+}
+
+/// Heat capacity that a pack is taken to have where only its diffusivity is known [J/(m³K)].
+const USUAL_CAPACITY_J_PER_M3_K: f64 = 1.7e6;
+
+/// A heat path as the air drives it, and the time of a skin where there is no film in it.
+pub(super) fn driven_by_air(path: &HeatPath, film_w_per_m2_k: f64) -> (HeatPath, Option<f64>) {
+    let mut driven = path.clone();
+    driven.conductivity_slope_per_k = 0.0;
+    if path.extent == Extent::HalfSpace {
+        let capacity = match path.material {
+            Material::Conductivity { heat_capacity_j_per_m3_k, .. } => heat_capacity_j_per_m3_k,
+            Material::Diffusivity { .. } => USUAL_CAPACITY_J_PER_M3_K,
+        };
+        let thickness_m = path.shape.layers as f64 * path.shape.radial_pitch_m;
+        return (driven, Some(capacity * thickness_m / film_w_per_m2_k));
+    }
+    if let Material::Diffusivity { m2_per_s } = path.material {
+        driven.material = Material::Conductivity {
+            w_per_m_k: m2_per_s * USUAL_CAPACITY_J_PER_M3_K,
+            heat_capacity_j_per_m3_k: USUAL_CAPACITY_J_PER_M3_K,
+        };
+    }
+    if path.location == Location::OuterLayer {
+        driven.film_w_per_m2_k = Some(film_w_per_m2_k);
+    }
+    driven.location = Location::Ambient;
+    (driven, None)
+}
+
+/// Where each state stands.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Layout {
+    pub modes: usize,
+    skin: Option<usize>,
+    /// Level of the air's trend; its slope is the next.
+    pub trend: usize,
+    pub turbulence: usize,
+    pub ripple: usize,
+    lag: Option<usize>,
+    wander: usize,
+    drift: Option<usize>,
+    cycle: Option<usize>,
+    offset: usize,
+    window: usize,
+    /// What readings were where a window begins; only where readings are averaged.
+    reading: Option<usize>,
+    pub size: usize,
+}
+
+impl Layout {
+    pub fn new(parts: &Parts, averaged: bool) -> Self {
+        let mut size = 0;
+        let mut take = |count: usize| {
+            size += count;
+            size - count
+        };
+        let modes = take(parts.reduced.modes());
+        let _ = modes;
+        let skin = parts.skin_s.map(|_| take(1));
+        let (trend, turbulence, ripple) = (take(2), take(1), take(2));
+        let lag = (parts.lag_s > 0.0).then(|| take(1));
+        let wander = take(1);
+        let drift = parts.drift.then(|| take(1));
+        let cycle = parts.cycle.then(|| take(2));
+        let (offset, window) = (take(1), take(1));
+        let reading = averaged.then(|| take(1));
+        let modes = parts.reduced.modes();
+        Self { modes, skin, trend, turbulence, ripple, lag, wander, drift, cycle, offset, window, reading, size }
+    }
+
+    /// The states whose sum is the air.
+    pub fn air(&self) -> [usize; 3] {
+        [self.trend, self.turbulence, self.ripple]
+    }
+
+    /// An output's row over the states.
+    pub fn output(&self, reduced: &Reduced, output: usize) -> Vec<f64> {
+        let mut row = vec![0.0; self.size];
+        row[..self.modes].copy_from_slice(reduced.row(output));
+        match self.skin {
+            Some(skin) => row[skin] = reduced.residue[output],
+            None => self.air().into_iter().for_each(|i| row[i] = reduced.residue[output]),
+        }
+        row
+    }
+
+    pub fn air_row(&self) -> Vec<f64> {
+        let mut row = vec![0.0; self.size];
+        self.air().into_iter().for_each(|i| row[i] = 1.0);
+        row
+    }
+}
+
+/// The system for one record.
+pub(super) fn system(parts: &Parts, numbers: &Numbers, series: &Series) -> System {
+    let layout = Layout::new(parts, series.averaged > 1);
+    let n = layout.size;
+    let (f, noise, trend_noise) = dynamics(parts, &layout, numbers);
+    let steps = series
+        .steps_s
+        .iter()
+        .map(|&step_s| {
+            let mut found = discretise(&f, &[noise.clone(), trend_noise.clone()], n, step_s);
+            let trend_noise = found.noises.pop().unwrap_or_default();
+            let noise = found.noises.pop().unwrap_or_default();
+            Step {
+                phi: Sparse::new(&found.transition, n),
+                phi_turned: Sparse::transposed(&found.transition, n),
+                noise,
+                trend_noise,
+            }
+        })
+        .collect();
+    let response = response(parts, &layout);
+    let places = places(parts, &layout);
+    let mut rows = Vec::new();
+    for shape in &series.shapes {
+        for place in &places {
+            let share = |row: &[f64]| row.iter().map(|v| v * shape.end_share).collect::<Vec<f64>>();
+            let mut row = share(place);
+            // Only the sensor's readings are interpolated; those of other thermometers are taken at the window's end.
+            if let (Some(reading), true) = (layout.reading, std::ptr::eq(place, &places[0])) {
+                row[reading] = 1.0 - shape.end_share;
+            } else {
+                row.clone_from(place);
+            }
+            rows.extend(row);
+        }
+        rows.extend(rate_row(&layout, &f, &response, shape.window_s));
+    }
+    let mut keep = vec![layout.window];
+    let mut kept = response;
+    if let Some(reading) = layout.reading {
+        keep.push(reading);
+        kept.extend(&places[0]);
+    }
+    let (mean, covariance) = start(parts, &layout, numbers, series);
+    let square = |q: Quantity| numbers.get(q).powi(2);
+    let grid = series.resolution_k.powi(2) / 12.0;
+    System {
+        size: n,
+        steps,
+        trend: (numbers.get(Quantity::RestNoise), numbers.get(Quantity::BendNoise)),
+        rows: Sparse::new(&rows, n),
+        variances: [
+            square(Quantity::ReadingNoise) + grid,
+            square(Quantity::InnerNoise) + grid,
+            square(Quantity::AmbientNoise),
+            square(Quantity::RateNoise),
+        ],
+        keep,
+        kept: Sparse::new(&kept, n),
+        mean,
+        covariance,
+    }
+}
+
+/// c: the rate per kelvin a second of each state.
+fn response(parts: &Parts, layout: &Layout) -> Vec<f64> {
+    let mut row = vec![0.0; layout.size];
+    for (output, gain) in parts.gains.outputs.iter().enumerate().filter(|(_, g)| **g != 0.0) {
+        row.iter_mut().zip(layout.output(parts.reduced, output)).for_each(|(r, a)| *r += gain * a);
+    }
+    layout.air().into_iter().for_each(|i| row[i] += parts.gains.air);
+    row
+}
+
+/// What each thermometer shows.
+fn places(parts: &Parts, layout: &Layout) -> [Vec<f64>; RATE] {
+    let place = sensor_place(parts, layout);
+    let sensor = match layout.lag {
+        Some(lag) => (0..layout.size).map(|i| f64::from(i == lag)).collect(),
+        None => place,
+    };
+    [sensor, layout.output(parts.reduced, 0), layout.air_row()]
+}
+
+fn sensor_place(parts: &Parts, layout: &Layout) -> Vec<f64> {
+    if parts.shows_air { layout.air_row() } else { layout.output(parts.reduced, parts.reduced.layers - 1) }
+}
+
+fn rate_row(layout: &Layout, f: &[f64], response: &[f64], window_s: f64) -> Vec<f64> {
+    let n = layout.size;
+    let mut row = vec![0.0; n];
+    if window_s > 0.0 {
+        row.iter_mut().zip(response).for_each(|(r, c)| *r = c / window_s);
+        row[layout.window] = -1.0 / window_s;
+    } else {
+        // The rate at an instant: c·F x.
+        for (i, c) in response.iter().enumerate() {
+            row.iter_mut().zip(&f[i * n..(i + 1) * n]).for_each(|(r, v)| *r += c * v);
+        }
+    }
+    row[layout.offset] = 1.0;
+    row[layout.wander] = 1.0;
+    for i in [layout.drift, layout.cycle].into_iter().flatten() {
+        row[i] = 1.0;
+    }
+    row
+}
+
+/// F, the diagonal of G without the trend's noise, and that of the trend's per unit of its density.
+fn dynamics(parts: &Parts, layout: &Layout, numbers: &Numbers) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+    let n = layout.size;
+    let (mut f, mut g) = (vec![0.0; n * n], vec![0.0; n]);
+    let get = |q: Quantity| numbers.get(q);
+    let driving: Vec<usize> = match layout.skin {
+        Some(skin) => vec![skin],
+        None => layout.air().to_vec(),
+    };
+    for (i, &l) in parts.reduced.decay_per_s.iter().enumerate() {
+        f[i * n + i] = -l;
+        driving.iter().for_each(|&j| f[i * n + j] = l);
+    }
+    if let (Some(skin), Some(skin_s)) = (layout.skin, parts.skin_s) {
+        f[skin * n + skin] = -1.0 / skin_s;
+        layout.air().into_iter().for_each(|j| f[skin * n + j] = 1.0 / skin_s);
+    }
+    f[layout.trend * n + layout.trend + 1] = 1.0;
+    let mut relax = |i: usize, size: f64, time_s: f64| {
+        f[i * n + i] = -1.0 / time_s;
+        g[i] = 2.0 * size * size / time_s;
+    };
+    relax(layout.turbulence, get(Quantity::TurbulenceSize), get(Quantity::TurbulenceTime));
+    relax(layout.wander, get(Quantity::WanderShare) * get(Quantity::RateNoise), get(Quantity::WanderTime));
+    if let Some(drift) = layout.drift {
+        relax(drift, get(Quantity::DriftSize), get(Quantity::DriftTime));
+    }
+    let (size, period_s, coherence_s) =
+        (get(Quantity::RippleSize), get(Quantity::RipplePeriod), get(Quantity::RippleCoherence));
+    for i in [layout.ripple, layout.ripple + 1] {
+        relax(i, size, coherence_s);
+    }
+    rotate(&mut f, n, layout.ripple, period_s);
+    if let Some(cycle) = layout.cycle {
+        rotate(&mut f, n, cycle, get(Quantity::CyclePeriod));
+    }
+    if let Some(lag) = layout.lag {
+        for (j, v) in sensor_place(parts, layout).iter().enumerate() {
+            f[lag * n + j] += v / parts.lag_s;
+        }
+        f[lag * n + lag] -= 1.0 / parts.lag_s;
+    }
+    let mut trend = vec![0.0; n];
+    trend[layout.trend + 1] = 1.0;
+    (f, g, trend)
+}
+
+fn rotate(f: &mut [f64], n: usize, place: usize, period_s: f64) {
+    let omega = std::f64::consts::TAU / period_s;
+    f[place * n + place + 1] = omega;
+    f[(place + 1) * n + place] = -omega;
+}
+
+/// Mean and covariance before the first row.
+fn start(parts: &Parts, layout: &Layout, numbers: &Numbers, series: &Series) -> (Vec<f64>, Vec<f64>) {
+    let n = layout.size;
+    let mut mean = vec![0.0; n];
+    let rates: Vec<f64> = series.values[RATE].iter().copied().filter(|v| v.is_finite()).collect();
+    mean[layout.offset] = median(&rates);
+    let mut covariance = vec![0.0; n * n];
+    let mut add = |direction: &[f64], size: f64| {
+        for i in (0..n).filter(|&i| direction[i] != 0.0) {
+            for j in 0..n {
+                covariance[i * n + j] += size * size * direction[i] * direction[j];
+            }
+        }
+    };
+    let slow: Vec<usize> = (0..layout.modes).chain(layout.skin).chain(layout.lag).collect();
+    let mut together = vec![0.0; n];
+    slow.iter().for_each(|&i| together[i] = 1.0);
+    let mut ramp = vec![0.0; n];
+    ramp[layout.trend + 1] = 1.0;
+    let skin_s = parts.skin_s.unwrap_or(0.0);
+    parts.reduced.decay_per_s.iter().enumerate().for_each(|(i, l)| ramp[i] = -1.0 / l - skin_s);
+    layout.skin.into_iter().for_each(|i| ramp[i] = -skin_s);
+    layout.lag.into_iter().for_each(|i| ramp[i] = -parts.lag_s + ramp[0]);
+    let (slope, apart) =
+        if parts.unsteady { (UNSTEADY_SLOPE_K_PER_S, UNSTEADY_APART_K) } else { (START_SLOPE_K_PER_S, START_APART_K) };
+    add(&ramp, slope);
+    add(&together, apart);
+    together[layout.trend] = 1.0;
+    add(&together, START_K);
+    let mut one = |i: usize, size: f64| {
+        let mut direction = vec![0.0; n];
+        direction[i] = 1.0;
+        add(&direction, size);
+    };
+    one(layout.trend + 1, slope);
+    if parts.unsteady {
+        (0..layout.modes).for_each(|i| one(i, 0.1 * apart));
+    }
+    one(layout.turbulence, numbers.get(Quantity::TurbulenceSize));
+    one(layout.ripple, numbers.get(Quantity::RippleSize));
+    one(layout.ripple + 1, numbers.get(Quantity::RippleSize));
+    one(layout.wander, numbers.get(Quantity::WanderShare) * numbers.get(Quantity::RateNoise));
+    layout.drift.into_iter().for_each(|i| one(i, numbers.get(Quantity::DriftSize)));
+    layout
+        .cycle
+        .into_iter()
+        .for_each(|i| [i, i + 1].into_iter().for_each(|i| one(i, numbers.get(Quantity::CycleSize))));
+    one(layout.offset, OFFSET_RAD_PER_S);
+    (mean, covariance)
+}
+
+impl System {
+    /// Takes the offset as known and the gyro as steady: what is left of a rate's variance is air and white noise.
+    pub fn forget_offset(&mut self, parts: &Parts, averaged: bool) {
+        let layout = Layout::new(parts, averaged);
+        for i in 0..self.size {
+            self.covariance[i * self.size + layout.offset] = 0.0;
+            self.covariance[layout.offset * self.size + i] = 0.0;
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! A heat path as a few states: its slowest modes behind the film, everything faster following without delay.
+//!
+//! ```text
+//! dx_i/dt = λ_i (u − x_i),   T_j = Σ_i a_ji x_i + ρ_j u + T_j^heat(t),   Σ_i a_ji + ρ_j = steady response (1 for a layer)
+//! ```
+//!
+//! | symbol | meaning | unit | in code |
+//! |---|---|---|---|
+//! | u | the drive: the air outside the film, or a half space's outermost layer | K | – |
+//! | x_i, λ_i | state of mode i, 1 per kelvin of the drive in equilibrium; its decay | K, 1/s | `decay_per_s` |
+//! | a_ji, ρ_j | share of a mode, and of the drive itself, in an output | 1 | `amplitude`, `residue` |
+//! | T^heat | what the bore's heat adds, over all modes | K | [`Reduced::heat_k`] |
+//!
+//! A half space has no modes; a sum of exponentials with decays spaced evenly in the logarithm is fitted to its response
+//! over the times that a record knows.
+//!
+//! # Source
+//! Modal truncation with static residue, as in any text on structural dynamics; the exponentials as in
+//! `thermal::half_space_memory`.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::half_space::HalfSpace;
+use super::modal::heated_mode;
+use super::pack::Pack;
+use super::{BoreHeat, Extent, HeatPath, ThermalError};
+
+/// A heat path's slow part.
+///
+/// # Shapes
+/// Outputs: the layers' means, innermost first, then (with a heated flange) their first axial moments. `amplitude` is
+/// row-major outputs × modes.
+#[derive(Debug, Clone)]
+pub struct Reduced {
+    pub layers: usize,
+    pub outputs: usize,
+    /// Ascending.
+    pub decay_per_s: Vec<f64>,
+    pub amplitude: Vec<f64>,
+    pub residue: Vec<f64>,
+    heat: Option<Heated>,
+}
+
+#[derive(Debug, Clone)]
+struct Heated {
+    heat: BoreHeat,
+    decay_per_s: Vec<f64>,
+    content: DMatrix<f64>,
+}
+
+/// Points in time at which a half space's response is fitted.
+const FIT_POINTS: usize = 80;
+
+impl Reduced {
+    /// At most `modes` states; a half space is fitted between `shortest_s` and `longest_s`.
+    ///
+    /// # Errors
+    /// As [`Pack::new`]; a half space whose fit is singular.
+    pub fn new(path: &HeatPath, modes: usize, shortest_s: f64, longest_s: f64) -> Result<Self, ThermalError> {
+        match path.extent {
+            Extent::Pack => Ok(Self::of_pack(&Pack::new(path)?, modes)),
+            Extent::HalfSpace => Self::of_half_space(path, modes, shortest_s, longest_s),
+        }
+    }
+
+    fn of_pack(pack: &Pack, modes: usize) -> Self {
+        let joint = pack.joint();
+        let outputs = pack.outputs;
+        // What a mode takes away while the drive ramps; where a flange is heated the slowest modes need not matter most.
+        let lag = |i: usize| joint.amplitude.column(i).iter().map(|a| a.abs()).sum::<f64>() / pack.decay_per_s[i];
+        let mut kept: Vec<usize> = (0..pack.modes()).collect();
+        kept.sort_by(|&a, &b| lag(b).total_cmp(&lag(a)));
+        kept.truncate(modes);
+        kept.sort_unstable();
+        let mut reduced = Self {
+            layers: pack.layers,
+            outputs,
+            decay_per_s: kept.iter().map(|&i| pack.decay_per_s[i]).collect(),
+            amplitude: Vec::with_capacity(outputs * kept.len()),
+            residue: joint.steady.as_slice().to_vec(),
+            heat: pack.heat.as_ref().map(|(heat, content)| Heated {
+                heat: *heat,
+                decay_per_s: pack.decay_per_s.clone(),
+                content: content.clone(),
+            }),
+        };
+        for j in 0..outputs {
+            for &i in &kept {
+                let a = joint.amplitude[(j, i)];
+                reduced.amplitude.push(a);
+                reduced.residue[j] -= a;
+            }
+        }
+        reduced
+    }
+
+    fn of_half_space(path: &HeatPath, modes: usize, shortest_s: f64, longest_s: f64) -> Result<Self, ThermalError> {
+        let half_space = HalfSpace::new(path);
+        let layers = path.shape.layers;
+        let over = |i: usize, count: usize, low: f64, high: f64| low * (high / low).powf(i as f64 / (count - 1) as f64);
+        let (slowest, fastest) = (0.5 / longest_s, 1.0 / shortest_s);
+        let decay_per_s: Vec<f64> = (0..modes).map(|i| over(i, modes, slowest, fastest)).collect();
+        let times: Vec<f64> = (0..FIT_POINTS).map(|i| over(i, FIT_POINTS, 0.25 * shortest_s, longest_s)).collect();
+        let design = DMatrix::from_fn(FIT_POINTS, modes, |t, i| (-decay_per_s[i] * times[t]).exp());
+        let mut wanted = DMatrix::zeros(FIT_POINTS, layers);
+        let mut rates = vec![0.0; layers];
+        for (t, &time_s) in times.iter().enumerate() {
+            half_space.step_rates(time_s, &mut rates);
+            for (j, rate) in rates.iter().enumerate() {
+                wanted[(t, j)] = 1.0 - rate;
+            }
+        }
+        let found = design.svd(true, true).solve(&wanted, 1e-9).map_err(|_| ThermalError::Eigen)?;
+        let amplitude: Vec<f64> =
+            (0..layers).flat_map(|j| found.column(j).iter().copied().collect::<Vec<_>>()).collect();
+        let residue = amplitude.chunks_exact(modes).map(|row| 1.0 - row.iter().sum::<f64>()).collect();
+        Ok(Self { layers, outputs: layers, decay_per_s, amplitude, residue, heat: None })
+    }
+
+    pub fn modes(&self) -> usize {
+        self.decay_per_s.len()
+    }
+
+    /// a_ji of one output.
+    pub fn row(&self, output: usize) -> &[f64] {
+        &self.amplitude[output * self.modes()..(output + 1) * self.modes()]
+    }
+
+    /// What the bore's heat adds to each output so long after power-on; None where nothing heats the bore.
+    pub fn heat_k(&self, since_s: f64) -> Option<Vec<f64>> {
+        let heated = self.heat.as_ref()?;
+        let building = (-since_s / heated.heat.time_constant_s).exp();
+        let contents = heated.decay_per_s.iter().map(|&l| {
+            let left = (-l * since_s).exp();
+            heated_mode(&heated.heat, l, since_s, left, building).0
+        });
+        let contents = DVector::from_iterator(heated.decay_per_s.len(), contents);
+        Some((&heated.content * contents).as_slice().to_vec())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numeric::piecewise::PiecewiseLinear;
+    use crate::thermal::{Drive, Instant, Location, Material, PackShape, solve};
+
+    fn path(extent: Extent) -> HeatPath {
+        let shape = PackShape { layers: 24, bore_radius_m: 0.04, radial_pitch_m: 165e-6, height_m: 8e-3 };
+        let material = Material::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 };
+        HeatPath::new(shape, extent, material, Location::Ambient)
+    }
+
+    /// Outputs after a ramp of one kelvin a second has lasted so long, from rest.
+    fn ramped(reduced: &Reduced, time_s: f64) -> Vec<f64> {
+        (0..reduced.outputs)
+            .map(|j| {
+                let steady = reduced.row(j).iter().sum::<f64>() + reduced.residue[j];
+                let lag = |(a, l): (&f64, &f64)| a * (1.0 - (-l * time_s).exp()) / l;
+                steady * time_s - reduced.row(j).iter().zip(&reduced.decay_per_s).map(lag).sum::<f64>()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn five_modes_of_a_pack_behind_a_film_are_the_pack_to_a_few_millikelvin() {
+        let mut path = path(Extent::Pack);
+        path.film_w_per_m2_k = Some(25.0);
+        path.bore_heat = Some(BoreHeat { power_w_per_m2: 100.0, time_constant_s: 500.0 });
+        let reduced = Reduced::new(&path, 5, 10.0, 1e4).unwrap();
+        let drive = Drive::boundary(PiecewiseLinear::new(vec![0.0, 900.0], vec![0.0, 15.0]).unwrap());
+        let field = solve(&path, &drive).unwrap();
+        for time_s in [10.0, 60.0, 300.0, 900.0] {
+            let exact = field.at(&[Instant::after(time_s)]);
+            let heat = reduced.heat_k(time_s).unwrap();
+            for (j, ramp) in ramped(&reduced, time_s).iter().enumerate() {
+                let found = ramp * 15.0 / 900.0 + heat[j];
+                assert!((found - exact.temperatures_k(0)[j]).abs() < 1e-4, "{time_s} {j}");
+            }
+        }
+    }
+
+    #[test]
+    fn eight_exponentials_are_a_half_space_within_a_hundredth() {
+        let mut path = path(Extent::HalfSpace);
+        path.location = Location::OuterLayer;
+        let reduced = Reduced::new(&path, 8, 10.0, 15_000.0).unwrap();
+        let half_space = HalfSpace::new(&path);
+        let mut exact = vec![0.0; 24];
+        for time_s in [10.0_f64, 40.0, 200.0, 1000.0, 6000.0, 14_000.0] {
+            half_space.step_rates(time_s, &mut exact);
+            for (j, exact) in exact.iter().enumerate() {
+                let left = reduced.row(j).iter().zip(&reduced.decay_per_s);
+                let found = 1.0 - left.map(|(a, l)| a * (-l * time_s).exp()).sum::<f64>();
+                assert!((found - exact).abs() < 0.01, "{time_s} s, layer {j}: {found} for {exact}");
+            }
+        }
+    }
+}
