@@ -1,8 +1,9 @@
 //! What a fitted model says of a record: its rate, its noise told apart, and its score where nothing is fitted.
 
 use super::filter::{Innovation, RATE};
-use super::fit::{Fit, log_likelihood};
-use super::point::CoilSide;
+use super::fit::{Effort, Fit};
+use super::known::Reference;
+use super::point::{BLIND_RAD2_PER_S2, CoilSide, Rates, smoothed};
 use super::prior::Quantity;
 use super::system::Numbers;
 use super::{Chamber, ChamberError};
@@ -21,7 +22,7 @@ pub struct Noise {
     pub whiteness: f64,
 }
 
-/// What a model says a record's rate was, from its readings alone or from everything.
+/// What a model says a record's rate was, from its readings alone.
 ///
 /// # Shapes
 /// One entry a row of the chamber; NaN where a row has no rate.
@@ -32,17 +33,18 @@ pub struct Prediction {
     pub variance_rad2_per_s2: Vec<f64>,
     /// Measured less predicted.
     pub residual_rad_per_s: Vec<f64>,
+    /// The layers and the air that the readings imply.
+    pub course: Reference,
 }
 
 impl Chamber<'_> {
-    /// Log likelihood of a record that was not fitted, with everything frozen but its offset and its start.
+    /// Log evidence of a record that was not fitted: the coil's numbers stay as they were found, the chamber's on that day
+    /// are its own.
     ///
     /// # Errors
     /// A model that cannot be solved for this record.
-    pub fn held_out(&self, fit: &Fit, record: usize) -> Result<f64, ChamberError> {
-        let numbers = self.numbers_for(fit, record);
-        let (_, innovations) = self.pass(fit, &numbers, record, true)?;
-        Ok(log_likelihood(&innovations))
+    pub fn held_out(&self, fit: &Fit, record: usize) -> Result<Fit, ChamberError> {
+        self.fit(&fit.assumed, &[], &[record], Some(fit), Effort::FULL)
     }
 
     /// White noise, wander and unresolved air of a fitted record.
@@ -61,12 +63,14 @@ impl Chamber<'_> {
         if fit.assumed.cycle {
             wander += numbers.get(Quantity::CycleSize).powi(2);
         }
-        let prediction = self.prediction(fit, record, false)?;
+        let (places, innovations) = self.pass(fit, &numbers, record, false)?;
         let own = white * white / self.averaged(record) as f64 + wander;
         let (mut air, mut count) = (0.0, 0);
-        for variance in prediction.variance_rad2_per_s2.iter().skip(SETTLING_ROWS).filter(|v| v.is_finite()) {
-            air += (variance - own).max(0.0);
-            count += 1;
+        for ((row, measurement), i) in places.into_iter().zip(innovations) {
+            if measurement == RATE && row >= SETTLING_ROWS {
+                air += (i.variance - own).max(0.0);
+                count += 1;
+            }
         }
         let (rows, innovations) = self.pass(fit, &numbers, record, true)?;
         let (mut squares, mut rates) = (0.0, 0);
@@ -85,31 +89,36 @@ impl Chamber<'_> {
         })
     }
 
-    /// The rate that readings imply (`with_rates` false: the gyro's own rates are only compared), or that everything up to
-    /// the row before implies (true), the offset fitted to the whole record.
+    /// The rate that a record's readings imply, smoothed over the whole record, the gyro's own rates being only compared
+    /// with it; the offset is fitted. Its variance is that of a filter, which knows the readings so far.
     ///
     /// # Errors
     /// As [`Chamber::held_out`].
-    pub fn prediction(&self, fit: &Fit, record: usize, with_rates: bool) -> Result<Prediction, ChamberError> {
+    pub fn prediction(&self, fit: &Fit, record: usize) -> Result<Prediction, ChamberError> {
+        let observed = &self.observed[record];
         let numbers = self.numbers_for(fit, record);
+        let (assumed, film) = (&fit.assumed, numbers.get(Quantity::Film));
+        let side = CoilSide::new(assumed, film, self.modes, observed)?;
+        let mut course = smoothed(&side, assumed, &numbers, observed, record, None, Rates::Unseen)?;
+        if side.needs_reference() {
+            course = smoothed(&side, assumed, &numbers, observed, record, Some(&course), Rates::Unseen)?;
+        }
         let rows = self.times_s(record).len();
         let mut prediction = Prediction {
-            rate_rad_per_s: vec![f64::NAN; rows],
+            rate_rad_per_s: side.rates(assumed, observed, record, &course)?,
             variance_rad2_per_s2: vec![f64::NAN; rows],
             residual_rad_per_s: vec![f64::NAN; rows],
+            course,
         };
-        let (places, innovations) = self.pass(fit, &numbers, record, with_rates)?;
+        let (places, innovations) = self.pass(fit, &numbers, record, false)?;
         for ((row, measurement), i) in places.into_iter().zip(innovations) {
             if measurement == RATE {
-                let measured = self.observed[record].series.values[RATE][row];
-                prediction.rate_rad_per_s[row] = measured - i.value;
+                let measured = observed.series.values[RATE][row];
                 prediction.variance_rad2_per_s2[row] = i.variance;
-                prediction.residual_rad_per_s[row] = i.value;
+                prediction.residual_rad_per_s[row] = measured - prediction.rate_rad_per_s[row];
             }
         }
-        if !with_rates {
-            prediction.fit_offset();
-        }
+        prediction.fit_offset();
         Ok(prediction)
     }
 
@@ -120,33 +129,27 @@ impl Chamber<'_> {
     }
 
     /// The innovations of a record, and of each its row and which measurement it is.
-    fn pass(
-        &self,
-        fit: &Fit,
-        numbers: &Numbers,
-        record: usize,
-        with_rates: bool,
-    ) -> Result<(Vec<(usize, usize)>, Vec<Innovation>), ChamberError> {
+    fn pass(&self, fit: &Fit, numbers: &Numbers, record: usize, with_rates: bool) -> Result<Pass, ChamberError> {
         let observed = &self.observed[record];
         let (assumed, film) = (&fit.assumed, numbers.get(Quantity::Film));
         let side = CoilSide::new(assumed, film, self.modes, observed)?;
         let mut course = fit.courses[record].clone();
         if course.is_none() && side.needs_reference() {
             for _ in 0..2 {
-                course = Some(super::point::smoothed(&side, assumed, numbers, observed, record, course.as_ref())?);
+                course = Some(smoothed(&side, assumed, numbers, observed, record, course.as_ref(), Rates::Seen)?);
             }
         }
         let values = side.values(assumed, observed, record, course.as_ref().filter(|_| side.needs_reference()))?;
-        let mut rows = observed.series.rows.clone();
+        let rows = &observed.series.rows;
         let mut system = super::system::system(&side.parts(assumed), numbers, &observed.series);
         if !with_rates {
             // Rates are looked at, not taken in: their gain is as good as zero.
             system.variances[RATE] += BLIND_RAD2_PER_S2;
             system.forget_offset(&side.parts(assumed), observed.series.averaged > 1);
         }
-        let trace = super::filter::forward(&system, &rows, &values, false);
+        let trace = super::filter::forward(&system, rows, &values, false);
         let mut places = Vec::with_capacity(trace.innovations.len());
-        for (k, row) in rows.iter_mut().enumerate() {
+        for (k, row) in rows.iter().enumerate() {
             places.extend(row.measured.iter().enumerate().filter(|(_, m)| m.is_some()).map(|(m, _)| (k, m)));
         }
         let mut innovations = trace.innovations;
@@ -161,8 +164,9 @@ impl Chamber<'_> {
     }
 }
 
-/// A rate with this variance says nothing beside any gyro's [(rad/s)²].
-const BLIND_RAD2_PER_S2: f64 = 1e-2;
+/// Of each innovation its row and which measurement it is; and the innovations.
+type Pass = (Vec<(usize, usize)>, Vec<Innovation>);
+
 /// Rows after which the start is forgotten.
 const SETTLING_ROWS: usize = 30;
 

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::filter::{Innovation, Values};
 use super::known::Reference;
 use super::parameter::{Free, Parameter, Place, write};
-use super::point::{CoilSide, quantities, run, smoothed};
+use super::point::{CoilSide, Rates, quantities, run, smoothed};
 use super::prior::Quantity;
 use super::system::Numbers;
 use super::{Assumption, Chamber, ChamberError};
@@ -210,9 +210,9 @@ impl Chamber<'_> {
                         let before = courses[r].as_ref().filter(|c| c.outputs == side.reduced.outputs);
                         let first = match before {
                             Some(_) => None,
-                            None => Some(smoothed(&side, assumed, &numbers[r], observed, r, None)?),
+                            None => Some(smoothed(&side, assumed, &numbers[r], observed, r, None, Rates::Seen)?),
                         };
-                        smoothed(&side, assumed, &numbers[r], observed, r, before.or(first.as_ref()))
+                        smoothed(&side, assumed, &numbers[r], observed, r, before.or(first.as_ref()), Rates::Seen)
                     });
                 (r, found)
             })
@@ -451,7 +451,7 @@ pub(super) struct DerivativeColumn {
 }
 
 impl DerivativeColumn {
-    fn new(base: &[Innovation], there: &[Innovation], step: f64) -> Self {
+    pub fn new(base: &[Innovation], there: &[Innovation], step: f64) -> Self {
         let over = |f: fn(&Innovation) -> f64| base.iter().zip(there).map(|(b, t)| (f(t) - f(b)) / step).collect();
         Self { value: over(|i| i.value), variance: over(|i| i.variance) }
     }
@@ -491,6 +491,26 @@ impl Derivatives {
                 }
             }
         }
+    }
+}
+
+impl Derivatives {
+    /// Score of the last column, and its information with all.
+    pub fn last_row(&self, base: &[Innovation], size: usize) -> (f64, DVector<f64>) {
+        let mut row = DVector::zeros(size);
+        let mut score = 0.0;
+        if let Some(last) = self.columns.last() {
+            let value: Vec<f64> = last.value.iter().zip(base).map(|(d, i)| d / i.variance).collect();
+            let variance: Vec<f64> =
+                last.variance.iter().zip(base).map(|(d, i)| 0.5 * d / (i.variance * i.variance)).collect();
+            for (b, (dv, ds)) in base.iter().zip(value.iter().zip(&variance)) {
+                score += -dv * b.value + ds * (b.value * b.value - b.variance);
+            }
+            for (&p, column) in self.parameters.iter().zip(&self.columns) {
+                row[p] += dot(&value, &column.value) + dot(&variance, &column.variance);
+            }
+        }
+        (score, row)
     }
 }
 

@@ -41,19 +41,20 @@ impl Reference {
         &self.outputs_k[row * self.outputs..(row + 1) * self.outputs]
     }
 
-    /// Change of an output over each row's window, per second; zero at the first row.
-    pub(super) fn window_rates(&self, series: &Series, output: usize) -> Vec<f64> {
+    /// Change of an output (None: of the air) over each row's window, per second; zero at the first row.
+    pub(super) fn window_rates(&self, series: &Series, output: Option<usize>) -> Vec<f64> {
         let mut start = Vec::new();
         let rate = |k: usize| {
             if k == 0 {
                 return 0.0;
             }
-            self.at_window_start(series, k, &mut start);
+            let air = self.at_window_start(series, k, &mut start);
+            let at = |k: usize| output.map_or(self.air_k[k], |j| self.row(k)[j]);
             let window_s = series.shapes[series.shape_of(k)].window_s;
             if window_s > 0.0 {
-                (self.row(k)[output] - start[output]) / window_s
+                (at(k) - output.map_or(air, |j| start[j])) / window_s
             } else {
-                (self.row(k)[output] - self.row(k - 1)[output]) / (series.times_s[k] - series.times_s[k - 1])
+                (at(k) - at(k - 1)) / (series.times_s[k] - series.times_s[k - 1])
             }
         };
         (0..series.times_s.len()).map(rate).collect()
@@ -184,8 +185,8 @@ pub(super) fn changes(asked: &Asked, series: &Series, reference: &Reference) -> 
             fields.push(driven(&there, series, &reference.air_k));
         }
         let here = driven(asked.reduced, series, &reference.air_k);
-        for k in 0..rows {
-            let x = (temperatures[k] - nodes[1]) / (nodes[2] - nodes[1]);
+        for (k, temperature_k) in temperatures.iter().enumerate() {
+            let x = (temperature_k - nodes[1]) / (nodes[2] - nodes[1]);
             let weights = [0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0)];
             for j in 0..outputs {
                 let place = k * outputs + j;
@@ -219,14 +220,14 @@ fn driven(reduced: &Reduced, series: &Series, air_k: &[f64]) -> Vec<f64> {
 }
 
 /// Adds what the full model says at the reference beyond its linear part; NaN where a channel has no value.
-fn beyond_linear(asked: &Asked, record: &Record, series: &Series, reference: &Reference, rates: &mut [f64]) {
+pub(super) fn beyond_linear(asked: &Asked, record: &Record, series: &Series, reference: &Reference, rates: &mut [f64]) {
     let layers = reference.layers;
     let lengths_m = asked.rate.coil().layer_lengths_m();
     let length_m = asked.rate.coil().length_m();
     let mean = |values: &[f64]| values.iter().zip(lengths_m).map(|(v, l)| v * l).sum::<f64>() / length_m;
     let mut channels = vec![0.0; record.channels().len()];
     let mut start = Vec::new();
-    for k in 1..rates.len() {
+    for (k, rate) in rates.iter_mut().enumerate().skip(1) {
         for (value, channel) in channels.iter_mut().zip(record.channels()) {
             let (from, to) = series.spans[k];
             *value = channel.values[from..=to].iter().sum::<f64>() / (to + 1 - from) as f64;
@@ -252,7 +253,7 @@ fn beyond_linear(asked: &Asked, record: &Record, series: &Series, reference: &Re
         };
         let linear: f64 =
             change.iter().zip(&asked.gains.outputs).map(|(c, g)| c * g).sum::<f64>() + asked.gains.air * air_rate;
-        rates[k] += asked.rate.rate_error_rad_per_s(&state) - linear;
+        *rate += asked.rate.rate_error_rad_per_s(&state) - linear;
     }
 }
 

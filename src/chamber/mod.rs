@@ -57,7 +57,7 @@ pub use fit::{Effort, Fit};
 pub use known::Reference;
 pub use parameter::{Free, Parameter, Place, Scale};
 pub use prior::{PRIORS, Prior, Quantity};
-pub use score::{Column, Scores};
+pub use score::{Column, Direction, Scores};
 
 /// What is assumed of coil, sensor and gyro; the numbers of chamber and noise are fitted with it.
 #[derive(Debug, Clone)]

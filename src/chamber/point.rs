@@ -113,6 +113,36 @@ impl CoilSide {
         Ok(values)
     }
 
+    /// The rates that a course implies, without any offset; NaN at the first row.
+    ///
+    /// # Errors
+    /// A conductivity that is not positive.
+    pub fn rates(
+        &self,
+        assumed: &Assumption,
+        observed: &Observed,
+        place: usize,
+        course: &Reference,
+    ) -> Result<Vec<f64>, ChamberError> {
+        let series = &observed.series;
+        let mut rates = vec![0.0; series.times_s.len()];
+        for (output, gain) in self.gains.outputs.iter().enumerate().filter(|(_, g)| **g != 0.0) {
+            let own = course.window_rates(series, Some(output));
+            rates.iter_mut().zip(own).for_each(|(r, o)| *r += gain * o);
+        }
+        let air = course.window_rates(series, None);
+        rates.iter_mut().zip(air).for_each(|(r, a)| *r += self.gains.air * a);
+        if self.beyond_linear {
+            super::known::beyond_linear(&self.asked(), observed.record, series, course, &mut rates);
+        }
+        for input in &assumed.inputs {
+            let Some(own) = input.rate_rad_per_s.get(place) else { continue };
+            rates.iter_mut().zip(own).for_each(|(r, c)| *r += input.amplitude * c);
+        }
+        rates[0] = f64::NAN;
+        Ok(rates)
+    }
+
     /// The course that states and known changes make.
     ///
     /// # Errors
@@ -203,6 +233,16 @@ pub(super) fn run_kept(
     (system, trace)
 }
 
+/// Whether the gyro's rates are taken in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Rates {
+    Seen,
+    Unseen,
+}
+
+/// A rate with this variance says nothing beside any gyro's [(rad/s)²].
+pub(super) const BLIND_RAD2_PER_S2: f64 = 1e-2;
+
 /// The smoothed course of one record.
 ///
 /// # Errors
@@ -214,9 +254,14 @@ pub(super) fn smoothed(
     observed: &Observed,
     place: usize,
     before: Option<&Reference>,
+    rates: Rates,
 ) -> Result<Reference, ChamberError> {
     let values = side.values(assumed, observed, place, before)?;
-    let (system, trace) = run_kept(side, assumed, numbers, observed, &values);
+    let mut system = system(&side.parts(assumed), numbers, &observed.series);
+    if rates == Rates::Unseen {
+        system.variances[filter::RATE] += BLIND_RAD2_PER_S2;
+    }
+    let trace = filter::forward(&system, &observed.series.rows, &values, true);
     let states = filter::smooth(&system, &observed.series.rows, &trace);
     side.reference(assumed, observed, &states, before)
 }

@@ -17,9 +17,9 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::filter::{RATE, Values, respond};
-use super::fit::{Derivatives, Fit};
+use super::fit::{DerivativeColumn, Derivatives, Fit};
 use super::point::run_kept;
-use super::{Chamber, ChamberError};
+use super::{Assumption, Chamber, ChamberError};
 
 /// A course that might add to the rate [rad/s at unit amplitude].
 ///
@@ -28,6 +28,21 @@ use super::{Chamber, ChamberError};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
     pub rate_rad_per_s: Vec<Vec<f64>>,
+}
+
+/// A change of the model as a direction from a fit, cleared of what was fitted; the whole change is one unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Direction {
+    pub score: f64,
+    pub information: f64,
+}
+
+impl Direction {
+    /// By how much the log likelihood would rise at most between these multiples of the change, and at which.
+    pub fn gain(&self, least: f64, most: f64) -> (f64, f64) {
+        let amplitude = (self.score / self.information).clamp(least, most);
+        (amplitude * self.score - 0.5 * amplitude * amplitude * self.information, amplitude)
+    }
 }
 
 /// Score and information of columns, cleared of what was fitted.
@@ -109,6 +124,51 @@ impl Chamber<'_> {
         Ok(Scores { score, information })
     }
 
+    /// What changes of the whole model would gain, each computed at one other place and taken as a direction from the fit:
+    /// one evaluation a record and change. None where the changed model cannot be solved.
+    ///
+    /// # Errors
+    /// A fit whose own model cannot be solved.
+    pub fn score_models(&self, fit: &Fit, changed: &[Assumption]) -> Result<Vec<Option<Direction>>, ChamberError> {
+        let place = self.place(fit.assumed.clone(), fit.numbers.clone(), &fit.records, &fit.courses)?;
+        let base: Result<Vec<_>, _> = fit.records.iter().map(|&r| self.innovations(&place, r)).collect();
+        let base = base?;
+        let derivatives = self.derivatives(&place, &fit.parameters, &fit.coordinates, &fit.records, &base)?;
+        let fitted = fit.parameters.len();
+        let mut slope = DVector::zeros(fitted);
+        let mut own = DMatrix::zeros(fitted, fitted);
+        derivatives.iter().zip(&base).for_each(|(d, b)| d.add_to(b, &mut slope, &mut own));
+        for (i, p) in fit.parameters.iter().enumerate() {
+            let precision = p.deviation.powi(-2);
+            slope[i] -= (fit.coordinates[i] - p.mean) * precision;
+            own[(i, i)] += precision;
+        }
+        let Some(factor) = own.cholesky() else { return Err(ChamberError::Unsolvable) };
+        let found = changed
+            .par_iter()
+            .map(|assumed| {
+                let mut score = 0.0;
+                let mut information = 0.0;
+                let mut cross = DVector::zeros(fitted);
+                let there = self.place(assumed.clone(), fit.numbers.clone(), &fit.records, &fit.courses).ok()?;
+                for (i, &record) in fit.records.iter().enumerate() {
+                    let moved = self.innovations(&there, record).ok()?;
+                    let mut joint = derivatives[i].clone();
+                    joint.parameters.push(fitted);
+                    joint.columns.push(DerivativeColumn::new(&base[i], &moved, 1.0));
+                    let (g, row) = joint.last_row(&base[i], fitted + 1);
+                    score += g;
+                    information += row[fitted];
+                    cross += row.rows(0, fitted);
+                }
+                let weights = factor.solve(&cross);
+                let (score, information) = (score - weights.dot(&slope), information - weights.dot(&cross));
+                (information > 0.0 && score.is_finite()).then_some(Direction { score, information })
+            })
+            .collect();
+        Ok(found)
+    }
+
     /// The rates of each output of the layers' smoothed course over each row's window, as columns: what a change of one
     /// layer's gain would add to the rate, per unit of gain.
     ///
@@ -120,7 +180,9 @@ impl Chamber<'_> {
             .map(|j| Column {
                 rate_rad_per_s: (0..self.records())
                     .map(|r| {
-                        fit.courses[r].as_ref().map_or_else(Vec::new, |c| c.window_rates(&self.observed[r].series, j))
+                        fit.courses[r]
+                            .as_ref()
+                            .map_or_else(Vec::new, |c| c.window_rates(&self.observed[r].series, Some(j)))
                     })
                     .collect(),
             })

@@ -1,5 +1,8 @@
 //! Matrices of which most entries are zero, times the few columns that a filter carries.
 
+// Loops over an index that the compiler knows the end of: iterators stay calls in functions as large as these.
+#![allow(clippy::needless_range_loop)]
+
 /// A square block of states; lanes beyond the model's states stay zero.
 pub(super) type Square<const N: usize> = [[f64; N]; N];
 
