@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::derivative::{DerivativeColumn, Derivatives};
 use super::filter::{Innovation, Values};
 use super::known::Reference;
 use super::parameter::{Free, Parameter, Place, write};
@@ -24,6 +25,10 @@ pub struct Effort {
 impl Effort {
     /// To a tenth of a unit of log likelihood.
     pub const FULL: Self = Self { iterations: 25, tolerance: 0.1, rounds: 2 };
+    /// To half a unit: enough to rank sets.
+    pub const QUICK: Self = Self { iterations: 10, tolerance: 0.7, rounds: 1 };
+    /// One step only.
+    pub const LOOK: Self = Self { iterations: 1, tolerance: 0.7, rounds: 1 };
     /// Enough to rank starts.
     pub const SHORT: Self = Self { iterations: 3, tolerance: 3.0, rounds: 1 };
 }
@@ -83,8 +88,21 @@ impl Fit {
         self.courses.get(record)?.as_ref()
     }
 
-    pub fn effects(&self) -> usize {
-        self.assumed.model.effects.len()
+    /// Begins again with a gyro whose wander is the prior's and whose white noise makes up for it.
+    pub fn calm(&mut self, records: &[usize]) {
+        for &r in records {
+            let numbers = &mut self.numbers[r];
+            let white = numbers.get(Quantity::RateNoise);
+            let wander = white * numbers.get(Quantity::WanderShare);
+            numbers.set(Quantity::RateNoise, white.hypot(wander));
+            numbers.set(Quantity::WanderShare, Quantity::WanderShare.prior().median);
+            numbers.set(Quantity::WanderTime, Quantity::WanderTime.prior().median);
+        }
+    }
+
+    /// Another value of a number of the chamber, for a fit to begin with.
+    pub fn set_number(&mut self, quantity: Quantity, value: f64) {
+        self.numbers.iter_mut().for_each(|n| n.set(quantity, value));
     }
 }
 
@@ -431,6 +449,33 @@ struct State<'c> {
 }
 
 impl Fit {
+    /// Log evidence with as much said beforehand of an effect's parameters as one row says: what the description of an
+    /// effect holds likely of its size does not decide between two that do the same.
+    ///
+    /// ```text
+    /// ln E = ln L + ln p(chamber) − ½ Σ_e z_e² + (c/2) ln 2π − ½ ln |I_cc| − (e/2) ln n
+    /// ```
+    ///
+    /// z: distance from an effect's prior in its deviations; c, e: numbers of the chamber and of effects; n: `rows`.
+    pub fn merit(&self, rows: usize) -> f64 {
+        let of_chamber: Vec<usize> = (0..self.parameters.len())
+            .filter(|&i| matches!(self.parameters[i].place, Place::Quantity { .. }))
+            .collect();
+        let count = of_chamber.len();
+        let block = DMatrix::from_fn(count, count, |i, k| self.information[(of_chamber[i], of_chamber[k])]);
+        let Some(factor) = block.cholesky() else { return f64::NEG_INFINITY };
+        let log_determinant = 2.0 * factor.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+        let mut merit = self.log_likelihood + 0.5 * count as f64 * std::f64::consts::TAU.ln() - 0.5 * log_determinant;
+        for (i, p) in self.parameters.iter().enumerate() {
+            if of_chamber.contains(&i) {
+                merit += p.log_prior(self.coordinates[i]);
+            } else {
+                merit -= 0.5 * ((self.coordinates[i] - p.mean) / p.deviation).powi(2) + 0.5 * (rows as f64).ln();
+            }
+        }
+        merit
+    }
+
     /// Logarithm of likelihood times prior.
     pub fn posterior(&self) -> f64 {
         self.log_likelihood + self.log_prior
@@ -441,81 +486,6 @@ pub(super) fn log_likelihood(innovations: &[Innovation]) -> f64 {
     let sum: f64 =
         innovations.iter().map(|i| i.value * i.value / i.variance + (std::f64::consts::TAU * i.variance).ln()).sum();
     -0.5 * sum
-}
-
-/// dv and dS of one coordinate.
-#[derive(Debug, Clone)]
-pub(super) struct DerivativeColumn {
-    pub value: Vec<f64>,
-    pub variance: Vec<f64>,
-}
-
-impl DerivativeColumn {
-    pub fn new(base: &[Innovation], there: &[Innovation], step: f64) -> Self {
-        let over = |f: fn(&Innovation) -> f64| base.iter().zip(there).map(|(b, t)| (f(t) - f(b)) / step).collect();
-        Self { value: over(|i| i.value), variance: over(|i| i.variance) }
-    }
-}
-
-/// The derivatives of one record's innovations.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Derivatives {
-    pub parameters: Vec<usize>,
-    pub columns: Vec<DerivativeColumn>,
-}
-
-impl Derivatives {
-    pub fn add_to(&self, base: &[Innovation], score: &mut DVector<f64>, information: &mut DMatrix<f64>) {
-        let weighted: Vec<(Vec<f64>, Vec<f64>)> = self
-            .columns
-            .iter()
-            .map(|c| {
-                let value = c.value.iter().zip(base).map(|(d, i)| d / i.variance).collect();
-                let variance = c.variance.iter().zip(base).map(|(d, i)| 0.5 * d / (i.variance * i.variance)).collect();
-                (value, variance)
-            })
-            .collect();
-        for (i, &p) in self.parameters.iter().enumerate() {
-            let (value, variance) = &weighted[i];
-            score[p] += base
-                .iter()
-                .zip(value.iter().zip(variance))
-                .map(|(b, (dv, ds))| -dv * b.value + ds * (b.value * b.value - b.variance))
-                .sum::<f64>();
-            for (k, &q) in self.parameters.iter().enumerate().take(i + 1) {
-                let other = &self.columns[k];
-                let sum = dot(value, &other.value) + dot(variance, &other.variance);
-                information[(p, q)] += sum;
-                if p != q {
-                    information[(q, p)] += sum;
-                }
-            }
-        }
-    }
-}
-
-impl Derivatives {
-    /// Score of the last column, and its information with all.
-    pub fn last_row(&self, base: &[Innovation], size: usize) -> (f64, DVector<f64>) {
-        let mut row = DVector::zeros(size);
-        let mut score = 0.0;
-        if let Some(last) = self.columns.last() {
-            let value: Vec<f64> = last.value.iter().zip(base).map(|(d, i)| d / i.variance).collect();
-            let variance: Vec<f64> =
-                last.variance.iter().zip(base).map(|(d, i)| 0.5 * d / (i.variance * i.variance)).collect();
-            for (b, (dv, ds)) in base.iter().zip(value.iter().zip(&variance)) {
-                score += -dv * b.value + ds * (b.value * b.value - b.variance);
-            }
-            for (&p, column) in self.parameters.iter().zip(&self.columns) {
-                row[p] += dot(&value, &column.value) + dot(&variance, &column.variance);
-            }
-        }
-        (score, row)
-    }
-}
-
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// The damped step, within bounds and strides; None where the information is not positive.

@@ -16,8 +16,9 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::derivative::{DerivativeColumn, Derivatives};
 use super::filter::{RATE, Values, respond};
-use super::fit::{DerivativeColumn, Derivatives, Fit};
+use super::fit::Fit;
 use super::point::run_kept;
 use super::{Assumption, Chamber, ChamberError};
 
@@ -28,6 +29,17 @@ use super::{Assumption, Chamber, ChamberError};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
     pub rate_rad_per_s: Vec<Vec<f64>>,
+}
+
+impl Column {
+    /// One from a row of a record on.
+    pub fn step(chamber: &Chamber, record: usize, row: usize) -> Self {
+        let course = |r: usize| {
+            let rows = chamber.times_s(r).len();
+            (0..rows).map(|k| f64::from(r == record && k >= row)).collect()
+        };
+        Self { rate_rad_per_s: (0..chamber.records()).map(course).collect() }
+    }
 }
 
 /// A change of the model as a direction from a fit, cleared of what was fitted; the whole change is one unit.

@@ -27,7 +27,8 @@ use crate::predict::{noise_floor_rad_per_s, predict};
 use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::report::diagnosis::{
-    self, before_and_after_chart, explanations, rest_in_words, value_in_words, verdict_in_words,
+    self, before_and_after_chart, explanations, noise_in_words, posterior_in_words, refitted_in_words, rest_in_words,
+    value_in_words, verdict_in_words,
 };
 use crate::report::ladder::ladder_chart;
 use crate::units::deg_per_h_from_rad_per_s;
@@ -91,8 +92,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let (records, holdout) = (read(&arguments.records)?, read(&arguments.holdout)?);
     let progress = screen.progress("diagnose", Some(PARTS as u64));
     let request = Request { model: &file.model, pattern: &pattern, records: &records, holdout: &holdout };
-    let (diagnosis, contest) =
-        diagnose::diagnose_with_contest(&request, &|share| progress.at((share * PARTS) as u64, ""))?;
+    let diagnosis = diagnose::diagnose(&request, &|share| progress.at((share * PARTS) as u64, ""))?;
     progress.finish();
     let mut inputs = Vec::new();
     for (paths, role) in [(&arguments.records, "fitted"), (&arguments.holdout, "held out")] {
@@ -102,8 +102,10 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     }
     let wanted = arguments.output.is_some() || arguments.experiment.is_some();
     let all: Vec<&Record> = records.iter().chain(&holdout).collect();
-    let experiment =
-        Chamber::of(&all).filter(|_| wanted).and_then(|chamber| design(&contest, &pattern, &chamber, arguments.seed));
+    let experiment = match Chamber::of(&all).filter(|_| wanted && !diagnosis.effects.is_empty()) {
+        Some(chamber) => design(&diagnose::contest(&request, &diagnosis)?, &pattern, &chamber, arguments.seed),
+        None => None,
+    };
     let holdout_noise = (!holdout.is_empty()).then(|| noise_of(&holdout));
     let inputs = InputsJson::new(Some(&file), inputs);
     let mut body = DiagnosisJson::new(&file.model.name, &diagnosis, holdout_noise, experiment.as_ref(), inputs);
@@ -201,6 +203,9 @@ fn text(body: &DiagnosisJson) -> String {
     for (kind, words) in explanations(&body.effects) {
         text += &format!("\n{kind}: {words}\n");
     }
+    for line in refitted_in_words(body) {
+        text += &format!("\n{line}\n");
+    }
     let rest = rest_in_words(body);
     if !rest.is_empty() {
         text += &format!("\n{}\n", rest.join("\n"));
@@ -218,6 +223,10 @@ fn text(body: &DiagnosisJson) -> String {
     });
     text += &table(&["model", "error °/h", "hold-out °/h", "reduced χ²", "BIC"], rows);
     text += &format!("noise floor {:.4} °/h\n\n", body.noise_floor_deg_per_h);
+    for line in noise_in_words(body) {
+        text += &format!("{line}\n");
+    }
+    text += &format!("posterior: {}\n\n", posterior_in_words(body).join(", "));
     for step in &body.ladder_in_words {
         text += &format!("{step}\n");
     }

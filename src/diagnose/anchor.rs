@@ -2,7 +2,6 @@
 
 use std::sync::OnceLock;
 
-use super::tilt::Tilt;
 use crate::boundary::{Boundary, RateWhitener};
 use crate::effect::{Acts, DeclaredEffect};
 use crate::rate::CoilModel;
@@ -25,8 +24,6 @@ pub(super) struct Anchor {
     pub one: Vec<f64>,
     /// None without a flange.
     pub flange_response: OnceLock<Option<[ThermalHistory; 2]>>,
-    /// How it follows what moves heat, as far as that was asked.
-    pub tilts: Vec<Tilt>,
 }
 
 impl Anchor {
@@ -44,7 +41,7 @@ pub(super) fn way_of(model: &CoilModel) -> Vec<String> {
     moving(model).map(name_of).collect()
 }
 
-pub(super) fn name_of(effect: &DeclaredEffect) -> String {
+fn name_of(effect: &DeclaredEffect) -> String {
     format!("{} {:?}", effect.kind(), effect.choices())
 }
 
@@ -105,8 +102,6 @@ impl Bracket {
 /// that no kink moves by more than a reading.
 pub(super) const BRACKET_SHARE: f64 = 0.04;
 pub(super) const LEAST_BRACKET_S: f64 = 1.0;
-/// Share of the half width within which a fit has found the middle.
-pub(super) const CENTRAL: f64 = 0.4;
 
 /// Share by which a value may differ from that for which a boundary was estimated.
 const NEAR: f64 = 0.05;
@@ -144,7 +139,7 @@ mod tests {
         let way = bracket.way.clone();
         assert!(bracket.holds(Location::OuterLayer, &way, 41.9, 1.0));
         assert!(!bracket.holds(Location::OuterLayer, &way, 42.1, 1.0));
-        assert!(!bracket.holds(Location::OuterLayer, &way, 41.9, CENTRAL));
+        assert!(!bracket.holds(Location::OuterLayer, &way, 41.9, 0.4));
         assert!(!bracket.holds(Location::Ambient, &way, 40.0, 1.0));
         assert!(!bracket.holds(Location::OuterLayer, &[], 40.0, 1.0));
     }

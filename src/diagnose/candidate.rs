@@ -1,6 +1,6 @@
 //! What may be missing: the effects that a model lacks, as things to fit.
 
-use crate::effect::{Acts, CATALOGUE, DeclaredEffect, EffectSpec, Nature, Subject};
+use crate::effect::{CATALOGUE, DeclaredEffect, EffectSpec, Nature, Subject};
 use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::units::Unit;
@@ -22,19 +22,6 @@ impl Candidate {
     pub fn kind(&self) -> String {
         self.effect.kind()
     }
-
-    pub fn is_empirical(&self) -> bool {
-        is_empirical(&self.effect)
-    }
-
-    /// Whether the boundary's estimate depends on it.
-    pub fn moves_sensor(&self) -> bool {
-        self.effect.spec().acts == Acts::Sensor
-    }
-
-    pub fn moves_heat(&self) -> bool {
-        self.effect.spec().acts == Acts::HeatPath
-    }
 }
 
 pub fn is_empirical(effect: &DeclaredEffect) -> bool {
@@ -47,7 +34,7 @@ pub fn is_declared_number(effect: &DeclaredEffect) -> bool {
 }
 
 /// Everything of the catalogue that the model does not have, and every further column that all records share.
-pub(super) fn candidates(model: &CoilModel, records: &[&Record]) -> Vec<Candidate> {
+pub fn candidates(model: &CoilModel, records: &[&Record]) -> Vec<Candidate> {
     let present: Vec<String> = model.effects.iter().map(DeclaredEffect::kind).collect();
     let temperatures = temperature_quartiles_k(records);
     let mut all = Vec::new();

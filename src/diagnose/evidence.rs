@@ -6,16 +6,15 @@ use rayon::prelude::*;
 
 use super::DiagnoseError;
 use super::anchor::{
-    Anchor, BRACKET_SHARE, Bracket, CENTRAL, LEAST_BRACKET_S, difference, heat_values, is_near, moves_sensor, way_of,
+    Anchor, BRACKET_SHARE, Bracket, LEAST_BRACKET_S, difference, heat_values, is_near, moves_sensor, way_of,
 };
 use super::conductivity::SlopeResponse;
-use super::field::{DrivenAnchor, Keep, Solved};
+use super::field::{DrivenAnchor, Solved};
 use crate::boundary::{Boundary, Start};
 use crate::pattern::Pattern;
 use crate::predict::{estimate_boundary, noise_floor_rad_per_s, rates_rad_per_s, refine_boundary};
 use crate::rate::CoilModel;
 use crate::record::Record;
-use crate::thermal::ThermalHistory;
 
 /// What a record is used for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,8 +27,6 @@ pub(super) enum Role {
 pub(super) struct Evidence<'a> {
     pub pattern: &'a Pattern,
     pub cases: Vec<Case>,
-    /// Whether what was to be held out is fitted, and the other way round.
-    pub exchanged: bool,
 }
 
 /// One record.
@@ -37,16 +34,13 @@ pub(super) struct Case {
     pub record: Record,
     pub role: Role,
     pub noise_rad_per_s: f64,
-    /// Rows left out because of a gross error.
-    pub outliers: usize,
     pub(super) anchors: Vec<Anchor>,
     /// Anchors in threes, between which the pack is interpolated.
     pub(super) brackets: Vec<Bracket>,
     /// Solved when it is first asked for, under the first boundary: what a slope does to the pack hardly depends on how the
     /// sensor is connected to it. None where it cannot be solved.
     pub(super) slope_response: OnceLock<Option<SlopeResponse>>,
-    /// Fields that are asked for again and again, and those asked for lately.
-    pub(super) pinned: Mutex<Vec<Arc<Solved>>>,
+    /// Fields asked for lately.
     pub(super) recent: Mutex<Vec<Arc<Solved>>>,
     /// What the drives of anchors leave behind, those asked for lately.
     pub(super) driven: Mutex<Vec<Arc<DrivenAnchor>>>,
@@ -76,7 +70,7 @@ impl<'a> Evidence<'a> {
         let with_role = |records: &[Record], role| records.iter().map(|r| Case::new(r, role)).collect::<Vec<_>>();
         let mut cases = with_role(records, Role::Fit);
         cases.extend(with_role(holdout, Role::Holdout));
-        let mut evidence = Self { pattern, cases, exchanged: false };
+        let mut evidence = Self { pattern, cases };
         evidence.anchor(model, Begin::Anew)?;
         for case in &evidence.cases {
             case.check()?;
@@ -136,7 +130,7 @@ impl<'a> Evidence<'a> {
                     a.location == location && a.way == old.way && a.lag_s != lag_s && old.lags_s().contains(&a.lag_s)
                 };
                 case.anchors.retain(|a| !outdated(a));
-                (case.recent, case.pinned, case.driven) = Default::default();
+                (case.recent, case.driven) = Default::default();
             }
             case.brackets.push(new);
             for side in sides {
@@ -151,31 +145,10 @@ impl<'a> Evidence<'a> {
         self.bracketed_within(model, 1.0)
     }
 
-    /// … and close enough to it for the parabola to be exact.
-    pub fn is_central(&self, model: &CoilModel) -> bool {
-        self.bracketed_within(model, CENTRAL)
-    }
-
     fn bracketed_within(&self, model: &CoilModel, share: f64) -> bool {
         let Ok(path) = model.heat_path() else { return false };
         let (way, lag_s) = (way_of(model), model.sensor_lag_s());
         self.cases.iter().all(|case| case.brackets.iter().any(|b| b.holds(path.location, &way, lag_s, share)))
-    }
-
-    /// From here on what was held out is fitted, and what was fitted held out.
-    pub fn exchange(&mut self) {
-        self.exchanged = !self.exchanged;
-        for case in &mut self.cases {
-            case.role = match case.role {
-                Role::Fit => Role::Holdout,
-                Role::Holdout => Role::Fit,
-            };
-        }
-    }
-
-    /// The roles that the records have now which were given to be fitted, and to be held out.
-    pub fn roles(&self) -> [Role; 2] {
-        if self.exchanged { [Role::Holdout, Role::Fit] } else { [Role::Fit, Role::Holdout] }
     }
 
     /// Number of rows in the records of a role.
@@ -189,18 +162,13 @@ impl<'a> Evidence<'a> {
 
     /// Whitened residuals of a model, each record's offset taken out; None where the model cannot be solved.
     pub fn residuals(&self, model: &CoilModel, role: Role) -> Option<Vec<f64>> {
-        self.residuals_of(model, role, Keep::Recent)
+        self.residuals_of(model, role)
     }
 
-    /// As [`Evidence::residuals`] of the fitted records, for a model that will be asked for again.
-    pub fn residuals_often(&self, model: &CoilModel) -> Option<Vec<f64>> {
-        self.residuals_of(model, Role::Fit, Keep::Pinned)
-    }
-
-    fn residuals_of(&self, model: &CoilModel, role: Role, keep: Keep) -> Option<Vec<f64>> {
+    fn residuals_of(&self, model: &CoilModel, role: Role) -> Option<Vec<f64>> {
         let mut all = Vec::new();
         for case in self.of(role) {
-            all.extend(case.residuals(model, self.pattern, keep)?);
+            all.extend(case.residuals(model, self.pattern)?);
         }
         Some(all)
     }
@@ -219,17 +187,14 @@ impl Case {
         let mut rows: Vec<usize> = record.gross_errors().iter().map(|e| e.row).collect();
         rows.dedup();
         let record = record.without_rows(&rows).unwrap_or_else(|_| record.clone());
-        let outliers = rows.len();
         let noise_rad_per_s = noise_floor_rad_per_s(&record);
         Self {
             record,
             role,
             noise_rad_per_s,
-            outliers,
             anchors: Vec::new(),
             brackets: Vec::new(),
             slope_response: OnceLock::new(),
-            pinned: Mutex::default(),
             recent: Mutex::default(),
             driven: Mutex::default(),
         }
@@ -319,7 +284,6 @@ impl Case {
             measured,
             one,
             flange_response: OnceLock::new(),
-            tilts: Vec::new(),
         })
     }
 
@@ -330,11 +294,11 @@ impl Case {
             Some(place) => self.anchors[place] = anchor,
             None => self.anchors.push(anchor),
         }
-        (self.recent, self.pinned, self.driven) = Default::default();
+        (self.recent, self.driven) = Default::default();
     }
 
-    pub fn residuals(&self, model: &CoilModel, pattern: &Pattern, keep: Keep) -> Option<Vec<f64>> {
-        let solved = self.solved(model, keep)?;
+    pub fn residuals(&self, model: &CoilModel, pattern: &Pattern) -> Option<Vec<f64>> {
+        let solved = self.solved(model)?;
         let predicted = rates_rad_per_s(model, pattern, &self.record, &solved.history).ok()?;
         let anchor = &self.anchors[solved.anchor];
         let mut residuals = anchor.whitener.whiten(&predicted);
@@ -346,41 +310,6 @@ impl Case {
             *r -= offset * one;
         }
         Some(residuals)
-    }
-
-    /// Columns over the rows, whitened under the boundary for a model and with the offset taken out.
-    pub fn whiten_columns(&self, model: &CoilModel, columns: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
-        let location = model.heat_path().ok()?.location;
-        let anchor = &self.anchors[self.anchor_for(location, &way_of(model), model.sensor_lag_s())?];
-        Some(
-            columns
-                .iter()
-                .map(|column| {
-                    let mut whitened = anchor.whitener.whiten(column);
-                    let offset = dot(&whitened, &anchor.one);
-                    whitened.iter_mut().zip(&anchor.one).for_each(|(w, one)| *w -= offset * one);
-                    whitened
-                })
-                .collect(),
-        )
-    }
-
-    /// Σ (Ω_model − mean)²/σ²: how much of the noise the coil's own error is.
-    pub fn signal_square(&self, model: &CoilModel, pattern: &Pattern) -> f64 {
-        let Some(solved) = self.solved(model, Keep::Recent) else { return 0.0 };
-        let Ok(rates) = rates_rad_per_s(model, pattern, &self.record, &solved.history) else { return 0.0 };
-        let mean = rates.iter().sum::<f64>() / rates.len() as f64;
-        rates.iter().map(|r| ((r - mean) / self.noise_rad_per_s).powi(2)).sum()
-    }
-
-    /// Plain residuals, their mean taken out [rad/s], and the pack under the model.
-    pub fn plain_residuals(&self, model: &CoilModel, pattern: &Pattern) -> Option<(Vec<f64>, ThermalHistory)> {
-        let solved = self.solved(model, Keep::Recent)?;
-        let predicted = rates_rad_per_s(model, pattern, &self.record, &solved.history).ok()?;
-        let mut residuals: Vec<f64> = self.record.rate_rad_per_s().iter().zip(&predicted).map(|(m, p)| m - p).collect();
-        let mean = residuals.iter().sum::<f64>() / residuals.len() as f64;
-        residuals.iter_mut().for_each(|r| *r -= mean);
-        Some((residuals, solved.history.clone()))
     }
 }
 

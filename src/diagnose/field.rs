@@ -26,18 +26,9 @@ pub(super) struct Solved {
 
 /// Fields kept for models that differ only in what is done with them …
 const KEPT_FIELDS: usize = 8;
-/// … and for the starts of the candidates.
-const PINNED_FIELDS: usize = 64;
 
 /// Drives kept ready: a bracket's three and a few more.
 const KEPT_DRIVES: usize = 6;
-
-/// How long a field is kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Keep {
-    Recent,
-    Pinned,
-}
 
 impl Case {
     /// The anchor for a sensor: that of its place which was estimated for the most nearly same effects, and then for the
@@ -51,44 +42,28 @@ impl Case {
     }
 
     /// The pack over each averaging interval under a model.
-    pub(super) fn solved(&self, model: &CoilModel, keep: Keep) -> Option<Arc<Solved>> {
+    pub(super) fn solved(&self, model: &CoilModel) -> Option<Arc<Solved>> {
         let path = model.heat_path().ok()?;
         let (way, lag_s) = (way_of(model), model.sensor_lag_s());
         if let Some(bracket) = self.brackets.iter().find(|b| b.holds(path.location, &way, lag_s, 1.0)) {
             let anchors = bracket.lags_s().map(|at_s| {
                 let nearest = self.anchor_for(path.location, &way, at_s)?;
-                self.solved_at(path.clone(), nearest, self.anchors[nearest].lag_s, model.rate_mean_s, Keep::Recent)
+                self.solved_at(path.clone(), nearest, self.anchors[nearest].lag_s, model.rate_mean_s)
             });
             let [Some(shorter), Some(middle), Some(longer)] = anchors else { return None };
-            let mut history = mixed([&shorter.history, &middle.history, &longer.history], bracket.weights(lag_s));
-            self.follow(middle.anchor, model, &mut history);
+            let history = mixed([&shorter.history, &middle.history, &longer.history], bracket.weights(lag_s));
             return Some(Arc::new(Solved { path, anchor: middle.anchor, lag_s, history }));
         }
         let anchor = self.anchor_for(path.location, &way, lag_s)?;
-        let solved = self.solved_at(path, anchor, lag_s, model.rate_mean_s, keep)?;
-        if self.anchors[anchor].tilts.is_empty() {
-            return Some(solved);
-        }
-        let mut history = solved.history.clone();
-        self.follow(anchor, model, &mut history);
-        Some(Arc::new(Solved { path: solved.path.clone(), anchor, lag_s, history }))
+        self.solved_at(path, anchor, lag_s, model.rate_mean_s)
     }
 
     /// The pack under one anchor's boundary, remembered if it was asked for lately.
-    fn solved_at(
-        &self,
-        path: HeatPath,
-        anchor: usize,
-        lag_s: f64,
-        rate_mean_s: f64,
-        keep: Keep,
-    ) -> Option<Arc<Solved>> {
-        for fields in [&self.pinned, &self.recent] {
-            if let Ok(fields) = fields.lock()
-                && let Some(known) = fields.iter().find(|s| s.anchor == anchor && s.lag_s == lag_s && s.path == path)
-            {
-                return Some(known.clone());
-            }
+    fn solved_at(&self, path: HeatPath, anchor: usize, lag_s: f64, rate_mean_s: f64) -> Option<Arc<Solved>> {
+        if let Ok(fields) = self.recent.lock()
+            && let Some(known) = fields.iter().find(|s| s.anchor == anchor && s.lag_s == lag_s && s.path == path)
+        {
+            return Some(known.clone());
         }
         let from = &self.anchors[anchor];
         let kept = self.driven(anchor, rate_mean_s);
@@ -107,12 +82,7 @@ impl Case {
             history = mixed([&history, &response[0], &response[1]], [1.0, 1.0, -1.0]);
         }
         let solved = Arc::new(Solved { path, anchor, lag_s, history });
-        if keep == Keep::Pinned
-            && let Ok(mut pinned) = self.pinned.lock()
-            && pinned.len() < PINNED_FIELDS
-        {
-            pinned.push(solved.clone());
-        } else if let Ok(mut recent) = self.recent.lock() {
+        if let Ok(mut recent) = self.recent.lock() {
             if recent.len() >= KEPT_FIELDS {
                 // The first is that of the declared model, which is asked for most.
                 recent.remove(1);

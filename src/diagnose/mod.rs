@@ -1,39 +1,35 @@
 //! Which piece of physics a model lacks, judged by records.
 //!
-//! Every effect of the catalogue that the model lacks is fitted to the records as an addition: alone, in pairs, as a
-//! further step and in exchange. Residuals are whitened with the covariance of noise and boundary, so that sums of
-//! squares are χ². An effect stays if the information criterion pays for it and for the search, if it explains data
-//! that it was not fitted to, and if its size is practical. Plain functions of time compete, so that something outside
-//! the catalogue is recognised.
+//! Every effect of the catalogue, the numbers that the model file states, other windings, a step of the offset, and wander
+//! or a cycle that nothing explains are members of sets; each set is a joint model of chamber, pack, sensor and gyro
+//! ([`crate::chamber`]) with an evidence. A score test says what is worth a fit; the search goes forward and back; the
+//! verdict is drawn from posterior masses.
 //!
 //! ```text
-//! χ² = Σ_records (Ω − Ω̂ − Ω_0)ᵀ (σ² 1 + J C Jᵀ)⁻¹ (Ω − Ω̂ − Ω_0)
-//! merit = χ²/s² + p ln n + 6 m,   s² = max(1, χ²_best/n)        p parameters, m effects
+//! M(set) = ln E(fitted records) + ln E(held-out records | the coil as fitted) + Σ ln p(member),   p(set) ∝ e^M
 //! ```
 //!
 //! # Source
-//! Schwarz, Ann. Stat. 6 (1978) 461 (the criterion); Golub and Pereyra, Inverse Problems 19 (2003) R1 (linear parameters
-//! projected out); Bartlett, J. R. Stat. Soc. Suppl. 8 (1946) 27 (standard errors under autocorrelation).
+//! Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773 (evidence); Rao, Proc. Camb. Phil. Soc. 44 (1948) 50 (score test);
+//! Madigan and Raftery, J. Am. Stat. Assoc. 89 (1994) 1535 (a set that holds a smaller one as good is that one).
 
 mod anchor;
+mod answer;
 mod candidate;
 mod conductivity;
-mod confirm;
+mod describe;
 mod evidence;
 pub mod experiment;
 mod field;
-mod hypothesis;
+mod joint;
 pub mod plain;
-mod prune;
-mod search;
-mod stranger;
-mod tilt;
-mod verdict;
 
 use thiserror::Error;
 
+use crate::chamber::{Assumption, Chamber, ChamberError, Noise};
 use crate::coil::CoilError;
 use crate::effect::DeclaredEffect;
+use crate::numeric::noise::white_noise;
 use crate::pattern::Pattern;
 use crate::predict::PredictError;
 use crate::rate::CoilModel;
@@ -41,6 +37,7 @@ use crate::record::Record;
 use crate::units::Unit;
 
 use experiment::Contest;
+use joint::Question;
 
 pub use candidate::{is_declared_number, is_empirical};
 pub use plain::{Plain, Shape};
@@ -106,18 +103,7 @@ pub struct Finding {
     pub confirmed_by: f64,
 }
 
-/// A value counts as determined that is so many standard errors from where it would do nothing.
-const DETERMINED: f64 = 3.0;
-
 impl Finding {
-    /// Whether the records hold any of what was fitted away from where the effect would do nothing.
-    fn is_determined(&self) -> bool {
-        let idle = if is_declared_number(&self.effect) { 1.0 } else { 0.0 };
-        let far = |p: &FittedParameter| p.standard_error.is_some_and(|e| (p.value - idle).abs() > DETERMINED * e);
-        let mut fitted = self.parameters.iter().filter(|p| p.fitted).peekable();
-        fitted.peek().is_none() || fitted.any(far)
-    }
-
     /// An effect at values that no record was asked about.
     pub fn unfitted(effect: DeclaredEffect) -> Self {
         let parameters = effect
@@ -222,6 +208,59 @@ pub struct Diagnosis {
     pub cautions: Vec<Caution>,
     /// The declared model with the accepted effects.
     pub extended: CoilModel,
+    /// Sets of explanations and what they hold, largest first.
+    pub posterior: Vec<Share>,
+    /// Numbers that the model file states and the records contradict.
+    pub refitted: Vec<Refitted>,
+    /// What is no effect and yet explains the records.
+    pub hypothesis: Option<Hypothesis>,
+    /// Fitted records first, then those held out.
+    pub noise: Vec<RecordNoise>,
+}
+
+/// What one set of explanations holds of the posterior mass.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Share {
+    pub effects: Vec<String>,
+    pub probability: f64,
+}
+
+/// A stated number that the records contradict; SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Refitted {
+    pub kind: String,
+    pub parameter: String,
+    pub unit: Unit,
+    pub declared: f64,
+    pub value: f64,
+    pub standard_error: Option<f64>,
+}
+
+/// What is no effect of the catalogue.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Hypothesis {
+    /// The classic that the coil seems to be wound as.
+    pub winding: Option<&'static str>,
+    /// Connected the other way round.
+    pub reversed: bool,
+    /// Two layers that changed places, counted from 1 innermost.
+    pub exchanged: Option<(usize, usize)>,
+    pub offset_steps: Vec<OffsetStep>,
+}
+
+/// A step of the offset.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OffsetStep {
+    pub record: String,
+    pub time_s: f64,
+    pub size_rad_per_s: f64,
+}
+
+/// Noise told apart, of one record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordNoise {
+    pub record: String,
+    pub noise: Noise,
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
@@ -232,6 +271,8 @@ pub enum DiagnoseError {
     Record { record: String, source: PredictError },
     #[error(transparent)]
     Coil(#[from] CoilError),
+    #[error(transparent)]
+    Chamber(ChamberError),
     #[error("{record}: the rate has no noise at all: is this a measurement?")]
     NoNoise { record: String },
     #[error(
@@ -268,25 +309,56 @@ pub struct Extension {
 pub fn extend(request: &Request, effect: &DeclaredEffect) -> Result<Extension, DiagnoseError> {
     let mut without = request.model.clone();
     without.effects.retain(|e| e.kind() != effect.kind());
-    check_lengths(request)?;
-    let mut evidence = evidence::Evidence::new(&without, request.pattern, request.records, request.holdout)?;
-    let records: Vec<&Record> = request.records.iter().chain(request.holdout).collect();
-    let candidates = candidate::of_kind(&without, &records, effect);
-    verdict::settle_one(&mut evidence, &without, &candidates)?
+    let records = checked(request)?;
+    let chamber = Chamber::new(&without, &records)?;
+    let fitted: Vec<usize> = (0..request.records.len()).collect();
+    let declared = Assumption::new(without.clone(), request.pattern.clone());
+    let base = chamber.fit_anew(&declared, &[], &fitted)?;
+    let all = candidate::of_kind(&without, &records, effect);
+    let question = Question {
+        chamber: &chamber,
+        model: &without,
+        pattern: request.pattern,
+        candidates: &all,
+        fitted,
+        held_out: Vec::new(),
+    };
+    joint::settle_one(&question, &base)
+        .map(|(best, reduced)| Extension {
+            finding: describe::alone(&question, &best, &base),
+            extended: best.fit.assumed.model.clone(),
+            reduced_chi_square_before: reduced.0,
+            reduced_chi_square_after: reduced.1,
+        })
         .ok_or_else(|| DiagnoseError::NoFit { kind: effect.kind() })
 }
 
-fn check_lengths(request: &Request) -> Result<(), DiagnoseError> {
+/// The least change of temperature that says anything: of the sensor's noise, and at all [K].
+const LEAST_RANGE_NOISES: f64 = 50.0;
+const LEAST_RANGE_K: f64 = 0.1;
+
+fn checked<'a>(request: &Request<'a>) -> Result<Vec<&'a Record>, DiagnoseError> {
     if request.records.is_empty() {
         return Err(DiagnoseError::NoRecord);
     }
-    for record in request.records.iter().chain(request.holdout) {
+    let records: Vec<&Record> = request.records.iter().chain(request.holdout).collect();
+    for record in &records {
         if record.rows() < LEAST_ROWS {
             let (record, found) = (record.name().to_owned(), record.rows());
             return Err(DiagnoseError::TooShort { record, found, needed: LEAST_ROWS });
         }
+        let values = record.temperature_k();
+        let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
+        let needed_k = (LEAST_RANGE_NOISES * white_noise(record.times_s(), values).deviation).max(LEAST_RANGE_K);
+        if high > low && high - low < needed_k {
+            return Err(DiagnoseError::TemperatureConstant {
+                record: record.name().to_owned(),
+                range_k: high - low,
+                needed_k,
+            });
+        }
     }
-    Ok(())
+    Ok(records)
 }
 
 /// Finds what a model lacks; `progress` is told the share that is done.
@@ -294,53 +366,50 @@ fn check_lengths(request: &Request) -> Result<(), DiagnoseError> {
 /// # Errors
 /// No records, records that say nothing, a model that cannot be solved.
 pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Diagnosis, DiagnoseError> {
-    Ok(diagnose_and(request, progress, |_, _| ())?.0)
+    let records = checked(request)?;
+    progress(0.0);
+    let chamber = Chamber::new(request.model, &records)?;
+    let candidates = candidate::candidates(request.model, &records);
+    let given = request.records.len();
+    let question = Question {
+        chamber: &chamber,
+        model: request.model,
+        pattern: request.pattern,
+        candidates: &candidates,
+        fitted: (0..given).collect(),
+        held_out: (given..records.len()).collect(),
+    };
+    let found = joint::search(&question, &|share| progress(0.9 * share))?;
+    let diagnosis = answer::answer(&question, &found, &records)?;
+    progress(1.0);
+    Ok(diagnosis)
 }
 
-/// As [`diagnose`], and what is left to be told apart by an experiment.
+/// What a diagnosis leaves to be told apart by an experiment.
 ///
 /// # Errors
-/// As [`diagnose`].
-pub fn diagnose_with_contest(
-    request: &Request,
-    progress: &(dyn Fn(f64) + Sync),
-) -> Result<(Diagnosis, Contest), DiagnoseError> {
-    diagnose_and(request, progress, |evidence, found| Contest::new(evidence, request.model, found))
-}
-
-/// Also what else is made of the evidence.
-fn diagnose_and<T>(
-    request: &Request,
-    progress: &(dyn Fn(f64) + Sync),
-    further: impl FnOnce(&evidence::Evidence, &Diagnosis) -> T,
-) -> Result<(Diagnosis, T), DiagnoseError> {
-    check_lengths(request)?;
-    progress(0.0);
+/// Records whose boundary cannot be estimated.
+pub fn contest(request: &Request, diagnosis: &Diagnosis) -> Result<Contest, DiagnoseError> {
     let mut evidence = evidence::Evidence::new(request.model, request.pattern, request.records, request.holdout)?;
-    progress(0.15);
-    let records: Vec<&Record> = request.records.iter().chain(request.holdout).collect();
-    let candidates = candidate::candidates(request.model, &records);
-    let answer = |evidence: &mut evidence::Evidence, most_effects: usize, progress: &(dyn Fn(f64) + Sync)| {
-        let found = search::search(evidence, request.model, &candidates, most_effects, progress)?;
-        progress(0.9);
-        verdict::judge(evidence, request.model, &candidates, found)
-    };
-    let mut diagnosis = answer(&mut evidence, search::MAX_EFFECTS, progress)?;
-    // Where what is to be fitted shows nothing, the other records may; the former then confirm it. Of several effects they
-    // could confirm none.
-    if diagnosis.verdict == Verdict::Adequate && !request.holdout.is_empty() {
-        evidence.exchange();
-        let other = answer(&mut evidence, 1, &|share| progress(0.9 + 0.1 * share))?;
-        if other.verdict == Verdict::Adequate || !other.effects.iter().all(Finding::is_determined) {
-            evidence.exchange();
-        } else {
-            diagnosis = other;
-            diagnosis.cautions.insert(0, Caution::FittedToHoldout);
+    let rivals = diagnosis.effects.iter().flat_map(|e| &e.equivalents).map(|e| &e.extended);
+    for model in rivals.chain([&diagnosis.extended]) {
+        if !evidence.is_anchored(model) && model.sensor_lag_s() > 0.0 {
+            evidence.bracket(model, evidence::Begin::Nearby)?;
+        } else if !evidence.is_anchored(model) {
+            evidence.anchor(model, evidence::Begin::Nearby)?;
         }
     }
-    let further = further(&evidence, &diagnosis);
-    progress(1.0);
-    Ok((diagnosis, further))
+    Ok(Contest::new(&evidence, request.model, diagnosis))
+}
+
+impl From<ChamberError> for DiagnoseError {
+    fn from(error: ChamberError) -> Self {
+        match error {
+            ChamberError::NoNoise { record } => Self::NoNoise { record },
+            ChamberError::Unsolvable => Self::Unsolvable,
+            other => Self::Chamber(other),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::ladder::ladder_chart;
 use super::page::figure;
 use super::plot::{Axis, Chart, Mark, Series};
-use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow, FindingJson, ParameterJson};
+use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow, FindingJson, NoiseJson, ParameterJson, RefittedJson};
 use crate::io::json::experiment::ExperimentJson;
 use crate::units::{h_from_s, min_from_s, percent_from_fraction};
 
@@ -17,13 +17,87 @@ pub fn verdict_in_words(body: &DiagnosisJson) -> String {
     let kinds = || body.effects.iter().map(|e| e.kind.as_str()).collect::<Vec<_>>().join(" and ");
     match body.verdict.as_str() {
         "adequate" => "adequate — these records show nothing that the model lacks".to_owned(),
+        "missing" if body.effects.is_empty() => {
+            let wrong = body.refitted.iter().map(|r| format!("{} of {}", r.parameter, r.kind)).collect::<Vec<_>>();
+            format!("missing — what the model file states of {} is wrong", wrong.join(" and "))
+        }
         "missing" => format!("missing — the model lacks {}", kinds()),
         "indistinguishable" => format!("indistinguishable — {} or an equivalent is missing", kinds()),
+        _ if body.hypothesis.is_some() => format!("unexplained — {}", hypothesis_in_words(body).join("; ")),
         _ if body.effects.is_empty() => {
             "unexplained — something is there that no combination of known effects explains".to_owned()
         }
         _ => format!("unexplained — {} explains a part only", kinds()),
     }
+}
+
+/// Another winding, a reversed coil, steps of the offset: a line each.
+pub fn hypothesis_in_words(body: &DiagnosisJson) -> Vec<String> {
+    let Some(said) = &body.hypothesis else { return Vec::new() };
+    let mut lines = Vec::new();
+    match (&said.winding, said.reversed) {
+        (Some(winding), false) => lines.push(format!("this record looks like that of a coil wound as {winding}")),
+        (Some(winding), true) => {
+            lines.push(format!(
+                "this record looks like that of a coil wound as {winding} and connected the other way round"
+            ));
+        }
+        (None, true) => lines.push("this record looks like that of a coil connected the other way round".to_owned()),
+        (None, false) => {}
+    }
+    if let Some([a, b]) = said.exchanged_layers {
+        lines.push(format!("layers {a} and {b}, counted from the innermost, seem to have changed places in winding"));
+    }
+    for step in &said.offset_steps {
+        lines.push(format!(
+            "the offset of {} steps by {:+.4} °/h at {:.0} s",
+            step.record, step.size_deg_per_h, step.time_s
+        ));
+    }
+    lines
+}
+
+/// Stated numbers that the records contradict: a line each, with the old and the new value.
+pub fn refitted_in_words(body: &DiagnosisJson) -> Vec<String> {
+    let line = |r: &RefittedJson| {
+        let error = r.standard_error.map_or_else(String::new, |e| format!(" ± {e:.2}"));
+        let unit = if r.unit == "1" { String::new() } else { format!(" {}", r.unit) };
+        format!(
+            "{} of {}: the model file states {:.4}{unit}, the records say {:.4}{error}{unit}",
+            r.parameter, r.kind, r.declared, r.value
+        )
+    };
+    body.refitted.iter().map(line).collect()
+}
+
+/// White noise, wander and unresolved air of each record, and what limits it most.
+pub fn noise_in_words(body: &DiagnosisJson) -> Vec<String> {
+    let line = |n: &NoiseJson| {
+        let (white, wander, air) = (n.white_deg_per_h, n.wander_deg_per_h, n.unresolved_air_deg_per_h);
+        let limit = if air > white && air > wander {
+            "what limits it most is what the air does and the sensor does not see: a finer or faster sensor, or calmer air, would help"
+        } else if wander > white {
+            "what limits it most is the gyro's wander: shorter records, or an average of several, would help"
+        } else {
+            "what limits it most is the gyro's white noise: a longer record would help"
+        };
+        format!(
+            "{}: white noise {white:.4} ± {:.4} °/h a row, wander {wander:.4} °/h, unresolved air {air:.4} °/h; {limit}",
+            n.record, n.white_standard_error_deg_per_h
+        )
+    };
+    body.noise.iter().map(line).collect()
+}
+
+/// The sets that hold the posterior mass, a line each.
+pub fn posterior_in_words(body: &DiagnosisJson) -> Vec<String> {
+    let shown = body.posterior.iter().filter(|s| s.probability > 0.005);
+    shown
+        .map(|s| {
+            let name = if s.effects.is_empty() { "the declared model".to_owned() } else { s.effects.join(" + ") };
+            format!("{:.1} % {name}", percent_from_fraction(s.probability))
+        })
+        .collect()
 }
 
 /// With its error, and whether a bound holds it.
@@ -115,6 +189,14 @@ pub(super) fn section(body: &DiagnosisJson, tables: &[Vec<DiagnosisRow>]) -> Mar
                     &format!("{}, {}: the residual of the declared model and what the effects found leave of it.", record.file, record.role)))
             }
         }
+        @if !body.refitted.is_empty() {
+            h2 { "Stated numbers that the records contradict" }
+            ul { @for line in refitted_in_words(body) { li { (line) } } }
+        }
+        h2 { "Noise, told apart" }
+        ul { @for line in noise_in_words(body) { li { (line) } } }
+        h2 { "How sure" }
+        ul { @for line in posterior_in_words(body) { li { (line) } } }
         @if body.suggested_experiment.is_some() || body.experiment.is_some() { h2 { "Next experiment" } }
         @if let Some(words) = &body.suggested_experiment { p { (words) } }
         @if let Some(found) = &body.experiment { (experiment(found)) }

@@ -31,7 +31,6 @@ mod plan;
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use super::verdict::{EQUAL, EQUAL_SHARE};
 use crate::pattern::Pattern;
 use crate::profile::Profile;
 use crate::units::REFERENCE_TEMPERATURE_K;
@@ -44,6 +43,12 @@ pub use plan::Refusal;
 
 #[cfg(test)]
 pub(super) use contest::tests as fixtures;
+
+/// Candidates that differ by less than this share of what they explain explain it equally well: no effect's equation is
+/// more accurate than that.
+const EQUAL_SHARE: f64 = 0.01;
+/// Candidates whose χ² differ by less explain the records equally well (odds of 400 at best).
+const EQUAL: f64 = 12.0;
 
 /// A profile, and how surely it tells the candidates apart.
 #[derive(Debug, Clone, PartialEq)]

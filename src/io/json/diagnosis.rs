@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::diagnose::experiment::Experiment;
 use crate::diagnose::{
-    Contender, Diagnosis, Equivalent, Finding, FittedParameter, Plain, Rung, Shape, Unexplained, Verdict,
+    Contender, Diagnosis, Equivalent, Finding, FittedParameter, Hypothesis, OffsetStep, Plain, RecordNoise, Refitted,
+    Rung, Shape, Share, Unexplained, Verdict,
 };
 use crate::effect::DeclaredEffect;
 use crate::units::deg_per_h_from_rad_per_s;
@@ -33,7 +34,63 @@ pub struct DiagnosisJson {
     /// The profile that would tell the candidates apart; null unless it was asked for and there is something to tell apart.
     pub experiment: Option<ExperimentJson>,
     pub cautions: Vec<String>,
+    /// Sets of explanations with their posterior probability, largest first.
+    #[serde(default)]
+    pub posterior: Vec<ShareJson>,
+    /// Declared numbers that the records contradict.
+    #[serde(default)]
+    pub refitted: Vec<RefittedJson>,
+    /// Another winding, a coil connected the other way round, steps of the offset; null where none of these won.
+    #[serde(default)]
+    pub hypothesis: Option<HypothesisJson>,
+    /// White noise, wander and unresolved air of each record, fitted ones first.
+    #[serde(default)]
+    pub noise: Vec<NoiseJson>,
     pub inputs: InputsJson,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ShareJson {
+    pub effects: Vec<String>,
+    pub probability: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RefittedJson {
+    pub kind: String,
+    pub parameter: String,
+    pub declared: f64,
+    pub value: f64,
+    pub standard_error: Option<f64>,
+    pub unit: String,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HypothesisJson {
+    /// The classic that the coil seems to be wound as.
+    pub winding: Option<String>,
+    pub reversed: bool,
+    /// Two layers that changed places, counted from 1 innermost.
+    pub exchanged_layers: Option<[usize; 2]>,
+    pub offset_steps: Vec<OffsetStepJson>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OffsetStepJson {
+    pub record: String,
+    pub time_s: f64,
+    pub size_deg_per_h: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NoiseJson {
+    pub record: String,
+    /// Of one logged rate.
+    pub white_deg_per_h: f64,
+    pub white_standard_error_deg_per_h: f64,
+    pub wander_deg_per_h: f64,
+    /// What the air did and the sensor could not see.
+    pub unresolved_air_deg_per_h: f64,
 }
 
 /// One row of a record: what the declared model and the one with the accepted effects leave.
@@ -163,6 +220,10 @@ impl DiagnosisJson {
             holdout_noise_floor_deg_per_h: holdout_noise_rad_per_s.map(deg_per_h_from_rad_per_s),
             experiment: experiment.map(|e| ExperimentJson::new(e, diagnosis.noise_floor_rad_per_s)),
             ladder_in_words: Vec::new(),
+            posterior: diagnosis.posterior.iter().map(ShareJson::new).collect(),
+            refitted: diagnosis.refitted.iter().map(RefittedJson::new).collect(),
+            hypothesis: diagnosis.hypothesis.as_ref().map(HypothesisJson::new),
+            noise: diagnosis.noise.iter().map(NoiseJson::new).collect(),
             inputs,
         };
         document.ladder_in_words = document.steps_in_words();
@@ -204,6 +265,54 @@ impl DiagnosisJson {
                 format!("{model} the error is {} on the fitted records{unseen}", error(rung.rmse_deg_per_h, false))
             })
             .collect()
+    }
+}
+
+impl ShareJson {
+    fn new(share: &Share) -> Self {
+        Self { effects: share.effects.clone(), probability: share.probability }
+    }
+}
+
+impl RefittedJson {
+    fn new(refitted: &Refitted) -> Self {
+        let unit = refitted.unit;
+        Self {
+            kind: refitted.kind.clone(),
+            parameter: refitted.parameter.clone(),
+            declared: unit.from_si(refitted.declared),
+            value: unit.from_si(refitted.value),
+            standard_error: refitted.standard_error.map(|e| unit.difference_from_si(e)),
+            unit: unit.symbol().to_owned(),
+        }
+    }
+}
+
+impl HypothesisJson {
+    fn new(hypothesis: &Hypothesis) -> Self {
+        let step = |s: &OffsetStep| OffsetStepJson {
+            record: s.record.clone(),
+            time_s: s.time_s,
+            size_deg_per_h: deg_per_h_from_rad_per_s(s.size_rad_per_s),
+        };
+        Self {
+            winding: hypothesis.winding.map(str::to_owned),
+            reversed: hypothesis.reversed,
+            exchanged_layers: hypothesis.exchanged.map(|(a, b)| [a, b]),
+            offset_steps: hypothesis.offset_steps.iter().map(step).collect(),
+        }
+    }
+}
+
+impl NoiseJson {
+    fn new(of: &RecordNoise) -> Self {
+        Self {
+            record: of.record.clone(),
+            white_deg_per_h: deg_per_h_from_rad_per_s(of.noise.white_rad_per_s),
+            white_standard_error_deg_per_h: deg_per_h_from_rad_per_s(of.noise.white_standard_error_rad_per_s),
+            wander_deg_per_h: deg_per_h_from_rad_per_s(of.noise.wander_rad_per_s),
+            unresolved_air_deg_per_h: deg_per_h_from_rad_per_s(of.noise.unresolved_air_rad_per_s),
+        }
     }
 }
 

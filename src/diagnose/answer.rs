@@ -1,0 +1,246 @@
+//! From posterior masses to a verdict, and everything that is said with it.
+//!
+//! *Adequate*: the declared model holds the mass. *Missing*: one set holds 95 % of it. *Indistinguishable*: the smallest
+//! family that reaches 95 %, all of it. *Unexplained*: sets with wander, a cycle or an estimate beyond what is physical
+//! hold half, or the coil is wound or connected otherwise.
+
+use rayon::prelude::*;
+
+use super::describe::{contenders, findings, ladder, unexplained};
+use super::joint::{Explanation, Found, Member, Question};
+use super::{Caution, DiagnoseError, Diagnosis, Hypothesis, OffsetStep, RecordNoise, Refitted, Share, Verdict};
+use crate::chamber::{Chamber, Fit, Place};
+use crate::record::Record;
+
+/// What one set, or the smallest family, must hold.
+pub(super) const CERTAIN: f64 = 0.95;
+/// What sets with something unknown in them must hold for that to be the answer.
+const HALF: f64 = 0.5;
+
+/// An explanation with the fits of the held-out records.
+pub(super) struct Settled<'e> {
+    pub explanation: &'e Explanation,
+    /// One a held-out record, in their order.
+    pub held_out: Vec<Fit>,
+}
+
+impl<'e> Settled<'e> {
+    pub fn new(question: &Question, explanation: &'e Explanation) -> Result<Self, DiagnoseError> {
+        let fits: Result<Vec<Fit>, _> =
+            question.held_out.par_iter().map(|&r| question.chamber.held_out(&explanation.fit, r)).collect();
+        Ok(Self { explanation, held_out: fits? })
+    }
+}
+
+/// The whole answer.
+///
+/// # Errors
+/// A model that cannot be solved any more.
+pub(super) fn answer(question: &Question, found: &Found, records: &[&Record]) -> Result<Diagnosis, DiagnoseError> {
+    let declared = found.declared().ok_or(DiagnoseError::Unsolvable)?;
+    let outside: f64 = found.explanations.iter().filter(|e| e.is_outside()).map(|e| e.probability).sum();
+    let rewound = |e: &Explanation| e.members.iter().any(|m| matches!(m, Member::Winding(_)));
+    let wound: f64 = found.explanations.iter().filter(|e| rewound(e) && !e.is_outside()).map(|e| e.probability).sum();
+    let family = family(found);
+    let top = family.first().copied().unwrap_or(declared);
+    let (verdict, named) = if outside >= HALF {
+        (Verdict::Unexplained, declared)
+    } else if wound >= HALF {
+        (Verdict::Unexplained, top)
+    } else if top.members.is_empty() {
+        (Verdict::Adequate, top)
+    } else if family.len() > 1 && distinct(question, &family) > 1 {
+        (Verdict::Indistinguishable, top)
+    } else if top.members.iter().all(|m| matches!(m, Member::Step { .. })) {
+        (Verdict::Unexplained, top)
+    } else {
+        (Verdict::Missing, top)
+    };
+    let likeliest =
+        if outside >= HALF { found.explanations.iter().find(|e| e.is_outside()).unwrap_or(top) } else { top };
+    let (settled, first) = (Settled::new(question, named)?, Settled::new(question, declared)?);
+    let noise = noises(question, likeliest)?;
+    let noise_floor = {
+        let squares: f64 = noise.iter().take(question.fitted.len()).map(|n| n.noise.white_rad_per_s.powi(2)).sum();
+        (squares / question.fitted.len().max(1) as f64).sqrt()
+    };
+    let equals: &[&Explanation] = if verdict == Verdict::Indistinguishable { &family } else { &[] };
+    let effects = findings(question, found, &settled, &first, equals)?;
+    let mut cautions = cautions(question.chamber, records);
+    let hypothesis = hypothesis(question, found, named);
+    if let Some(winding) = hypothesis.as_ref().and_then(|h| h.winding) {
+        cautions.push(Caution::OtherWinding { winding });
+    }
+    if question.held_out.is_empty() {
+        cautions.push(Caution::NoHoldout);
+    }
+    let suggested_experiment = experiment(verdict, &effects);
+    Ok(Diagnosis {
+        verdict,
+        ladder: ladder(question, found, &settled, &first, &noise)?,
+        candidates: contenders(question, found, declared),
+        noise_floor_rad_per_s: noise_floor,
+        unexplained: match verdict {
+            Verdict::Unexplained => Some(unexplained(question, &first, likeliest)?),
+            _ => None,
+        },
+        suggested_experiment,
+        cautions,
+        extended: named.fit.assumed.model.clone(),
+        posterior: posterior(question, found),
+        refitted: refitted(question, named),
+        hypothesis,
+        noise,
+        effects,
+    })
+}
+
+/// The smallest family of sets without anything unknown that holds 95 % of what such sets hold.
+fn family(found: &Found) -> Vec<&Explanation> {
+    let known: Vec<&Explanation> =
+        found.explanations.iter().filter(|e| !e.is_outside() || e.members.is_empty()).collect();
+    let total: f64 = known.iter().map(|e| e.probability).sum();
+    let mut sum = 0.0;
+    let mut family = Vec::new();
+    for explanation in known {
+        if sum >= CERTAIN * total && !family.is_empty() {
+            break;
+        }
+        sum += explanation.probability;
+        family.push(explanation);
+    }
+    family
+}
+
+/// How many sets of effects a family holds, whatever parameters are free in them.
+fn distinct(question: &Question, family: &[&Explanation]) -> usize {
+    let mut seen: Vec<Vec<String>> = family.iter().map(|e| names(question, e)).collect();
+    seen.iter_mut().for_each(|s| s.sort());
+    seen.sort();
+    seen.dedup();
+    seen.len()
+}
+
+/// The kinds of a set; of what is no effect, a word.
+pub(super) fn names(question: &Question, explanation: &Explanation) -> Vec<String> {
+    let word = |m: &Member| match m {
+        Member::Effect(candidate) => question.candidates[*candidate].kind(),
+        Member::Refitted(effect) => format!("{} (refitted)", question.model.effects[*effect].kind()),
+        Member::Winding(_) => "another winding".to_owned(),
+        Member::Step { .. } => "offset step".to_owned(),
+        Member::Drift => "unexplained wander".to_owned(),
+        Member::Cycle => "unexplained cycle".to_owned(),
+    };
+    explanation.members.iter().map(word).collect()
+}
+
+fn posterior(question: &Question, found: &Found) -> Vec<Share> {
+    let mut shares: Vec<Share> = Vec::new();
+    for explanation in found.explanations.iter().filter(|e| e.probability > 1e-6) {
+        let effects = names(question, explanation);
+        match shares.iter_mut().find(|s| s.effects == effects) {
+            Some(share) => share.probability += explanation.probability,
+            None => shares.push(Share { effects, probability: explanation.probability }),
+        }
+    }
+    shares
+}
+
+/// Declared numbers that were fitted anew.
+fn refitted(question: &Question, named: &Explanation) -> Vec<Refitted> {
+    let places = named.fit.parameters.iter().filter_map(|p| match p.place {
+        Place::Effect { effect, parameter } if effect < question.model.effects.len() => {
+            Some((p.place, effect, parameter))
+        }
+        _ => None,
+    });
+    places
+        .filter_map(|(place, effect, parameter)| {
+            let declared = &question.model.effects[effect];
+            let own = &declared.parameters()[parameter];
+            let (value, error) = named.fit.value(place)?;
+            Some(Refitted {
+                kind: declared.kind(),
+                parameter: own.key.clone(),
+                unit: own.unit,
+                declared: declared.values()[parameter],
+                value,
+                standard_error: error.is_finite().then_some(error),
+            })
+        })
+        .collect()
+}
+
+/// What is no effect and yet explains the records.
+fn hypothesis(question: &Question, found: &Found, named: &Explanation) -> Option<Hypothesis> {
+    let mut said = Hypothesis::default();
+    let mut steps = 0;
+    for member in &named.members {
+        match member {
+            Member::Winding(place) => {
+                let winding = &found.windings[*place];
+                said.winding = winding.classic;
+                said.reversed = winding.reversed;
+                said.exchanged = winding.exchanged.map(|(a, b)| (a + 1, b + 1));
+            }
+            Member::Step { record, row } => {
+                let size = named.fit.assumed.inputs.get(steps).map_or(0.0, |i| i.amplitude);
+                steps += 1;
+                said.offset_steps.push(OffsetStep {
+                    record: question.chamber.record(*record).name().to_owned(),
+                    time_s: question.chamber.times_s(*record)[*row],
+                    size_rad_per_s: size,
+                });
+            }
+            _ => {}
+        }
+    }
+    (said != Hypothesis::default()).then_some(said)
+}
+
+fn noises(question: &Question, explanation: &Explanation) -> Result<Vec<RecordNoise>, DiagnoseError> {
+    let chamber = question.chamber;
+    let mut all = Vec::new();
+    for &record in &question.fitted {
+        all.push(RecordNoise {
+            record: chamber.record(record).name().to_owned(),
+            noise: chamber.noise(&explanation.fit, record)?,
+        });
+    }
+    for &record in &question.held_out {
+        let fit = chamber.held_out(&explanation.fit, record)?;
+        all.push(RecordNoise { record: chamber.record(record).name().to_owned(), noise: chamber.noise(&fit, record)? });
+    }
+    Ok(all)
+}
+
+fn cautions(chamber: &Chamber, records: &[&Record]) -> Vec<Caution> {
+    let mut cautions = Vec::new();
+    for (place, record) in records.iter().enumerate() {
+        let name = record.name().to_owned();
+        if chamber.spikes(place) > 0 {
+            cautions.push(Caution::Outliers { record: name.clone(), rows: chamber.spikes(place) });
+        }
+        for channel in record.channels().iter().filter(|c| c.values.iter().any(|v| !v.is_finite())) {
+            cautions.push(Caution::ChannelIncomplete { record: name.clone(), channel: channel.name.clone() });
+        }
+    }
+    cautions
+}
+
+/// What to measure next.
+fn experiment(verdict: Verdict, effects: &[super::Finding]) -> Option<String> {
+    match verdict {
+        Verdict::Adequate => None,
+        Verdict::Unexplained => Some(
+            "repeat the record with the disturbance that its period or time constant suggests switched off, and log what correlates with it"
+                .to_owned(),
+        ),
+        Verdict::Missing => effects.first().map(|e| format!("to confirm {}: {}", e.effect.kind(), e.effect.spec().experiment)),
+        Verdict::Indistinguishable => effects.iter().find(|e| !e.equivalents.is_empty()).map(|e| {
+            let others = e.equivalents.iter().map(|o| format!("for {}: {}", o.effect.kind(), o.effect.spec().experiment));
+            let own = format!("for {}: {}", e.effect.kind(), e.effect.spec().experiment);
+            std::iter::once(own).chain(others).collect::<Vec<_>>().join("; ")
+        }),
+    }
+}

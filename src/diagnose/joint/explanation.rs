@@ -1,0 +1,204 @@
+//! One set of explanations, fitted.
+
+use super::{EFFECT, EXCHANGE, OUTSIDE, Question, REFITTED, STEP, WINDING, Winding, rates};
+use crate::chamber::{Assumption, Effort, Fit, Free, Input, Place, Quantity, Scale};
+use crate::effect::DeclaredEffect;
+
+/// One thing that a set assumes beside the declared model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Member {
+    /// An effect of the catalogue: its candidate.
+    Effect(usize),
+    /// The numbers of an effect that the model declares are wrong: its place in the model.
+    Refitted(usize),
+    /// Another winding: its place among those looked at.
+    Winding(usize),
+    /// The offset steps before this row of this record.
+    Step {
+        record: usize,
+        row: usize,
+    },
+    /// Wander, and a cycle, that nothing in the model makes.
+    Drift,
+    Cycle,
+}
+
+impl Member {
+    pub fn is_outside(self) -> bool {
+        matches!(self, Member::Drift | Member::Cycle)
+    }
+}
+
+/// A set with its fit and what it is worth.
+#[derive(Debug, Clone)]
+pub struct Explanation {
+    /// In the order in which they joined.
+    pub members: Vec<Member>,
+    pub fit: Fit,
+    /// Log evidence of the fitted records, prior of the set included.
+    pub merit: f64,
+    /// … of the held-out ones; None where it was not computed or nothing was held out.
+    pub held_out: Option<f64>,
+    pub probability: f64,
+}
+
+/// How far a stated number of a model file may be off: one deviation.
+const STATED_WITHIN: f64 = 0.25;
+/// An estimate so many prior deviations away is beyond what is physical …
+const PHYSICAL: f64 = 3.5;
+/// … and a gyro's wander of so many of its white noises is no flicker any more.
+const FLICKER: f64 = 1.2;
+
+impl Explanation {
+    pub fn new(question: &Question, windings: &[Winding], members: Vec<Member>, fit: Fit) -> Self {
+        let prior: f64 = members
+            .iter()
+            .map(|m| match m {
+                Member::Effect(_) => EFFECT.0,
+                Member::Refitted(_) => REFITTED.0,
+                Member::Winding(w) if windings[*w].exchanged.is_some() => {
+                    let n = windings[*w].pattern.layers() as f64;
+                    EXCHANGE.0 - (0.5 * n * (n - 1.0)).ln()
+                }
+                Member::Winding(_) => WINDING.0,
+                Member::Step { record, .. } => STEP.0 - (question.chamber.times_s(*record).len() as f64).ln(),
+                Member::Drift | Member::Cycle => OUTSIDE.0,
+            })
+            .sum();
+        let merit = fit.merit(rates(question.chamber, &fit)) + prior;
+        Self { members, fit, merit, held_out: None, probability: 0.0 }
+    }
+
+    /// The members in an order of their own.
+    pub fn key(&self) -> Vec<Member> {
+        let mut key = self.members.clone();
+        key.sort_unstable();
+        key
+    }
+
+    pub fn total(&self) -> f64 {
+        self.merit + self.held_out.unwrap_or(0.0)
+    }
+
+    /// Whether something is in it that no known effect explains: a member that says so, a gyro that wanders more than
+    /// gyros do, an estimate beyond what is physical.
+    pub fn is_outside(&self) -> bool {
+        let wanders = self.fit.records.iter().any(|&r| self.fit.number(Quantity::WanderShare, r) > FLICKER);
+        wanders || self.members.iter().any(|m| m.is_outside()) || self.is_beyond_physical()
+    }
+
+    pub fn is_beyond_physical(&self) -> bool {
+        self.fit.parameters.iter().zip(&self.fit.coordinates).any(|(p, &x)| {
+            let Place::Effect { .. } = p.place else { return false };
+            let at_bound = (p.scale == Scale::Logarithm && p.lower > f64::NEG_INFINITY && x - p.lower < 1e-3)
+                || p.upper - x < 1e-3 * p.deviation
+                || (p.scale == Scale::Linear && p.lower < 0.0 && x - p.lower < 1e-3 * p.deviation);
+            at_bound || (x - p.mean).abs() > PHYSICAL * p.deviation
+        })
+    }
+
+    /// The effects that it adds to the declared model, each with its candidate.
+    pub fn effects(&self, question: &Question) -> Vec<(usize, DeclaredEffect)> {
+        let declared = question.model.effects.len();
+        let added = self.members.iter().filter_map(|m| match m {
+            Member::Effect(candidate) => Some(*candidate),
+            _ => None,
+        });
+        added.zip(self.fit.assumed.model.effects[declared..].iter().cloned()).collect()
+    }
+}
+
+/// What an explanation with one more member assumes, its values as given for an effect.
+pub(super) fn with(
+    question: &Question,
+    windings: &[Winding],
+    from: &Fit,
+    member: Member,
+    values: Option<Vec<f64>>,
+) -> Option<(Assumption, Vec<Free>)> {
+    let (mut assumed, mut free) = (from.assumed.clone(), from.free.clone());
+    match member {
+        Member::Effect(place) => {
+            let candidate = &question.candidates[place];
+            let effect = match values {
+                Some(values) => candidate.effect.with_values(values).ok()?,
+                None => candidate.effect.clone(),
+            };
+            let effect_place = assumed.model.effects.len();
+            assumed.model.effects.push(effect);
+            free.extend(candidate.free.iter().map(|&parameter| Free {
+                effect: effect_place,
+                parameter,
+                stated_within: None,
+            }));
+        }
+        Member::Refitted(effect) => {
+            let parameters = assumed.model.effects[effect].values().iter().enumerate();
+            free.extend(parameters.filter(|(_, v)| **v != 0.0).map(|(parameter, _)| Free {
+                effect,
+                parameter,
+                stated_within: Some(STATED_WITHIN),
+            }));
+        }
+        Member::Winding(winding) => assumed.pattern = windings[winding].pattern.clone(),
+        Member::Step { record, row } => assumed.inputs.push(step(question, record, row)),
+        Member::Drift => assumed.drift = true,
+        Member::Cycle => assumed.cycle = true,
+    }
+    Some((assumed, free))
+}
+
+/// The assumption of an explanation without one of its members.
+pub(super) fn without(question: &Question, from: &Explanation, place: usize) -> (Assumption, Vec<Free>) {
+    let (mut assumed, mut free) = (from.fit.assumed.clone(), from.fit.free.clone());
+    let declared = question.model.effects.len();
+    match from.members[place] {
+        Member::Effect(_) => {
+            let before = from.members[..place].iter().filter(|m| matches!(m, Member::Effect(_))).count();
+            let effect = declared + before;
+            assumed.model.effects.remove(effect);
+            free.retain(|f| f.effect != effect);
+            free.iter_mut().filter(|f| f.effect > effect).for_each(|f| f.effect -= 1);
+        }
+        Member::Refitted(effect) => {
+            assumed.model.effects[effect] = question.model.effects[effect].clone();
+            free.retain(|f| f.effect != effect);
+        }
+        Member::Winding(_) => assumed.pattern = question.pattern.clone(),
+        Member::Step { .. } => {
+            let before = from.members[..place].iter().filter(|m| matches!(m, Member::Step { .. })).count();
+            assumed.inputs.remove(before);
+        }
+        Member::Drift => assumed.drift = false,
+        Member::Cycle => assumed.cycle = false,
+    }
+    (assumed, free)
+}
+
+/// An offset that steps: of the size of the record's noise, give or take an order.
+fn step(question: &Question, record: usize, row: usize) -> Input {
+    let chamber = question.chamber;
+    let course = |r: usize| {
+        let rows = chamber.times_s(r).len();
+        (0..rows).map(|k| f64::from(r == record && k >= row)).collect()
+    };
+    Input {
+        name: format!("offset step at {:.0} s", chamber.times_s(record)[row]),
+        rate_rad_per_s: (0..chamber.records()).map(course).collect(),
+        amplitude: 0.0,
+        deviation: 10.0 * chamber.noise_floor_rad_per_s(record),
+    }
+}
+
+/// Fits a set.
+pub(super) fn fitted(
+    question: &Question,
+    windings: &[Winding],
+    members: Vec<Member>,
+    (assumed, free): &(Assumption, Vec<Free>),
+    from: &Fit,
+    effort: Effort,
+) -> Option<Explanation> {
+    let fit = question.chamber.fit(assumed, free, &question.fitted, Some(from), effort).ok()?;
+    Some(Explanation::new(question, windings, members, fit))
+}

@@ -1,0 +1,74 @@
+//! The search over sets of explanations in the joint model, and what is left of them by posterior mass.
+//!
+//! ```text
+//! M(set) = ln E(fitted records) + ln E(held-out records | the coil's numbers as fitted) + Σ ln p(member)
+//! p(set) ∝ e^M;   a set that holds a smaller one as good gives its mass to that one
+//! ```
+//!
+//! # Source
+//! Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773; Madigan and Raftery, ibid. 89 (1994) 1535 (Occam's window).
+
+mod explanation;
+mod search;
+mod winding;
+
+use crate::chamber::{Chamber, ChamberError, Fit};
+use crate::diagnose::candidate::Candidate;
+use crate::pattern::Pattern;
+
+pub use explanation::{Explanation, Member};
+pub use search::{refit_without, search, settle_one};
+pub use winding::Winding;
+
+/// What is asked of the search.
+#[derive(Debug)]
+pub struct Question<'a> {
+    pub chamber: &'a Chamber<'a>,
+    pub model: &'a crate::rate::CoilModel,
+    pub pattern: &'a Pattern,
+    pub candidates: &'a [Candidate],
+    /// Places of the records to fit, and of those that are held out.
+    pub fitted: Vec<usize>,
+    pub held_out: Vec<usize>,
+}
+
+/// What the search found.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// Best first; probabilities add up to one. The declared model is always among them.
+    pub explanations: Vec<Explanation>,
+    /// Of each candidate the gain in log likelihood that the score test promised, largest first, with the effect there.
+    pub promised: Vec<(usize, f64)>,
+    pub windings: Vec<Winding>,
+}
+
+impl Found {
+    /// The declared model, with whatever belongs to the day.
+    pub fn declared(&self) -> Option<&Explanation> {
+        self.explanations.iter().find(|e| e.members.is_empty())
+    }
+}
+
+/// A natural logarithm of a prior odds, with its reason.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Odds(pub f64);
+
+/// One effect of the catalogue is missing in one coil of twenty.
+pub(super) const EFFECT: Odds = Odds(-3.0);
+/// A number of a model file is wrong in one of ten.
+pub(super) const REFITTED: Odds = Odds(-2.3);
+/// One coil in fifty is wound, or connected, as another classic or the other way round …
+pub(super) const WINDING: Odds = Odds(-3.9);
+/// … and one in a hundred has two of its layers exchanged, whichever they are.
+pub(super) const EXCHANGE: Odds = Odds(-4.6);
+/// Wander, or a cycle, that belongs to nothing in the model.
+pub(super) const OUTSIDE: Odds = Odds(-3.0);
+/// A step of the offset somewhere in a record.
+pub(super) const STEP: Odds = Odds(-3.9);
+
+pub(super) type Outcome<T> = Result<T, ChamberError>;
+
+/// Rates that a fit has seen.
+pub(super) fn rates(chamber: &Chamber, fit: &Fit) -> usize {
+    fit.records.iter().map(|&r| chamber.times_s(r).len()).sum::<usize>().max(2)
+}

@@ -1,0 +1,517 @@
+//! The search: score test over everything that may be missing, fits of what promises most, forward and back.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::explanation::{fitted, with, without};
+use super::winding::promising;
+use super::{Explanation, Found, Member, Outcome, Question, Winding};
+use crate::chamber::{Assumption, ChamberError, Effort, Fit, Free, Quantity};
+use crate::effect::DeclaredEffect;
+use crate::units::Unit;
+
+/// Effects that a model may lack at once.
+const MOST_MEMBERS: usize = 4;
+/// Members that are fitted after each score test, as far as they promise this much …
+const TRIED: usize = 6;
+const WORTH_A_FIT: f64 = 3.0;
+/// … and this share of what the first does.
+const WORTH_BESIDE: f64 = 0.08;
+/// An effect that gains so much needs no comparison with a mere wander yet.
+const PLAIN: f64 = 25.0;
+/// A set must be better by so much to go on from.
+const WORTH_A_STEP: f64 = 1.0;
+/// Sets so much worse than the best are forgotten.
+const WINDOW: f64 = 20.0;
+/// Sets that are judged by held-out records at most.
+const JUDGED: usize = 8;
+/// A set that is better than one within it by less than this is that one.
+const AS_GOOD: f64 = 3.0;
+/// What a set with an estimate beyond what is physical must be better by to be heard.
+const UNPHYSICAL: f64 = 30.0;
+/// The record begins in a ramp if that gains so much: it is a property of the day, not of the coil.
+const UNSTEADY: f64 = 3.0;
+/// Periods of a cycle and times of an offset step, as shares of the record.
+const CYCLES: [f64; 3] = [0.06, 0.15, 0.4];
+const STEPS: usize = 60;
+
+/// Where a fit begins: what is assumed, and what of its effects is free.
+type Begin = (Assumption, Vec<Free>);
+
+/// Sets that were fitted, by their members.
+type Cache = BTreeMap<Vec<Member>, Explanation>;
+
+/// Searches sets of explanations; `progress` is told the share that is done.
+///
+/// # Errors
+/// A declared model that cannot be solved for these records.
+pub fn search(question: &Question, progress: &(dyn Fn(f64) + Sync)) -> Outcome<Found> {
+    let chamber = question.chamber;
+    let declared = Assumption::new(question.model.clone(), question.pattern.clone());
+    let mut null = chamber.fit_anew(&declared, &[], &question.fitted)?;
+    let mut moving = declared;
+    moving.unsteady = true;
+    if let Ok(unsteady) = chamber.fit(&moving, &[], &question.fitted, Some(&null), Effort::FULL)
+        && unsteady.evidence > null.evidence + UNSTEADY
+    {
+        null = unsteady;
+    }
+    progress(0.2);
+    let mut windings: Vec<Winding> = Vec::new();
+    let mut cache = Cache::new();
+    let mut best = Explanation::new(question, &windings, Vec::new(), null);
+    cache.insert(best.key(), best.clone());
+    let mut promised = Vec::new();
+    for stage in 0..MOST_MEMBERS {
+        let mut proposals = proposals(question, &best)?;
+        if stage == 0 {
+            windings = promising(question, &best.fit)?;
+            promised = foremost(&proposals);
+        }
+        proposals.extend(discrete(question, &windings, &best));
+        let mut found = fit_all(question, &windings, &best, choose(proposals));
+        let most = found.iter().map(|e| e.merit - best.merit).fold(0.0, f64::max);
+        if most < PLAIN {
+            found.extend(fit_all(question, &windings, &best, outside(&best)));
+        }
+        let mut next: Option<Explanation> = None;
+        for explanation in found {
+            if !explanation.is_beyond_physical() && next.as_ref().is_none_or(|n| explanation.merit > n.merit) {
+                next = Some(explanation.clone());
+            }
+            keep(&mut cache, explanation);
+        }
+        progress(0.2 + 0.6 * (stage + 1) as f64 / MOST_MEMBERS as f64);
+        let Some(next) = next else { break };
+        let next = calmed(question, &windings, next);
+        keep(&mut cache, next.clone());
+        // What was fitted with the larger set may be a better chamber for the smaller one.
+        if let Some(again) = refit_without_last(question, &windings, &next) {
+            keep(&mut cache, again);
+        }
+        let base = cache.get(&best.key()).map_or(best.merit, |b| b.merit);
+        if next.merit < base + WORTH_A_STEP {
+            break;
+        }
+        best = look_back(question, &windings, next, &mut cache);
+        if best.members.iter().any(|m| m.is_outside()) {
+            break;
+        }
+    }
+    complete(question, &windings, &best, &mut cache);
+    let mut explanations: Vec<Explanation> = cache.into_values().collect();
+    judge(question, &windings, &mut explanations);
+    progress(1.0);
+    Ok(Found { explanations, promised, windings })
+}
+
+fn keep(cache: &mut Cache, explanation: Explanation) {
+    let key = explanation.key();
+    if cache.get(&key).is_none_or(|known| explanation.merit > known.merit) {
+        cache.insert(key, explanation);
+    }
+}
+
+/// One more member, where its fit begins, and what the score test promises.
+#[derive(Debug, Clone)]
+struct Proposal {
+    member: Member,
+    values: Option<Vec<f64>>,
+    gain: f64,
+}
+
+/// The score test of every candidate from each of its starts.
+fn proposals(question: &Question, best: &Explanation) -> Outcome<Vec<Proposal>> {
+    let mut asked: Vec<(usize, Vec<f64>)> = Vec::new();
+    for (place, candidate) in question.candidates.iter().enumerate() {
+        let there = best.members.iter().any(|m| match m {
+            Member::Effect(own) => question.candidates[*own].kind() == candidate.kind(),
+            _ => false,
+        });
+        // With a default a parameter joins only once the effect is there.
+        let fuller = question.candidates[..place]
+            .iter()
+            .any(|c| c.kind() == candidate.kind() && c.effect.choices() == candidate.effect.choices());
+        if !there && !fuller {
+            asked.extend(candidate.starts.iter().map(|start| (place, start.clone())));
+        }
+    }
+    let changed: Vec<Option<Assumption>> = asked
+        .iter()
+        .map(|(place, start)| with(question, &[], &best.fit, Member::Effect(*place), Some(start.clone())).map(|a| a.0))
+        .collect();
+    let places: Vec<usize> = (0..asked.len()).filter(|&i| changed[i].is_some()).collect();
+    let changed: Vec<Assumption> = changed.into_iter().flatten().collect();
+    let directions = question.chamber.score_models(&best.fit, &changed)?;
+    let mut all = Vec::new();
+    for (&i, direction) in places.iter().zip(directions) {
+        let Some(direction) = direction else { continue };
+        let (place, start) = &asked[i];
+        let effect = &question.candidates[*place].effect;
+        let (least, most) = range(effect, &question.candidates[*place].free);
+        let (gain, amplitude) = direction.gain(least, most);
+        let values = scaled(effect, &question.candidates[*place].free, start, amplitude);
+        all.push(Proposal { member: Member::Effect(*place), values: Some(values), gain });
+    }
+    Ok(all)
+}
+
+/// Multiples of a start that a score test may look for: either sign where the parameter has both.
+fn range(effect: &DeclaredEffect, free: &[usize]) -> (f64, f64) {
+    let parameters = effect.parameters();
+    if free.iter().any(|&i| parameters[i].lower < 0.0 && parameters[i].unit != Unit::Celsius) {
+        (-100.0, 100.0)
+    } else if free.iter().any(|&i| parameters[i].unit == Unit::One) {
+        (-4.0, 4.0)
+    } else {
+        (0.0, 2.0)
+    }
+}
+
+/// A start moved to where the score test wants it; what only has an order stays where it is.
+fn scaled(effect: &DeclaredEffect, free: &[usize], start: &[f64], amplitude: f64) -> Vec<f64> {
+    let parameters = effect.parameters();
+    let mut values = start.to_vec();
+    for &i in free {
+        let p = &parameters[i];
+        if p.unit == Unit::Celsius {
+            continue;
+        }
+        let inside = |v: f64| v.clamp(p.lower + 1e-6 * (p.upper - p.lower), p.upper - 1e-6 * (p.upper - p.lower));
+        if p.lower < 0.0 {
+            values[i] = inside(amplitude * start[i]);
+        } else if p.unit == Unit::One && p.lower > 0.0 {
+            values[i] = inside(start[i].powf(amplitude));
+        }
+    }
+    values
+}
+
+/// The best promise of each candidate.
+fn foremost(proposals: &[Proposal]) -> Vec<(usize, f64)> {
+    let mut best: BTreeMap<usize, f64> = BTreeMap::new();
+    for proposal in proposals {
+        if let Member::Effect(place) = proposal.member {
+            let known = best.entry(place).or_insert(f64::NEG_INFINITY);
+            *known = known.max(proposal.gain);
+        }
+    }
+    let mut all: Vec<(usize, f64)> = best.into_iter().collect();
+    all.sort_by(|a, b| b.1.total_cmp(&a.1));
+    all
+}
+
+/// Members that are no effects of the catalogue. What cannot be scored is fitted wherever something is missing.
+fn discrete(question: &Question, windings: &[Winding], best: &Explanation) -> Vec<Proposal> {
+    let mut all = Vec::new();
+    let mut add = |member: Member, gain: f64| {
+        if !best.members.contains(&member) {
+            all.push(Proposal { member, values: None, gain });
+        }
+    };
+    if !best.members.iter().any(|m| matches!(m, Member::Winding(_))) {
+        windings.iter().enumerate().for_each(|(w, winding)| add(Member::Winding(w), winding.promised));
+    }
+    for (effect, declared) in question.model.effects.iter().enumerate() {
+        if declared.values().iter().any(|v| *v != 0.0) {
+            add(Member::Refitted(effect), f64::INFINITY);
+        }
+    }
+    all.extend(steps(question, best));
+    all
+}
+
+/// Members that say that something else is there.
+fn outside(best: &Explanation) -> Vec<Proposal> {
+    let all = [Member::Drift, Member::Cycle].into_iter().filter(|m| !best.members.contains(m));
+    all.map(|member| Proposal { member, values: None, gain: f64::INFINITY }).collect()
+}
+
+/// The most promising step of the offset.
+fn steps(question: &Question, best: &Explanation) -> Option<Proposal> {
+    let chamber = question.chamber;
+    let places: Vec<(usize, usize)> = question
+        .fitted
+        .iter()
+        .flat_map(|&r| {
+            let rows = chamber.times_s(r).len();
+            (1..STEPS).map(move |i| (r, i * rows / STEPS)).filter(|(_, row)| *row > 2)
+        })
+        .collect();
+    let scan = |places: &[(usize, usize)]| -> Option<(f64, (usize, usize))> {
+        let columns: Vec<_> = places.iter().map(|&(r, row)| crate::chamber::Column::step(chamber, r, row)).collect();
+        let scores = chamber.score(&best.fit, &columns).ok()?;
+        let gains = places.iter().enumerate().map(|(i, place)| (scores.gain(i).0, *place));
+        gains.max_by(|a, b| a.0.total_cmp(&b.0))
+    };
+    let (coarse, (record, row)) = scan(&places)?;
+    if coarse < WORTH_A_FIT {
+        return None;
+    }
+    let rows = chamber.times_s(record).len();
+    let width = (rows / STEPS).max(1);
+    let from = row.saturating_sub(width).max(2);
+    let fine: Vec<(usize, usize)> = (from..(row + width).min(rows - 1)).map(|k| (record, k)).collect();
+    let (gain, (record, row)) = scan(&fine)?;
+    Some(Proposal { member: Member::Step { record, row }, values: None, gain })
+}
+
+/// The most promising proposals, one start a member, two where they promise nearly the same.
+fn choose(mut proposals: Vec<Proposal>) -> Vec<Proposal> {
+    proposals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let first = proposals.iter().map(|p| p.gain).filter(|g| g.is_finite()).fold(0.0, f64::max);
+    let least = WORTH_A_FIT.max(WORTH_BESIDE * first);
+    let mut seen: BTreeMap<Member, usize> = BTreeMap::new();
+    let mut scored = 0;
+    proposals.retain(|p| {
+        if !(p.gain > least) {
+            return false;
+        }
+        let times = seen.entry(p.member).or_insert(0);
+        *times += 1;
+        if p.gain.is_finite() && *times == 1 {
+            scored += 1;
+        }
+        *times == 1 && (!p.gain.is_finite() || scored <= TRIED)
+    });
+    proposals
+}
+
+fn fit_all(question: &Question, windings: &[Winding], best: &Explanation, tried: Vec<Proposal>) -> Vec<Explanation> {
+    tried
+        .into_par_iter()
+        .filter_map(|proposal| {
+            let mut members = best.members.clone();
+            members.push(proposal.member);
+            let begin = with(question, windings, &best.fit, proposal.member, proposal.values)?;
+            if proposal.member == Member::Cycle {
+                let longest = question.fitted.iter().map(|&r| duration_s(question, r)).fold(0.0, f64::max);
+                let from = CYCLES.iter().map(|share| moved(&best.fit, Quantity::CyclePeriod, share * longest));
+                let fits =
+                    from.filter_map(|start| fitted(question, windings, members.clone(), &begin, &start, Effort::QUICK));
+                return fits.max_by(|a, b| a.merit.total_cmp(&b.merit));
+            }
+            let known = fitted(question, windings, members.clone(), &begin, &best.fit, Effort::QUICK);
+            if !matches!(proposal.member, Member::Winding(_)) {
+                return known;
+            }
+            // The chamber that made the best of another winding is far from that of the right one.
+            let mut calm = best.fit.clone();
+            calm.calm(&question.fitted);
+            let again = fitted(question, windings, members, &begin, &calm, Effort::QUICK);
+            known.into_iter().chain(again).max_by(|a, b| a.merit.total_cmp(&b.merit))
+        })
+        .collect()
+}
+
+/// A set once more from a gyro that does not wander: with less missing there may be a better maximum there.
+fn calmed(question: &Question, windings: &[Winding], known: Explanation) -> Explanation {
+    let mut start = known.fit.clone();
+    start.calm(&question.fitted);
+    let begin = (known.fit.assumed.clone(), known.fit.free.clone());
+    let further = [&known.fit, &start]
+        .into_par_iter()
+        .filter_map(|from| fitted(question, windings, known.members.clone(), &begin, from, Effort::FULL));
+    let further: Vec<Explanation> = further.collect();
+    further.into_iter().fold(known, |best, again| if again.merit > best.merit { again } else { best })
+}
+
+fn duration_s(question: &Question, record: usize) -> f64 {
+    let times = question.chamber.times_s(record);
+    times[times.len() - 1] - times[0]
+}
+
+fn moved(fit: &Fit, quantity: Quantity, value: f64) -> Fit {
+    let mut fit = fit.clone();
+    fit.set_number(quantity, value);
+    fit
+}
+
+/// The set before its last member, beginning with the chamber that was found with it.
+fn refit_without_last(question: &Question, windings: &[Winding], next: &Explanation) -> Option<Explanation> {
+    let place = next.members.len().checked_sub(1)?;
+    let mut members = next.members.clone();
+    members.remove(place);
+    fitted(question, windings, members, &without(question, next, place), &next.fit, Effort::QUICK)
+}
+
+/// The rest of a set, fitted again without one member.
+pub fn refit_without(question: &Question, from: &Explanation, place: usize) -> Option<Explanation> {
+    let mut members = from.members.clone();
+    members.remove(place);
+    let begin = without(question, from, place);
+    let fit = question.chamber.fit(&begin.0, &begin.1, &question.fitted, Some(&from.fit), Effort::QUICK).ok()?;
+    Some(Explanation { members, fit, merit: f64::NEG_INFINITY, held_out: None, probability: 0.0 })
+}
+
+/// Leaves out what the rest does not need.
+fn look_back(question: &Question, windings: &[Winding], mut best: Explanation, cache: &mut Cache) -> Explanation {
+    while best.members.len() > 1 {
+        let smaller: Vec<Explanation> = (0..best.members.len())
+            .into_par_iter()
+            .filter_map(|place| {
+                let mut members = best.members.clone();
+                members.remove(place);
+                let mut key = members.clone();
+                key.sort_unstable();
+                let again =
+                    fitted(question, windings, members, &without(question, &best, place), &best.fit, Effort::QUICK);
+                again.into_iter().chain(cache.get(&key).cloned()).max_by(|a, b| a.merit.total_cmp(&b.merit))
+            })
+            .collect();
+        smaller.iter().for_each(|s| keep(cache, s.clone()));
+        let Some(least) = smaller.into_iter().max_by(|a, b| a.merit.total_cmp(&b.merit)) else { break };
+        if least.merit < best.merit {
+            break;
+        }
+        best = least;
+    }
+    best
+}
+
+/// The best set once more with the parameters that have defaults, and with each member exchanged for what promises most.
+fn complete(question: &Question, windings: &[Winding], best: &Explanation, cache: &mut Cache) {
+    let mut begins: Vec<(Vec<Member>, Begin)> = Vec::new();
+    for (place, member) in best.members.iter().enumerate() {
+        let Member::Effect(own) = member else { continue };
+        let rest = without(question, best, place);
+        let mut rest_fit = best.fit.clone();
+        (rest_fit.assumed, rest_fit.free) = (rest.0.clone(), rest.1.clone());
+        for (other, candidate) in question.candidates.iter().enumerate() {
+            let fuller = other != *own
+                && candidate.kind() == question.candidates[*own].kind()
+                && candidate.effect.choices() == question.candidates[*own].effect.choices();
+            if fuller {
+                let values = best.effects(question).iter().find(|e| e.0 == *own).map(|e| e.1.values().to_vec());
+                let mut members = best.members.clone();
+                members.remove(place);
+                members.push(Member::Effect(other));
+                if let Some(begin) = with(question, windings, &rest_fit, Member::Effect(other), values) {
+                    begins.push((members, begin));
+                }
+            }
+        }
+        if best.members.len() > 1 {
+            let mut members = best.members.clone();
+            members.remove(place);
+            let Ok(rest_fit) = question.chamber.fit(&rest.0, &rest.1, &question.fitted, Some(&best.fit), Effort::FULL)
+            else {
+                continue;
+            };
+            let rest = Explanation::new(question, windings, members.clone(), rest_fit);
+            let Ok(proposals) = proposals(question, &rest) else { continue };
+            for proposal in choose(proposals) {
+                let mut members = members.clone();
+                members.push(proposal.member);
+                let mut key = members.clone();
+                key.sort_unstable();
+                if !cache.contains_key(&key)
+                    && let Some(begin) = with(question, windings, &rest.fit, proposal.member, proposal.values)
+                {
+                    begins.push((members, begin));
+                }
+            }
+        }
+    }
+    let found: Vec<Explanation> = begins
+        .into_par_iter()
+        .filter_map(|(members, begin)| fitted(question, windings, members, &begin, &best.fit, Effort::QUICK))
+        .collect();
+    found.into_iter().for_each(|explanation| keep(cache, explanation));
+}
+
+/// Held-out records, posterior masses, and what is as good without some of its members.
+fn judge(question: &Question, windings: &[Winding], explanations: &mut Vec<Explanation>) {
+    // A size that no coil has is no explanation beside one that does nearly as well.
+    let physical =
+        explanations.iter().filter(|e| !e.is_beyond_physical()).map(|e| e.merit).fold(f64::NEG_INFINITY, f64::max);
+    explanations.retain(|e| e.members.is_empty() || !e.is_beyond_physical() || e.merit > physical + UNPHYSICAL);
+    let order = |list: &mut Vec<Explanation>| {
+        list.sort_by(|a, b| b.total().total_cmp(&a.total()).then_with(|| a.key().cmp(&b.key())))
+    };
+    order(explanations);
+    let least = explanations.first().map_or(0.0, |e| e.merit) - WINDOW;
+    let mut kept = 0;
+    explanations.retain(|e| {
+        kept += 1;
+        e.members.is_empty() || (e.merit > least && kept <= JUDGED)
+    });
+    explanations.par_iter_mut().for_each(|e| {
+        // What was only ranked is fitted in full before it is judged.
+        let begin = (e.fit.assumed.clone(), e.fit.free.clone());
+        if let Some(again) = fitted(question, windings, e.members.clone(), &begin, &e.fit, Effort::FULL)
+            && again.merit > e.merit
+        {
+            *e = again;
+        }
+        if !question.held_out.is_empty() {
+            let scores: Result<Vec<f64>, ChamberError> = question
+                .held_out
+                .iter()
+                .map(|&r| question.chamber.held_out(&e.fit, r).map(|fit| fit.evidence))
+                .collect();
+            e.held_out = Some(scores.map_or(f64::NEG_INFINITY, |s| s.iter().sum()));
+        }
+    });
+    order(explanations);
+    let top = explanations.first().map_or(0.0, Explanation::total);
+    let masses: Vec<f64> = explanations.iter().map(|e| (e.total() - top).exp()).collect();
+    let sum: f64 = masses.iter().sum();
+    for (e, mass) in explanations.iter_mut().zip(masses) {
+        e.probability = mass / sum;
+    }
+    // From the largest set on: its mass goes to the best set within it that is as good.
+    let mut places: Vec<usize> = (0..explanations.len()).collect();
+    places.sort_by_key(|&i| std::cmp::Reverse(explanations[i].members.len()));
+    for &large in &places {
+        let within = places
+            .iter()
+            .copied()
+            .filter(|&small| {
+                let (a, b) = (&explanations[small], &explanations[large]);
+                a.members.len() < b.members.len()
+                    && a.members.iter().all(|m| b.members.contains(m))
+                    && a.total() > b.total() - AS_GOOD
+            })
+            .max_by(|&a, &b| explanations[a].total().total_cmp(&explanations[b].total()));
+        if let Some(small) = within {
+            explanations[small].probability += explanations[large].probability;
+            explanations[large].probability = 0.0;
+        }
+    }
+    explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(b.total().total_cmp(&a.total())));
+}
+
+/// The best fit of the only kind among the candidates, and mean squares of standardised innovations before and after.
+pub fn settle_one(question: &Question, base: &Fit) -> Option<(Explanation, (f64, f64))> {
+    let null = Explanation::new(question, &[], Vec::new(), base.clone());
+    let begins: Vec<(usize, Vec<f64>)> = question
+        .candidates
+        .iter()
+        .enumerate()
+        .flat_map(|(place, c)| c.starts.iter().map(move |start| (place, start.clone())))
+        .collect();
+    let mut proposals = proposals(question, &null).ok()?;
+    proposals.extend(begins.into_iter().map(|(place, values)| Proposal {
+        member: Member::Effect(place),
+        values: Some(values),
+        gain: 0.0,
+    }));
+    let fits = proposals.into_par_iter().filter_map(|p| {
+        let begin = with(question, &[], base, p.member, p.values)?;
+        fitted(question, &[], vec![p.member], &begin, base, Effort::QUICK)
+    });
+    let fits: Vec<Explanation> = fits.collect();
+    let best = fits.into_iter().max_by(|a, b| a.merit.total_cmp(&b.merit))?;
+    let best = calmed(question, &[], best);
+    let reduced = |fit: &Fit| {
+        let of = |&r: &usize| question.chamber.noise(fit, r).ok().map(|n| n.whiteness * n.whiteness);
+        let all: Vec<f64> = question.fitted.iter().filter_map(of).collect();
+        all.iter().sum::<f64>() / all.len().max(1) as f64
+    };
+    let after = reduced(&best.fit);
+    // In units of what the better model expects.
+    let less = 2.0 * (best.fit.log_likelihood - base.log_likelihood) / super::rates(question.chamber, base) as f64;
+    Some((best, (after + less, after)))
+}

@@ -1,0 +1,102 @@
+//! What else may have been wound: another classic, the coil the other way round, two layers exchanged.
+
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+use super::{Outcome, Question};
+use crate::chamber::{Effort, Fit, Scores};
+use crate::pattern::Pattern;
+use crate::pattern::classic::Classic;
+use crate::rate::{LayerWeights, RateModel};
+
+/// A winding that is not the declared one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Winding {
+    pub pattern: Pattern,
+    /// A classic's name, where it is one.
+    pub classic: Option<&'static str>,
+    /// Connected the other way round than declared (or than the classic).
+    pub reversed: bool,
+    /// The two layers that changed places, counted from 0 innermost.
+    pub exchanged: Option<(usize, usize)>,
+    /// Rise of the log likelihood that the score test promises.
+    pub promised: f64,
+}
+
+/// Windings that are worth a fit: this many, if they promise so much.
+const TRIED: usize = 4;
+const WORTH_A_FIT: f64 = 5.0;
+/// … and of the classics so many.
+const CLASSICS_TRIED: usize = 2;
+
+/// The most promising other windings for a fit.
+pub(super) fn promising(question: &Question, fit: &Fit) -> Outcome<Vec<Winding>> {
+    let columns = question.chamber.layer_columns(fit);
+    let layers = question.pattern.layers();
+    if columns.len() < layers {
+        return Ok(Vec::new());
+    }
+    let scores = question.chamber.score(fit, &columns[..layers])?;
+    let model = &fit.assumed.model;
+    let coil = model.wound_coil()?;
+    let rate = RateModel::new(model, question.pattern, &[])?;
+    let scale = rate.scale_per_m2() * coil.fibre().path_per_k();
+    let gains = |pattern: &Pattern| -> Outcome<DVector<f64>> {
+        let weights = LayerWeights::new(&coil, pattern)?;
+        Ok(DVector::from_vec(weights.total_m2().iter().map(|w| w * scale).collect()))
+    };
+    let own = gains(&fit.assumed.pattern)?;
+    let mut all = Vec::new();
+    let mut look = |pattern: Pattern, classic, reversed, exchanged| -> Outcome<()> {
+        if pattern != fit.assumed.pattern && !all.iter().any(|w: &Winding| w.pattern == pattern) {
+            let promised = gain(&scores, &(gains(&pattern)? - &own));
+            all.push(Winding { pattern, classic, reversed, exchanged, promised });
+        }
+        Ok(())
+    };
+    for a in 0..layers {
+        for b in a + 1..layers {
+            let mut segments = question.pattern.segments().to_vec();
+            segments.swap(a, b);
+            if let Ok(pattern) = Pattern::new(segments) {
+                look(pattern, None, false, Some((a, b)))?;
+            }
+        }
+    }
+    all.retain(|w| w.promised > WORTH_A_FIT);
+    all.sort_by(|a, b| b.promised.total_cmp(&a.promised));
+    all.truncate(TRIED);
+    all.extend(classics(question, fit));
+    Ok(all)
+}
+
+/// Another classic, or the declared winding connected the other way round, is no small change: the likelihood says what it
+/// does, with a gyro that does not wander, before anything is fitted.
+fn classics(question: &Question, fit: &Fit) -> Vec<Winding> {
+    let layers = question.pattern.layers();
+    let known = Classic::ALL.into_iter().filter_map(|c| Some((c.pattern(layers).ok()?, Some(c.key()))));
+    let mut all: Vec<Winding> = Vec::new();
+    for (pattern, classic) in known.chain([(question.pattern.clone(), None)]) {
+        for (pattern, reversed) in [(pattern.clone(), false), (pattern.reversed(), true)] {
+            if pattern != fit.assumed.pattern && !all.iter().any(|w| w.pattern == pattern) {
+                all.push(Winding { pattern, classic, reversed, exchanged: None, promised: f64::NEG_INFINITY });
+            }
+        }
+    }
+    let mut start = fit.clone();
+    start.calm(&question.fitted);
+    all.par_iter_mut().for_each(|winding| {
+        let mut assumed = fit.assumed.clone();
+        assumed.pattern = winding.pattern.clone();
+        if let Ok(there) = question.chamber.fit(&assumed, &fit.free, &question.fitted, Some(&start), Effort::LOOK) {
+            winding.promised = there.posterior() - fit.posterior();
+        }
+    });
+    all.sort_by(|a, b| b.promised.total_cmp(&a.promised));
+    all.truncate(CLASSICS_TRIED);
+    all
+}
+
+fn gain(scores: &Scores, change: &DVector<f64>) -> f64 {
+    scores.gain_of(change)
+}
