@@ -28,6 +28,8 @@
 //! and Raftery, J. Am. Stat. Assoc. 90 (1995) 773 (Laplace's evidence); Rao, Proc. Camb. Phil. Soc. 44 (1948) 50 (score test).
 
 mod course;
+#[cfg(test)]
+mod dense;
 mod derivative;
 mod discretise;
 mod filter;
