@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::derivative::{DerivativeColumn, Derivatives};
 use super::filter::{Innovation, Values};
 use super::known::Reference;
-use super::parameter::{Free, Parameter, Place, write};
+use super::parameter::{Free, Parameter, write};
 use super::point::{CoilSide, Rates, quantities, run, smoothed};
 use super::prior::Quantity;
 use super::system::Numbers;
@@ -64,46 +64,6 @@ pub(super) struct Place0<'a> {
     pub sides: Vec<Option<CoilSide>>,
     pub values: Vec<Option<Values>>,
     pub courses: &'a [Option<Reference>],
-}
-
-impl Fit {
-    /// The parameter's value and its standard error, both in SI; that of a logarithm is relative.
-    pub fn value(&self, place: Place) -> Option<(f64, f64)> {
-        let at = self.parameters.iter().position(|p| p.place == place)?;
-        let value = self.parameters[at].value(self.coordinates[at]);
-        let error = match self.parameters[at].scale {
-            super::Scale::Logarithm => value * self.standard_errors[at],
-            super::Scale::Linear => self.standard_errors[at],
-        };
-        Some((value, error))
-    }
-
-    /// A number of the chamber, of one of its records.
-    pub fn number(&self, quantity: Quantity, record: usize) -> f64 {
-        self.numbers[record].get(quantity)
-    }
-
-    /// The smoothed course of a fitted record.
-    pub fn course(&self, record: usize) -> Option<&Reference> {
-        self.courses.get(record)?.as_ref()
-    }
-
-    /// Begins again with a gyro whose wander is the prior's and whose white noise makes up for it.
-    pub fn calm(&mut self, records: &[usize]) {
-        for &r in records {
-            let numbers = &mut self.numbers[r];
-            let white = numbers.get(Quantity::RateNoise);
-            let wander = white * numbers.get(Quantity::WanderShare);
-            numbers.set(Quantity::RateNoise, white.hypot(wander));
-            numbers.set(Quantity::WanderShare, Quantity::WanderShare.prior().median);
-            numbers.set(Quantity::WanderTime, Quantity::WanderTime.prior().median);
-        }
-    }
-
-    /// Another value of a number of the chamber, for a fit to begin with.
-    pub fn set_number(&mut self, quantity: Quantity, value: f64) {
-        self.numbers.iter_mut().for_each(|n| n.set(quantity, value));
-    }
 }
 
 impl Chamber<'_> {
@@ -446,40 +406,6 @@ struct State<'c> {
     log_likelihood: f64,
     posterior: f64,
     information: DMatrix<f64>,
-}
-
-impl Fit {
-    /// Log evidence with as much said beforehand of an effect's parameters as one row says: what the description of an
-    /// effect holds likely of its size does not decide between two that do the same.
-    ///
-    /// ```text
-    /// ln E = ln L + ln p(chamber) − ½ Σ_e z_e² + (c/2) ln 2π − ½ ln |I_cc| − (e/2) ln n
-    /// ```
-    ///
-    /// z: distance from an effect's prior in its deviations; c, e: numbers of the chamber and of effects; n: `rows`.
-    pub fn merit(&self, rows: usize) -> f64 {
-        let of_chamber: Vec<usize> = (0..self.parameters.len())
-            .filter(|&i| matches!(self.parameters[i].place, Place::Quantity { .. }))
-            .collect();
-        let count = of_chamber.len();
-        let block = DMatrix::from_fn(count, count, |i, k| self.information[(of_chamber[i], of_chamber[k])]);
-        let Some(factor) = block.cholesky() else { return f64::NEG_INFINITY };
-        let log_determinant = 2.0 * factor.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
-        let mut merit = self.log_likelihood + 0.5 * count as f64 * std::f64::consts::TAU.ln() - 0.5 * log_determinant;
-        for (i, p) in self.parameters.iter().enumerate() {
-            if of_chamber.contains(&i) {
-                merit += p.log_prior(self.coordinates[i]);
-            } else {
-                merit -= 0.5 * ((self.coordinates[i] - p.mean) / p.deviation).powi(2) + 0.5 * (rows as f64).ln();
-            }
-        }
-        merit
-    }
-
-    /// Logarithm of likelihood times prior.
-    pub fn posterior(&self) -> f64 {
-        self.log_likelihood + self.log_prior
-    }
 }
 
 pub(super) fn log_likelihood(innovations: &[Innovation]) -> f64 {

@@ -34,6 +34,7 @@ mod derivative;
 mod discretise;
 mod filter;
 mod fit;
+mod fitted;
 mod known;
 mod parameter;
 mod point;

@@ -9,6 +9,7 @@
 //! Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773; Madigan and Raftery, ibid. 89 (1994) 1535 (Occam's window).
 
 mod explanation;
+mod judge;
 mod search;
 mod winding;
 
