@@ -26,7 +26,7 @@ pub mod plain;
 
 use thiserror::Error;
 
-use crate::chamber::{Assumption, Chamber, ChamberError, Noise};
+use crate::chamber::{Assumption, Chamber, ChamberError, Effort, Noise};
 use crate::coil::CoilError;
 use crate::effect::DeclaredEffect;
 use crate::numeric::noise::white_noise;
@@ -361,6 +361,9 @@ fn checked<'a>(request: &Request<'a>) -> Result<Vec<&'a Record>, DiagnoseError> 
     Ok(records)
 }
 
+/// What a score test on held-out records must promise for them to be searched themselves: what an effect costs, twice.
+const PROMISING: f64 = 12.0;
+
 /// Finds what a model lacks; `progress` is told the share that is done.
 ///
 /// # Errors
@@ -379,8 +382,23 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
         fitted: (0..given).collect(),
         held_out: (given..records.len()).collect(),
     };
-    let found = joint::search(&question, &|share| progress(0.9 * share))?;
-    let diagnosis = answer::answer(&question, &found, &records)?;
+    let found = joint::search(&question, &|share| progress(0.8 * share))?;
+    let mut diagnosis = answer::answer(&question, &found, &records)?;
+    // Where what is to be fitted shows nothing, the other records may; the former then confirm it.
+    if let (Verdict::Adequate, Some(declared), false) =
+        (diagnosis.verdict, found.declared(), request.holdout.is_empty())
+    {
+        let other = Question { fitted: question.held_out.clone(), held_out: question.fitted.clone(), ..question };
+        let day = chamber.fit(&declared.fit.assumed, &[], &other.fitted, Some(&declared.fit), Effort::FULL)?;
+        if joint::promise(&other, &day)? > PROMISING {
+            let found = joint::search(&other, &|share| progress(0.8 + 0.2 * share))?;
+            let elsewhere = answer::answer(&other, &found, &records)?;
+            if elsewhere.verdict != Verdict::Adequate {
+                diagnosis = elsewhere;
+                diagnosis.cautions.insert(0, Caution::FittedToHoldout);
+            }
+        }
+    }
     progress(1.0);
     Ok(diagnosis)
 }

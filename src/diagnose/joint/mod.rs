@@ -18,7 +18,7 @@ use crate::diagnose::candidate::Candidate;
 use crate::pattern::Pattern;
 
 pub use explanation::{Explanation, Member};
-pub use search::{refit_without, search, settle_one};
+pub use search::{promise, refit_without, search, settle_one};
 pub use winding::Winding;
 
 /// What is asked of the search.

@@ -414,6 +414,15 @@ fn complete(question: &Question, windings: &[Winding], best: &Explanation, cache
     found.into_iter().for_each(|explanation| keep(cache, explanation));
 }
 
+/// The most that the score test promises of any candidate beside a fit of the declared model.
+///
+/// # Errors
+/// A model that cannot be solved for these records.
+pub fn promise(question: &Question, null: &Fit) -> Outcome<f64> {
+    let null = Explanation::new(question, &[], Vec::new(), null.clone());
+    Ok(proposals(question, &null)?.iter().map(|p| p.gain).fold(0.0, f64::max))
+}
+
 /// The best fit of the only kind among the candidates, and mean squares of standardised innovations before and after.
 pub fn settle_one(question: &Question, base: &Fit) -> Option<(Explanation, (f64, f64))> {
     let null = Explanation::new(question, &[], Vec::new(), base.clone());
