@@ -27,8 +27,6 @@ impl Effort {
     pub const FULL: Self = Self { iterations: 25, tolerance: 0.1, rounds: 2 };
     /// To half a unit: enough to rank sets.
     pub const QUICK: Self = Self { iterations: 10, tolerance: 0.7, rounds: 1 };
-    /// One step only.
-    pub const LOOK: Self = Self { iterations: 1, tolerance: 0.7, rounds: 1 };
     /// Enough to rank starts.
     pub const SHORT: Self = Self { iterations: 3, tolerance: 3.0, rounds: 1 };
 }

@@ -59,7 +59,10 @@ pub fn search(question: &Question, progress: &(dyn Fn(f64) + Sync)) -> Outcome<F
     for stage in 0..MOST_MEMBERS {
         let mut proposals = proposals(question, &best)?;
         if stage == 0 {
-            windings = promising(question, &best.fit)?;
+            // Where a gyro that wanders as gyros do is enough, nothing is wound otherwise.
+            if best.is_outside() || proposals.iter().any(|p| p.gain > PLAIN) {
+                windings = promising(question, &best.fit)?;
+            }
             promised = foremost(&proposals);
         }
         proposals.extend(discrete(question, &windings, &best));
@@ -289,10 +292,9 @@ fn fit_all(question: &Question, windings: &[Winding], best: &Explanation, tried:
             if !matches!(proposal.member, Member::Winding(_)) {
                 return known;
             }
-            // The chamber that made the best of another winding is far from that of the right one.
-            let mut calm = best.fit.clone();
-            calm.calm(&question.fitted);
-            let again = fitted(question, windings, members, &begin, &calm, Effort::QUICK);
+            // The chamber that made the best of the declared winding is far from that of the right one.
+            let again = question.chamber.fit_anew(&begin.0, &begin.1, &question.fitted).ok();
+            let again = again.map(|fit| Explanation::new(question, windings, members, fit));
             known.into_iter().chain(again).max_by(|a, b| a.merit.total_cmp(&b.merit))
         })
         .collect()

@@ -88,7 +88,7 @@ fn classics(question: &Question, fit: &Fit) -> Vec<Winding> {
     all.par_iter_mut().for_each(|winding| {
         let mut assumed = fit.assumed.clone();
         assumed.pattern = winding.pattern.clone();
-        if let Ok(there) = question.chamber.fit(&assumed, &fit.free, &question.fitted, Some(&start), Effort::LOOK) {
+        if let Ok(there) = question.chamber.fit(&assumed, &fit.free, &question.fitted, Some(&start), Effort::SHORT) {
             winding.promised = there.posterior() - fit.posterior();
         }
     });
