@@ -1,267 +1,278 @@
 //! The filter, the smoother and the derivatives against other ways of computing the same: a dense joint Gaussian of all
 //! measurements, the conditional mean in it, central differences.
 
-use nalgebra::{DMatrix, DVector};
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
 
-use super::filter::{self, System};
-use super::point::{CoilSide, Observed};
-use super::prior::Quantity;
-use super::series::Series;
-use super::system::{Numbers, system};
-use super::{Assumption, Chamber, Effort, Free, Input};
-use crate::coil::{Coil, CoilSpec, Fibre, LayerLength};
-use crate::effect::{DeclaredEffect, find};
-use crate::pattern::classic::Classic;
-use crate::rate::CoilModel;
-use crate::record::Record;
-use crate::thermal::{Extent, Location, Material};
+    use crate::chamber::filter::{self, System};
+    use crate::chamber::point::{CoilSide, Observed};
+    use crate::chamber::prior::Quantity;
+    use crate::chamber::series::Series;
+    use crate::chamber::system::{Numbers, system};
+    use crate::chamber::{Assumption, Chamber, Effort, Free, Input};
+    use crate::coil::{Coil, CoilSpec, Fibre, LayerLength};
+    use crate::effect::{DeclaredEffect, find};
+    use crate::pattern::classic::Classic;
+    use crate::rate::CoilModel;
+    use crate::record::Record;
+    use crate::thermal::{Extent, Location, Material};
 
-fn model(effects: Vec<DeclaredEffect>) -> CoilModel {
-    let fibre = Fibre {
-        refractive_index: 1.45,
-        thermo_optic_per_k: 1.0e-5,
-        thermal_expansion_per_k: 0.0,
-        wavelength_m: 1550e-9,
-        outer_diameter_m: 330e-6,
-    };
-    let spec = CoilSpec {
-        fibre,
-        layers: 8,
-        turns_per_layer: Some(50.0),
-        bore_radius_m: 0.04,
-        radial_pitch_m: 330e-6,
-        axial_pitch_m: 340e-6,
-        layer_length: LayerLength::Actual,
-        length_m: None,
-    };
-    CoilModel {
-        name: "test".into(),
-        coil: Coil::new(spec).unwrap(),
-        extent: Extent::Pack,
-        material: Material::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 },
-        location: Location::OuterLayer,
-        rate_mean_s: 10.0,
-        cells_per_layer: 2,
-        effects,
-    }
-}
-
-fn effect(kind: &str, values: &[f64]) -> DeclaredEffect {
-    let spec = find(kind).unwrap();
-    DeclaredEffect::new(spec, values.to_vec(), vec![0; spec.choices.len()]).unwrap()
-}
-
-/// Rows every 10 s with a gap of 47 s, one of them off the grid, and a gross error in a reading.
-fn record(rows: usize) -> Record {
-    let mut times_s: Vec<f64> = (0..rows).map(|i| 10.0 * i as f64 + if i > 25 { 37.0 } else { 0.0 }).collect();
-    times_s[13] += 3.0;
-    let wave = |t: f64, k: f64| (0.013 * k * t).sin() + 0.3 * (0.17 * k * t).cos();
-    let mut temperature_k: Vec<f64> =
-        times_s.iter().map(|t| 293.0 + 2.0 * (t / 300.0).tanh() + 0.004 * wave(*t, 7.0)).collect();
-    temperature_k[19] += 60.0;
-    let rate = times_s.iter().map(|t| 1e-6 * wave(*t, 1.0) + 2e-7 * wave(*t, 23.0)).collect();
-    Record::new("short", times_s, temperature_k, rate).unwrap()
-}
-
-fn dense(system: &System, sparse: &super::sparse::Sparse) -> DMatrix<f64> {
-    let n = system.size;
-    let one = DMatrix::<f64>::identity(n, n);
-    DMatrix::from_row_slice(sparse.rows(), n, &sparse.times_matrix(one.as_slice(), n))
-}
-
-/// Mean and covariance of all measurements, and of each with the states at one row.
-struct Joint {
-    mean: DVector<f64>,
-    covariance: DMatrix<f64>,
-    values: DVector<f64>,
-    /// Covariance of the states at the row asked for with the measurements, and their own mean.
-    cross: DMatrix<f64>,
-    states: DVector<f64>,
-}
-
-fn joint(system: &System, series: &Series, asked: usize) -> Joint {
-    let n = system.size;
-    let (rows, kept) = (dense(system, &system.rows), dense(system, &system.kept));
-    // Each row's map and noise.
-    let mut maps = Vec::new();
-    let mut prior = vec![(DVector::from_vec(system.mean.clone()), DMatrix::from_row_slice(n, n, &system.covariance))];
-    for (k, row) in series.rows.iter().enumerate() {
-        let mut map = DMatrix::identity(n, n);
-        let mut noise = DMatrix::zeros(n, n);
-        let density = system.trend.0 + row.bend * (system.trend.1 - system.trend.0);
-        let step = |index: u16, map: &mut DMatrix<f64>, noise: &mut DMatrix<f64>| {
-            let s = &system.steps[index as usize];
-            let phi = dense(system, &s.phi);
-            let own = DMatrix::from_row_slice(n, n, &s.noise) + DMatrix::from_row_slice(n, n, &s.trend_noise) * density;
-            *noise = &phi * &*noise * phi.transpose() + own;
-            *map = &phi * &*map;
+    fn model(effects: Vec<DeclaredEffect>) -> CoilModel {
+        let fibre = Fibre {
+            refractive_index: 1.45,
+            thermo_optic_per_k: 1.0e-5,
+            thermal_expansion_per_k: 0.0,
+            wavelength_m: 1550e-9,
+            outer_diameter_m: 330e-6,
         };
-        row.before.iter().for_each(|&s| step(s, &mut map, &mut noise));
-        if row.keeps {
-            let mut keep = DMatrix::identity(n, n);
-            for (place, &state) in system.keep.iter().enumerate() {
-                keep.set_row(state, &kept.row(place));
+        let spec = CoilSpec {
+            fibre,
+            layers: 8,
+            turns_per_layer: Some(50.0),
+            bore_radius_m: 0.04,
+            radial_pitch_m: 330e-6,
+            axial_pitch_m: 340e-6,
+            layer_length: LayerLength::Actual,
+            length_m: None,
+        };
+        CoilModel {
+            name: "test".into(),
+            coil: Coil::new(spec).unwrap(),
+            extent: Extent::Pack,
+            material: Material::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 },
+            location: Location::OuterLayer,
+            rate_mean_s: 10.0,
+            cells_per_layer: 2,
+            effects,
+        }
+    }
+
+    fn effect(kind: &str, values: &[f64]) -> DeclaredEffect {
+        let spec = find(kind).unwrap();
+        DeclaredEffect::new(spec, values.to_vec(), vec![0; spec.choices.len()]).unwrap()
+    }
+
+    /// Rows every 10 s with a gap of 47 s, one of them off the grid, and a gross error in a reading.
+    fn record(rows: usize) -> Record {
+        let mut times_s: Vec<f64> = (0..rows).map(|i| 10.0 * i as f64 + if i > 25 { 37.0 } else { 0.0 }).collect();
+        times_s[13] += 3.0;
+        let wave = |t: f64, k: f64| (0.013 * k * t).sin() + 0.3 * (0.17 * k * t).cos();
+        let mut temperature_k: Vec<f64> =
+            times_s.iter().map(|t| 293.0 + 2.0 * (t / 300.0).tanh() + 0.004 * wave(*t, 7.0)).collect();
+        temperature_k[19] += 60.0;
+        let rate = times_s.iter().map(|t| 1e-6 * wave(*t, 1.0) + 2e-7 * wave(*t, 23.0)).collect();
+        Record::new("short", times_s, temperature_k, rate).unwrap()
+    }
+
+    fn dense(system: &System, sparse: &crate::chamber::sparse::Sparse) -> DMatrix<f64> {
+        let n = system.size;
+        let one = DMatrix::<f64>::identity(n, n);
+        DMatrix::from_row_slice(sparse.rows(), n, &sparse.times_matrix(one.as_slice(), n))
+    }
+
+    /// Mean and covariance of all measurements, and of each with the states at one row.
+    struct Joint {
+        mean: DVector<f64>,
+        covariance: DMatrix<f64>,
+        values: DVector<f64>,
+        /// Covariance of the states at the row asked for with the measurements, and their own mean.
+        cross: DMatrix<f64>,
+        states: DVector<f64>,
+    }
+
+    fn joint(system: &System, series: &Series, asked: usize) -> Joint {
+        let n = system.size;
+        let (rows, kept) = (dense(system, &system.rows), dense(system, &system.kept));
+        // Each row's map and noise.
+        let mut maps = Vec::new();
+        let mut prior =
+            vec![(DVector::from_vec(system.mean.clone()), DMatrix::from_row_slice(n, n, &system.covariance))];
+        for (k, row) in series.rows.iter().enumerate() {
+            let mut map = DMatrix::identity(n, n);
+            let mut noise = DMatrix::zeros(n, n);
+            let density = system.trend.0 + row.bend * (system.trend.1 - system.trend.0);
+            let step = |index: u16, map: &mut DMatrix<f64>, noise: &mut DMatrix<f64>| {
+                let s = &system.steps[index as usize];
+                let phi = dense(system, &s.phi);
+                let own =
+                    DMatrix::from_row_slice(n, n, &s.noise) + DMatrix::from_row_slice(n, n, &s.trend_noise) * density;
+                *noise = &phi * &*noise * phi.transpose() + own;
+                *map = &phi * &*map;
+            };
+            row.before.iter().for_each(|&s| step(s, &mut map, &mut noise));
+            if row.keeps {
+                let mut keep = DMatrix::identity(n, n);
+                for (place, &state) in system.keep.iter().enumerate() {
+                    keep.set_row(state, &kept.row(place));
+                }
+                map = &keep * map;
+                noise = &keep * noise * keep.transpose();
             }
-            map = &keep * map;
-            noise = &keep * noise * keep.transpose();
+            row.after.iter().for_each(|&s| step(s, &mut map, &mut noise));
+            let (mean, covariance) = &prior[k];
+            prior.push((&map * mean, &map * covariance * map.transpose() + noise));
+            maps.push(map);
         }
-        row.after.iter().for_each(|&s| step(s, &mut map, &mut noise));
-        let (mean, covariance) = &prior[k];
-        prior.push((&map * mean, &map * covariance * map.transpose() + noise));
-        maps.push(map);
-    }
-    let measured: Vec<(usize, usize, usize)> = series
-        .rows
-        .iter()
-        .enumerate()
-        .flat_map(|(k, row)| row.measured.iter().enumerate().filter_map(move |(m, h)| h.map(|h| (k, m, h as usize))))
-        .collect();
-    let carried = |from: usize, to: usize| {
-        let mut map = DMatrix::<f64>::identity(n, n);
-        maps[from + 1..=to].iter().for_each(|m| map = m * &map);
-        map
-    };
-    let covariance_of = |a: usize, b: usize| {
-        // Of the states at two rows.
-        if a >= b { carried(b, a) * &prior[b + 1].1 } else { &prior[a + 1].1 * carried(a, b).transpose() }
-    };
-    let count = measured.len();
-    let mut covariance = DMatrix::zeros(count, count);
-    for (i, &(k, m, h)) in measured.iter().enumerate() {
-        for (j, &(l, _, g)) in measured.iter().enumerate() {
-            covariance[(i, j)] = (rows.row(h) * covariance_of(k, l) * rows.row(g).transpose())[(0, 0)];
-        }
-        covariance[(i, i)] += system.variances[m] / series.rows[k].averaged;
-    }
-    let cross = DMatrix::from_columns(
-        &measured.iter().map(|&(k, _, h)| covariance_of(asked, k) * rows.row(h).transpose()).collect::<Vec<_>>(),
-    );
-    Joint {
-        mean: DVector::from_iterator(count, measured.iter().map(|&(k, _, h)| (rows.row(h) * &prior[k + 1].0)[(0, 0)])),
-        values: DVector::from_iterator(count, measured.iter().map(|&(k, m, _)| series.values[m][k])),
-        covariance,
-        cross,
-        states: prior[asked + 1].0.clone(),
-    }
-}
-
-fn observed(model: &CoilModel, record: &Record) -> (Series, f64) {
-    (Series::new(record, model.rate_mean_s, 30.0), 294.0)
-}
-
-fn check(assumed: &Assumption, averaged: bool) {
-    let record = if averaged { one_hertz() } else { record(48) };
-    let (series, mean_k) = observed(&assumed.model, &record);
-    assert_eq!(series.averaged > 1, averaged);
-    let numbers = Numbers::medians(&series);
-    let seen = Observed { record: &record, series, channels: Vec::new(), mean_k };
-    let side = CoilSide::new(assumed, numbers.get(Quantity::Film), 4, &seen).unwrap();
-    let system = system(&side.parts(assumed), &numbers, &seen.series);
-    let values = filter::Values { of: seen.series.values.clone() };
-    let trace = filter::forward(&system, &seen.series.rows, &values, true);
-    let asked = seen.series.rows.len() / 2;
-    let dense = joint(&system, &seen.series, asked);
-    let factor = dense.covariance.clone().cholesky().unwrap();
-    let apart = &dense.values - &dense.mean;
-    let solved = factor.solve(&apart);
-    let determinant: f64 = factor.l().diagonal().iter().map(|d| 2.0 * d.ln()).sum();
-    let exact = -0.5 * (apart.dot(&solved) + determinant + apart.len() as f64 * std::f64::consts::TAU.ln());
-    println!("{} measurements, log likelihood {} and {exact}", apart.len(), trace.log_likelihood);
-    assert!((trace.log_likelihood - exact).abs() < 1e-8 * exact.abs());
-    let states = &dense.states + &dense.cross * solved;
-    let smoothed = filter::smooth(&system, &seen.series.rows, &trace);
-    for (i, exact) in states.iter().enumerate() {
-        let found = smoothed[asked * system.size + i];
-        let scale = exact.abs().max(dense.cross.row(i).norm());
-        assert!((found - exact).abs() < 1e-6 * scale.max(1e-12), "state {i}: {found} for {exact}");
-    }
-}
-
-/// Ten rows become one, with two of them missing.
-fn one_hertz() -> Record {
-    let times_s: Vec<f64> = (0..400).filter(|i| ![77, 231].contains(i)).map(f64::from).collect();
-    let temperature_k = times_s.iter().map(|t| 293.0 + 1e-2 * t + 2e-3 * (3.0 * t).sin()).collect();
-    let rate = times_s.iter().map(|t| 1e-6 * (0.02 * t).sin() + 3e-7 * (5.0 * t).cos()).collect();
-    Record::new("fast", times_s, temperature_k, rate).unwrap()
-}
-
-fn dip() -> crate::pattern::Pattern {
-    Classic::Dip.pattern(8).unwrap()
-}
-
-#[test]
-fn likelihood_and_smoothed_states_are_those_of_the_dense_gaussian() {
-    check(&Assumption::new(model(Vec::new()), dip()), false);
-}
-
-#[test]
-fn with_a_lag_a_spool_a_drift_a_cycle_and_an_unsteady_start_they_are_too() {
-    let effects = vec![effect("sensor_lag", &[40.0]), effect("spool_mass", &[4000.0, 300.0, 5.0])];
-    let assumed = Assumption { drift: true, cycle: true, unsteady: true, ..Assumption::new(model(effects), dip()) };
-    check(&assumed, false);
-}
-
-#[test]
-fn averaged_rows_of_a_sensor_in_the_air_and_of_a_half_space_are_too() {
-    let mut fast = model(vec![effect("surface_film", &[30.0])]);
-    fast.rate_mean_s = 1.0;
-    check(&Assumption::new(fast, dip()), true);
-    let mut half_space = model(Vec::new());
-    half_space.extent = Extent::HalfSpace;
-    half_space.rate_mean_s = 0.0;
-    check(&Assumption::new(half_space, dip()), false);
-}
-
-#[test]
-fn gains_that_are_frozen_cost_less_than_a_fifth_of_log_likelihood() {
-    let record = record(1500);
-    let assumed = Assumption::new(model(Vec::new()), dip());
-    let (series, mean_k) = observed(&assumed.model, &record);
-    let numbers = Numbers::medians(&series);
-    let mut seen = Observed { record: &record, series, channels: Vec::new(), mean_k };
-    let side = CoilSide::new(&assumed, 25.0, 5, &seen).unwrap();
-    let values = filter::Values { of: seen.series.values.clone() };
-    let system = system(&side.parts(&assumed), &numbers, &seen.series);
-    let frozen = filter::forward(&system, &seen.series.rows, &values, false);
-    // Rows that differ by what makes no difference never freeze.
-    for (k, row) in seen.series.rows.iter_mut().enumerate() {
-        row.averaged = 1.0 + 1e-15 * (k % 2) as f64;
-    }
-    let full = filter::forward(&system, &seen.series.rows, &values, false);
-    println!("{} of 1500 rows in full; {} and {}", frozen.thawed, frozen.log_likelihood, full.log_likelihood);
-    assert!(frozen.thawed < full.thawed && full.thawed == 1500);
-    assert!((frozen.log_likelihood - full.log_likelihood).abs() < 0.2);
-}
-
-#[test]
-fn score_and_information_are_those_of_differences() {
-    let record = record(300);
-    let model = model(vec![effect("strain_mismatch", &[0.004])]);
-    let chamber = Chamber::new(&model, &[&record]).unwrap();
-    let step = (0..300).map(|k| f64::from(k > 150)).collect();
-    let input = Input { name: "step".into(), rate_rad_per_s: vec![step], amplitude: 1e-7, deviation: 1e-6 };
-    let assumed = Assumption { inputs: vec![input], ..Assumption::new(model, dip()) };
-    let free = [Free { effect: 0, parameter: 0, stated_within: None }];
-    let fit = chamber.fit(&assumed, &free, &[0], None, Effort { iterations: 0, tolerance: 0.0, rounds: 1 }).unwrap();
-    let place = chamber.place(fit.assumed.clone(), fit.numbers.clone(), &[0], &fit.courses).unwrap();
-    let base = vec![chamber.innovations(&place, 0).unwrap()];
-    let found = chamber.derivatives(&place, &fit.parameters, &fit.coordinates, &[0], &base).unwrap();
-    let count = fit.parameters.len();
-    let (mut score, mut information) = (DVector::zeros(count), DMatrix::zeros(count, count));
-    found[0].add_to(&base[0], &mut score, &mut information);
-    for (i, parameter) in fit.parameters.iter().enumerate() {
-        let at = |sign: f64| {
-            let (mut assumed, mut numbers) = (fit.assumed.clone(), fit.numbers.clone());
-            let moved = fit.coordinates[i] + 0.3 * sign * parameter.step();
-            assert!(super::parameter::write(&[*parameter], &[moved], &mut assumed, &mut numbers));
-            let there = chamber.place(assumed, numbers, &[0], &fit.courses).unwrap();
-            super::fit::log_likelihood(&chamber.innovations(&there, 0).unwrap())
+        let measured: Vec<(usize, usize, usize)> = series
+            .rows
+            .iter()
+            .enumerate()
+            .flat_map(|(k, row)| {
+                row.measured.iter().enumerate().filter_map(move |(m, h)| h.map(|h| (k, m, h as usize)))
+            })
+            .collect();
+        let carried = |from: usize, to: usize| {
+            let mut map = DMatrix::<f64>::identity(n, n);
+            maps[from + 1..=to].iter().for_each(|m| map = m * &map);
+            map
         };
-        let slope = (at(1.0) - at(-1.0)) / (0.6 * parameter.step());
-        // One-sided differences of the innovations: off by half a step's worth of curvature.
-        let allowed = 0.01 * slope.abs() + 2.0 * information[(i, i)] * parameter.step() + 1e-3;
-        println!("{:?}: {:.5e} for {slope:.5e}", parameter.place, score[i]);
-        assert!((score[i] - slope).abs() < allowed, "{:?}", parameter.place);
-        assert!(information[(i, i)] > 0.0);
+        let covariance_of = |a: usize, b: usize| {
+            // Of the states at two rows.
+            if a >= b { carried(b, a) * &prior[b + 1].1 } else { &prior[a + 1].1 * carried(a, b).transpose() }
+        };
+        let count = measured.len();
+        let mut covariance = DMatrix::zeros(count, count);
+        for (i, &(k, m, h)) in measured.iter().enumerate() {
+            for (j, &(l, _, g)) in measured.iter().enumerate() {
+                covariance[(i, j)] = (rows.row(h) * covariance_of(k, l) * rows.row(g).transpose())[(0, 0)];
+            }
+            covariance[(i, i)] += system.variances[m] / series.rows[k].averaged;
+        }
+        let cross = DMatrix::from_columns(
+            &measured.iter().map(|&(k, _, h)| covariance_of(asked, k) * rows.row(h).transpose()).collect::<Vec<_>>(),
+        );
+        Joint {
+            mean: DVector::from_iterator(
+                count,
+                measured.iter().map(|&(k, _, h)| (rows.row(h) * &prior[k + 1].0)[(0, 0)]),
+            ),
+            values: DVector::from_iterator(count, measured.iter().map(|&(k, m, _)| series.values[m][k])),
+            covariance,
+            cross,
+            states: prior[asked + 1].0.clone(),
+        }
+    }
+
+    fn observed(model: &CoilModel, record: &Record) -> (Series, f64) {
+        (Series::new(record, model.rate_mean_s, 30.0), 294.0)
+    }
+
+    fn check(assumed: &Assumption, averaged: bool) {
+        let record = if averaged { one_hertz() } else { record(48) };
+        let (series, mean_k) = observed(&assumed.model, &record);
+        assert_eq!(series.averaged > 1, averaged);
+        let numbers = Numbers::medians(&series);
+        let seen = Observed { record: &record, series, channels: Vec::new(), mean_k };
+        let side = CoilSide::new(assumed, numbers.get(Quantity::Film), 4, &seen).unwrap();
+        let system = system(&side.parts(assumed), &numbers, &seen.series);
+        let values = filter::Values { of: seen.series.values.clone() };
+        let trace = filter::forward(&system, &seen.series.rows, &values, true);
+        let asked = seen.series.rows.len() / 2;
+        let dense = joint(&system, &seen.series, asked);
+        let factor = dense.covariance.clone().cholesky().unwrap();
+        let apart = &dense.values - &dense.mean;
+        let solved = factor.solve(&apart);
+        let determinant: f64 = factor.l().diagonal().iter().map(|d| 2.0 * d.ln()).sum();
+        let exact = -0.5 * (apart.dot(&solved) + determinant + apart.len() as f64 * std::f64::consts::TAU.ln());
+        println!("{} measurements, log likelihood {} and {exact}", apart.len(), trace.log_likelihood);
+        assert!((trace.log_likelihood - exact).abs() < 1e-8 * exact.abs());
+        let states = &dense.states + &dense.cross * solved;
+        let smoothed = filter::smooth(&system, &seen.series.rows, &trace);
+        for (i, exact) in states.iter().enumerate() {
+            let found = smoothed[asked * system.size + i];
+            let scale = exact.abs().max(dense.cross.row(i).norm());
+            assert!((found - exact).abs() < 1e-6 * scale.max(1e-12), "state {i}: {found} for {exact}");
+        }
+    }
+
+    /// Ten rows become one, with two of them missing.
+    fn one_hertz() -> Record {
+        let times_s: Vec<f64> = (0..400).filter(|i| ![77, 231].contains(i)).map(f64::from).collect();
+        let temperature_k = times_s.iter().map(|t| 293.0 + 1e-2 * t + 2e-3 * (3.0 * t).sin()).collect();
+        let rate = times_s.iter().map(|t| 1e-6 * (0.02 * t).sin() + 3e-7 * (5.0 * t).cos()).collect();
+        Record::new("fast", times_s, temperature_k, rate).unwrap()
+    }
+
+    fn dip() -> crate::pattern::Pattern {
+        Classic::Dip.pattern(8).unwrap()
+    }
+
+    #[test]
+    fn likelihood_and_smoothed_states_are_those_of_the_dense_gaussian() {
+        check(&Assumption::new(model(Vec::new()), dip()), false);
+    }
+
+    #[test]
+    fn with_a_lag_a_spool_a_drift_a_cycle_and_an_unsteady_start_they_are_too() {
+        let effects = vec![effect("sensor_lag", &[40.0]), effect("spool_mass", &[4000.0, 300.0, 5.0])];
+        let assumed = Assumption { drift: true, cycle: true, unsteady: true, ..Assumption::new(model(effects), dip()) };
+        check(&assumed, false);
+    }
+
+    #[test]
+    fn averaged_rows_of_a_sensor_in_the_air_and_of_a_half_space_are_too() {
+        let mut fast = model(vec![effect("surface_film", &[30.0])]);
+        fast.rate_mean_s = 1.0;
+        check(&Assumption::new(fast, dip()), true);
+        let mut half_space = model(Vec::new());
+        half_space.extent = Extent::HalfSpace;
+        half_space.rate_mean_s = 0.0;
+        check(&Assumption::new(half_space, dip()), false);
+    }
+
+    #[test]
+    fn gains_that_are_frozen_cost_less_than_a_fifth_of_log_likelihood() {
+        let record = record(1500);
+        let assumed = Assumption::new(model(Vec::new()), dip());
+        let (series, mean_k) = observed(&assumed.model, &record);
+        let numbers = Numbers::medians(&series);
+        let mut seen = Observed { record: &record, series, channels: Vec::new(), mean_k };
+        let side = CoilSide::new(&assumed, 25.0, 5, &seen).unwrap();
+        let values = filter::Values { of: seen.series.values.clone() };
+        let system = system(&side.parts(&assumed), &numbers, &seen.series);
+        let frozen = filter::forward(&system, &seen.series.rows, &values, false);
+        // Rows that differ by what makes no difference never freeze.
+        for (k, row) in seen.series.rows.iter_mut().enumerate() {
+            row.averaged = 1.0 + 1e-15 * (k % 2) as f64;
+        }
+        let full = filter::forward(&system, &seen.series.rows, &values, false);
+        println!("{} of 1500 rows in full; {} and {}", frozen.thawed, frozen.log_likelihood, full.log_likelihood);
+        assert!(frozen.thawed < full.thawed && full.thawed == 1500);
+        assert!((frozen.log_likelihood - full.log_likelihood).abs() < 0.2);
+    }
+
+    #[test]
+    fn score_and_information_are_those_of_differences() {
+        let record = record(300);
+        let model = model(vec![effect("strain_mismatch", &[0.004])]);
+        let chamber = Chamber::new(&model, &[&record]).unwrap();
+        let step = (0..300).map(|k| f64::from(k > 150)).collect();
+        let input = Input { name: "step".into(), rate_rad_per_s: vec![step], amplitude: 1e-7, deviation: 1e-6 };
+        let assumed = Assumption { inputs: vec![input], ..Assumption::new(model, dip()) };
+        let free = [Free { effect: 0, parameter: 0, stated_within: None }];
+        let fit =
+            chamber.fit(&assumed, &free, &[0], None, Effort { iterations: 0, tolerance: 0.0, rounds: 1 }).unwrap();
+        let place = chamber.place(fit.assumed.clone(), fit.numbers.clone(), &[0], &fit.courses).unwrap();
+        let base = vec![chamber.innovations(&place, 0).unwrap()];
+        let found = chamber.derivatives(&place, &fit.parameters, &fit.coordinates, &[0], &base).unwrap();
+        let count = fit.parameters.len();
+        let (mut score, mut information) = (DVector::zeros(count), DMatrix::zeros(count, count));
+        found[0].add_to(&base[0], &mut score, &mut information);
+        for (i, parameter) in fit.parameters.iter().enumerate() {
+            let at = |sign: f64| {
+                let (mut assumed, mut numbers) = (fit.assumed.clone(), fit.numbers.clone());
+                let moved = fit.coordinates[i] + 0.3 * sign * parameter.step();
+                assert!(crate::chamber::parameter::write(&[*parameter], &[moved], &mut assumed, &mut numbers));
+                let there = chamber.place(assumed, numbers, &[0], &fit.courses).unwrap();
+                crate::chamber::fit::log_likelihood(&chamber.innovations(&there, 0).unwrap())
+            };
+            let slope = (at(1.0) - at(-1.0)) / (0.6 * parameter.step());
+            // One-sided differences of the innovations: off by half a step's worth of curvature.
+            let allowed = 0.01 * slope.abs() + 2.0 * information[(i, i)] * parameter.step() + 1e-3;
+            println!("{:?}: {:.5e} for {slope:.5e}", parameter.place, score[i]);
+            assert!((score[i] - slope).abs() < allowed, "{:?}", parameter.place);
+            assert!(information[(i, i)] > 0.0);
+        }
     }
 }
