@@ -3,6 +3,28 @@
 //! When the temperature changes, points that mirror each other about the fibre's middle warm at different rates and
 //! the gyro reports a rotation that is not there (the Shupe effect). Which piece of fibre lies in which layer decides
 //! how much. `ARCHITECTURE.md` shows the floors; each module imports only from the floors below its own.
+//!
+//! Quantities are in SI and their names end in the unit; [`RotationRate`](units::RotationRate) shows a rate in °/h.
+//!
+//! # Example
+//! How large the rate error of a quadrupole winding becomes while a coil's surface warms at 10 °C/h:
+//! ```
+//! use coilwright::{Classic, CoilModel, Piece, Profile, SolvedProfiles, units::k_per_s_from_c_per_h};
+//!
+//! let model = CoilModel::builder("a coil of 200 m", 12).mean_diameter_m(0.075).length_m(200.0).build()?;
+//! let ramp = Piece { rate_k_per_s: k_per_s_from_c_per_h(10.0), duration_s: 1500.0 };
+//! let solved = SolvedProfiles::new(&model, &[Profile::new("ramp", vec![ramp])?])?;
+//! let [zyl, qua] = [Classic::Zyl, Classic::Qua].map(|classic| classic.pattern(12));
+//! let (zyl, qua) = (solved.worst_case(&model, &zyl?)?, solved.worst_case(&model, &qua?)?);
+//! println!("ZYL {zyl}, QUA {qua}"); // each as "… °/h at … s of ramp"
+//! // What a quadrupole is for.
+//! assert!(qua.rate_rad_per_s.abs() < zyl.rate_rad_per_s.abs());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Features
+//! `cli` (the command line) and `report` (pages and pictures) are on by default. Without them the library also builds for
+//! `wasm32-unknown-unknown`.
 
 // Floor 0: units and mathematics without domain words.
 pub mod numeric;
@@ -37,3 +59,11 @@ pub mod report;
 // Floor 6: the command line.
 #[cfg(feature = "cli")]
 pub mod cli;
+
+// What most users begin with.
+pub use effect::DeclaredEffect;
+pub use pattern::{Pattern, classic::Classic};
+pub use profile::{Piece, Profile, ProfileSpec};
+pub use rate::{CoilModel, CoilModelBuilder, RateModel};
+pub use record::Record;
+pub use search::cost::worst_case::{SolvedProfiles, WorstCase};

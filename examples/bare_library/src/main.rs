@@ -1,15 +1,12 @@
 //! The library alone, without files, command line or pictures: a coil built in code, and its worst rate error.
 //!
-//! `cargo run --example bare_library --no-default-features`; the gate also runs it as WebAssembly.
+//! `cargo run --package bare-library`; the gate also runs it as WebAssembly.
 
 use std::error::Error;
 
-use coilwright::pattern::classic::Classic;
-use coilwright::profile::{Piece, Profile, ProfileSpec};
-use coilwright::rate::CoilModel;
-use coilwright::search::cost::worst_case::SolvedProfiles;
 use coilwright::thermal::Extent;
 use coilwright::units::k_per_s_from_c_per_h;
+use coilwright::{Classic, CoilModel, Piece, Profile, ProfileSpec, SolvedProfiles};
 
 fn main() -> Result<(), Box<dyn Error>> {
     // The 200 m coil of Yan, Lan, Jian (1998), as in examples/paper-200m.toml.
