@@ -13,6 +13,7 @@ use coilwright::pattern::classic::Classic;
 use coilwright::pattern::windability::WindingGraph;
 use coilwright::reproduce::yan1998;
 use coilwright::search::cost::worst_case::SolvedProfiles;
+use coilwright::text::sink::TomlComment;
 use coilwright::units::deg_per_h_from_rad_per_s;
 
 const LAYER_COUNTS: [usize; 11] = [8, 12, 16, 20, 24, 28, 32, 36, 40, 44, 48];
@@ -41,7 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             ];
             let named = NamedPattern { name: format!("{}-{layers}", classic.key()), pattern };
             let path = Path::new(&folder).join(format!("{}.toml", named.name));
-            write_atomically(&path, print_pattern(&named, &comments).as_bytes())?;
+            write_atomically(&path, print_pattern(&named, &comments.map(TomlComment::of)).as_bytes())?;
         }
     }
     Ok(())

@@ -26,8 +26,9 @@
 //! `cli` (the command line) and `report` (pages and pictures) are on by default. Without them the library also builds for
 //! `wasm32-unknown-unknown`.
 
-// Floor 0: units and mathematics without domain words.
+// Floor 0: units, mathematics and text without domain words.
 pub mod numeric;
+pub mod text;
 pub mod units;
 // Floor 1: what a coil, a pattern, a profile and a record are.
 pub mod coil;

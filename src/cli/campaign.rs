@@ -86,7 +86,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         results,
     };
     if answer.missing == 0 {
-        let csv = summary_csv(&answer.results).map_err(|e| CliError::Stdout(e.into()))?;
+        let csv = summary_csv(&answer.results);
         write_atomically(&folder.join("summary.csv"), &csv)?;
         write_atomically(&folder.join("summary.svg"), chart(&answer).as_bytes())?;
         screen.note(&format!("wrote {}", folder.join("summary.csv").display()));

@@ -8,6 +8,7 @@ use crate::io::fault::Faults;
 use crate::io::json::{CheckJson, FaultJson};
 use crate::io::read::model_file::read_model;
 use crate::io::read::plausibility::advice;
+use crate::text::sink::Line;
 
 /// All faults of a model file at once
 #[derive(Debug, clap::Args)]
@@ -24,7 +25,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
             let advice = advice(&found).iter().map(ToString::to_string).collect();
             screen.answer(CheckJson { file, faults: Vec::new(), advice }, |body| {
                 let notes: String = body.advice.iter().map(|a| format!("note: {a}\n")).collect();
-                format!("{}: no faults\n{notes}", body.file)
+                format!("{}: no faults\n{notes}", Line::of(&body.file))
             })?;
             Ok(Ending::Done)
         }

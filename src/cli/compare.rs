@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::records::{GrossErrors, Noticed, RecordArguments, read_noticed};
 use super::report::{REPORT_FILE, write_report};
 use super::schedule::pattern_of;
-use super::screen::{Screen, table};
+use super::screen::{Screen, held, table};
 use super::{CliError, Ending};
 use crate::compare::{compare, suspicion};
 use crate::io::files::write_atomically;
@@ -18,6 +18,7 @@ use crate::io::write::measurement_folder::{
     COMPARISON_FILE, MODEL_FILE, check_free, table_name, write_document, write_table,
 };
 use crate::report::comparison::pictures;
+use crate::text::sink::Line;
 
 /// A model's prediction beside measured records, and where it fails
 #[derive(Debug, clap::Args)]
@@ -48,6 +49,7 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
+    let _held = arguments.output.as_deref().map(|folder| held(folder, "compare")).transpose()?;
     if let Some(folder) = &arguments.output {
         check_free(folder)?;
     }
@@ -105,7 +107,7 @@ fn write_folder(
 fn text(body: &CompareJson) -> String {
     let mut text = format!("{} with {}: {}\n", body.model, body.pattern, body.verdict);
     for record in &body.records {
-        text += &format!("\n{}: {} rows, {}\n", record.file, record.rows, record.verdict);
+        text += &format!("\n{}: {} rows, {}\n", Line::of(&record.file), record.rows, record.verdict);
         for finding in &record.findings {
             text += &format!("  {finding}\n");
         }

@@ -22,6 +22,10 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     clap_complete::generate(arguments.shell, &mut Cli::command(), "coilwright", &mut script);
     let script = String::from_utf8_lossy(&script).into_owned();
     let shell = arguments.shell.to_string();
-    screen.answer(CompletionsJson { shell, script }, |body| body.script.clone())?;
+    if screen.is_json() {
+        screen.answer(CompletionsJson { shell, script }, |_| String::new())?;
+    } else {
+        screen.own(&script)?;
+    }
     Ok(Ending::Done)
 }

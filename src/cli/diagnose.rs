@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::records::{RecordArguments, read_remarked};
 use super::report::{REPORT_FILE, write_report};
 use super::schedule::pattern_of;
-use super::screen::{Screen, table};
+use super::screen::{Screen, held, table};
 use super::{CliError, Ending};
 use crate::compare::suspicion;
 use crate::diagnose::experiment::{Chamber, design};
@@ -31,6 +31,7 @@ use crate::report::diagnosis::{
     value_in_words, verdict_in_words,
 };
 use crate::report::ladder::ladder_chart;
+use crate::text::sink::TomlComment;
 use crate::units::deg_per_h_from_rad_per_s;
 
 /// Which piece of physics a model lacks: fits every known effect to records and says what is missing, and how sure
@@ -80,6 +81,7 @@ const PARTS: f64 = 100.0;
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
+    let _held = arguments.output.as_deref().map(|folder| held(folder, "diagnose")).transpose()?;
     if let Some(folder) = &arguments.output {
         check_free(folder)?;
     }
@@ -113,8 +115,9 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     if let Some(path) = &arguments.experiment {
         match (&experiment, &body.experiment) {
             (Some(found), Some(shown)) => {
-                let mut remarks = vec![format!("For {}: the chamber's air.", file.model.name), shown.statement.clone()];
-                remarks.extend(shown.expectations.clone());
+                let first = format!("For {}: the chamber's air.", file.model.name);
+                let remarks: Vec<TomlComment> =
+                    [&first, &shown.statement].into_iter().chain(&shown.expectations).map(TomlComment::of).collect();
                 write_atomically(path, print_profile(&found.profile, &remarks).as_bytes())?;
                 screen.note(&format!("wrote {}", path.display()));
             }
@@ -192,7 +195,7 @@ fn before_and_after(file: &ModelFile, found: &Found, record: &Record) -> Result<
 /// What stands behind an effect's values in a model file.
 pub(super) fn remarks(effect: &FindingJson) -> Vec<Remark> {
     let fitted = effect.parameters.iter().filter(|(_, p)| p.fitted);
-    fitted.map(|(key, p)| Remark { key: key.clone(), text: value_in_words(p) }).collect()
+    fitted.map(|(key, p)| Remark { key: key.clone(), text: TomlComment::of(value_in_words(p)) }).collect()
 }
 
 fn text(body: &DiagnosisJson) -> String {

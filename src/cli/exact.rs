@@ -25,6 +25,7 @@ use crate::search::cost::objective::Objective;
 use crate::search::cost::worst_case::SolvedProfiles;
 use crate::search::evaluator::JudgeError;
 use crate::search::proof::{Goal, Progress, Status, Task, prove, starting_patterns};
+use crate::text::sink::TomlComment;
 use crate::units::deg_per_h_from_rad_per_s;
 
 /// The best winding of a class with a proof, or a lower bound on what any winding can reach
@@ -133,7 +134,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
             format!("coil: {}; class: {class}; over {} profiles", model.name, solved.profiles().len()),
             format!("worst rate {:.6} °/h; proof: {}", body.best.worst_rate_deg_per_h, body.proof.status),
         ];
-        write_atomically(path, print_pattern(&named, &comments).as_bytes())?;
+        write_atomically(path, print_pattern(&named, &comments.map(TomlComment::of)).as_bytes())?;
         screen.note(&format!("wrote {}", path.display()));
     }
     if let Some(path) = &arguments.samples {

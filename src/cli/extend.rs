@@ -17,11 +17,13 @@ use crate::io::json::comparison::{CompareJson, PartJson, RecordComparisonJson};
 use crate::io::json::diagnosis::{ExtendJson, FindingJson};
 use crate::io::json::inputs::{InputsJson, RecordInputJson};
 use crate::io::model::ModelFile;
+use crate::io::read::effect_tables::channel_fault;
 use crate::io::read::model_file::read_model;
 use crate::io::write::model_edit::with_effect;
 use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::report::diagnosis::value_in_words;
+use crate::text::sink::Line;
 
 /// Adds an effect to a model file, fitted to records; comments and layout of the file are kept
 #[derive(Debug, clap::Args)]
@@ -130,7 +132,10 @@ fn wanted(arguments: &Arguments, file: &ModelFile) -> Result<DeclaredEffect, Cli
         return Ok(DeclaredEffect::custom(formula, values)?);
     }
     if let Some(channel) = arguments.effect.strip_prefix("channel:") {
-        return Ok(DeclaredEffect::channel(channel, 0.0));
+        return match channel_fault(channel) {
+            Some(message) => Err(CliError::Option { option: "--effect", message }),
+            None => Ok(DeclaredEffect::channel(channel, 0.0)),
+        };
     }
     let declared = file.model.effects.iter().find(|e| e.kind() == arguments.effect);
     match (crate::effect::find(&arguments.effect), declared) {
@@ -141,7 +146,7 @@ fn wanted(arguments: &Arguments, file: &ModelFile) -> Result<DeclaredEffect, Cli
 }
 
 fn text(body: &ExtendJson) -> String {
-    let mut text = format!("wrote {}\n{}\n", body.written, body.effect.kind);
+    let mut text = format!("wrote {}\n{}\n", Line::of(&body.written), body.effect.kind);
     for (key, parameter) in &body.effect.parameters {
         text += &format!("  {key} = {}\n", value_in_words(parameter));
     }
@@ -153,7 +158,7 @@ fn text(body: &ExtendJson) -> String {
     {
         text += &format!(
             "\n{} ({}): error {:.4} -> {:.4} °/h, reduced chi-square {:.3} -> {:.3}, noise floor {:.4} °/h, {} -> {}\n",
-            before.file,
+            Line::of(&before.file),
             input.role,
             before.rmse_deg_per_h,
             after.rmse_deg_per_h,

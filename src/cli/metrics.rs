@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::records::{GrossErrors, RecordArguments, remark, remark_gross};
 use super::report::{REPORT_FILE, write_report};
-use super::screen::{Screen, table};
+use super::screen::{Screen, held, table};
 use super::{CliError, Ending};
 use crate::io::fault::Faults;
 use crate::io::files::write_atomically;
@@ -41,6 +41,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+    let _held = arguments.output.as_deref().map(|folder| held(folder, "metrics")).transpose()?;
     if let Some(folder) = &arguments.output {
         check_free(folder)?;
     }

@@ -53,6 +53,7 @@ use crate::search::cost::guaranteed::GuaranteedError;
 use crate::search::cost::tolerance::ToleranceError;
 use crate::search::cost::worst_case::SearchError;
 use crate::search::evaluator::JudgeError;
+use crate::text::sink::{Block, Line};
 use progress::ProgressMode;
 use screen::Screen;
 
@@ -208,6 +209,18 @@ pub enum CliError {
     Stdout(std::io::Error),
 }
 
+impl CliError {
+    /// As a terminal shows it. Faults of a file come as several lines of their own making; anything else is one line.
+    fn shown(&self) -> Block {
+        match self {
+            CliError::Faults(_)
+            | CliError::Stream(StreamError::Header(_))
+            | CliError::Resolve(ResolveError::File(_)) => Block::of(&self.to_string()),
+            other => Block::of(Line::of(other).as_str()),
+        }
+    }
+}
+
 impl From<StreamError> for CliError {
     fn from(error: StreamError) -> Self {
         match error {
@@ -220,7 +233,7 @@ impl From<StreamError> for CliError {
 
 /// Parses the arguments, runs the command, and turns its ending into an exit code.
 pub fn run() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = parsed();
     let screen = Screen::new(&cli.output);
     let started = std::time::Instant::now();
     let ending = carry_out(&cli.command, &screen);
@@ -236,7 +249,7 @@ pub fn run() -> ExitCode {
         // A reader that has seen enough (`| head`) is no failure.
         Err(CliError::Stdout(error)) if error.kind() == std::io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("{}", error.to_string().trim_end());
+            eprintln!("{}", error.shown().as_str().trim_end());
             ExitCode::from(2)
         }
     }
@@ -280,4 +293,15 @@ fn carry_out(command: &Command, screen: &Screen) -> Result<Ending, CliError> {
         Command::Verify(arguments) => verify::run(arguments, screen),
         Command::Report(arguments) => report::run(arguments, screen),
     }
+}
+
+/// What was asked for. A complaint about the arguments quotes them, so it is made of their visible form.
+fn parsed() -> Cli {
+    Cli::try_parse().unwrap_or_else(|error| {
+        let shown = std::env::args_os().map(|argument| Line::of(argument.display()).into_string());
+        match Cli::try_parse_from(shown) {
+            Ok(_) => error.exit(),
+            Err(error) => error.exit(),
+        }
+    })
 }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use super::budget::parse_duration;
 use super::former::former_pattern;
 use super::progress::StopFlag;
-use super::screen::{Screen, table};
+use super::screen::{Screen, held, table};
 use super::watch::Watch;
 use super::{CliError, Ending, report, schedule};
 use crate::io::fault::Faults;
@@ -15,7 +15,7 @@ use crate::io::json::search::OptimiseJson;
 use crate::io::model::{ModelFile, NamedPattern};
 use crate::io::read::model_file::read_model;
 use crate::io::read::pattern_file::resolve_pattern;
-use crate::io::write::checkpoint::{CHECKPOINT_FILE, read_checkpoint};
+use crate::io::write::checkpoint::{BROKEN_FILE, CHECKPOINT_FILE, read_checkpoint, set_broken_aside};
 use crate::io::write::run_directory::{Request, write_results};
 use crate::pattern::windability::WindabilityClass;
 use crate::search;
@@ -196,6 +196,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         return Err(CliError::Option { option: "--prove", message });
     }
     let folder = arguments.output.as_deref();
+    let _held = folder.map(|folder| held(folder, "optimise")).transpose()?;
     let saved = match folder {
         Some(folder) => saved_state(arguments, folder, &request, screen)?,
         None => None,
@@ -247,6 +248,9 @@ fn saved_state(
     screen: &Screen,
 ) -> Result<Option<State>, CliError> {
     if arguments.fresh {
+        if set_broken_aside(folder)? {
+            screen.note(&format!("the broken checkpoint is kept as {BROKEN_FILE}"));
+        }
         return Ok(None);
     }
     let found = read_checkpoint(folder, &request.fingerprint());

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use super::progress::StopFlag;
-use super::screen::{Screen, table};
+use super::screen::{Screen, held, table};
 use super::{CliError, Ending};
 use crate::io::files::write_atomically;
 use crate::io::json::PatternJson;
@@ -12,7 +12,7 @@ use crate::io::json::pareto::{ParetoJson, PointJson, front_csv};
 use crate::io::model::{ModelFile, NamedPattern};
 use crate::io::read::model_file::read_model;
 use crate::io::read::pattern_file::print_pattern;
-use crate::io::write::pareto_parts::Front;
+use crate::io::write::pareto_parts::{Front, remove_front};
 use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
 use crate::pattern::windability::WindabilityClass;
@@ -29,6 +29,7 @@ use crate::search::cost::tolerance::Coils;
 use crate::search::cost::worst_case::SolvedProfiles;
 use crate::search::evaluator::{Evaluator, Judged};
 use crate::search::pareto::{Point, front};
+use crate::text::sink::TomlComment;
 
 /// The front of worst-case error against windability and robustness
 #[derive(Debug, clap::Args)]
@@ -80,6 +81,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     if file.tolerance.is_some() {
         whose.push(evaluator.sampled_coils(Whose::Built, WindabilityClass::Any, seed)?);
     }
+    let _held = arguments.output.as_deref().map(|folder| held(folder, "pareto")).transpose()?;
     let kept = arguments.output.as_deref().map(|folder| Front { folder, file: &file, seed, rounds: arguments.rounds });
     let parts = parts(&classes, &climbs, whose.len());
     let progress = screen.progress("pareto", Some(parts.len() as u64));
@@ -111,6 +113,9 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     progress.finish();
     let points = front(&with_spreads(&file, judged)?);
     let names = named(points.iter().map(|p| p.judged.name.as_str()));
+    if let Some(folder) = &arguments.output {
+        remove_front(folder)?;
+    }
     let mut shown = Vec::new();
     for (point, name) in points.iter().zip(names) {
         let mut point = point.clone();
@@ -121,15 +126,14 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
                 let path = folder.join(format!("{name}.toml"));
                 let comment = format!("coil: {}; a point of the front of error against windability", file.model.name);
                 let pattern = NamedPattern { name, pattern: point.judged.pattern.clone() };
-                write_atomically(&path, print_pattern(&pattern, &[comment]).as_bytes())?;
+                write_atomically(&path, print_pattern(&pattern, &[TomlComment::of(comment)]).as_bytes())?;
                 path.file_name().map(|n| n.to_string_lossy().into_owned())
             }
         };
         shown.push(PointJson::of(&point, written));
     }
     if let Some(folder) = &arguments.output {
-        let csv = front_csv(&shown).map_err(|e| CliError::Stdout(e.into()))?;
-        write_atomically(&folder.join("pareto.csv"), &csv)?;
+        write_atomically(&folder.join("pareto.csv"), &front_csv(&shown))?;
         let worst = chart(&file, &shown, "worst rate error", |p| Some(p.worst_rate_deg_per_h));
         write_atomically(&folder.join("pareto.svg"), worst.as_bytes())?;
         if file.tolerance.is_some() {

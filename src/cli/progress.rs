@@ -11,6 +11,8 @@ use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
+use crate::text::sink::{JsonText, Line};
+
 /// How progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ProgressMode {
@@ -63,11 +65,11 @@ impl Progress {
         match &self.shown {
             Shown::Bar(bar) => {
                 bar.set_position(done);
-                bar.set_message(message.to_owned());
+                bar.set_message(Line::of(message).into_string());
             }
             Shown::Json => {
                 let line = ProgressLine { task: &self.task, done, total: self.total, message };
-                if let Ok(json) = serde_json::to_string(&line) {
+                if let Ok(json) = serde_json::to_string(&line).map(|json| JsonText::of(&json)) {
                     // Progress that nobody reads any more is no reason to stop the work.
                     let _ = writeln!(std::io::stderr().lock(), "{json}");
                 }

@@ -10,6 +10,7 @@ use crate::io::read::run_reader::read_run;
 use crate::io::write::measurement_folder::{holds_measurements, read_measurements};
 use crate::report::measurement::measurement_page;
 use crate::report::search_run::search_page;
+use crate::text::sink::Line;
 
 /// One self-contained page about a search, a comparison, a diagnosis or measures, written to report.html in their folder
 #[derive(Debug, clap::Args)]
@@ -26,7 +27,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let path = arguments.output.clone().unwrap_or_else(|| arguments.folder.join(REPORT_FILE));
     let bytes = write_report(&arguments.folder, &path)?;
     let report = path.display().to_string();
-    screen.answer(ReportJson { report, bytes }, |body| format!("{}\n", body.report))?;
+    screen.answer(ReportJson { report, bytes }, |body| format!("{}\n", Line::of(&body.report)))?;
     Ok(Ending::Done)
 }
 

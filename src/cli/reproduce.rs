@@ -10,6 +10,7 @@ use crate::io::files::write_atomically;
 use crate::report::thesis2021 as thesis;
 use crate::report::yan1998::{ReproductionFile, ReproductionJson, TABLE_HEAD, files, table_rows};
 use crate::reproduce::{thesis2021, yan1998};
+use crate::text::sink::Line;
 
 /// A publication's results, as printed beside as computed, with every discrepancy named
 #[derive(Debug, clap::Args)]
@@ -76,7 +77,7 @@ fn of_paper(folder: &Path, screen: &Screen) -> Result<Ending, CliError> {
         text += "\nErrata: what is printed and what is used\n";
         text.extend(body.errata.iter().map(|e| format!("- {}: {}. Used: {}.\n", e.place, e.printed, e.used)));
         text += "\nWritten\n";
-        text.extend(body.files.iter().map(|f| format!("  {f}\n")));
+        text.extend(body.files.iter().map(|f| format!("  {}\n", Line::of(f))));
         text
     })?;
     Ok(Ending::Done)

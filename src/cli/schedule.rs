@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::screen::{Screen, table};
+use super::screen::{Screen, held, table};
 use super::{CliError, Ending};
 use crate::io::files::write_atomically;
 use crate::io::json::schedule::{ScheduleJson, crossover_words};
@@ -38,6 +38,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let named = pattern_of(&file, arguments.pattern.as_deref())?;
     let (schedule, document) = plan(&file, &named)?;
     if let Some(folder) = &arguments.output {
+        let _held = held(folder, "schedule")?;
         for (name, text) in files(&file, &named, &schedule, &document)? {
             let path = folder.join(name);
             write_atomically(&path, text.as_bytes())?;

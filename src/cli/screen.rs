@@ -1,13 +1,16 @@
 //! Where commands write: the answer to stdout, notes to stderr.
 
 use std::io::Write;
+use std::path::Path;
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 use serde::Serialize;
 
 use super::progress::{Progress, ProgressMode};
 use super::{CliError, Format, OutputOptions};
+use crate::io::folder::HeldFolder;
 use crate::io::json::Document;
+use crate::text::sink::{Block, JsonText, Line};
 
 /// The program's two outlets, with the options that the user gave.
 #[derive(Debug, Clone)]
@@ -43,8 +46,7 @@ impl Screen {
     pub fn answer<T: Serialize>(&self, body: T, text: impl FnOnce(&T) -> String) -> Result<(), CliError> {
         if self.is_json() {
             let document = Document::new(body);
-            let json = serde_json::to_string_pretty(&document).map_err(|e| CliError::Stdout(e.into()))?;
-            self.write(&(json + "\n"))
+            self.json(&document)
         } else {
             self.write(&text(&body))
         }
@@ -55,19 +57,27 @@ impl Screen {
     /// # Errors
     /// A stdout that cannot be written.
     pub fn document<T: Serialize>(&self, document: &T, text: impl FnOnce(&T) -> String) -> Result<(), CliError> {
-        if self.is_json() {
-            let json = serde_json::to_string_pretty(document).map_err(|e| CliError::Stdout(e.into()))?;
-            self.write(&(json + "\n"))
-        } else {
-            self.write(&text(document))
-        }
+        if self.is_json() { self.json(document) } else { self.write(&text(document)) }
     }
 
-    /// Writes to stdout as it is.
+    fn json<T: Serialize>(&self, document: &T) -> Result<(), CliError> {
+        let json = serde_json::to_string_pretty(document).map_err(|e| CliError::Stdout(e.into()))?;
+        self.own(&(JsonText::of(&json).into_string() + "\n"))
+    }
+
+    /// Writes to stdout what may hold text from outside: lines that do nothing to a terminal but appear on it.
     ///
     /// # Errors
     /// A stdout that cannot be written.
     pub fn write(&self, text: &str) -> Result<(), CliError> {
+        self.own(Block::of(text).as_str())
+    }
+
+    /// Writes to stdout, as it is, what holds nothing from outside: scripts for a shell, manual pages.
+    ///
+    /// # Errors
+    /// A stdout that cannot be written.
+    pub fn own(&self, text: &str) -> Result<(), CliError> {
         if self.is_silent {
             return Ok(());
         }
@@ -80,20 +90,32 @@ impl Screen {
         Progress::new(self.progress, self.quiet, task, total)
     }
 
-    /// A note to the person at the terminal.
+    /// A note to the person at the terminal: one line.
     pub fn note(&self, text: &str) {
         if !self.quiet {
-            eprintln!("{text}");
+            eprintln!("{}", Line::of(text));
         }
     }
+}
+
+/// The folder that a command writes into, held until it has ended.
+///
+/// # Errors
+/// A folder that cannot be written, or that another run holds.
+pub fn held(folder: &Path, command: &str) -> Result<HeldFolder, CliError> {
+    Ok(HeldFolder::take(folder, &format!("coilwright {command} (process {})", std::process::id()))?)
 }
 
 /// A plain table: first column to the left, the others to the right.
 pub fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut table = Table::new();
-    table.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Disabled).set_header(header);
+    table
+        .load_style(presets::NOTHING)
+        .set_content_arrangement(ContentArrangement::Disabled)
+        .set_header(header.iter().map(|cell| Line::of(cell).into_string()));
     for row in rows {
-        table.add_row(row);
+        // A cell's own line break would look like a row of its own.
+        table.add_row(row.iter().map(|cell| Line::of(cell).into_string()));
     }
     for (i, column) in table.column_iter_mut().enumerate() {
         column.set_padding((0, 2));

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::records::{GrossErrors, RecordArguments, read_noticed};
-use super::screen::Screen;
+use super::screen::{Screen, held};
 use super::{CliError, Ending};
 use crate::io::files::write_atomically;
 use crate::io::json::temperatures::TemperaturesJson;
@@ -65,6 +65,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     };
     let body = TemperaturesJson::new(&file.model.name, &name, &history);
     if let Some(folder) = &arguments.output {
+        let _held = held(folder, "temperatures")?;
         for (file, content) in [
             ("temperatures.csv", body.csv()),
             ("temperatures.svg", temperature_chart(&body).svg()),

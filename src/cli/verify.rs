@@ -8,6 +8,8 @@ use crate::io::files::sha256_hex;
 use crate::io::json::{VerifyJson, ViolationJson};
 use crate::io::read::model_file::read_model;
 use crate::io::read::schedule_reader::{read_claim, shop_of};
+use crate::report::page::assets;
+use crate::text::sink::Line;
 use crate::units::deg_per_h_from_rad_per_s;
 use crate::verify::{RateCheck, Truth, verify};
 
@@ -31,6 +33,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         profiles: &file.profiles,
         model_sha256: &sha256_hex(&file.source),
         shop: &shop_of(&file.production),
+        assets: &assets(),
     };
     let found = verify(&truth, &claim);
     let clean = found.violations.is_empty();
@@ -69,7 +72,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
             .collect(),
     };
     screen.answer(body, |body| {
-        let mut text: String = body.violations.iter().map(|v| format!("{}\n", v.message)).collect();
+        let mut text: String = body.violations.iter().map(|v| format!("{}\n", Line::of(&v.message))).collect();
         let rate = match body.independent_worst_rate_deg_per_h {
             Some(rate) => format!("; an independent solution finds a worst rate error of {rate:.4} °/h"),
             None => format!("; rate error: {}", body.rate_check),
@@ -79,7 +82,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
             1 => "1 violation".to_owned(),
             n => format!("{n} violations"),
         };
-        text.push_str(&format!("{}: {count} in {} checks{rate}\n", body.schedule, body.checks));
+        text.push_str(&format!("{}: {count} in {} checks{rate}\n", Line::of(&body.schedule), body.checks));
         let listed = |items: &[&str]| items.iter().map(|item| format!("  {item}\n")).collect::<String>();
         text.push_str(&format!("worked out again:\n{}", listed(&body.recomputed)));
         if let Some(tolerance) = body.rate_tolerance_deg_per_h {

@@ -65,6 +65,11 @@ const FIRST_ROWS: usize = 4;
 const GAP: f64 = 1.5;
 /// After a gap of more steps the pack has forgotten what was before.
 const LONGEST_GAP_STEPS: f64 = 20_000.0;
+/// Steps over gaps that each row earns, up to [`LONGEST_GAP_STEPS`]: a stream whose first rows were close together and whose
+/// further ones are far apart would otherwise bridge a long gap at every row.
+const BRIDGED_STEPS_A_ROW: f64 = 100.0;
+/// Rows that are closer are one instant.
+const LEAST_INTERVAL_S: f64 = 1e-6;
 /// A coil's temperature does not leap by more than this, and so much per second.
 const LEAP_K: f64 = 1.0;
 const LEAP_K_PER_S: f64 = 0.1;
@@ -110,6 +115,7 @@ pub struct Stream<'c, T> {
     pending: VecDeque<Pending<T>>,
     step: u64,
     last_s: f64,
+    bridgeable_steps: f64,
     last_temperature: Option<(f64, u64)>,
     last_channel_rad_per_s: f64,
     leaps: Vec<f64>,
@@ -130,6 +136,7 @@ impl<'c, T> Stream<'c, T> {
             pending: VecDeque::new(),
             step: 0,
             last_s: f64::NEG_INFINITY,
+            bridgeable_steps: LONGEST_GAP_STEPS,
             last_temperature: None,
             last_channel_rad_per_s: 0.0,
             leaps: Vec::new(),
@@ -173,7 +180,7 @@ impl<'c, T> Stream<'c, T> {
 
     fn start(&mut self, out: &mut impl FnMut(Compensated<T>)) {
         let times: Vec<f64> = self.first.iter().filter_map(|(_, r)| Some(r.as_ref()?.time_s)).collect();
-        let steps: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).filter(|s| *s > 0.0).collect();
+        let steps: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).filter(|s| *s >= LEAST_INTERVAL_S).collect();
         let found_s = median(&steps);
         self.interval_s = if found_s > 0.0 { found_s } else { 1.0 };
         self.delay = self.compensator.delay_rows(self.interval_s);
@@ -254,7 +261,8 @@ impl<'c, T> Stream<'c, T> {
         if since_s == f64::INFINITY {
             return 1;
         }
-        if since_s <= 0.0 {
+        self.bridgeable_steps = (self.bridgeable_steps + BRIDGED_STEPS_A_ROW).min(LONGEST_GAP_STEPS);
+        if since_s < LEAST_INTERVAL_S {
             flags.push(Flag::ClockBack);
             return 1;
         }
@@ -263,7 +271,7 @@ impl<'c, T> Stream<'c, T> {
         }
         flags.push(Flag::Gap);
         let steps = (since_s / self.interval_s).round();
-        if steps > LONGEST_GAP_STEPS {
+        if steps > self.bridgeable_steps {
             for row in 0..self.pending.len() {
                 self.settle(row);
             }
@@ -271,6 +279,7 @@ impl<'c, T> Stream<'c, T> {
             self.last_temperature = None;
             return 1;
         }
+        self.bridgeable_steps -= steps;
         steps as u64
     }
 

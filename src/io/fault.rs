@@ -1,10 +1,14 @@
 //! Faults of an input file: all of them at once, each with the source line drawn.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use codespan_reporting::diagnostic::{Diagnostic, Label};
 use codespan_reporting::files::SimpleFile;
 use codespan_reporting::term::{self, Config};
+
+use crate::text::sink::Line;
+use crate::text::{is_unseen, visible};
 
 /// One fault: what was expected, what was found, what to do; and where.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -50,26 +54,93 @@ impl std::error::Error for Faults {}
 
 impl std::fmt::Display for Faults {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let file = SimpleFile::new(&self.file, &self.source);
+        // Whatever the file, its name and the faults hold is text on a terminal's lines from here on.
+        let name = Line::of(&self.file);
+        let source = Shown::of(&self.source);
+        let file = SimpleFile::new(name.as_str(), &*source.text);
         for fault in &self.faults {
-            let drawable = fault.span.clone().filter(|s| s.start <= s.end && s.end <= self.source.len());
-            let Some(span) = drawable else {
-                writeln!(f, "error: {}: {}", self.file, fault.message)?;
-                if let Some(note) = &fault.note {
+            let (message, note) = (Line::of(&fault.message), fault.note.as_ref().map(Line::of));
+            let Some(span) = fault.span.clone().and_then(|span| source.span(&self.source, span)) else {
+                writeln!(f, "error: {name}: {message}")?;
+                if let Some(note) = &note {
                     writeln!(f, "  = {note}")?;
                 }
                 continue;
             };
             let diagnostic = Diagnostic::error()
-                .with_message(&fault.message)
+                .with_message(message)
                 .with_labels(vec![Label::primary((), span)])
-                .with_notes(fault.note.iter().cloned().collect());
+                .with_notes(note.into_iter().map(Line::into_string).collect());
             let drawn = term::emit_into_string(&Config::default(), &file, &diagnostic).map_err(|_| std::fmt::Error)?;
             writeln!(f, "{}", drawn.trim_end())?;
         }
         if self.faults.len() > 1 {
-            writeln!(f, "{} faults in {}", self.faults.len(), self.file)?;
+            writeln!(f, "{} faults in {name}", self.faults.len())?;
         }
         Ok(())
+    }
+}
+
+/// A line that is longer is not drawn: it would fill the screen.
+const LONGEST_DRAWN_LINE: usize = 2_000;
+
+/// A source as a terminal may show it.
+struct Shown<'s> {
+    text: Cow<'s, str>,
+}
+
+impl<'s> Shown<'s> {
+    fn of(source: &'s str) -> Self {
+        let clean = !source.contains(|c| is_unseen(c) && !KEPT.contains(&c)) && !source.contains('\r');
+        Self { text: if clean { Cow::Borrowed(source) } else { Cow::Owned(shown(source)) } }
+    }
+
+    /// Where a part of the source is in what is shown; none where it cannot be drawn.
+    fn span(&self, source: &str, span: Range<usize>) -> Option<Range<usize>> {
+        let (before, part) = (source.get(..span.start)?, source.get(span.clone())?);
+        let line = source[span.start..].lines().next().map_or(0, str::len) + before.len()
+            - before.rfind('\n').map_or(0, |i| i + 1);
+        if line > LONGEST_DRAWN_LINE {
+            return None;
+        }
+        match self.text {
+            Cow::Borrowed(_) => Some(span),
+            Cow::Owned(_) => {
+                let start = shown(before).len();
+                Some(start..start + shown(part).len())
+            }
+        }
+    }
+}
+
+/// Tabs are drawn as spaces; a line's own end stays.
+const KEPT: [char; 2] = ['\n', '\t'];
+
+fn shown(source: &str) -> String {
+    visible(&source.replace("\r\n", "\n"), &KEPT)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_file_holds_neither_moves_the_cursor_nor_forges_a_line() {
+        let source = "name = \"a\u{1b}[2J\u{202e}\" \r x\nlayers = 0\r\n";
+        let at = source.find("layers").unwrap();
+        let fault = Fault::new("layers must be even,\nverify: no violations", Some(at..at + 6)).with_note("a\u{9b}b");
+        let first = Fault::new("the name", Some(0..4));
+        let faults = Faults { file: "x\n\u{7f}.toml".into(), source: source.into(), faults: vec![fault, first] };
+        let text = faults.to_string();
+        assert!(!text.contains(|c| is_unseen(c) && c != '\n'), "{text:?}");
+        assert!(text.contains("layers must be even,\\nverify: no violations\n"), "{text}");
+        assert!(text.contains("\\u{1b}[2J\\u{202e}") && text.contains("^^^^^^"), "{text}");
+    }
+
+    #[test]
+    fn a_line_of_a_million_characters_is_named_and_not_drawn() {
+        let source = format!("name = \"{}\"", "x".repeat(1_000_000));
+        let faults = Faults::one("m.toml", source, Fault::new("too long", Some(0..4)));
+        assert_eq!(faults.to_string(), "error: m.toml: too long\n");
     }
 }

@@ -1,5 +1,6 @@
 //! Reading whole text files, and writing them so that nothing is ever half there.
 
+use std::fs::File;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
@@ -15,6 +16,8 @@ const LARGEST_TEXT_BYTES: u64 = 16 * 1024 * 1024;
 pub enum WriteError {
     #[error("cannot create the folder {path}: {source}", path = .path.display())]
     Folder { path: PathBuf, source: std::io::Error },
+    #[error("{holder} writes into {path}: wait until it has ended, or choose another folder", path = .path.display())]
+    Held { path: PathBuf, holder: String },
     #[error("cannot write {path}: {source}", path = .path.display())]
     File { path: PathBuf, source: std::io::Error },
 }
@@ -43,7 +46,7 @@ pub fn read_text_up_to(path: &Path, largest_bytes: u64) -> Result<String, Faults
     }
     // A pipe or device has no length to check beforehand.
     let mut bytes = Vec::new();
-    std::fs::File::open(path)
+    File::open(path)
         .and_then(|file| file.take(largest_bytes + 1).read_to_end(&mut bytes))
         .map_err(|e| fault(format!("cannot be read: {e}")))?;
     if bytes.len() as u64 > largest_bytes {
@@ -80,11 +83,19 @@ pub fn write_atomically(path: &Path, contents: &[u8]) -> Result<(), WriteError> 
 }
 
 /// A file that is written piece by piece under a temporary name in the same folder; it takes its own name at the end.
+///
+/// The temporary name follows from the file's own (`.NAME.0.coilwright`), and whoever writes holds a lock on it: what a
+/// killed run left behind is taken over by the next one that writes the same file, and never one that is being written.
 #[derive(Debug)]
 pub struct NewFile {
     path: PathBuf,
-    file: tempfile::NamedTempFile,
+    temporary: PathBuf,
+    file: File,
+    finished: bool,
 }
+
+/// So many runs may write the same file at once; the last one to end leaves its own.
+const MOST_WRITERS: usize = 64;
 
 impl NewFile {
     /// # Errors
@@ -96,22 +107,82 @@ impl NewFile {
         };
         std::fs::create_dir_all(folder).map_err(|source| WriteError::Folder { path: folder.to_owned(), source })?;
         let fail = |source| WriteError::File { path: path.to_owned(), source };
-        let file = tempfile::Builder::new().prefix(".coilwright-").tempfile_in(folder).map_err(fail)?;
-        Ok(Self { path: path.to_owned(), file })
+        let name = path.file_name().ok_or_else(|| fail(std::io::ErrorKind::InvalidFilename.into()))?;
+        for slot in 0..MOST_WRITERS {
+            let mut own = std::ffi::OsString::from(".");
+            own.push(name);
+            own.push(format!(".{slot}.coilwright"));
+            let temporary = folder.join(own);
+            if let Some(file) = claimed(&temporary).map_err(fail)? {
+                return Ok(Self { path: path.to_owned(), temporary, file, finished: false });
+            }
+        }
+        Err(fail(std::io::Error::other("too many runs write this file at once")))
     }
 
     /// Readers see the old file until here, and the new one from here on.
     ///
     /// # Errors
     /// A file that cannot be written or renamed.
-    pub fn finish(self) -> Result<(), WriteError> {
-        let Self { path, file } = self;
-        let fail = |source| WriteError::File { path: path.clone(), source };
-        file.as_file().sync_all().map_err(fail)?;
-        share_with_readers(file.path()).map_err(fail)?;
-        file.persist(&path).map_err(|e| fail(e.error))?;
-        Ok(())
+    pub fn finish(mut self) -> Result<(), WriteError> {
+        let done = self
+            .file
+            .sync_all()
+            .and_then(|()| share_with_readers(&self.temporary))
+            .and_then(|()| std::fs::rename(&self.temporary, &self.path));
+        self.finished = done.is_ok();
+        done.map_err(|source| WriteError::File { path: self.path.clone(), source })
     }
+}
+
+impl Drop for NewFile {
+    fn drop(&mut self) {
+        if !self.finished {
+            // The lock is still held: nobody else's file goes.
+            let _ = std::fs::remove_file(&self.temporary);
+        }
+    }
+}
+
+/// An empty file of that name, locked; none where another run has it.
+///
+/// # Errors
+/// A file that can be neither made nor taken over.
+pub(super) fn claimed(path: &Path) -> std::io::Result<Option<File>> {
+    // Twice: between opening and locking, its owner may have renamed or removed it.
+    for _ in 0..8 {
+        if std::fs::symlink_metadata(path).is_ok_and(|found| !found.is_file()) {
+            return Err(std::io::ErrorKind::AlreadyExists.into());
+        }
+        let file = File::options().create(true).truncate(false).write(true).read(true).open(path)?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(std::fs::TryLockError::WouldBlock) => return Ok(None),
+            // A file system without locks: then the name alone has to do.
+            Err(std::fs::TryLockError::Error(error)) if error.kind() == std::io::ErrorKind::Unsupported => {}
+            Err(std::fs::TryLockError::Error(error)) => return Err(error),
+        }
+        if is_at(&file, path) {
+            file.set_len(0)?;
+            return Ok(Some(file));
+        }
+    }
+    Ok(None)
+}
+
+/// Whether an open file is still the one of that name.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    match (file.metadata(), std::fs::symlink_metadata(path)) {
+        (Ok(a), Ok(b)) => (a.dev(), a.ino()) == (b.dev(), b.ino()),
+        _ => false,
+    }
+}
+
+#[cfg(not(unix))]
+fn is_at(_file: &File, path: &Path) -> bool {
+    path.exists()
 }
 
 impl Write for NewFile {
@@ -134,4 +205,40 @@ fn share_with_readers(path: &Path) -> std::io::Result<()> {
 #[cfg(not(unix))]
 fn share_with_readers(_path: &Path) -> std::io::Result<()> {
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> =
+            std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn what_a_killed_run_left_behind_is_gone_after_the_next_write_of_the_same_file() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join(".a.csv.0.coilwright"), "half of a fi").unwrap();
+        write_atomically(&folder.path().join("a.csv"), b"whole").unwrap();
+        assert_eq!(names(folder.path()), ["a.csv"]);
+        assert_eq!(std::fs::read_to_string(folder.path().join("a.csv")).unwrap(), "whole");
+    }
+
+    #[test]
+    fn two_writers_of_one_file_do_not_meet_and_the_last_one_leaves_its_own() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        let (mut first, mut second) = (NewFile::create(&path).unwrap(), NewFile::create(&path).unwrap());
+        first.write_all(b"first").unwrap();
+        second.write_all(b"second").unwrap();
+        first.finish().unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "first");
+        second.finish().unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "second");
+        drop(NewFile::create(&path).unwrap());
+        assert_eq!(names(folder.path()), ["a.csv"]);
+    }
 }

@@ -4,8 +4,10 @@
 
 pub mod fault;
 pub mod files;
+pub mod folder;
 pub mod json;
 pub mod model;
 pub mod read;
 pub mod record_format;
+pub mod table;
 pub mod write;

@@ -4,6 +4,7 @@ use maud::{PreEscaped, html};
 
 use super::plot;
 use crate::pattern::{Half, Pattern};
+use crate::text::sink::Markup;
 
 const ROW_PX: f64 = 17.0;
 const WIDTH_PX: f64 = 560.0;
@@ -23,7 +24,7 @@ pub fn cross_section(title: &str, pattern: &Pattern) -> String {
     let outbound = |layer: usize| pattern.axial_direction(layer) > 0.0;
     let colour = |half: Half| COLOURS[usize::from(half == Half::B)];
     let centre_px = (LEFT_PX + RIGHT_PX) / 2.0;
-    html! {
+    let drawn = html! {
         svg xmlns="http://www.w3.org/2000/svg" class="chart" role="img" width=(WIDTH_PX) height=(height_px)
             viewBox={ "0 0 " (WIDTH_PX) " " (height_px) } {
             title { (title) }
@@ -70,8 +71,8 @@ pub fn cross_section(title: &str, pattern: &Pattern) -> String {
                 "arrows: from end A to end B; arcs: crossovers, black or white at the midpoint"
             }
         }
-    }
-    .into_string()
+    };
+    Markup::of(&drawn.into_string()).into_string()
 }
 
 #[cfg(test)]

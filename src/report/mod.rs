@@ -8,7 +8,7 @@ pub mod diagnosis;
 pub mod improvement;
 pub mod ladder;
 pub mod measurement;
-mod page;
+pub mod page;
 pub mod plot;
 pub mod search_run;
 pub mod temperatures;

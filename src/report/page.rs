@@ -1,14 +1,24 @@
 //! The shell of a page: one file that opens offline, on a screen, a phone or paper, light or dark.
 
+use data_encoding::BASE64;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use sha2::{Digest, Sha256};
+
+use super::plot;
+use crate::text::sink;
+use crate::verify::Assets;
 
 /// A whole page.
+///
+/// Its policy lets a browser run the one script and use the two styles that the program ships, told by their hashes, and
+/// load nothing: whatever a name could put on a page, it does nothing.
 pub(super) fn page(title: &str, body: &Markup) -> String {
-    html! {
+    let page = html! {
         (DOCTYPE)
         html lang="en" {
             head {
                 meta charset="utf-8";
+                meta http-equiv="Content-Security-Policy" content=(policy());
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
                 title { (title) }
@@ -21,8 +31,30 @@ pub(super) fn page(title: &str, body: &Markup) -> String {
                 script { (PreEscaped(ZOOM)) }
             }
         }
+    };
+    sink::Markup::of(&page.into_string()).into_string()
+}
+
+/// What a browser may load and run.
+fn policy() -> String {
+    let hash = |text: &str| format!("'sha256-{}'", BASE64.encode(&Sha256::digest(text.as_bytes())));
+    format!(
+        "default-src 'none'; script-src {}; style-src {} {}; img-src data:; base-uri 'none'; form-action 'none'",
+        hash(ZOOM),
+        hash(STYLE),
+        hash(plot::STYLE)
+    )
+}
+
+/// What every page holds besides its words, for the verification of one.
+pub fn assets() -> Assets {
+    let hex = |text: &str| Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect();
+    Assets {
+        style_sha256: hex(STYLE),
+        drawing_style_sha256: hex(plot::STYLE),
+        script_sha256: hex(ZOOM),
+        policy: policy(),
     }
-    .into_string()
 }
 
 /// A picture that can be enlarged, with its caption.

@@ -7,12 +7,12 @@ use super::page::{figure, page};
 use crate::io::json::schedule::{ScheduleJson, StepJson};
 use crate::io::read::schedule_reader::DATA_ELEMENT;
 use crate::pattern::Pattern;
+use crate::text::sink::JsonText;
 
 /// The traveller as one page; `document` as [`crate::io::write::traveller::traveller`] makes it.
 pub fn traveller_page(document: &ScheduleJson, pattern: &Pattern) -> String {
     let title = format!("Winding traveller: {}", document.model);
-    // "</" would end the element early.
-    let data = serde_json::to_string(document).unwrap_or_default().replace("</", "<\\/");
+    let data = JsonText::embedded(&serde_json::to_string(document).unwrap_or_default());
     let body = html! {
         h1 { (title) }
         (head(document))
@@ -34,7 +34,7 @@ pub fn traveller_page(document: &ScheduleJson, pattern: &Pattern) -> String {
             "The pack from the spool outwards; numbers at the left count layers, at the right segments of the fibre."))
         h2 { "Release" }
         (signatures())
-        (PreEscaped(DATA_ELEMENT)) (PreEscaped(data)) (PreEscaped("</script>"))
+        (PreEscaped(DATA_ELEMENT)) (PreEscaped(data.as_str())) (PreEscaped("</script>"))
     };
     page(&title, &body)
 }

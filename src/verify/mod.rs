@@ -10,12 +10,14 @@
 //! says so of each file.
 
 mod expected;
+mod form;
 mod heat;
 mod laplace;
 mod network;
 mod optics;
 mod page;
 mod physics;
+mod program;
 mod rate;
 mod stepping;
 
@@ -23,12 +25,22 @@ use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;
 use crate::units::{deg_per_h_from_rad_per_s, mm_from_m};
 
-/// What a file claims, in SI; absent fields are not checked.
+pub use form::Kind;
+
+/// What a file claims, in SI; what its kind of file says must be there, and nothing else.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Claim {
+    /// None only where nothing was read yet.
+    pub kind: Option<Kind>,
+    /// Whether the file says more of the whole than a table's last columns can.
+    pub is_document: bool,
+    /// What wrote the file.
+    pub program: Option<String>,
     pub model: Option<String>,
     pub model_sha256: Option<String>,
     pub pattern: Option<String>,
+    /// Of the pattern's name and segments.
+    pub pattern_sha256: Option<String>,
     pub segments: Option<Vec<i64>>,
     pub class: Option<String>,
     pub reels: Option<i64>,
@@ -47,15 +59,12 @@ pub struct Claim {
     pub supply: Option<Vec<ClaimedReel>>,
     pub shop: Option<Shop>,
     pub rows: Vec<Row>,
-    /// What a reader sees, where the file is a page.
-    pub page: Option<Vec<Shown>>,
-}
-
-/// A piece of text on a page, with the element that holds it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Shown {
-    pub element: String,
-    pub text: String,
+    /// The page as its file has it, where the file is one.
+    pub page: Option<String>,
+    /// The lines of a machine program, where the file is one; its rows are what these wind.
+    pub code: Option<String>,
+    /// What was found where the file was read.
+    pub unread: Vec<Violation>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -95,6 +104,9 @@ pub struct Row {
     pub turns_per_min: Option<f64>,
     pub reel_change: Option<bool>,
     pub potting: Option<bool>,
+    /// Entered by hand.
+    pub measured_length_m: Option<String>,
+    pub checked_by: Option<String>,
 }
 
 /// The winding shop's settings.
@@ -117,6 +129,17 @@ pub struct Truth<'a> {
     pub profiles: &'a ProfileSpec,
     pub model_sha256: &'a str,
     pub shop: &'a Shop,
+    pub assets: &'a Assets,
+}
+
+/// What the program's pages hold besides their words; SHA-256 as 64 hexadecimal digits.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Assets {
+    pub style_sha256: String,
+    pub drawing_style_sha256: String,
+    pub script_sha256: String,
+    /// What a browser may load and run.
+    pub policy: String,
 }
 
 /// One thing that is not as it should be.
@@ -252,9 +275,12 @@ impl Printed {
     }
 }
 
-/// Checks everything that a file claims.
+/// Checks everything that a file claims, and that it claims nothing else.
 pub fn verify(truth: &Truth, claim: &Claim) -> Verification {
-    let mut findings = Findings::default();
+    let mut findings = Findings { violations: claim.unread.clone(), checks: claim.unread.len() };
+    let executed = claim.code.as_ref().map(|code| Claim { rows: program::run(code, &mut findings), ..claim.clone() });
+    let claim = executed.as_ref().unwrap_or(claim);
+    form::check(claim, &mut findings);
     findings.same_if(None, "model", &truth.model.name, claim.model.as_ref());
     if let Some(found) = &claim.model_sha256 {
         findings.checks += 1;
@@ -264,10 +290,16 @@ pub fn verify(truth: &Truth, claim: &Claim) -> Verification {
             findings.add(None, "model_sha256", truth.model_sha256.to_owned(), found.clone(), remedy);
         }
     }
-    if let Some(found) = &claim.page {
-        page::check(claim, found, &mut findings);
+    // Where nothing could be read, what is missing needs no saying.
+    if claim.kind.is_none() && !claim.unread.is_empty() {
+        let (recomputed, taken_as_given) = (Vec::new(), vec!["the model as its file was read"]);
+        let Findings { violations, checks } = findings;
+        return Verification { violations, checks, rate_check: RateCheck::None, recomputed, taken_as_given };
     }
     let segments = expected::permutation(truth, claim, &mut findings);
+    if let Some(html) = &claim.page {
+        page::check(claim, truth.assets, html, segments.as_deref(), &mut findings);
+    }
     let mut rate_check = RateCheck::None;
     if let Some(segments) = &segments {
         expected::check(truth, claim, segments, &mut findings);
@@ -293,9 +325,13 @@ fn scope(
     if is_winding && (claim.class.is_some() || claim.captive.is_some()) {
         again.push("the class of windability");
     }
-    if claim.page.is_some() {
-        again.push("every word that the page shows");
+    if claim.page.is_some() && is_winding {
+        again.push("every element, attribute, word and line of the page; its style and scripts by their SHA-256");
     }
+    if claim.code.is_some() {
+        again.push("every line of the program, run on a model of the machine");
+    }
+    again.push("that the file holds what its kind of file holds, and nothing else");
     match rate_check {
         RateCheck::None => given.push("the rate error"),
         RateCheck::Independent { .. } => {

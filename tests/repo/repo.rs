@@ -14,6 +14,7 @@ use source::{Source, Token, flatten, sources};
 const FLOORS: &[(&str, u8)] = &[
     ("units", 0),
     ("numeric", 0),
+    ("text", 0),
     ("coil", 1),
     ("pattern", 1),
     ("profile", 1),

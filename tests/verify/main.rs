@@ -1,122 +1,19 @@
-//! Every schedule that the program emits is verified without violations, and every field of it matters.
+//! Every schedule that the program emits is verified without violations, in every form, for every effect.
 //!
-//! Reference: src/verify works the winding out again with code of its own. A changed field counts as harmless only if
-//! what is claimed stays the same but for free text that the file itself introduces (the program's name, a pattern's
-//! own name) and the time at which one of several equal maxima was read.
+//! Reference: src/verify works the winding out again with code of its own. `tampering.rs` alters what is emitted.
 
 use std::path::Path;
 
-use coilwright::io::model::{ModelFile, NamedPattern};
 use coilwright::io::read::model_file::parse_model;
-use coilwright::io::read::pattern_file::parse_pattern;
-use coilwright::io::read::schedule_reader::{parse_claim, shop_of};
-use coilwright::io::write::machine_program::{gcode, machine_program};
-use coilwright::io::write::traveller::traveller;
-use coilwright::io::{files::sha256_hex, json::schedule::ScheduleJson};
-use coilwright::pattern::Pattern;
+use coilwright::io::write::machine_program::gcode;
 use coilwright::pattern::classic::Classic;
-use coilwright::report::traveller::traveller_page;
-use coilwright::schedule::Schedule;
-use coilwright::search::cost::worst_case::SolvedProfiles;
 use coilwright::units::deg_per_h_from_rad_per_s;
-use coilwright::verify::{Claim, RateCheck, Truth, Verification, verify};
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use coilwright::verify::RateCheck;
 
-const PAPER: &str = r#"
-name = "paper's coil"
-[fibre]
-refractive_index = 1.447
-thermo_optic_per_k = 1.35e-5
-wavelength_nm = 1300.0
-outer_diameter_um = 250.0
-[winding]
-layers = 16
-mean_diameter_mm = 75.0
-layer_length = "equal"
-length_m = 200.0
-[thermal]
-model = "half_space"
-diffusivity_m2_per_s = 2.7e-7
-[profiles]
-max_rate_c_per_h = 10.0
-count = 2
-segments = 2
-duration_s = 6000.0
-[production]
-part_number = "FOG-200-16"
-tension_n = 0.12
-tension_taper_percent_per_layer = 1.0
-potting_every_layers = 4
-adhesive = "UV acrylate"
-"#;
+mod forms;
+mod tampering;
 
-const LONG: &str = r#"
-name = "998 m, 40 x 68"
-[fibre]
-refractive_index = 1.44
-thermo_optic_per_k = 1.0e-5
-wavelength_nm = 1550.0
-outer_diameter_um = 137.5
-[winding]
-layers = 40
-turns_per_layer = 68
-inner_diameter_mm = 110.0
-axial_pitch_um = 191.0
-layer_length = "actual"
-[thermal]
-model = "pack"
-conductivity_w_per_m_k = 0.35
-volumetric_heat_capacity_j_per_m3_k = 1.7e6
-[profiles]
-max_rate_c_per_h = 60.0
-count = 1
-segments = 2
-duration_s = 3000.0
-"#;
-
-fn model(text: &str) -> ModelFile {
-    parse_model(Path::new("model.toml"), text).unwrap()
-}
-
-fn plan(file: &ModelFile, named: &NamedPattern) -> (Schedule, ScheduleJson) {
-    let schedule = Schedule::new(&file.model.wound_coil().unwrap(), &named.pattern).unwrap();
-    let solved = SolvedProfiles::new(&file.model, &file.profiles.profiles()).unwrap();
-    let worst = solved.worst_case(&file.model, &named.pattern).unwrap();
-    let document = ScheduleJson::new(file, named, &schedule, &worst);
-    (schedule, document)
-}
-
-fn program(file: &ModelFile, named: &NamedPattern) -> ScheduleJson {
-    let (schedule, document) = plan(file, named);
-    machine_program(&document, &schedule, &file.production, file.model.coil.axial_pitch_m())
-}
-
-/// None where the text is refused before it can be verified.
-fn judged(file: &ModelFile, text: &str) -> Option<Verification> {
-    let claim = parse_claim("file", text).ok()?;
-    let (sha, shop) = (sha256_hex(&file.source), shop_of(&file.production));
-    Some(verify(&Truth { model: &file.model, profiles: &file.profiles, model_sha256: &sha, shop: &shop }, &claim))
-}
-
-fn classic(classic: Classic, layers: usize) -> Option<NamedPattern> {
-    Some(NamedPattern { name: classic.key().to_owned(), pattern: classic.pattern(layers).ok()? })
-}
-
-fn shuffled(layers: usize, seed: u64) -> NamedPattern {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut segments: Vec<usize> = (1..=layers).collect();
-    for i in (1..layers).rev() {
-        segments.swap(i, random.random_range(0..=i));
-    }
-    NamedPattern { name: format!("shuffled-{seed}"), pattern: Pattern::new(segments).unwrap() }
-}
-
-/// A pattern of patterns/.
-fn shipped(name: &str) -> NamedPattern {
-    let text = std::fs::read_to_string(Path::new("patterns").join(name).with_extension("toml")).unwrap();
-    parse_pattern(name, &text).unwrap()
-}
+use forms::{LONG, PAPER, classic, forms, judged, model, plan, program, shipped, shuffled};
 
 #[test]
 fn schedules_of_classic_and_arbitrary_windings_hold_in_every_form() {
@@ -141,157 +38,6 @@ fn schedules_of_classic_and_arbitrary_windings_hold_in_every_form() {
             }
         }
     }
-}
-
-/// Every form in which a schedule leaves the program, by name.
-fn forms(file: &ModelFile, named: &NamedPattern) -> Vec<(&'static str, String)> {
-    let (schedule, document) = plan(file, named);
-    let pitch_m = file.model.coil.axial_pitch_m();
-    let traveller = traveller(&document, &schedule, &file.production, pitch_m);
-    let program = machine_program(&document, &schedule, &file.production, pitch_m);
-    vec![
-        ("schedule.csv", document.csv().unwrap()),
-        ("schedule.json", serde_json::to_string_pretty(&document).unwrap()),
-        ("traveller.csv", traveller.csv().unwrap()),
-        ("traveller.json", serde_json::to_string_pretty(&traveller).unwrap()),
-        ("traveller.html", traveller_page(&traveller, &named.pattern)),
-        ("program.csv", program.csv().unwrap()),
-        ("program.gcode", gcode(&program)),
-    ]
-}
-
-/// The fields of a text: words and numbers; of a page those that are seen or that are its data.
-fn fields(form: &str, text: &str) -> Vec<std::ops::Range<usize>> {
-    let mut found: Vec<std::ops::Range<usize>> = Vec::new();
-    let (mut in_tag, mut hidden) = (false, false);
-    for (i, c) in text.char_indices() {
-        if form.ends_with("html") {
-            if c == '<' {
-                in_tag = true;
-                let is_data = text[i..].starts_with("<script type=\"application/json\"");
-                let hides = ["<style", "<script"].iter().any(|tag| text[i..].starts_with(tag)) && !is_data;
-                hidden = hides || (hidden && !text[i..].starts_with("</"));
-            }
-            let inside = in_tag || hidden;
-            in_tag &= c != '>';
-            if inside {
-                continue;
-            }
-        }
-        if c.is_alphanumeric() || "._+-".contains(c) {
-            match found.last_mut() {
-                Some(last) if last.end == i => last.end = i + c.len_utf8(),
-                _ => found.push(i..i + c.len_utf8()),
-            }
-        }
-    }
-    found
-}
-
-/// One character of a field becomes another one, goes, or is doubled.
-fn mutate(field: &str, random: &mut ChaCha8Rng) -> String {
-    let mut characters: Vec<char> = field.chars().collect();
-    let at = random.random_range(0..characters.len());
-    let old = characters[at];
-    match random.random_range(0..4) {
-        0 => drop(characters.remove(at)),
-        1 => characters.insert(at, old),
-        _ if old.is_ascii_digit() => {
-            let digit = old.to_digit(10).unwrap();
-            characters[at] = char::from_digit((digit + random.random_range(1..10)) % 10, 10).unwrap();
-        }
-        _ => characters[at] = if old == 'x' { 'y' } else { 'x' },
-    }
-    characters.into_iter().collect()
-}
-
-/// What a file claims, without what it may say as it likes: the name of its pattern and of the program that wrote it,
-/// and at which of several equal maxima the worst rate error was read.
-fn substance(text: &str) -> Option<Claim> {
-    let mut claim = parse_claim("file", text).ok()?;
-    claim.pattern = None;
-    claim.worst_time_s = None;
-    if let Some(page) = &mut claim.page
-        && let Some(i) = page.iter().position(|p| p.text == "Made by")
-        && i + 1 < page.len()
-    {
-        page.remove(i + 1);
-    }
-    Some(claim)
-}
-
-/// A number that moves by one unit of its last printed digit at most and is still within half of one of the true value
-/// (or the verification would have said so).
-fn same_to_the_last_digit(old: &str, new: &str) -> bool {
-    let decimals = old.split_once('.').map_or(0, |(_, digits)| digits.len() as i32);
-    match (old.parse::<f64>(), new.parse::<f64>()) {
-        (Ok(old), Ok(new)) => decimals > 0 && (old - new).abs() <= 1.001 * 10f64.powi(-decimals),
-        _ => false,
-    }
-}
-
-#[test]
-fn of_a_thousand_changes_of_one_field_in_any_form_each_is_noticed_or_changes_nothing_that_is_claimed() {
-    let mut random = ChaCha8Rng::seed_from_u64(1);
-    let mut counts: std::collections::BTreeMap<&str, [usize; 4]> = std::collections::BTreeMap::new();
-    let mut unnoticed = Vec::new();
-    for (text, named, changes) in [
-        (PAPER, classic(Classic::Qua, 16).unwrap(), 75),
-        (PAPER, shuffled(16, 3), 75),
-        (LONG, classic(Classic::Oct, 40).unwrap(), 12),
-        (LONG, shipped("searched-standard-40"), 12),
-    ] {
-        let file = model(text);
-        for (form, whole) in forms(&file, &named) {
-            let clean = judged(&file, &whole).unwrap();
-            assert_eq!(clean.violations, [], "{form}");
-            let original = substance(&whole);
-            let fields = fields(form, &whole);
-            for _ in 0..changes {
-                let span = fields[random.random_range(0..fields.len())].clone();
-                let new = mutate(&whole[span.clone()], &mut random);
-                let changed = format!("{}{new}{}", &whole[..span.start], &whole[span.end..]);
-                let count: &mut [usize; 4] = counts.entry(form).or_default();
-                match judged(&file, &changed) {
-                    None => count[0] += 1,
-                    Some(found) if !found.violations.is_empty() => count[1] += 1,
-                    Some(_) if substance(&changed) == original => count[2] += 1,
-                    Some(_) if same_to_the_last_digit(&whole[span.clone()], &new) => count[3] += 1,
-                    Some(_) => unnoticed.push(format!("{form}: \"{}\" became \"{new}\"", &whole[span])),
-                }
-            }
-        }
-    }
-    let mut total = 0;
-    for (form, [refused, violations, harmless, close]) in &counts {
-        println!(
-            "{form:15} {refused:4} refused as no schedule, {violations:4} violations, {harmless:4} change nothing claimed, {close:4} are as close to the truth"
-        );
-        total += refused + violations + harmless + close;
-    }
-    println!("{total} changes of one field, {} unnoticed", unnoticed.len());
-    assert_eq!(unnoticed, Vec::<String>::new());
-    assert!(total >= 1000, "{total}");
-}
-
-#[test]
-fn a_page_whose_visible_table_was_altered_is_caught_though_its_data_are_right() {
-    let file = model(PAPER);
-    let (_, page) = forms(&file, &classic(Classic::Qua, 16).unwrap()).swap_remove(4);
-    for (seen, altered, field) in [
-        ("<td>12.500</td>", "<td>12.600</td>", "length_m on the page"),
-        ("first → second", "second → first", "direction on the page"),
-        ("UV acrylate", "epoxy", "Adhesive on the page"),
-        ("0.120 (", "0.150 (", "tension_n on the page"),
-        ("half A</text>", "half B</text>", "a heading on the page"),
-    ] {
-        assert!(page.contains(seen), "{seen}");
-        let found = judged(&file, &page.replacen(seen, altered, 1)).unwrap();
-        let fields: Vec<&str> = found.violations.iter().map(|v| v.field.as_str()).collect();
-        assert_eq!(fields, [field], "{seen}");
-    }
-    let found = judged(&file, &page.replacen("<h2>Release", "<p>Skip step 3.</p><h2>Release", 1)).unwrap();
-    assert!(found.violations.iter().any(|v| v.field == "the page"), "{:?}", found.violations);
 }
 
 #[test]
@@ -358,7 +104,11 @@ const EMITTERS: &[&str] =
 
 #[test]
 fn the_verification_uses_nothing_that_emits_schedules() {
-    for entry in std::fs::read_dir("src/verify").unwrap().map(|entry| entry.unwrap().path()) {
+    let files = |folder: &str| -> Vec<_> {
+        let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+        entries.filter(|path| path.is_file()).collect()
+    };
+    for entry in files("src/verify").into_iter().chain(files("src/verify/page")) {
         let text = std::fs::read_to_string(&entry).unwrap();
         let code: String = text.lines().filter(|line| !line.trim_start().starts_with("//")).collect();
         for name in EMITTERS {

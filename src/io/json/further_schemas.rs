@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::search::cost::objective::Objective;
 
 use super::SCHEMA_VERSION;
-use super::schema::{described, table, with_dialect};
+use super::schema::{described, name, table, with_dialect};
 
 /// The schema of a campaign file.
 pub fn campaign_schema() -> Value {
@@ -15,7 +15,7 @@ pub fn campaign_schema() -> Value {
         "coilwright campaign file",
         &["name", "models"],
         json!({
-            "name": { "type": "string" },
+            "name": name("of the campaign"),
             "models": list(json!({ "type": "string" }), "model files, beside the campaign file"),
             "layers": list(json!({ "type": "integer", "minimum": 2 }), "in place of the models' own"),
             "classes": list(json!({ "type": "string", "pattern": "^(standard|any|captive:[0-9]+)$" }), "without it: standard"),

@@ -2,7 +2,9 @@
 
 use serde::Serialize;
 
+use crate::io::table::Table;
 use crate::search::pareto::Point;
+use crate::text::sink::Cell;
 
 use super::PatternJson;
 
@@ -30,12 +32,8 @@ impl PointJson {
 }
 
 /// One row a point.
-///
-/// # Errors
-/// A row that cannot be encoded.
-pub fn front_csv(points: &[PointJson]) -> Result<Vec<u8>, csv::Error> {
-    let mut csv = csv::Writer::from_writer(Vec::new());
-    csv.write_record([
+pub fn front_csv(points: &[PointJson]) -> Vec<u8> {
+    let mut table = Table::with_header([
         "name",
         "worst_rate_deg_per_h",
         "p95_rate_deg_per_h",
@@ -46,10 +44,10 @@ pub fn front_csv(points: &[PointJson]) -> Result<Vec<u8>, csv::Error> {
         "long_crossovers",
         "file",
         "segments",
-    ])?;
+    ]);
     for point in points {
         let segments: Vec<String> = point.pattern.segments.iter().map(ToString::to_string).collect();
-        csv.write_record([
+        let cells = [
             point.pattern.name.clone(),
             point.pattern.worst_rate_deg_per_h.to_string(),
             point.pattern.p95_rate_deg_per_h.map(|p| p.to_string()).unwrap_or_default(),
@@ -60,7 +58,8 @@ pub fn front_csv(points: &[PointJson]) -> Result<Vec<u8>, csv::Error> {
             point.long_crossovers.to_string(),
             point.file.clone().unwrap_or_default(),
             segments.join(" "),
-        ])?;
+        ];
+        table.row(cells.iter().map(|text| Cell::text(text)));
     }
-    csv.into_inner().map_err(|e| e.into_error().into())
+    table.into_bytes()
 }

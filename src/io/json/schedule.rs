@@ -18,6 +18,10 @@ use crate::thermal::Flange;
 use crate::units::{deg_per_h_from_rad_per_s, mm_from_m, nm_from_m, percent_from_fraction, um_from_m};
 
 use super::SCHEMA_VERSION;
+use crate::io::table::rows_as_csv;
+
+/// Raised when a word of a machine program changes its meaning.
+pub const PROGRAM_VERSION: u32 = 1;
 
 /// Digits after the point: micrometres of fibre, a tenth of a micrometre of radius.
 pub const LENGTH_DECIMALS: i32 = 6;
@@ -52,6 +56,9 @@ pub struct ScheduleJson {
     pub model: String,
     pub model_sha256: String,
     pub pattern: String,
+    /// Of the pattern's name and segments, so that neither changes alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pattern_sha256: Option<String>,
     pub segments: Vec<i64>,
     pub windability: ClaimedWindability,
     pub worst_rate_deg_per_h: f64,
@@ -194,6 +201,7 @@ impl ScheduleJson {
             model: file.model.name.clone(),
             model_sha256: sha256_hex(&file.source),
             pattern: named.name.clone(),
+            pattern_sha256: Some(pattern_sha256(named)),
             segments: named.pattern.segments().iter().map(|&s| s as i64).collect(),
             windability: ClaimedWindability {
                 class: windability.class().to_string(),
@@ -233,20 +241,14 @@ impl ScheduleJson {
     /// # Errors
     /// None in practice: it is written to memory.
     pub fn csv(&self) -> Result<String, csv::Error> {
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        for step in &self.steps {
-            writer.serialize((
-                step,
-                ClaimColumns {
-                    model: self.model.clone(),
-                    model_sha256: self.model_sha256.clone(),
-                    pattern: self.pattern.clone(),
-                    windability_class: self.windability.class.clone(),
-                    worst_rate_deg_per_h: self.worst_rate_deg_per_h,
-                },
-            ))?;
-        }
-        let bytes = writer.into_inner().map_err(|e| e.into_error())?;
+        let claims = ClaimColumns {
+            model: self.model.clone(),
+            model_sha256: self.model_sha256.clone(),
+            pattern: self.pattern.clone(),
+            windability_class: self.windability.class.clone(),
+            worst_rate_deg_per_h: self.worst_rate_deg_per_h,
+        };
+        let bytes = rows_as_csv(self.steps.iter().map(|step| (step, &claims)))?;
         Ok(String::from_utf8_lossy(&bytes).into_owned())
     }
 }
@@ -294,6 +296,12 @@ impl StepJson {
             checked_by: None,
         }
     }
+}
+
+/// Of the name, a line break, and the segments with spaces between.
+fn pattern_sha256(named: &NamedPattern) -> String {
+    let segments: Vec<String> = named.pattern.segments().iter().map(ToString::to_string).collect();
+    sha256_hex(&format!("{}\n{}", named.name, segments.join(" ")))
 }
 
 /// What the header says of the fibre: `250.0 µm over the coating, n 1.447 at 1300 nm`.

@@ -7,6 +7,7 @@ use serde_json::{Map, Value, json};
 use crate::effect::{CATALOGUE, CHANNEL, CUSTOM, EffectSpec};
 use crate::pattern::classic::Classic;
 use crate::search::cost::objective::Objective;
+use crate::text::{MOST_NAME_CHARACTERS, NAME_PATTERN, NAME_RULE};
 
 use super::SCHEMA_VERSION;
 use super::schedule::STEP_COLUMNS;
@@ -25,6 +26,18 @@ pub(super) fn table(title: &str, needed: &[&str], properties: Value) -> Value {
 
 pub(super) fn described(kind: &str, description: &str) -> Value {
     json!({ "type": kind, "description": description })
+}
+
+/// A name: see [`crate::text`].
+pub(super) fn name(description: &str) -> Value {
+    json!({ "type": "string", "minLength": 1, "maxLength": MOST_NAME_CHARACTERS, "pattern": NAME_PATTERN,
+        "description": format!("{description}; {NAME_RULE}") })
+}
+
+/// As [`name`], or empty.
+fn words(description: &str) -> Value {
+    json!({ "type": "string", "maxLength": MOST_NAME_CHARACTERS, "pattern": format!("^$|{NAME_PATTERN}"),
+        "description": format!("{description}; empty, or {NAME_RULE}") })
 }
 
 pub(super) fn with_dialect(mut schema: Value) -> Value {
@@ -118,7 +131,7 @@ pub fn model_schema() -> Value {
         "coilwright model file",
         &["name", "fibre", "winding", "thermal"],
         json!({
-            "name": { "type": "string" },
+            "name": name("of the coil, on every answer and page"),
             "fibre": fibre,
             "winding": winding,
             "thermal": thermal,
@@ -138,11 +151,11 @@ fn production() -> Value {
         "production",
         &[],
         json!({
-            "part_number": { "type": "string" },
-            "revision": { "type": "string" },
-            "spool": { "type": "string" },
-            "adhesive": { "type": "string" },
-            "cure": { "type": "string" },
+            "part_number": words("of the coil"),
+            "revision": words("of the part"),
+            "spool": words("drawing number or name of the spool"),
+            "adhesive": words("what the layers are potted with"),
+            "cure": words("how it is cured"),
             "tension_n": described("number", "tension set-point of the first layer"),
             "tension_taper_percent_per_layer": described("number", "how much less each further layer gets"),
             "tension_limit_percent": described("number", "how far the tension may be from its set-point"),
@@ -180,7 +193,7 @@ fn profiles() -> Value {
     let ramp = table(
         "ramp",
         &["name", "pieces"],
-        json!({ "name": { "type": "string" }, "pieces": { "type": "array", "minItems": 1, "items": piece } }),
+        json!({ "name": name("of the profile"), "pieces": { "type": "array", "minItems": 1, "items": piece } }),
     );
     table(
         "profiles",
@@ -240,7 +253,7 @@ pub fn pattern_schema() -> Value {
         "coilwright pattern file",
         &["name", "layers", "segments"],
         json!({
-            "name": { "type": "string" },
+            "name": name("of the winding"),
             "layers": { "type": "integer", "minimum": 2, "multipleOf": 2 },
             "segments": {
                 "type": "array",
@@ -352,6 +365,7 @@ pub fn schedule_schema() -> Value {
             "model": word("the model's name"),
             "model_sha256": word("of the model file"),
             "pattern": word("the winding's name"),
+            "pattern_sha256": word("of the pattern's name and segments"),
             "segments": { "type": "array", "items": { "type": "integer", "minimum": 1 } },
             "windability": windability,
             "worst_rate_deg_per_h": number("over the model's profiles and all times"),

@@ -13,6 +13,8 @@ use crate::search::cost::objective::Objective;
 
 use super::model_file::parse_model;
 use super::toml_reader::{TomlReader, parse};
+use crate::io::table::Table;
+use crate::text::sink;
 
 /// A campaign file, understood: the grid is the product of its lists.
 #[derive(Debug, Clone)]
@@ -81,7 +83,7 @@ pub fn read_campaign(path: &Path) -> Result<CampaignFile, Faults> {
     let mut reader = TomlReader::new(&shown, &source);
     let r = &mut reader;
     let mut root = r.root(&document);
-    let name = root.needed_text(r, "name", "a string").map(str::to_owned);
+    let name = root.needed_name(r, "name").map(str::to_owned);
     let models = root.needed_texts(r, "models", "an array of model files");
     let classes = if root.states("classes") { root.needed_texts(r, "classes", ARRAY_OF_STRINGS) } else { None };
     let objectives =
@@ -160,6 +162,11 @@ impl CampaignFile {
         let mut cells = Vec::new();
         for path in &self.models {
             let source = read_text(path)?;
+            // What is something else altogether is named, not shown: it may be any file of the system.
+            if !looks_like_a_model(&source) {
+                let message = "is no model file: expected TOML with name, fibre, winding and thermal";
+                return Err(Faults::of_file(path.display().to_string(), message));
+            }
             let files = if self.layers.is_empty() {
                 vec![parse_model(path, &source)?]
             } else {
@@ -193,6 +200,11 @@ impl CampaignFile {
     }
 }
 
+/// Whether a text is TOML that says at least one of the things that only a model file says.
+fn looks_like_a_model(source: &str) -> bool {
+    parse("", source).is_ok_and(|document| ["fibre", "winding", "thermal"].iter().any(|key| document.contains_key(key)))
+}
+
 /// The model with another layer count; its own pattern would no longer fit.
 fn with_layers(path: &Path, source: &str, layers: usize) -> Result<String, Faults> {
     parse(&path.display().to_string(), source)?;
@@ -217,12 +229,8 @@ pub fn read_cell(folder: &Path, index: usize, fingerprint: &str) -> Option<CellJ
 }
 
 /// The table of all cells.
-///
-/// # Errors
-/// A row that cannot be encoded.
-pub fn summary_csv(results: &[CellJson]) -> Result<Vec<u8>, csv::Error> {
-    let mut csv = csv::Writer::from_writer(Vec::new());
-    csv.write_record([
+pub fn summary_csv(results: &[CellJson]) -> Vec<u8> {
+    let mut table = Table::with_header([
         "cell",
         "model",
         "layers",
@@ -234,10 +242,10 @@ pub fn summary_csv(results: &[CellJson]) -> Result<Vec<u8>, csv::Error> {
         "improvement_over_qua",
         "evaluations",
         "segments",
-    ])?;
+    ]);
     for found in results {
         let segments: Vec<String> = found.segments.iter().map(ToString::to_string).collect();
-        csv.write_record([
+        let cells = [
             found.cell.to_string(),
             found.model.clone(),
             found.layers.to_string(),
@@ -249,7 +257,8 @@ pub fn summary_csv(results: &[CellJson]) -> Result<Vec<u8>, csv::Error> {
             found.improvement_over_qua.map(|f| f.to_string()).unwrap_or_default(),
             found.evaluations.to_string(),
             segments.join(" "),
-        ])?;
+        ];
+        table.row(cells.iter().map(|text| sink::Cell::text(text)));
     }
-    csv.into_inner().map_err(|e| e.into_error().into())
+    table.into_bytes()
 }

@@ -7,6 +7,7 @@ use crate::effect::{self, CATALOGUE, CHANNEL, CUSTOM, DeclaredEffect};
 use crate::io::fault::Fault;
 
 use super::toml_reader::{Limits, TableReader, TomlReader, nearest};
+use crate::text;
 
 /// The `[[effect]]` tables; none if one has a fault.
 pub(super) fn read_effects(r: &mut TomlReader, tables: Vec<TableReader>) -> Option<Vec<DeclaredEffect>> {
@@ -89,16 +90,15 @@ fn read_effect(r: &mut TomlReader, table: &mut TableReader) -> Option<DeclaredEf
 }
 
 fn read_channel(r: &mut TomlReader, table: &mut TableReader, name: &str) -> Option<DeclaredEffect> {
-    if name.is_empty() {
-        r.fault(Fault::new(
-            "effect.kind \"channel:\" lacks the column's name: write channel:NAME",
-            table.span_of("kind"),
-        ));
+    let fault = channel_fault(name);
+    let is_name = fault.is_none();
+    if let Some(fault) = fault {
+        r.fault(Fault::new(format!("effect.kind: {fault}"), table.span_of("kind")));
     }
     let parameter = &CHANNEL.parameters[0];
     let gain = table.needed_number(r, parameter.key, Limits::between(parameter.lower, parameter.upper));
     match gain {
-        Some(gain) if !name.is_empty() => Some(DeclaredEffect::channel(name, parameter.unit.to_si(gain))),
+        Some(gain) if is_name => Some(DeclaredEffect::channel(name, parameter.unit.to_si(gain))),
         _ => {
             std::mem::replace(table, TableReader::gone()).finish(r);
             None
@@ -106,8 +106,23 @@ fn read_channel(r: &mut TomlReader, table: &mut TableReader, name: &str) -> Opti
     }
 }
 
+/// Why a further column cannot be called so; none if it can.
+pub fn channel_fault(name: &str) -> Option<String> {
+    if name.is_empty() {
+        return Some("\"channel:\" lacks the column's name: write channel:NAME".to_owned());
+    }
+    text::name_fault(name).map(|fault| format!("the column's name {fault}"))
+}
+
 fn read_custom(r: &mut TomlReader, table: &mut TableReader) -> Option<DeclaredEffect> {
-    let source = table.needed_text(r, "formula", "a formula in °/h");
+    let source =
+        table.needed_text(r, "formula", "a formula in °/h").filter(|source| match text::unseen_fault(source) {
+            Some(fault) => {
+                r.fault(Fault::new(format!("effect.formula {fault}"), table.span_of("formula")));
+                false
+            }
+            None => true,
+        });
     let formula_span = table.span_of("formula");
     let mut parameters = table.table(r, "parameters");
     let named = parameters.all_numbers(r);

@@ -4,10 +4,8 @@
 //! reader, so that what is printed can be read.
 
 pub mod campaign_file;
-mod effect_tables;
-pub mod machine_program;
+pub mod effect_tables;
 pub mod model_file;
-mod page_reader;
 pub mod pattern_file;
 pub mod plausibility;
 mod production_table;

@@ -17,7 +17,7 @@ use crate::thermal::{self, DEFAULT_CELLS_PER_LAYER, Extent, Location, Material};
 use crate::units::{m_from_mm, m_from_nm, m_from_um, um_from_m};
 
 use super::effect_tables::read_effects;
-use super::pattern_file::resolve_pattern;
+use super::pattern_file::{ResolveError, resolve_pattern};
 use super::production_table::read_production;
 use super::profile_tables::{read_profiles, too_many_ramps};
 use super::record_columns::read_format;
@@ -43,7 +43,7 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
     let mut reader = TomlReader::new(&file, source);
     let r = &mut reader;
     let mut root = r.root(&document);
-    let name = root.needed_text(r, "name", "a string").map(str::to_owned);
+    let name = root.needed_name(r, "name").map(str::to_owned);
     let mut fibre_table = root.needed_table(r, "fibre");
     let mut winding = root.needed_table(r, "winding");
     let mut thermal = root.needed_table(r, "thermal");
@@ -273,6 +273,12 @@ fn read_pattern(
     let span = table.span_of("pattern");
     match resolve_pattern(stated, layers?, path.parent()) {
         Ok(named) => Some(named),
+        Err(ResolveError::File(faults)) => {
+            let shown = faults.faults.iter().map(|fault| fault.message.as_str()).collect::<Vec<_>>().join("; ");
+            let message = format!("the pattern file {} has faults", faults.file);
+            r.fault(Fault::new(message, span).with_note(shown));
+            None
+        }
         Err(error) => {
             r.fault(Fault::new(error.to_string(), span));
             None

@@ -9,6 +9,7 @@ use crate::io::files::read_text;
 use crate::io::model::NamedPattern;
 use crate::pattern::Pattern;
 use crate::pattern::classic::{Classic, ClassicError};
+use crate::text::sink::TomlComment;
 
 use super::toml_reader::{TomlReader, parse};
 
@@ -18,6 +19,8 @@ pub enum ResolveError {
     Classic(#[from] ClassicError),
     #[error("the pattern file {path} has {found} layers where the coil has {expected}", path = .path.display())]
     Layers { path: PathBuf, expected: usize, found: usize },
+    #[error("{path} is no pattern file: expected TOML with name, layers and segments", path = .path.display())]
+    NoPattern { path: PathBuf },
     #[error("the pattern file has faults:\n{0}")]
     File(Faults),
 }
@@ -38,11 +41,21 @@ pub fn resolve_pattern(stated: &str, layers: usize, base: Option<&Path>) -> Resu
     if !path.exists() && !looks_like_a_path {
         return Err(ClassicError::Unknown { found: format!("\"{stated}\"") }.into());
     }
-    let named = read_pattern(&path).map_err(ResolveError::File)?;
+    let source = read_text(&path).map_err(ResolveError::File)?;
+    // What is something else altogether is named, not shown: it may be any file of the system.
+    if !looks_like_a_pattern(&source) {
+        return Err(ResolveError::NoPattern { path });
+    }
+    let named = parse_pattern(&path.display().to_string(), &source).map_err(ResolveError::File)?;
     if named.pattern.layers() != layers {
         return Err(ResolveError::Layers { path, expected: layers, found: named.pattern.layers() });
     }
     Ok(named)
+}
+
+/// Whether a text is TOML that says at least one of the things that a pattern file says.
+fn looks_like_a_pattern(source: &str) -> bool {
+    parse("", source).is_ok_and(|document| ["layers", "segments"].iter().any(|key| document.contains_key(key)))
 }
 
 /// Reads and checks a pattern file.
@@ -63,7 +76,7 @@ pub fn parse_pattern(file: &str, source: &str) -> Result<NamedPattern, Faults> {
     let mut reader = TomlReader::new(file, source);
     let r = &mut reader;
     let mut root = r.root(&document);
-    let name = root.needed_text(r, "name", "a string").map(str::to_owned);
+    let name = root.needed_name(r, "name").map(str::to_owned);
     let layers = root.needed_integer(r, "layers", 2, 10_000);
     let segments = root.needed_integers(r, "segments");
     let segments_span = root.span_of("segments");
@@ -108,13 +121,14 @@ pub fn parse_pattern(file: &str, source: &str) -> Result<NamedPattern, Faults> {
 }
 
 /// A pattern file's text; `comments` are written above it, one a line.
-pub fn print_pattern(named: &NamedPattern, comments: &[String]) -> String {
+pub fn print_pattern(named: &NamedPattern, comments: &[TomlComment]) -> String {
     let mut document = toml_edit::DocumentMut::new();
     document["name"] = toml_edit::value(&named.name);
     document["layers"] = toml_edit::value(named.pattern.layers() as i64);
     let segments: toml_edit::Array = named.pattern.segments().iter().map(|&s| s as i64).collect();
-    document["segments"] = toml_edit::value(segments);
+    let mut segments = toml_edit::Value::from(segments);
+    segments.decor_mut().set_suffix("   # innermost layer first");
+    document["segments"] = toml_edit::Item::Value(segments);
     let head: String = comments.iter().map(|c| format!("# {c}\n")).collect();
-    let body = document.to_string().replace("]\n", "]   # innermost layer first\n");
-    head + &body
+    head + &document.to_string()
 }

@@ -8,7 +8,7 @@ use super::toml_reader::{Limits, TableReader, TomlReader};
 /// The `[production]` table; every key may be absent.
 pub(super) fn read_production(r: &mut TomlReader, table: &mut TableReader) -> Production {
     let default = Production::default();
-    let mut text = |r: &mut TomlReader, key: &'static str| table.text(r, key).unwrap_or_default().to_owned();
+    let mut text = |r: &mut TomlReader, key: &'static str| table.words(r, key).unwrap_or_default().to_owned();
     let (part_number, revision, spool) = (text(r, "part_number"), text(r, "revision"), text(r, "spool"));
     let (adhesive, cure) = (text(r, "adhesive"), text(r, "cure"));
     let tension_n = table.number(r, "tension_n", Limits::between(1e-4, 100.0));

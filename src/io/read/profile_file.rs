@@ -7,6 +7,7 @@ use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, val
 use crate::io::fault::Faults;
 use crate::io::files::read_text;
 use crate::profile::{Profile, ProfileSpec};
+use crate::text::sink::TomlComment;
 use crate::units::c_per_h_from_k_per_s;
 
 use super::profile_tables::read_profiles;
@@ -38,7 +39,7 @@ pub fn parse_profiles(file: &str, source: &str) -> Result<ProfileSpec, Faults> {
 }
 
 /// One listed profile and none sampled, with remarks in front.
-pub fn print_profile(profile: &Profile, remarks: &[String]) -> String {
+pub fn print_profile(profile: &Profile, remarks: &[TomlComment]) -> String {
     let mut document = DocumentMut::new();
     let mut table = Table::new();
     // The bound is that of this profile; rounding must not put a ramp above it.
@@ -80,7 +81,7 @@ mod tests {
     fn a_profile_is_read_back_as_it_was_written() {
         let piece = |rate: f64, duration_s: f64| Piece { rate_k_per_s: rate / 3600.0, duration_s };
         let profile = Profile::new("tell-apart", vec![piece(59.7, 1200.0), piece(-12.3, 3600.0)]).unwrap();
-        let text = print_profile(&profile, &["for a test".to_owned()]);
+        let text = print_profile(&profile, &[TomlComment::of("for a test")]);
         assert!(text.starts_with("# for a test\n[profiles]\n"), "{text}");
         let read = parse_profiles("p.toml", &text).unwrap();
         assert_eq!((read.count, read.listed.len()), (0, 1));

@@ -58,7 +58,7 @@ pub(super) fn too_many_ramps(profiles: &ProfileSpec, layers: usize) -> Option<St
 }
 
 fn read_ramp(r: &mut TomlReader, table: &mut TableReader, max_rate_c_per_h: Option<f64>) -> Option<Profile> {
-    let name = table.needed_text(r, "name", "a string");
+    let name = table.needed_name(r, "name");
     let pieces_span = table.span_of("pieces").or_else(|| table.span());
     if !table.has("pieces") {
         table.note_missing_one_of(&["pieces"], "an array of { rate_c_per_h, duration_s }".to_owned());

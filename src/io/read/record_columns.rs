@@ -48,6 +48,21 @@ pub struct Column {
 pub const COMPENSATED: &str = "rate_compensated_deg_per_h";
 pub const FLAGS: &str = "flags";
 
+impl Quantity {
+    /// What can be measured at all, in SI and in words. Gross errors of a logger (-999, 9999999) are within; what is beyond is
+    /// a damaged file, and arithmetic on it would end in infinities.
+    fn bounds(self) -> (f64, &'static str) {
+        match self {
+            Quantity::Time => (1e11, "1e11 s from zero"),
+            Quantity::Temperature | Quantity::InnerTemperature | Quantity::AmbientTemperature => {
+                (1e9, "any temperature")
+            }
+            Quantity::Rate => (1e6, "any rate: 1e6 rad/s, 2e11 °/h"),
+            _ => (1e30, "any reading: 1e30"),
+        }
+    }
+}
+
 impl Column {
     fn new(name: &str, format: &RecordFormat, decimal_comma: bool) -> Result<Self, String> {
         let mapped = format.mapped.iter().find(|m| m.name == name);
@@ -111,11 +126,13 @@ impl Column {
             field.parse::<f64>()
         };
         let value = number.ok().filter(|v| v.is_finite()).ok_or_else(found)?;
-        Ok(match self.conversion {
+        let si = match self.conversion {
             Conversion::By(to_si) => to_si(value),
             Conversion::Raw => rad_per_s_from_deg_per_h(value / self.scale),
             Conversion::Stamp => value,
-        })
+        };
+        let (most, words) = self.quantity.bounds();
+        if si.abs() <= most { Ok(si) } else { Err(format!("{value:e}, beyond {words}")) }
     }
 
     /// Whether it must hold a number in every row.
@@ -211,6 +228,8 @@ pub fn read_header(
     for (i, column) in columns.iter().enumerate() {
         if column.name.is_empty() {
             faults.push((format!("column {} has no name: expected one such as supply_v", i + 1), None));
+        } else if let Some(fault) = crate::text::name_fault(&column.name) {
+            faults.push((format!("column {}: its name {fault}", i + 1), None));
         } else if columns[..i].iter().any(|c| c.name == column.name) {
             faults.push((format!("column {} is there twice: give each column a name of its own", column.name), None));
         } else if column.quantity != Quantity::Channel

@@ -7,6 +7,7 @@ use std::ops::Range;
 use toml_edit::{Document, Item, TableLike, Value};
 
 use crate::io::fault::{Fault, Faults};
+use crate::text;
 
 /// What a number may be.
 #[derive(Debug, Clone, Copy)]
@@ -237,6 +238,30 @@ impl<'d> TableReader<'d> {
             return None;
         };
         Some(value.value())
+    }
+
+    /// A name that must be there: one that can be seen as it is, of a length that fits on a page.
+    pub fn needed_name(&mut self, reader: &mut TomlReader, key: &'static str) -> Option<&'d str> {
+        let name = self.needed_text(reader, key, "a name")?;
+        self.without(reader, key, name, text::name_fault)
+    }
+
+    /// As [`TableReader::needed_name`], where the name may be absent or empty.
+    pub fn words(&mut self, reader: &mut TomlReader, key: &'static str) -> Option<&'d str> {
+        let words = self.text(reader, key)?;
+        self.without(reader, key, words, text::words_fault)
+    }
+
+    fn without(
+        &self,
+        reader: &mut TomlReader,
+        key: &str,
+        found: &'d str,
+        fault_of: fn(&str) -> Option<String>,
+    ) -> Option<&'d str> {
+        let Some(fault) = fault_of(found) else { return Some(found) };
+        reader.fault(Fault::new(format!("{}{key} {fault}", self.prefix), self.span_of(key)));
+        None
     }
 
     pub fn needed_text(&mut self, reader: &mut TomlReader, key: &'static str, expected: &str) -> Option<&'d str> {

@@ -10,7 +10,7 @@ use rand_chacha::rand_core::SeedableRng;
 use serde::{Deserialize, Serialize};
 
 use crate::io::fault::Faults;
-use crate::io::files::{WriteError, write_atomically};
+use crate::io::files::{WriteError, sha256_hex, write_atomically};
 use crate::io::json::SCHEMA_VERSION;
 use crate::search::anneal::restart::Restart;
 use crate::search::anneal::rounds::{Found, RoundRecord, State, Stop};
@@ -19,12 +19,14 @@ use crate::search::cost::columns::Work;
 /// The name of a checkpoint in its run's folder.
 pub const CHECKPOINT_FILE: &str = "checkpoint.json";
 
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CheckpointJson {
     schema_version: u32,
     /// Of everything that the search depends on; a checkpoint fits only the request that it was made for.
     fingerprint: String,
+    /// SHA-256 of all the rest: a search that goes on from a changed number is another search.
+    checksum: String,
     round: u64,
     restarts: Vec<RestartJson>,
     found: Vec<FoundJson>,
@@ -35,7 +37,7 @@ struct CheckpointJson {
     stop: Option<String>,
 }
 
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RestartJson {
     index: u64,
@@ -47,7 +49,7 @@ struct RestartJson {
     work: WorkJson,
 }
 
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct GeneratorJson {
     seed: [u8; 32],
@@ -56,7 +58,7 @@ struct GeneratorJson {
     word_position: String,
 }
 
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct WorkJson {
     moves: u64,
@@ -64,14 +66,14 @@ struct WorkJson {
     samples: u64,
 }
 
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct FoundJson {
     cost_bits: u64,
     segments: Vec<usize>,
 }
 
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RoundJson {
     round: u64,
@@ -85,9 +87,10 @@ struct RoundJson {
 /// # Errors
 /// A file that cannot be written.
 pub fn write_checkpoint(folder: &Path, fingerprint: &str, state: &State) -> Result<(), WriteError> {
-    let document = CheckpointJson {
+    let mut document = CheckpointJson {
         schema_version: SCHEMA_VERSION,
         fingerprint: fingerprint.to_owned(),
+        checksum: String::new(),
         round: state.round,
         restarts: state.restarts.iter().map(restart_json).collect(),
         found: state
@@ -110,7 +113,8 @@ pub fn write_checkpoint(folder: &Path, fingerprint: &str, state: &State) -> Resu
             .collect(),
         stop: state.stop.map(|stop| stop.key().to_owned()),
     };
-    let json = serde_json::to_string(&document).expect("numbers, strings and lists can always be written as JSON");
+    document.checksum = sha256_hex(&document.json());
+    let json = document.json();
     write_atomically(&folder.join(CHECKPOINT_FILE), (json + "\n").as_bytes())
 }
 
@@ -126,7 +130,7 @@ pub fn read_checkpoint(folder: &Path, fingerprint: &str) -> Result<Option<State>
     let shown = path.display().to_string();
     let fault = |message: String| Faults::of_file(&shown, message);
     let text = crate::io::files::read_text(&path)?;
-    let remedy = "begin again with --fresh";
+    let remedy = "begin again with --fresh, which keeps this one as checkpoint.broken.json";
     let document: CheckpointJson =
         serde_json::from_str(&text).map_err(|e| fault(format!("is no checkpoint of this program ({e}): {remedy}")))?;
     if document.schema_version != SCHEMA_VERSION {
@@ -135,13 +139,49 @@ pub fn read_checkpoint(folder: &Path, fingerprint: &str) -> Result<Option<State>
             document.schema_version
         )));
     }
+    if !document.is_whole() {
+        return Err(fault(format!("does not hold what its checksum says: it was changed or damaged: {remedy}")));
+    }
     if document.fingerprint != fingerprint {
-        return Err(fault(format!(
+        return Err(fault(
             "belongs to another model, seed, class or set of options than this request: repeat the request as it is \
-             in run.toml, or {remedy}"
-        )));
+             in run.toml, or begin again with --fresh"
+                .to_owned(),
+        ));
     }
     state_of(document).map(Some).ok_or_else(|| fault(format!("holds a number that no search has: {remedy}")))
+}
+
+/// Where a checkpoint goes that cannot be gone on from.
+pub const BROKEN_FILE: &str = "checkpoint.broken.json";
+
+/// Keeps a checkpoint that is damaged or none aside, before another one takes its name; whether there was one.
+///
+/// # Errors
+/// A file that cannot be renamed.
+pub fn set_broken_aside(folder: &Path) -> Result<bool, WriteError> {
+    let path = folder.join(CHECKPOINT_FILE);
+    if !path.exists() {
+        return Ok(false);
+    }
+    let read = std::fs::read_to_string(&path).ok().and_then(|text| serde_json::from_str::<CheckpointJson>(&text).ok());
+    if read.is_some_and(|document| document.is_whole()) {
+        return Ok(false);
+    }
+    let aside = folder.join(BROKEN_FILE);
+    std::fs::rename(&path, &aside).map_err(|source| WriteError::File { path: aside, source })?;
+    Ok(true)
+}
+
+impl CheckpointJson {
+    fn json(&self) -> String {
+        serde_json::to_string(self).expect("numbers, strings and lists can always be written as JSON")
+    }
+
+    fn is_whole(&self) -> bool {
+        let blank = Self { checksum: String::new(), ..self.clone() };
+        sha256_hex(&blank.json()) == self.checksum
+    }
 }
 
 fn restart_json(restart: &Restart) -> RestartJson {

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::compensate::filter::{BREAK_PROBABILITY, FORGOTTEN_ROWS, Filter, Gains, LEAST_LOG_WEIGHT};
 use crate::compensate::physical::Physical;
+use crate::text::sink::CComment;
 use crate::units::deg_per_h_from_rad_per_s;
 
 /// The physical compensator as a difference equation: °C in, °/h out.
@@ -109,27 +110,45 @@ impl DifferenceEquation {
         let factors: Vec<f64> = variances.iter().map(|v| -0.5 * v.ln()).collect();
         let starts: Vec<String> =
             self.level_states.iter().map(|i| format!("    s->h[0].v[{i}] = temperature_c;")).collect();
-        let name: String = self.model.chars().map(|c| if c.is_ascii_graphic() { c } else { ' ' }).collect();
-        HEADER
-            .replace("@name@", &name.replace("*/", "* /"))
-            .replace("@interval@", &self.interval_s.to_string())
-            .replace("@delay@", &self.delay_rows.to_string())
-            .replace("@states@", &self.rate.len().to_string())
-            .replace("@ages@", &self.gains.len().to_string())
-            .replace("@hypotheses@", &self.most_hypotheses.to_string())
-            .replace("@forgotten@", &self.forgotten_rows.to_string())
-            .replace("@transition@", &rows.join(",\n"))
-            .replace("@rate@", &list(&self.rate))
-            .replace("@reading@", &list(&self.reading))
-            .replace("@gains@", &gains.join(",\n"))
-            .replace("@variances@", &list(&variances))
-            .replace("@factors@", &list(&factors))
-            .replace("@offset@", &format!("{:.17e}", self.offset_deg_per_h))
-            .replace("@no_break@", &format!("{:.17e}", (-self.break_probability).ln_1p()))
-            .replace("@break@", &format!("{:.17e}", self.break_probability.ln()))
-            .replace("@least@", &format!("{:.17e}", self.least_log_weight))
-            .replace("@starts@", &starts.join("\n"))
+        filled(
+            HEADER,
+            &[
+                ("name", CComment::of(&self.model).into_string()),
+                ("interval", self.interval_s.to_string()),
+                ("delay", self.delay_rows.to_string()),
+                ("states", self.rate.len().to_string()),
+                ("ages", self.gains.len().to_string()),
+                ("hypotheses", self.most_hypotheses.to_string()),
+                ("forgotten", self.forgotten_rows.to_string()),
+                ("transition", rows.join(",\n")),
+                ("rate", list(&self.rate)),
+                ("reading", list(&self.reading)),
+                ("gains", gains.join(",\n")),
+                ("variances", list(&variances)),
+                ("factors", list(&factors)),
+                ("offset", format!("{:.17e}", self.offset_deg_per_h)),
+                ("no_break", format!("{:.17e}", (-self.break_probability).ln_1p())),
+                ("break", format!("{:.17e}", self.break_probability.ln())),
+                ("least", format!("{:.17e}", self.least_log_weight)),
+                ("starts", starts.join("\n")),
+            ],
+        )
     }
+}
+
+/// The template with every `@key@` replaced, in one pass: what a value holds is not looked at again.
+fn filled(template: &str, values: &[(&str, String)]) -> String {
+    let mut out = String::with_capacity(2 * template.len());
+    let mut parts = template.split('@');
+    out.push_str(parts.next().unwrap_or_default());
+    while let Some(key) = parts.next() {
+        match values.iter().find(|(k, _)| *k == key) {
+            Some((_, value)) => out.push_str(value),
+            None => out.push_str(&format!("@{key}@")),
+        }
+        out.push_str(parts.next().unwrap_or_default());
+    }
+    out
 }
 
 const HEADER: &str = include_str!("difference_equation.h");

@@ -13,10 +13,11 @@
 //! | `M30` | end |
 
 use crate::io::json::schedule::{
-    LENGTH_DECIMALS, MM_DECIMALS, ProductionJson, ScheduleJson, TURNS_DECIMALS, crossover_words, rotation_word, rounded,
+    LENGTH_DECIMALS, MM_DECIMALS, PROGRAM_VERSION, ProductionJson, ScheduleJson, TURNS_DECIMALS, crossover_words,
+    rotation_word, rounded,
 };
-use crate::io::read::machine_program::PROGRAM_VERSION;
 use crate::schedule::{Schedule, production::Production};
+use crate::text::sink::JsonText;
 use crate::units::mm_from_m;
 
 /// The schedule with everything that a machine needs; `axial_pitch_m` as the coil has it.
@@ -65,7 +66,8 @@ pub fn gcode(document: &ScheduleJson) -> String {
     let mut out = format!("; coilwright winding program, version {PROGRAM_VERSION}\n");
     out.push_str("; X carriage in mm from the first flange, C spool in turns, clockwise seen from the first flange\n");
     out.push_str("; F in turns/min; T1 reel A, T2 reel B, T11 reel C1; M0 apply adhesive\n");
-    out.push_str(&format!("; head {}\n", serde_json::to_string(&head).unwrap_or_default()));
+    let json = serde_json::to_string(&head).unwrap_or_default();
+    out.push_str(&format!("; head {}\n", JsonText::embedded(&json)));
     out.push_str("G21\nG90\n");
     for step in &document.steps {
         let pitch_mm = step.axial_pitch_mm.unwrap_or(0.0);

@@ -15,6 +15,7 @@ use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow};
 use crate::io::json::metrics::MetricsJson;
 
 use super::comparison_rows::ComparisonRow;
+use crate::io::table::rows_as_csv;
 
 pub const COMPARISON_FILE: &str = "comparison.json";
 pub const DIAGNOSIS_FILE: &str = "diagnosis.json";
@@ -109,12 +110,8 @@ pub fn write_document<T: Serialize>(folder: &Path, name: &str, document: &T) -> 
 /// # Errors
 /// A folder that cannot be written.
 pub fn write_table<T: Serialize>(folder: &Path, name: &str, rows: &[T]) -> Result<(), WriteError> {
-    const IN_MEMORY: &str = "a buffer in memory takes every row";
-    let mut csv = csv::Writer::from_writer(Vec::new());
-    for row in rows {
-        csv.serialize(row).expect(IN_MEMORY);
-    }
-    write_atomically(&folder.join(name), &csv.into_inner().expect(IN_MEMORY))
+    let table = rows_as_csv(rows).expect("rows are flat and a buffer in memory takes every one");
+    write_atomically(&folder.join(name), &table)
 }
 
 fn read_document<T: DeserializeOwned>(folder: &Path, name: &str, what: &str) -> Result<Option<T>, Faults> {

@@ -6,12 +6,13 @@ use crate::effect::{DeclaredEffect, Subject};
 use crate::io::fault::{Fault, Faults};
 use crate::io::read::profile_file::pieces;
 use crate::profile::Profile;
+use crate::text::sink::TomlComment;
 
 /// A remark written behind a parameter's value, such as its standard error.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Remark {
     pub key: String,
-    pub text: String,
+    pub text: TomlComment,
 }
 
 /// The source with the effect declared: appended, or with its values renewed where it is declared already.
@@ -116,7 +117,7 @@ fn declare(table: &mut Table, effect: &DeclaredEffect, remarks: &[Remark]) {
         }
         table["parameters"] = value(named);
         let stated: Vec<String> = remarks.iter().map(|r| format!("{} = {}", r.key, r.text)).collect();
-        let all = Remark { key: "parameters".to_owned(), text: stated.join("; ") };
+        let all = Remark { key: "parameters".to_owned(), text: TomlComment::of(stated.join("; ")) };
         remark(table, "parameters", if stated.is_empty() { &[] } else { std::slice::from_ref(&all) });
         return;
     }
@@ -163,7 +164,7 @@ max_rate_c_per_h = 10.0  # steep
 
     #[test]
     fn an_effect_is_added_and_everything_else_stays_as_it_was() {
-        let remarks = [Remark { key: "mismatch".into(), text: "± 0.0001, fitted".into() }];
+        let remarks = [Remark { key: "mismatch".into(), text: TomlComment::of("± 0.0001, fitted") }];
         let edited = with_effect("x.toml", SOURCE, &mismatch(0.004), &remarks).unwrap();
         assert_eq!(
             edited,

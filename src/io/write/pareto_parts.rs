@@ -27,6 +27,32 @@ struct PartJson {
     found: Vec<Vec<usize>>,
 }
 
+/// Takes away what an earlier front left in the folder: its table, its pictures and the pattern files that the table lists,
+/// so that a folder holds one front only.
+///
+/// # Errors
+/// A file that cannot be removed.
+pub fn remove_front(folder: &Path) -> Result<(), WriteError> {
+    let table = folder.join("pareto.csv");
+    let mut names = vec!["pareto.svg".to_owned(), "pareto-p95.svg".to_owned()];
+    if let Ok(mut reader) = csv::Reader::from_path(&table) {
+        let column = reader.headers().ok().and_then(|header| header.iter().position(|name| name == "file"));
+        let listed = reader.records().filter_map(|row| row.ok()?.get(column?).map(str::to_owned));
+        // Only what stands in the folder itself and is a pattern file by its name.
+        names.extend(listed.filter(|name| name.ends_with(".toml") && !name.contains(['/', '\\'])));
+    }
+    for name in names.into_iter().chain(["pareto.csv".to_owned()]) {
+        let path = folder.join(name);
+        match std::fs::remove_file(&path) {
+            Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+                return Err(WriteError::File { path, source });
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
 impl Front<'_> {
     /// The patterns of a part that has been searched; none if it has not, or for another request.
     pub fn read_part(&self, number: usize, part: &str) -> Option<Vec<Pattern>> {

@@ -10,10 +10,12 @@ use crate::io::json::search::{BestFoundJson, OptimiseJson};
 use crate::io::json::{Document, PatternJson};
 use crate::io::model::{ModelFile, NamedPattern};
 use crate::io::read::pattern_file::print_pattern;
+use crate::io::table::Table;
 use crate::pattern::windability::WindabilityClass;
 use crate::search::anneal::rounds::{Plan, RoundRecord, State};
 use crate::search::cost::objective::Objective;
 use crate::search::evaluator::Judged;
+use crate::text::sink::{Cell, TomlComment};
 use crate::units::deg_per_h_from_rad_per_s;
 
 /// A request, as far as the search's course depends on it.
@@ -74,11 +76,23 @@ impl Request<'_> {
     }
 }
 
-/// Writes what is known when a run begins; its checkpoint comes after it.
+/// Writes what is known when a run begins, and takes away what another run left; its checkpoint comes after it.
 ///
 /// # Errors
 /// Files that cannot be written.
 pub fn write_request(folder: &Path, request: &Request) -> Result<(), WriteError> {
+    // The summary first: while it is there, the rest is of its run.
+    for name in
+        ["summary.json", "best.toml", "baselines.csv", "history.csv", "schedule.csv", "schedule.json", "report.html"]
+    {
+        let path = folder.join(name);
+        match std::fs::remove_file(&path) {
+            Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+                return Err(WriteError::File { path, source });
+            }
+            _ => {}
+        }
+    }
     write_atomically(&folder.join("run.toml"), request.run_toml().as_bytes())?;
     write_atomically(&folder.join("model.toml"), request.file.source.as_bytes())
 }
@@ -95,7 +109,10 @@ pub fn write_results(folder: &Path, answer: &OptimiseJson, best: &Judged, state:
         format!("worst rate error: {:.6} deg/h under {}", answer.best.worst_rate_deg_per_h, answer.best.worst_profile),
     ];
     comments.extend(answer.best.p95_rate_deg_per_h.map(|p95| format!("P95 over built coils: {p95:.6} deg/h")));
-    write_atomically(&folder.join("best.toml"), print_pattern(&named, &comments).as_bytes())?;
+    write_atomically(
+        &folder.join("best.toml"),
+        print_pattern(&named, &comments.iter().map(TomlComment::of).collect::<Vec<_>>()).as_bytes(),
+    )?;
     write_atomically(&folder.join("baselines.csv"), &baselines_csv(&answer.baselines, &answer.best))?;
     write_atomically(&folder.join("history.csv"), &history_csv(&state.history))?;
     let best_found = BestFoundJson { seconds: None, ..answer.best_found.clone() };
@@ -104,10 +121,7 @@ pub fn write_results(folder: &Path, answer: &OptimiseJson, best: &Judged, state:
     write_atomically(&folder.join("summary.json"), (json + "\n").as_bytes())
 }
 
-const CSV_IN_MEMORY: &str = "a buffer in memory takes every row";
-
 fn baselines_csv(baselines: &[PatternJson], best: &PatternJson) -> Vec<u8> {
-    let mut csv = csv::Writer::from_writer(Vec::new());
     // A column only of searches over built coils, so that the others' files stay as they are.
     let p95 = |value: &dyn Fn() -> String| best.p95_rate_deg_per_h.map(|_| value());
     let mut header: Vec<String> = [
@@ -122,7 +136,7 @@ fn baselines_csv(baselines: &[PatternJson], best: &PatternJson) -> Vec<u8> {
     .to_vec();
     header.extend(p95(&|| "p95_rate_deg_per_h".to_owned()));
     header.extend(["class", "reels", "captive", "max_climb", "segments"].map(str::to_owned));
-    csv.write_record(&header).expect(CSV_IN_MEMORY);
+    let mut table = Table::with_header(header.iter().map(String::as_str));
     for pattern in baselines.iter().chain(std::iter::once(best)) {
         let segments: Vec<String> = pattern.segments.iter().map(ToString::to_string).collect();
         let mut row = vec![
@@ -141,22 +155,21 @@ fn baselines_csv(baselines: &[PatternJson], best: &PatternJson) -> Vec<u8> {
             pattern.windability.max_climb.to_string(),
             segments.join(" "),
         ]);
-        csv.write_record(&row).expect(CSV_IN_MEMORY);
+        table.row(row.iter().map(|text| Cell::text(text)));
     }
-    csv.into_inner().expect(CSV_IN_MEMORY)
+    table.into_bytes()
 }
 
 fn history_csv(history: &[RoundRecord]) -> Vec<u8> {
-    let mut csv = csv::Writer::from_writer(Vec::new());
-    csv.write_record(["round", "evaluations", "best_deg_per_h", "working_samples"]).expect(CSV_IN_MEMORY);
+    let mut table = Table::with_header(["round", "evaluations", "best_deg_per_h", "working_samples"]);
     for record in history {
-        csv.write_record([
+        let cells = [
             record.round.to_string(),
             record.evaluations.to_string(),
             deg_per_h_from_rad_per_s(record.best_cost).to_string(),
             record.working_samples.to_string(),
-        ])
-        .expect(CSV_IN_MEMORY);
+        ];
+        table.row(cells.map(Cell::plain));
     }
-    csv.into_inner().expect(CSV_IN_MEMORY)
+    table.into_bytes()
 }

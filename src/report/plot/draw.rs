@@ -8,6 +8,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::axis::three_digits;
 use super::layout::{Layout, LegendShape, MARK_ROW_PX, ROW_PX, TEXT_PX, text_width_px};
 use super::{Along, Chart, Series, Shape};
+use crate::text::sink::Markup;
 
 /// The backend counts whole pixels; drawing on a finer grid and shrinking the picture keeps slopes smooth.
 const FINE: i32 = 4;
@@ -72,13 +73,14 @@ fn finish(drawn: &str, chart: &Chart, width: u32, height: u32) -> String {
     let body = drawn.split_once('>').map_or("", |(_, rest)| rest);
     let title = if chart.title.is_empty() { &chart.y.label } else { &chart.title };
     let title = title.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
-    format!(
+    let picture = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"chart\" role=\"img\" width=\"{width}\" height=\"{height}\" \
          viewBox=\"0 0 {} {}\"><title>{title}</title><style>{STYLE}</style>{}",
         width * FINE as u32,
         height * FINE as u32,
         body.replace(INK_CODE, "currentColor")
-    )
+    );
+    Markup::of(&picture).into_string()
 }
 
 /// The same in every picture, so that several in one page do not quarrel.
