@@ -101,7 +101,10 @@ impl Weighed {
 fn chosen(weighed: &[Weighed]) -> (usize, Option<usize>) {
     let by_figure = |a: &usize, b: &usize| weighed[*a].figure().total_cmp(&weighed[*b].figure());
     let all = || 0..weighed.len();
-    let best_classic = all().filter(|&i| weighed[i].is_classic).min_by(by_figure);
+    let least_figure = all().filter(|&i| weighed[i].is_classic).min_by(by_figure).map_or(0.0, |i| weighed[i].figure());
+    // The classic that is furthest behind the best one nowhere: neither in the figure nor on any set of unseen profiles.
+    let regret = |i: usize| (weighed[i].figure() / least_figure).max(weighed[i].over_classics.unwrap_or(1.0));
+    let best_classic = all().filter(|&i| weighed[i].is_classic).min_by(|&a, &b| regret(a).total_cmp(&regret(b)));
     let eligible: Vec<usize> = match best_classic {
         None => all().collect(),
         Some(classic) => all()
@@ -109,7 +112,7 @@ fn chosen(weighed: &[Weighed]) -> (usize, Option<usize>) {
                 let (mine, its) = (&weighed[i], &weighed[classic]);
                 i == classic
                     || if mine.is_classic {
-                        mine.is_no_worse(its, 1.0 + TIE)
+                        regret(i) <= regret(classic) * (1.0 + TIE)
                     } else {
                         mine.is_no_worse(its, 1.0) && mine.figure() < its.figure() * (1.0 - TIE)
                     }
