@@ -27,6 +27,7 @@ use crate::predict::predict;
 use crate::rate::CoilModel;
 use crate::report::improvement::improvement_page;
 use crate::search::gain::predicted_gain;
+use crate::text::sink::TomlComment;
 use crate::thermal::Location;
 use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s};
 
@@ -66,7 +67,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let old = pattern_of(&file, arguments.pattern.as_deref())?;
     let folder = arguments.output.as_path();
     let old_path = folder.join("measured-pattern.toml");
-    let comment = "the winding that was measured".to_owned();
+    let comment = TomlComment::of("the winding that was measured");
     write_atomically(&old_path, print_pattern(&old, &[comment]).as_bytes())?;
     let (before, diagnosis) = (folder.join("before"), folder.join("diagnosis"));
     let all: Vec<&Path> = arguments.records.iter().chain(&arguments.holdout).map(PathBuf::as_path).collect();
@@ -94,7 +95,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let source = match &film {
         None => source,
         Some(film) => {
-            let remark = Remark { key: "film_w_per_m2_k".to_owned(), text: film.words() };
+            let remark = Remark { key: "film_w_per_m2_k".to_owned(), text: TomlComment::of(film.words()) };
             let effect = DeclaredEffect::film(film.value_w_per_m2_k);
             let source = with_effect(&shown(&extended_path), &source, &effect, &[remark])?;
             with_sensor_and_pattern(&shown(&extended_path), &source, Some("ambient"), "measured-pattern.toml")?
@@ -112,7 +113,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let summary = read_json(&search.join("summary.json"))?;
     let new = recommended(&summary, &old);
     let new_path = folder.join("recommended.toml");
-    let comments = [summary["recommendation"]["sentence"].as_str().unwrap_or_default().to_owned()];
+    let comments = [TomlComment::of(summary["recommendation"]["sentence"].as_str().unwrap_or_default())];
     write_atomically(&new_path, print_pattern(&new, &comments).as_bytes())?;
     let schedule = folder.join("schedule");
     silently(&["schedule", &shown(&design_path), "--pattern", &shown(&new_path), "-o", &shown(&schedule)])?;
