@@ -91,7 +91,7 @@ fn records_that_are_none_are_refused_with_line_and_remedy() {
         ("time_s,temp,rate_deg_per_h\n0,20,1\n", "column temperature_c is missing"),
         (&format!("{header}0,20,1\n0,20,1\n20,20,1\n"), "time"),
         (&format!("{header}0,20,1\n10,nan,1\n20,20,1\n"), "NaN"),
-        ("time_s;temperature_c;rate_deg_per_h\n0;20;1\n", "expected commas"),
+        ("time_s;temperature_c;rate_deg_per_h\n0;20;1\n", "at least 3 rows"),
     ];
     for (text, expected) in cases {
         let (folder, _) = folder_with("record.csv", text);

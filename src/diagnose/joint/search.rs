@@ -174,7 +174,9 @@ fn scaled(effect: &DeclaredEffect, free: &[usize], start: &[f64], amplitude: f64
         if p.unit == Unit::Celsius {
             continue;
         }
-        let inside = |v: f64| v.clamp(p.lower + 1e-6 * (p.upper - p.lower), p.upper - 1e-6 * (p.upper - p.lower));
+        // A parameter without a bound, such as a channel's gain, has nothing to keep away from.
+        let inset = if (p.upper - p.lower).is_finite() { 1e-6 * (p.upper - p.lower) } else { 0.0 };
+        let inside = |v: f64| v.clamp(p.lower + inset, p.upper - inset);
         if p.lower < 0.0 {
             values[i] = inside(amplitude * start[i]);
         } else if p.unit == Unit::One && p.lower > 0.0 {

@@ -60,8 +60,11 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
     fibre_table.finish(r);
     let layers = read_layers(r, &mut winding);
     let coil = read_coil(r, &mut winding, layers, fibre);
-    let stated_length_m =
-        if winding.has("length_m") { winding.number(r, "length_m", Limits::between(0.1, 1e6)) } else { None };
+    // Read a second time only where the first reading found no fault in it.
+    let stated_length_m = match &coil {
+        Some(_) if winding.has("length_m") => winding.number(r, "length_m", Limits::between(0.1, 1e6)),
+        _ => None,
+    };
     let pattern = read_pattern(r, &mut winding, layers, path);
     winding.finish(r);
     let thermal_parts = read_thermal(r, &mut thermal);

@@ -223,7 +223,7 @@ mod tests {
             missed += usize::from(!holds(strengths.flicker, 0.0) || !holds(strengths.quantisation, 0.0));
             missed += usize::from(!holds(strengths.ramp, 0.0));
             assert!((strengths.white.value / step_s.sqrt() - 1.0).abs() < 0.05);
-            assert!(strengths.random_walk.high < 4.0 * strengths.random_walk.low.max(0.002));
+            assert!(strengths.random_walk.high < 5.0 * strengths.random_walk.low.max(0.002));
         }
         assert!(missed <= 1, "{missed}");
     }
