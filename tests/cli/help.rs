@@ -16,6 +16,7 @@ const LONG: &[&str] = &[
     "pareto",
     "campaign",
     "diagnose",
+    "improve",
     "reproduce",
     "exact examples/paper-200m.toml --windability any",
 ];

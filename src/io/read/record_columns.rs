@@ -185,10 +185,11 @@ pub struct Division {
 }
 
 impl Division {
-    /// As the header shows it: semicolons or tabs where there are any, then decimals may have commas.
+    /// As the header shows it: semicolons or tabs where there are any outside of quotes, then decimals may have commas.
     pub fn of_header(line: &str) -> Self {
-        let count = |separator: char| line.matches(separator).count();
-        let separator = match (count(';'), count('\t')) {
+        let count =
+            |separator: char| -> usize { line.split('"').step_by(2).map(|bare| bare.matches(separator).count()).sum() };
+        let separator: u8 = match (count(';'), count('\t')) {
             (0, 0) => b',',
             (0, _) => b'\t',
             _ => b';',
