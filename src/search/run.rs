@@ -204,12 +204,9 @@ fn anneal(
 ) -> Result<Annealed, RunError> {
     let mut concluded = None;
     let mut asked = false;
+    let mut halt = ControlFlow::Continue(());
     let ended = loop {
-        let goes_on = search.advance();
-        let halt = observer.advanced(search);
-        if !goes_on {
-            break Ended::Rule(search.state().stop);
-        }
+        // Before the next advance: a search that goes on from a checkpoint may stand right behind its first round.
         if search.state().round == 1 && !std::mem::replace(&mut asked, true) {
             concluded = conclusion(evaluator, class, baselines, search)?;
             if concluded.is_some() {
@@ -220,6 +217,11 @@ fn anneal(
             ControlFlow::Break(Halt::Clock) => break Ended::Clock,
             ControlFlow::Break(Halt::Signal) => break Ended::Signal,
             ControlFlow::Continue(()) => {}
+        }
+        let goes_on = search.advance();
+        halt = observer.advanced(search);
+        if !goes_on {
+            break Ended::Rule(search.state().stop);
         }
     };
     Ok(Annealed { ended, concluded })
