@@ -15,7 +15,7 @@
 //! 2. An [`Assumption`] says what is assumed: a coil model with its effects, a pattern, and what else may be there (drift,
 //!    cycle, a start that is not at rest, further known inputs to the rate with unknown amplitudes).
 //! 3. [`Chamber::fit`] maximises over the chamber's numbers and whatever of the effects is [`Free`]; the [`Fit`] has the
-//!    evidence, each number with its error, and a smoothed course of every record: layers and air ([`Fit::courses`]).
+//!    evidence, each number with its error, and a smoothed course of every record: layers and air (`Fit::courses`).
 //! 4. [`Chamber::held_out`] scores records that were not fitted with everything frozen; [`Chamber::noise`] tells white
 //!    noise, wander and unresolved air apart; [`Chamber::prediction`] is the rate that readings alone, or all, imply.
 //! 5. [`Chamber::score`] says what any further output of the rate would gain, cleared of all that was fitted, without a

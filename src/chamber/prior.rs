@@ -5,32 +5,32 @@
 /// A number that describes the chamber, the sensor or the gyro, not the coil.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Quantity {
-    /// Film between air and pack [W/(m²K)].
+    /// Film between air and pack \[W/(m²K)\].
     Film,
-    /// White noise of one reading of the sensor, besides its resolution [K].
+    /// White noise of one reading of the sensor, besides its resolution \[K\].
     ReadingNoise,
-    /// … of a thermometer at the bore, and of one in the air [K].
+    /// … of a thermometer at the bore, and of one in the air \[K\].
     InnerNoise,
     AmbientNoise,
-    /// White noise of one rate [rad/s].
+    /// White noise of one rate \[rad/s\].
     RateNoise,
-    /// Density of the noise that drives the air's slope, at rest and where the readings bend [K²/s³].
+    /// Density of the noise that drives the air's slope, at rest and where the readings bend \[K²/s³\].
     RestNoise,
     BendNoise,
-    /// Turbulence: an Ornstein–Uhlenbeck process's size [K] and time [s].
+    /// Turbulence: an Ornstein–Uhlenbeck process's size \[K\] and time \[s\].
     TurbulenceSize,
     TurbulenceTime,
-    /// A compressor's ripple: a damped stochastic oscillator's size [K], period and coherence time [s].
+    /// A compressor's ripple: a damped stochastic oscillator's size \[K\], period and coherence time \[s\].
     RippleSize,
     RipplePeriod,
     RippleCoherence,
-    /// Slow wander of the gyro itself: its size over that of the white noise of one rate, and its time [s].
+    /// Slow wander of the gyro itself: its size over that of the white noise of one rate, and its time \[s\].
     WanderShare,
     WanderTime,
-    /// Wander that no gyro of this noise should have: its size [rad/s] and time [s].
+    /// Wander that no gyro of this noise should have: its size \[rad/s\] and time \[s\].
     DriftSize,
     DriftTime,
-    /// A cycle that no part of the model makes: its size [rad/s] and period [s].
+    /// A cycle that no part of the model makes: its size \[rad/s\] and period \[s\].
     CycleSize,
     CyclePeriod,
 }
@@ -99,14 +99,14 @@ impl Quantity {
     }
 }
 
-/// Standard deviation of the pack's first temperature about the first reading [K].
+/// Standard deviation of the pack's first temperature about the first reading \[K\].
 pub(super) const START_K: f64 = 1.0;
-/// … of what pack and sensor differ from the air at the start [K].
+/// … of what pack and sensor differ from the air at the start \[K\].
 pub(super) const START_APART_K: f64 = 0.1;
-/// … of the air's slope at the start: of a record that begins at rest, and of one that begins anywhere [K/s].
+/// … of the air's slope at the start: of a record that begins at rest, and of one that begins anywhere \[K/s\].
 pub(super) const START_SLOPE_K_PER_S: f64 = 1e-4;
 pub(super) const UNSTEADY_SLOPE_K_PER_S: f64 = 0.02;
-/// … and of pack and air of such a record [K].
+/// … and of pack and air of such a record \[K\].
 pub(super) const UNSTEADY_APART_K: f64 = 3.0;
 /// … of the rate's offset about the record's median [rad/s]: the earth's rate is 7.3e-5.
 pub(super) const OFFSET_RAD_PER_S: f64 = 2.5e-5;

@@ -2,9 +2,9 @@
 //!
 //! | suspicion | said where |
 //! |---|---|
-//! | the time step contradicts `rate_mean_s` | the median step is not the stated mean's length within [`STEP_TOLERANCE`] |
-//! | the record starts in a ramp | over the first [`START_S`] the sensor's straight line is steeper than [`STEADY_K_PER_S`] and than 5 of its errors |
-//! | a Fahrenheit coefficient | a fitted factor on dn/dT is 5/9 or 9/5 within [`FACTOR_TOLERANCE`] |
+//! | the time step contradicts `rate_mean_s` | the median step is not the stated mean's length within `STEP_TOLERANCE` |
+//! | the record starts in a ramp | over the first `START_S` the sensor's straight line is steeper than `STEADY_K_PER_S` and than 5 of its errors |
+//! | a Fahrenheit coefficient | a fitted factor on dn/dT is 5/9 or 9/5 within `FACTOR_TOLERANCE` |
 
 use crate::record::Record;
 use crate::units::c_per_min_from_k_per_s;

@@ -33,10 +33,10 @@ use crate::units::{
 pub const TITLE: &str = "Master's thesis on a line-of-sight stabilisation with a fibre-optic gyro (2021), chapter 3: \
                          temperature drift of the gyro and its compensation";
 
-/// Slope [bit/°C] and value at 0 °C [bit] of Eq. (3-11), and where each line ends [°C]; 100 outputs a second.
+/// Slope \[bit/°C] and value at 0 °C [bit\] of Eq. (3-11), and where each line ends [°C]; 100 outputs a second.
 pub const LINES: [(f64, f64, f64); 3] =
     [(0.3386, -7.3229, 23.6), (0.1045, -2.0033, 30.0), (0.4082, -11.492, f64::INFINITY)];
-/// What is left after compensation [bit], and the same in °/s: the only place where the two units meet.
+/// What is left after compensation \[bit\], and the same in °/s: the only place where the two units meet.
 pub const BAND_BIT: f64 = 2.5;
 pub const BAND_DEG_PER_S: f64 = 0.0076;
 const RANGE_C: (f64, f64) = (14.0, 42.0);

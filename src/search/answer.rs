@@ -92,7 +92,7 @@ pub struct Former {
     pub statement: String,
 }
 
-/// The answer of [`super::run`].
+/// The answer of `super::run`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Answer {
     pub best: Judged,

@@ -68,7 +68,7 @@ impl Evaluator<'_> {
         Ok(begun(QuantileCost::new(coils, class), plan, saved))
     }
 
-    /// The declared coil alone, or all coils built with the tolerances, ready to be searched within [`Limits`].
+    /// The declared coil alone, or all coils built with the tolerances, ready to be searched within `Limits`.
     ///
     /// # Errors
     /// No tolerances, or none that are above zero.
