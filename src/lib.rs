@@ -57,7 +57,9 @@ pub mod verify;
 pub mod io;
 #[cfg(feature = "report")]
 pub mod report;
-// Floor 6: the command line.
+// Floor 6: what the program is asked for.
+pub mod task;
+// Floor 7: the command line.
 #[cfg(feature = "cli")]
 pub mod cli;
 

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use super::screen::Screen;
 use super::{CliError, Ending};
-use crate::io::fault::Faults;
 use crate::io::json::{CheckJson, FaultJson};
 use crate::io::read::model_file::read_model;
 use crate::io::read::plausibility::advice;
@@ -30,21 +29,10 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
             Ok(Ending::Done)
         }
         Err(faults) if screen.is_json() => {
-            screen.answer(CheckJson { file, faults: faults_json(&faults), advice: Vec::new() }, |_| String::new())?;
+            screen
+                .answer(CheckJson { file, faults: FaultJson::all(&faults), advice: Vec::new() }, |_| String::new())?;
             Err(faults.into())
         }
         Err(faults) => Err(faults.into()),
     }
-}
-
-fn faults_json(faults: &Faults) -> Vec<FaultJson> {
-    faults
-        .faults
-        .iter()
-        .map(|fault| FaultJson {
-            message: fault.message.clone(),
-            line: fault.span.as_ref().map(|s| faults.source[..s.start].matches('\n').count() + 1),
-            note: fault.note.clone(),
-        })
-        .collect()
 }

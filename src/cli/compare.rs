@@ -1,23 +1,17 @@
 //! `compare`: a model's prediction beside measured records, and where it fails.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use super::records::{GrossErrors, Noticed, RecordArguments, read_noticed};
-use super::report::{REPORT_FILE, write_report};
-use super::schedule::pattern_of;
+use super::pattern_asked::pattern_asked;
+use super::records::{GrossErrors, RecordArguments};
 use super::screen::{Screen, held, table};
+use super::watching::Watching;
 use super::{CliError, Ending};
-use crate::compare::{compare, suspicion};
-use crate::io::files::write_atomically;
-use crate::io::json::comparison::{CompareJson, PartJson, RecordComparisonJson};
-use crate::io::json::inputs::{InputsJson, RecordInputJson};
-use crate::io::model::ModelFile;
+use crate::io::json::comparison::{CompareJson, PartJson};
 use crate::io::read::model_file::read_model;
-use crate::io::write::comparison_rows::{ComparisonRow, comparison_rows};
-use crate::io::write::measurement_folder::{
-    COMPARISON_FILE, MODEL_FILE, check_free, table_name, write_document, write_table,
-};
-use crate::report::comparison::pictures;
+use crate::io::write::measurement_folder::check_free;
+use crate::task::compare::{Request, run as compare};
+use crate::task::page::REPORT_FILE;
 use crate::text::sink::Line;
 
 /// A model's prediction beside measured records, and where it fails
@@ -53,55 +47,21 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     if let Some(folder) = &arguments.output {
         check_free(folder)?;
     }
-    let format = arguments.reading.format(Some(&file))?;
-    let named = pattern_of(&file, arguments.pattern.as_deref())?;
-    let mut tables = Vec::with_capacity(arguments.records.len());
-    let mut shown = Vec::with_capacity(arguments.records.len());
-    let mut inputs = Vec::with_capacity(arguments.records.len());
-    for path in &arguments.records {
-        let Noticed { record, gross_errors, gaps } =
-            read_noticed(path, arguments.gross_errors, &format, Some(&file), screen)?;
-        let names: Vec<String> = record.channels().iter().map(|c| c.name.clone()).collect();
-        let columns = file.model.missing_channels(&names);
-        let name = path.display().to_string();
-        if !columns.is_empty() {
-            return Err(CliError::ColumnsMissing { file: name, columns });
-        }
-        let found = compare(&file.model, &named.pattern, &record)?;
-        let mut compared = RecordComparisonJson::new(&name, &found, gross_errors, gaps);
-        let suspected = suspicion::of_record(&record, file.model.rate_mean_s);
-        compared.findings.extend(suspected.iter().map(ToString::to_string));
-        shown.push(compared);
-        inputs.push(RecordInputJson::new(path, "compared")?);
-        if arguments.output.is_some() {
-            tables.push(comparison_rows(&record, &found));
-        }
-    }
-    let body = CompareJson::new(&file.model.name, &named.name, shown, InputsJson::new(Some(&file), inputs));
-    let adequate = body.is_adequate();
+    let pattern = pattern_asked(&file, arguments.pattern.as_deref())?;
+    let measurements = arguments.reading.read(&arguments.records, Some(&file))?;
+    let request = Request {
+        pattern: pattern.as_ref(),
+        gross_errors: arguments.gross_errors.into(),
+        ..Request::new(&file, &measurements)
+    };
+    let answer = compare(&request, &Watching::quiet(screen))?;
+    let adequate = answer.document.is_adequate();
     if let Some(folder) = &arguments.output {
-        write_folder(folder, &file, &body, &tables)?;
-        write_report(folder, &folder.join(REPORT_FILE))?;
+        answer.write(folder, &file)?;
         screen.note(&format!("wrote {}", folder.join(REPORT_FILE).display()));
     }
-    screen.answer(body, text)?;
+    screen.answer(answer.document, text)?;
     Ok(if arguments.strict && !adequate { Ending::No } else { Ending::Done })
-}
-
-fn write_folder(
-    folder: &Path,
-    file: &ModelFile,
-    body: &CompareJson,
-    tables: &[Vec<ComparisonRow>],
-) -> Result<(), CliError> {
-    for (index, (record, rows)) in body.records.iter().zip(tables).enumerate() {
-        write_table(folder, &table_name(index + 1), rows)?;
-        for picture in pictures(index + 1, record, rows) {
-            write_atomically(&folder.join(&picture.file), picture.svg.as_bytes())?;
-        }
-    }
-    write_atomically(&folder.join(MODEL_FILE), file.source.as_bytes())?;
-    Ok(write_document(folder, COMPARISON_FILE, body)?)
 }
 
 fn text(body: &CompareJson) -> String {

@@ -6,28 +6,21 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 
-use super::records::{GrossErrors, RecordArguments, read_noticed};
-use super::schedule::pattern_of;
+use super::pattern_asked::pattern_asked;
+use super::records::RecordArguments;
 use super::screen::{Screen, table};
+use super::watching::Watching;
 use super::{CliError, Ending};
-use crate::compensate::physical::Physical;
 use crate::compensate::{Compensator, Method};
 use crate::io::fault::Faults;
 use crate::io::files::{NewFile, write_atomically};
 use crate::io::json::Document;
-use crate::io::model::{ModelFile, NamedPattern};
 use crate::io::read::model_file::read_model;
 use crate::io::read::record_columns::RecordFormat;
-use crate::io::write::compensation_file::{
-    BiasLineJson, CompensateJson, MeasuresJson, MethodJson, StreamSummary, compensate_lines,
-};
-use crate::io::write::difference_equation::DifferenceEquation;
-use crate::metrics::Metrics;
-use crate::numeric::statistics::rms;
-use crate::predict::noise_floor_rad_per_s;
-use crate::record::Record;
+use crate::io::write::compensation_file::{CompensateJson, MeasuresJson, StreamSummary, compensate_lines};
 use crate::report::compensation::compensation_chart;
-use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s, percent_from_fraction};
+use crate::task::compensate::{Answer, Request, all_methods as try_all, run as compensator_for};
+use crate::task::measurement::Measurement;
 
 /// Temperature and rate in, compensated rate out, as a file or as a stream
 #[derive(Debug, clap::Args)]
@@ -96,40 +89,31 @@ impl From<Way> for Method {
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
     let format = arguments.reading.format(Some(&file))?;
-    let named = pattern_of(&file, arguments.pattern.as_deref())?;
-    let fitted = match &arguments.fit {
-        Some(path) => Some(read_noticed(path, GrossErrors::Drop, &format, Some(&file), screen)?.record),
-        None => None,
+    let pattern = pattern_asked(&file, arguments.pattern.as_deref())?;
+    let fit = arguments.fit.as_ref().map(|path| Measurement::read(path, &format)).transpose()?;
+    let request = Request {
+        pattern: pattern.as_ref(),
+        method: arguments.method.into(),
+        fit: fit.as_ref(),
+        linear: arguments.linear,
+        delay_s: arguments.delay,
+        ..Request::new(&file)
     };
-    let method: Method = arguments.method.into();
     if arguments.all_methods {
-        return all_methods(arguments, &file, &named, fitted.as_ref(), screen);
+        return all_methods(arguments, &request, &format, screen);
     }
-    let mut compensator = match &fitted {
-        Some(record) => Compensator::fit(method, &file.model, &named.pattern, record)?,
-        None => Compensator::declared(method, &file.model, &named.pattern)?,
-    };
-    if let Compensator::Physical(physical) = &mut compensator {
-        adjust(physical, arguments, fitted.as_ref());
-        if let Some(linearised) = physical.linearised() {
-            screen.note(&format!(
-                "the conductivity is taken at {:.1} °C; over the fitted record it differs by up to {:.1} %",
-                celsius_from_kelvin(linearised.at_k),
-                percent_from_fraction(linearised.conductivity_error)
-            ));
-        }
-    }
+    let answer = compensator_for(&request, &Watching::quiet(screen))?;
     if let Some(prefix) = &arguments.export {
-        export(&compensator, &file, fitted.as_ref(), arguments.interval, prefix, screen)?;
+        export(&answer, arguments.interval, prefix, screen)?;
         if arguments.record.is_none() {
             return Ok(Ending::Done);
         }
     }
-    let summary = stream(arguments, &format, &compensator, screen)?;
+    let summary = stream(arguments, &format, &answer.compensator, screen)?;
     screen.note(&format!(
         "compensated {} rows ({}), {} rows behind; standard deviation {} -> {} °/h; malformed {}, clock back {}, gaps {}, temperature held {}, channel held {}, rate held {}, rate rejected {}",
         summary.rows,
-        method.key(),
+        request.method.key(),
         summary.delay_rows,
         shown(summary.rate_deviation_deg_per_h),
         shown(summary.compensated_deviation_deg_per_h),
@@ -142,31 +126,9 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         summary.rate_rejected
     ));
     if screen.is_json() {
-        let body = CompensateJson {
-            model: file.model.name.clone(),
-            method: method.key(),
-            summary: Some(summary),
-            noise_floor_deg_per_h: None,
-            before: None,
-            methods: Vec::new(),
-            lines: BiasLineJson::all(&compensator),
-        };
-        screen.answer(body, |_| String::new())?;
+        screen.answer(answer.document(Some(summary)), |_| String::new())?;
     }
     Ok(Ending::Done)
-}
-
-/// As was asked for, tuned again for it.
-fn adjust(physical: &mut Physical, arguments: &Arguments, fitted: Option<&Record>) {
-    if arguments.linear {
-        physical.hypotheses = 1;
-        if let Some(record) = fitted {
-            physical.tune(record);
-        }
-    }
-    if let Some(delay_s) = arguments.delay.filter(|d| *d >= 0.0) {
-        physical.delay_s = delay_s;
-    }
 }
 
 fn shown(value: Option<f64>) -> String {
@@ -202,20 +164,8 @@ fn stream(
     Ok(summary)
 }
 
-fn export(
-    compensator: &Compensator,
-    file: &ModelFile,
-    fitted: Option<&Record>,
-    interval_s: Option<f64>,
-    prefix: &Path,
-    screen: &Screen,
-) -> Result<(), CliError> {
-    let interval_s = interval_s.or(fitted.map(Record::interval_s)).filter(|i| *i > 0.0 && i.is_finite());
-    let (Compensator::Physical(physical), Some(interval_s)) = (compensator, interval_s) else {
-        return Err(CliError::NoExport);
-    };
-    let delay = compensator.delay_rows(interval_s);
-    let equation = DifferenceEquation::new(&file.model.name, physical, interval_s, delay).ok_or(CliError::NoExport)?;
+fn export(answer: &Answer, interval_s: Option<f64>, prefix: &Path, screen: &Screen) -> Result<(), CliError> {
+    let equation = answer.difference_equation(interval_s).ok_or(CliError::NoExport)?;
     let header = equation.c_header();
     let json = serde_json::to_string_pretty(&Document::new(equation)).map_err(|e| CliError::Stdout(e.into()))? + "\n";
     for (extension, text) in [("json", json), ("h", header)] {
@@ -225,21 +175,6 @@ fn export(
     }
     Ok(())
 }
-
-/// What a learned compensator leaves of days that it was not shown, where that is not what it leaves of its own.
-fn worth(compensator: &Compensator) -> Option<String> {
-    let Compensator::Learned(learned) = compensator else { return None };
-    learned.only_fits().then(|| {
-        format!(
-            "leaves {:.5} °/h of the record it was fitted to, {:.5} °/h of the parts of it that it was not shown: it only fits",
-            deg_per_h_from_rad_per_s(learned.left_rad_per_s),
-            deg_per_h_from_rad_per_s(learned.cross_validated_rad_per_s)
-        )
-    })
-}
-
-/// The averaging time of the bias stability, as in `metrics`.
-const AVERAGE_S: f64 = 10.0;
 
 /// Every measure, a column a method.
 fn before_and_after(body: &CompensateJson) -> String {
@@ -262,56 +197,18 @@ fn before_and_after(body: &CompensateJson) -> String {
 
 fn all_methods(
     arguments: &Arguments,
-    file: &ModelFile,
-    named: &NamedPattern,
-    fitted: Option<&Record>,
+    request: &Request,
+    format: &RecordFormat,
     screen: &Screen,
 ) -> Result<Ending, CliError> {
-    let (Some(fitted), Some(path)) = (fitted, &arguments.record) else { return Err(CliError::NoHoldout) };
-    let format = arguments.reading.format(Some(file))?;
-    let record = read_noticed(path, GrossErrors::Keep, &format, Some(file), screen)?.record;
-    let rate = |values: &[f64]| deg_per_h_from_rad_per_s(rms(values));
-    let measures = |rates: Vec<f64>| -> Result<MeasuresJson, CliError> {
-        let left = Record::new("left", record.times_s().to_vec(), record.temperature_k().to_vec(), rates)?;
-        Ok(MeasuresJson::new(&Metrics::of(&left, AVERAGE_S)?))
-    };
-    let mut curves = vec![("before", record.rate_rad_per_s().to_vec())];
-    let mut methods = Vec::new();
-    for method in Method::ALL {
-        methods.push(match Compensator::fit(method, &file.model, &named.pattern, fitted) {
-            Ok(compensator) => {
-                let left = compensator.batch(&record);
-                curves.push((method.key(), left.clone()));
-                MethodJson {
-                    method: method.key(),
-                    rms_deg_per_h: Some(rate(&left)),
-                    delay_rows: Some(compensator.delay_rows(record.interval_s())),
-                    reason: worth(&compensator),
-                    measures: Some(measures(left)?),
-                }
-            }
-            Err(error) => MethodJson {
-                method: method.key(),
-                rms_deg_per_h: None,
-                delay_rows: None,
-                reason: Some(error.to_string()),
-                measures: None,
-            },
-        });
-    }
+    let (Some(_), Some(path)) = (request.fit, &arguments.record) else { return Err(CliError::NoHoldout) };
+    let holdout = Measurement::read(path, format)?;
+    let found = try_all(request, &holdout, &Watching::quiet(screen))?;
     if let Some(path) = &arguments.output {
-        write_atomically(path, compensation_chart(record.times_s(), &curves).svg().as_bytes())?;
+        write_atomically(path, compensation_chart(found.record.times_s(), &found.curves).svg().as_bytes())?;
         screen.note(&format!("wrote {}", path.display()));
     }
-    let body = CompensateJson {
-        model: file.model.name.clone(),
-        method: "all",
-        summary: None,
-        noise_floor_deg_per_h: Some(deg_per_h_from_rad_per_s(noise_floor_rad_per_s(&record))),
-        before: Some(measures(record.rate_rad_per_s().to_vec())?),
-        methods,
-        lines: Vec::new(),
-    };
+    let body = found.document;
     screen.answer(body, |body| {
         let rows = body.methods.iter().map(|m| {
             vec![

@@ -4,6 +4,7 @@ use super::screen::Screen;
 use super::{CliError, Ending};
 use crate::effect::{CATALOGUE, CHANNEL, CUSTOM};
 use crate::io::json::effects::{EffectJson, EffectsJson, ParameterJson};
+use crate::task::extend::unknown_effect;
 
 /// The effects that a model file can declare, with equations, parameters and sources
 #[derive(Debug, clap::Args)]
@@ -18,25 +19,13 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let known = || CATALOGUE.iter().copied().chain([CHANNEL, CUSTOM]);
     for stated in &arguments.kinds {
         if !known().any(|spec| spec.kind == stated) {
-            return Err(unknown(stated));
+            return Err(unknown_effect(stated).into());
         }
     }
     let chosen = known().filter(|spec| arguments.kinds.is_empty() || arguments.kinds.iter().any(|k| k == spec.kind));
     let body = EffectsJson { effects: chosen.map(EffectJson::of).collect() };
     screen.answer(body, |body| body.effects.iter().map(describe).collect::<Vec<_>>().join("\n"))?;
     Ok(Ending::Done)
-}
-
-/// The complaint about an effect that does not exist, with the nearest that does.
-pub(super) fn unknown(stated: &str) -> CliError {
-    let nearest = CATALOGUE
-        .iter()
-        .copied()
-        .chain([CHANNEL, CUSTOM])
-        .map(|spec| (strsim::jaro_winkler(spec.kind, stated), spec.kind))
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map_or("", |(_, kind)| kind);
-    CliError::UnknownEffect { stated: stated.to_owned(), nearest }
 }
 
 fn describe(effect: &EffectJson) -> String {

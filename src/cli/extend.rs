@@ -2,27 +2,16 @@
 
 use std::path::PathBuf;
 
-use super::diagnose::remarks;
-use super::records::{GrossErrors, Noticed, RecordArguments, read_noticed};
-use super::schedule::pattern_of;
+use super::pattern_asked::pattern_asked;
+use super::records::RecordArguments;
 use super::screen::{Screen, table};
+use super::watching::Watching;
 use super::{CliError, Ending};
-use crate::compare::compare;
-use crate::diagnose::{self, Finding, Request};
-use crate::effect::custom::{Formula, FormulaError};
-use crate::effect::{CUSTOM, DeclaredEffect};
-use crate::io::fault::{Fault, Faults};
-use crate::io::files::write_atomically;
-use crate::io::json::comparison::{CompareJson, PartJson, RecordComparisonJson};
-use crate::io::json::diagnosis::{ExtendJson, FindingJson};
-use crate::io::json::inputs::{InputsJson, RecordInputJson};
-use crate::io::model::ModelFile;
-use crate::io::read::effect_tables::channel_fault;
+use crate::io::json::comparison::{PartJson, RecordComparisonJson};
+use crate::io::json::diagnosis::ExtendJson;
 use crate::io::read::model_file::read_model;
-use crate::io::write::model_edit::with_effect;
-use crate::rate::CoilModel;
-use crate::record::Record;
 use crate::report::diagnosis::value_in_words;
+use crate::task::extend::{Request, effect_of, run as extend};
 use crate::text::sink::Line;
 
 /// Adds an effect to a model file, fitted to records; comments and layout of the file are kept
@@ -66,83 +55,15 @@ fn named_value(stated: &str) -> Result<(String, f64), String> {
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
-    let format = arguments.reading.format(Some(&file))?;
-    let named = pattern_of(&file, arguments.pattern.as_deref())?;
-    let wanted = wanted(arguments, &file)?;
-    let mut given: Vec<(Noticed, RecordInputJson)> = Vec::new();
-    for (paths, role) in [(&arguments.fit, "fitted"), (&arguments.holdout, "held out")] {
-        for path in paths {
-            let noticed = read_noticed(path, GrossErrors::Drop, &format, Some(&file), screen)?;
-            let names: Vec<String> = noticed.record.channels().iter().map(|c| c.name.clone()).collect();
-            let mut columns = file.model.missing_channels(&names);
-            columns.extend(wanted.channels().into_iter().filter(|c| !names.contains(c)));
-            if !columns.is_empty() {
-                return Err(CliError::ColumnsMissing { file: path.display().to_string(), columns });
-            }
-            given.push((noticed, RecordInputJson::new(path, role)?));
-        }
-    }
-    let records: Vec<Record> = given[..arguments.fit.len()].iter().map(|(n, _)| n.record.clone()).collect();
-    let (finding, extended) = if records.is_empty() {
-        let mut model = file.model.clone();
-        model.effects.retain(|e| e.kind() != wanted.kind());
-        model.effects.push(wanted.clone());
-        (Finding::unfitted(wanted), model)
-    } else {
-        let request = Request { model: &file.model, pattern: &named.pattern, records: &records, holdout: &[] };
-        let extension = diagnose::extend(&request, &wanted)?;
-        (extension.finding, extension.extended)
-    };
-    let compared = |model: &CoilModel| -> Result<CompareJson, CliError> {
-        let mut shown = Vec::with_capacity(given.len());
-        for (noticed, input) in &given {
-            let record = &noticed.record;
-            let found = compare(model, &named.pattern, record)?;
-            let gross_errors = noticed.gross_errors.clone();
-            shown.push(RecordComparisonJson::new(&input.file, &found, gross_errors, noticed.gaps));
-        }
-        let inputs = given.iter().map(|(_, input)| input.clone()).collect();
-        Ok(CompareJson::new(&model.name, &named.name, shown, InputsJson::new(Some(&file), inputs)))
-    };
-    let (before, after) = (compared(&file.model)?, compared(&extended)?);
-    let effect = FindingJson::new(&finding);
-    let remarks = remarks(&effect);
-    let source = with_effect(&arguments.model.display().to_string(), &file.source, &finding.effect, &remarks)?;
-    write_atomically(&arguments.output, source.as_bytes())?;
-    let body = ExtendJson { written: arguments.output.display().to_string(), effect, before, after };
-    screen.answer(body, text)?;
+    let pattern = pattern_asked(&file, arguments.pattern.as_deref())?;
+    let effect = effect_of(&arguments.effect, arguments.formula.as_deref(), &arguments.parameter, &file)?;
+    let fit = arguments.reading.read(&arguments.fit, Some(&file))?;
+    let holdout = arguments.reading.read(&arguments.holdout, Some(&file))?;
+    let request = Request { model: &file, pattern: pattern.as_ref(), effect, fit: &fit, holdout: &holdout };
+    let answer = extend(&request, &Watching::quiet(screen))?;
+    answer.write(&arguments.output)?;
+    screen.answer(answer.document(&arguments.output), text)?;
     Ok(Ending::Done)
-}
-
-/// The effect that was asked for, at its start.
-fn wanted(arguments: &Arguments, file: &ModelFile) -> Result<DeclaredEffect, CliError> {
-    if arguments.effect == CUSTOM.kind {
-        let Some(formula) = &arguments.formula else { return Err(CliError::FormulaMissing) };
-        let names = arguments.parameter.iter().map(|(name, _)| name.clone()).collect();
-        let formula = Formula::new(formula, names).map_err(|error| {
-            let at = match &error {
-                FormulaError::Expression(error) => error.at(),
-                _ => None,
-            };
-            // At the end of the text there is no character to mark: the last one is.
-            let at = at.map(|at| at.start.min(formula.len().saturating_sub(1))..at.end.min(formula.len()));
-            Faults::one("--formula", formula.as_str(), Fault::new(error.to_string(), at))
-        })?;
-        let values = arguments.parameter.iter().map(|(_, value)| *value).collect();
-        return Ok(DeclaredEffect::custom(formula, values)?);
-    }
-    if let Some(channel) = arguments.effect.strip_prefix("channel:") {
-        return match channel_fault(channel) {
-            Some(message) => Err(CliError::Option { option: "--effect", message }),
-            None => Ok(DeclaredEffect::channel(channel, 0.0)),
-        };
-    }
-    let declared = file.model.effects.iter().find(|e| e.kind() == arguments.effect);
-    match (crate::effect::find(&arguments.effect), declared) {
-        (Some(_), Some(declared)) => Ok(declared.clone()),
-        (Some(spec), None) => Ok(DeclaredEffect::at_start(spec)),
-        (None, _) => Err(super::effects::unknown(&arguments.effect)),
-    }
 }
 
 fn text(body: &ExtendJson) -> String {

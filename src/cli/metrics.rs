@@ -3,20 +3,17 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use super::records::{GrossErrors, RecordArguments, remark, remark_gross};
-use super::report::{REPORT_FILE, write_report};
+use super::records::{GrossErrors, RecordArguments};
 use super::screen::{Screen, held, table};
+use super::watching::Watching;
 use super::{CliError, Ending};
 use crate::io::fault::Faults;
-use crate::io::files::write_atomically;
-use crate::io::json::inputs::{InputsJson, RecordInputJson};
-use crate::io::json::metrics::{GrossErrorJson, MetricsJson, NoiseJson, RecordMetricsJson};
+use crate::io::json::inputs::RecordInputJson;
+use crate::io::json::metrics::{MetricsJson, NoiseJson, RecordMetricsJson};
 use crate::io::read::record_columns::RecordFormat;
-use crate::io::read::record_rows::stream_rows;
-use crate::io::write::measurement_folder::{METRICS_FILE, check_free, write_document};
-use crate::metrics::{Meter, Metrics, repeatability_rad_per_s};
-use crate::record::{Row, gross_errors_of};
-use crate::report::allan::allan_chart;
+use crate::io::write::measurement_folder::check_free;
+use crate::task::metrics::{self, DEFAULT_AVERAGE_S, Measured, Settings, measure_stream};
+use crate::task::page::REPORT_FILE;
 
 /// Bias, stability, Allan deviation and temperature sensitivity of records
 #[derive(Debug, clap::Args)]
@@ -28,7 +25,7 @@ pub struct Arguments {
     #[arg(required = true)]
     records: Vec<PathBuf>,
     /// Averaging time of the bias stability [s]
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
+    #[arg(long, value_name = "SECONDS", default_value_t = DEFAULT_AVERAGE_S)]
     average: f64,
     /// What to do with values that stand alone
     #[arg(long, value_enum, default_value_t = GrossErrors::Keep)]
@@ -45,78 +42,32 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     if let Some(folder) = &arguments.output {
         check_free(folder)?;
     }
-    let mut format = arguments.reading.format(None)?;
-    format.compensated = true;
-    let mut measured = Vec::with_capacity(arguments.records.len());
-    let mut shown = Vec::with_capacity(arguments.records.len());
-    let mut inputs = Vec::with_capacity(arguments.records.len());
-    for path in &arguments.records {
-        let (metrics, gross_errors) = measure(path, arguments, &format, screen)?;
-        let file = path.display().to_string();
-        let gaps = metrics.gaps;
-        shown.push(RecordMetricsJson::new(&file, &metrics, gross_errors, gaps));
-        inputs.push(match is_stdin(path) {
-            true => RecordInputJson { file, sha256: None, role: "measured".to_owned() },
-            false => RecordInputJson::new(path, "measured")?,
-        });
-        measured.push(metrics);
-    }
-    let body = MetricsJson::new(shown, repeatability_rad_per_s(&measured)?, InputsJson::new(None, inputs));
+    let format = arguments.reading.format(None)?;
+    let settings = Settings { average_s: arguments.average, gross_errors: arguments.gross_errors.into() };
+    let watching = Watching::quiet(screen);
+    let measured = arguments.records.iter().map(|path| measure(path, &format, &settings, &watching));
+    let body = metrics::document(measured.collect::<Result<_, _>>()?)?;
     if let Some(folder) = &arguments.output {
-        for (index, record) in body.records.iter().enumerate() {
-            let name = format!("allan-{}.svg", index + 1);
-            write_atomically(&folder.join(name), allan_chart(record).svg().as_bytes())?;
-        }
-        write_document(folder, METRICS_FILE, &body)?;
-        write_report(folder, &folder.join(REPORT_FILE))?;
+        metrics::write(&body, folder)?;
         screen.note(&format!("wrote {}", folder.join(REPORT_FILE).display()));
     }
     screen.answer(body, text)?;
     Ok(Ending::Done)
 }
 
-fn is_stdin(path: &Path) -> bool {
-    path == Path::new("-")
-}
-
 /// Measures a record as it passes by, without holding it.
-fn measure(
-    path: &Path,
-    arguments: &Arguments,
-    format: &RecordFormat,
-    screen: &Screen,
-) -> Result<(Metrics, Vec<GrossErrorJson>), CliError> {
-    let name = if is_stdin(path) { "standard input".to_owned() } else { path.display().to_string() };
-    let mut meter = Meter::new(arguments.average)?;
-    let dropped = arguments.gross_errors == GrossErrors::Drop;
-    let mut found = Vec::new();
-    let sink = |rows: &[Row]| {
-        let temperature_k: Vec<f64> = rows.iter().map(|r| r.temperature_k).collect();
-        let rates: Vec<f64> = rows.iter().map(|r| r.rate_rad_per_s).collect();
-        let mut gross = gross_errors_of(&temperature_k, &rates).into_iter().peekable();
-        for (i, row) in rows.iter().enumerate() {
-            let mut alone = false;
-            while let Some(error) = gross.next_if(|e| e.row == i) {
-                alone = true;
-                found.push(GrossErrorJson { time_s: row.time_s, column: error.column.to_owned(), dropped });
-            }
-            if !(alone && dropped) {
-                meter.push(*row);
-            }
-        }
-    };
-    let noticed = if is_stdin(path) {
-        stream_rows(&name, std::io::stdin().lock(), format, sink)?
-    } else {
-        let unreadable = |e| Faults::of_file(&name, format!("cannot be read: {e}"));
-        if path.is_dir() {
-            return Err(Faults::of_file(&name, "expected a file, found a folder").into());
-        }
-        stream_rows(&name, File::open(path).map_err(unreadable)?, format, sink)?
-    };
-    remark(path, noticed.skipped_rows, &noticed.remarks, screen);
-    remark_gross(path, &found, dropped, screen);
-    Ok((meter.finish()?, found))
+fn measure(path: &Path, format: &RecordFormat, settings: &Settings, watching: &Watching) -> Result<Measured, CliError> {
+    let name = path.display().to_string();
+    if path == Path::new("-") {
+        let input = RecordInputJson { file: name, sha256: None, role: "measured".to_owned() };
+        return Ok(measure_stream(input, "standard input", std::io::stdin().lock(), format, settings, watching)?);
+    }
+    if path.is_dir() {
+        return Err(Faults::of_file(&name, "expected a file, found a folder").into());
+    }
+    let unreadable = |e| Faults::of_file(&name, format!("cannot be read: {e}"));
+    let source = File::open(path).map_err(unreadable)?;
+    Ok(measure_stream(RecordInputJson::new(path, "measured")?, &name, source, format, settings, watching)?)
 }
 
 fn text(body: &MetricsJson) -> String {

@@ -18,6 +18,7 @@ mod metrics;
 mod new;
 mod optimise;
 mod pareto;
+mod pattern_asked;
 mod patterns;
 pub mod progress;
 mod records;
@@ -30,29 +31,17 @@ mod temperatures;
 mod tolerance;
 mod verify;
 mod watch;
+mod watching;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use thiserror::Error;
 
-use crate::compensate::CompensateError;
-use crate::diagnose::DiagnoseError;
-use crate::effect::EffectError;
-use crate::effect::custom::FormulaError;
-use crate::io::fault::Faults;
-use crate::io::files::WriteError;
-use crate::io::read::pattern_file::ResolveError;
 use crate::io::write::compensation_file::StreamError;
-use crate::metrics::MetricsError;
-use crate::predict::PredictError;
-use crate::rate::RateError;
-use crate::record::RecordError;
 use crate::reproduce::thesis2021::ThesisError;
-use crate::search::cost::guaranteed::GuaranteedError;
-use crate::search::cost::tolerance::ToleranceError;
-use crate::search::cost::worst_case::SearchError;
-use crate::search::evaluator::JudgeError;
+use crate::task::TaskError;
 use crate::text::sink::{Block, Line};
 use progress::ProgressMode;
 use screen::Screen;
@@ -143,30 +132,8 @@ pub enum Ending {
 pub enum CliError {
     #[error("error: --columns: {message}")]
     Columns { message: String },
-    #[error("{0}")]
-    Faults(#[from] Faults),
-    #[error("error: {0}")]
-    Write(#[from] WriteError),
-    #[error("error: {0}")]
-    Resolve(#[from] ResolveError),
-    #[error("error: {0}")]
-    Search(#[from] SearchError),
-    #[error("error: {0}")]
-    Guaranteed(#[from] GuaranteedError),
-    #[error("error: {0}")]
-    Rate(#[from] RateError),
-    #[error("error: {0}")]
-    Predict(#[from] PredictError),
-    #[error("error: {0}")]
-    Tolerance(#[from] ToleranceError),
-    #[error("error: {path} has no [tolerance]: state at least one spread there, such as turns_per_layer_sd = 0.3")]
-    NoTolerance { path: String },
-    #[error("error: the model has no profile called \"{stated}\": its profiles are {known}")]
-    UnknownProfile { stated: String, known: String },
-    #[error("error: there is no effect {stated}: did you mean {nearest}? `coilwright effects` lists all")]
-    UnknownEffect { stated: String, nearest: &'static str },
-    #[error("error: {0}")]
-    Compensate(#[from] CompensateError),
+    #[error("{lead}{0}", lead = if .0.is_drawn() { "" } else { "error: " })]
+    Task(TaskError),
     #[error(transparent)]
     Stream(StreamError),
     #[error(
@@ -177,30 +144,8 @@ pub enum CliError {
     NoHoldout,
     #[error("error: {0}")]
     Thesis(#[from] ThesisError),
-    #[error("error: {0}")]
-    Metrics(#[from] MetricsError),
-    #[error("error: {0}")]
-    Record(#[from] RecordError),
-    #[error("error: {0}")]
-    Diagnose(#[from] DiagnoseError),
-    #[error("error: {0}")]
-    Formula(#[from] FormulaError),
-    #[error("error: {0}")]
-    Effect(#[from] EffectError),
-    #[error(
-        "error: --effect custom needs --formula: give a formula in t, T, dT_dt, T_inner, mean rate or further columns"
-    )]
-    FormulaMissing,
     #[error("error: {path} exists already: choose another name or remove it first")]
     Exists { path: String },
-    #[error("error: {file}: the model's effects read {}, which the record lacks: add the columns or leave the effects out", .columns.join(", "))]
-    ColumnsMissing { file: String, columns: Vec<String> },
-    #[error("error: {0}")]
-    Report(#[from] crate::report::search_run::ReportError),
-    #[error("error: no pattern is stated: give --pattern, or winding.pattern in the model file")]
-    PatternMissing,
-    #[error("error: {0}")]
-    Judge(#[from] JudgeError),
     #[error("error: {option}: {message}")]
     Option { option: &'static str, message: String },
     #[error("error: {path} does not fit the model: begin again with --fresh", path = .path.display())]
@@ -212,12 +157,18 @@ pub enum CliError {
 impl CliError {
     /// As a terminal shows it. Faults of a file come as several lines of their own making; anything else is one line.
     fn shown(&self) -> Block {
-        match self {
-            CliError::Faults(_)
-            | CliError::Stream(StreamError::Header(_))
-            | CliError::Resolve(ResolveError::File(_)) => Block::of(&self.to_string()),
-            other => Block::of(Line::of(other).as_str()),
-        }
+        let is_drawn = match self {
+            CliError::Task(error) => error.is_drawn(),
+            CliError::Stream(StreamError::Header(_)) => true,
+            _ => false,
+        };
+        if is_drawn { Block::of(&self.to_string()) } else { Block::of(Line::of(self).as_str()) }
+    }
+}
+
+impl<E: Into<TaskError>> From<E> for CliError {
+    fn from(error: E) -> Self {
+        CliError::Task(error.into())
     }
 }
 
@@ -231,9 +182,22 @@ impl From<StreamError> for CliError {
     }
 }
 
-/// Parses the arguments, runs the command, and turns its ending into an exit code.
+/// Parses the program's arguments, runs the command, and turns its ending into an exit code.
 pub fn run() -> ExitCode {
-    let cli = parsed();
+    ExitCode::from(run_with(std::env::args_os()))
+}
+
+/// As [`run`], with the words of a command line, the program's name first; the exit code.
+pub fn run_with(words: impl IntoIterator<Item = impl Into<OsString>>) -> u8 {
+    let words: Vec<OsString> = words.into_iter().map(Into::into).collect();
+    let cli = match parsed(&words) {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and the version go to stdout, complaints to stderr; where neither can be written nobody reads them.
+            let _ = error.print();
+            return error.exit_code() as u8;
+        }
+    };
     let screen = Screen::new(&cli.output);
     let started = std::time::Instant::now();
     let ending = carry_out(&cli.command, &screen);
@@ -243,27 +207,16 @@ pub fn run() -> ExitCode {
         screen.note(&format!("coilwright {version}, {threads} threads, {seconds:.2} s"));
     }
     match ending {
-        Ok(Ending::Done) => ExitCode::SUCCESS,
-        Ok(Ending::No) => ExitCode::from(1),
-        Ok(Ending::Interrupted) => ExitCode::from(130),
+        Ok(Ending::Done) => 0,
+        Ok(Ending::No) => 1,
+        Ok(Ending::Interrupted) => 130,
         // A reader that has seen enough (`| head`) is no failure.
-        Err(CliError::Stdout(error)) if error.kind() == std::io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
+        Err(CliError::Stdout(error)) if error.kind() == std::io::ErrorKind::BrokenPipe => 0,
         Err(error) => {
             eprintln!("{}", error.shown().as_str().trim_end());
-            ExitCode::from(2)
+            2
         }
     }
-}
-
-/// Carries out another command for its files; its answer and its notes are not shown.
-///
-/// # Errors
-/// As the command's.
-fn silently(arguments: &[impl AsRef<str>]) -> Result<Ending, CliError> {
-    let words = std::iter::once("coilwright").chain(arguments.iter().map(AsRef::as_ref));
-    let cli = Cli::try_parse_from(words)
-        .map_err(|error| CliError::Option { option: "improve", message: error.to_string() })?;
-    carry_out(&cli.command, &Screen::silent())
 }
 
 fn carry_out(command: &Command, screen: &Screen) -> Result<Ending, CliError> {
@@ -296,12 +249,9 @@ fn carry_out(command: &Command, screen: &Screen) -> Result<Ending, CliError> {
 }
 
 /// What was asked for. A complaint about the arguments quotes them, so it is made of their visible form.
-fn parsed() -> Cli {
-    Cli::try_parse().unwrap_or_else(|error| {
-        let shown = std::env::args_os().map(|argument| Line::of(argument.display()).into_string());
-        match Cli::try_parse_from(shown) {
-            Ok(_) => error.exit(),
-            Err(error) => error.exit(),
-        }
+fn parsed(words: &[OsString]) -> Result<Cli, clap::Error> {
+    Cli::try_parse_from(words).map_err(|error| {
+        let shown = words.iter().map(|word| Line::of(word.display()).into_string());
+        Cli::try_parse_from(shown).err().unwrap_or(error)
     })
 }

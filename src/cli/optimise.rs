@@ -5,26 +5,24 @@ use std::time::{Duration, Instant};
 
 use super::budget::parse_duration;
 use super::former::former_pattern;
+use super::pattern_asked::pattern_asked;
 use super::progress::StopFlag;
 use super::screen::{Screen, held, table};
 use super::watch::Watch;
-use super::{CliError, Ending, report, schedule};
+use super::{CliError, Ending};
 use crate::io::fault::Faults;
-use crate::io::files::write_atomically;
 use crate::io::json::search::OptimiseJson;
-use crate::io::model::{ModelFile, NamedPattern};
+use crate::io::model::ModelFile;
 use crate::io::read::model_file::read_model;
-use crate::io::read::pattern_file::resolve_pattern;
 use crate::io::write::checkpoint::{BROKEN_FILE, CHECKPOINT_FILE, read_checkpoint, set_broken_aside};
-use crate::io::write::run_directory::{Request, write_results};
+use crate::io::write::run_directory::Request;
 use crate::pattern::windability::WindabilityClass;
 use crate::search;
-use crate::search::Answer;
-use crate::search::anneal::rounds::{DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Plan, Rules, State};
+use crate::search::anneal::rounds::{DEFAULT_RESTARTS_PER_ROUND, State};
 use crate::search::answer::Ended;
 use crate::search::cost::objective::Objective;
 use crate::search::run::RunError;
-use crate::units::rad_per_s_from_deg_per_h;
+use crate::task::optimise::{self, Wishes};
 
 /// Search the winding pattern with the smallest error
 #[derive(Debug, Clone, clap::Args)]
@@ -107,7 +105,7 @@ pub struct SearchOptions {
     pub init: Option<String>,
 }
 
-fn parse_class(text: &str) -> Result<WindabilityClass, String> {
+pub(super) fn parse_class(text: &str) -> Result<WindabilityClass, String> {
     WindabilityClass::parse(text)
         .ok_or_else(|| format!("expected standard, captive:K with a number K, or any, found \"{text}\""))
 }
@@ -119,18 +117,7 @@ pub(super) fn parse_objective(text: &str) -> Result<Objective, String> {
     })
 }
 
-/// Patience where a budget of time says that the search may take long.
-const PATIENCE_WITH_BUDGET: u64 = 4 * DEFAULT_PATIENCE;
-
 impl SearchOptions {
-    pub(super) fn class(&self, file: &ModelFile) -> WindabilityClass {
-        self.windability.unwrap_or(file.search.windability)
-    }
-
-    pub(super) fn objective(&self, file: &ModelFile) -> Objective {
-        self.objective.unwrap_or(file.search.objective)
-    }
-
     pub(super) fn budget(&self) -> Result<Option<Duration>, CliError> {
         let parse = |stated: &String| {
             parse_duration(stated).map_err(|message| CliError::Option { option: "--budget", message })
@@ -138,38 +125,19 @@ impl SearchOptions {
         self.budget.as_ref().map(parse).transpose()
     }
 
-    /// The plan of a search of a model.
-    pub(super) fn plan(&self, file: &ModelFile) -> Result<Plan, CliError> {
-        let layers = file.model.coil.layers();
-        let class = self.class(file);
-        let starts = match &self.init {
-            None => Vec::new(),
-            Some(stated) => {
-                let NamedPattern { name, pattern } = resolve_pattern(stated, layers, None)?;
-                if !class.admits(&pattern) {
-                    let message = format!("the pattern {name} is not of the class {class}: choose a wider class");
-                    return Err(CliError::Option { option: "--init", message });
-                }
-                vec![pattern.segments().to_vec()]
-            }
-        };
-        if let Some(target) = self.target.filter(|t| !(*t >= 0.0 && t.is_finite())) {
-            let message = format!("expected a rate error of zero or more in °/h, found {target}");
-            return Err(CliError::Option { option: "--target", message });
-        }
-        let objective = self.objective(file);
-        let patience = if self.budget.is_some() { PATIENCE_WITH_BUDGET } else { DEFAULT_PATIENCE };
-        Ok(Plan {
-            seed: self.seed.unwrap_or(file.search.seed),
-            restarts_per_round: self.restarts.into(),
-            moves_per_restart: self.moves_per_restart.unwrap_or_else(|| objective.default_moves_per_restart(layers)),
-            rules: Rules {
-                rounds: self.rounds.unwrap_or(u64::MAX),
-                patience: self.patience.unwrap_or(patience),
-                moves: self.moves,
-                target: self.target.map(rad_per_s_from_deg_per_h),
-            },
-            starts,
+    pub(super) fn wishes(&self, file: &ModelFile) -> Result<Wishes, CliError> {
+        Ok(Wishes {
+            seed: self.seed,
+            class: self.windability,
+            objective: self.objective,
+            has_budget: self.budget.is_some(),
+            rounds: self.rounds,
+            moves: self.moves,
+            patience: self.patience,
+            target_deg_per_h: self.target,
+            restarts_per_round: Some(self.restarts.into()),
+            moves_per_restart: self.moves_per_restart,
+            start: pattern_asked(file, self.init.as_deref())?,
         })
     }
 }
@@ -185,36 +153,21 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         screen.note(&format!("note: {advice}"));
     }
     let options = &arguments.search;
-    let (class, objective) = (options.class(&file), options.objective(&file));
-    let budget = options.budget()?;
-    let plan = options.plan(&file)?;
+    let (budget, wishes) = (options.budget()?, options.wishes(&file)?);
     let former = arguments.compare_with.as_ref().or(options.init.as_ref());
     let former = former.map(|stated| former_pattern(stated, file.model.coil.layers())).transpose()?;
+    let mut searched = wishes.request(&file, arguments.prove.is_some(), former)?;
+    let plan = searched.plan.clone();
+    let (class, objective) = (searched.class, searched.objective);
     let request = Request { file: &file, class, objective, plan: &plan, budget: options.budget.as_deref() };
-    if arguments.prove.is_some() && objective == Objective::P95 {
-        let message = format!("proofs are of worst, guaranteed and rms rates, not of {}", objective.key());
-        return Err(CliError::Option { option: "--prove", message });
-    }
     let folder = arguments.output.as_deref();
     let _held = folder.map(|folder| held(folder, "optimise")).transpose()?;
-    let saved = match folder {
+    searched.saved = match folder {
         Some(folder) => saved_state(arguments, folder, &request, screen)?,
         None => None,
     };
 
     let started = Instant::now();
-    let searched = search::Request {
-        model: &file.model,
-        profiles: &file.profiles,
-        tolerance: file.tolerance.as_ref(),
-        objective,
-        class,
-        plan: plan.clone(),
-        saved,
-        former: former.map(|former| (former.name, former.pattern)),
-        prove: arguments.prove.is_some(),
-        recommend: true,
-    };
     let is_taken_up = folder.is_some_and(|f| arguments.resume && f.join(CHECKPOINT_FILE).exists());
     let mut watch = Watch::new(arguments, &request, budget, started, &stop, screen, is_taken_up);
     let answer = search::run(&searched, &mut watch);
@@ -226,7 +179,8 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     };
     let document = OptimiseJson::of(&file.model.name, &searched, &answer, seconds, found_s);
     if let Some(folder) = folder {
-        write_folder(folder, &file, &document, &answer, screen)?;
+        optimise::write(folder, &file, &document, &answer)?;
+        screen.note(&format!("wrote {}", folder.display()));
     }
     screen.answer(document, text)?;
     Ok(if answer.ended == Ended::Signal { Ending::Interrupted } else { Ending::Done })
@@ -276,26 +230,6 @@ fn saved_state(
         .into());
     }
     Ok(None)
-}
-
-fn write_folder(
-    folder: &Path,
-    file: &ModelFile,
-    document: &OptimiseJson,
-    answer: &Answer,
-    screen: &Screen,
-) -> Result<(), CliError> {
-    let best = &answer.best;
-    let named = NamedPattern { name: best.name.clone(), pattern: best.pattern.clone() };
-    let (_, schedule) = schedule::plan(file, &named)?;
-    let json = serde_json::to_string_pretty(&schedule).map_err(|e| CliError::Stdout(e.into()))? + "\n";
-    let csv = schedule.csv().map_err(|e| CliError::Stdout(e.into()))?;
-    write_atomically(&folder.join("schedule.csv"), csv.as_bytes())?;
-    write_atomically(&folder.join("schedule.json"), json.as_bytes())?;
-    write_results(folder, document, best, &answer.state)?;
-    report::write_report(folder, &folder.join("report.html"))?;
-    screen.note(&format!("wrote {}", folder.display()));
-    Ok(())
 }
 
 /// Shown only where the search was over built coils.

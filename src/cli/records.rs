@@ -1,17 +1,13 @@
 //! What commands that take records share: how their columns are named, reading them, and what to do about odd rows.
 
-use std::path::Path;
+use std::path::PathBuf;
 
 use clap::ValueEnum;
 
 use super::CliError;
-use super::screen::Screen;
-use crate::io::json::metrics::GrossErrorJson;
 use crate::io::model::ModelFile;
 use crate::io::read::record_columns::RecordFormat;
-use crate::io::read::record_file::read_record_as;
-use crate::io::read::record_rows::contradicts_mean;
-use crate::record::Record;
+use crate::task::measurement::{self, Measurement};
 
 /// What to do with values that stand alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -20,6 +16,15 @@ pub enum GrossErrors {
     Keep,
     /// Report them and leave their rows out
     Drop,
+}
+
+impl From<GrossErrors> for measurement::GrossErrors {
+    fn from(wish: GrossErrors) -> Self {
+        match wish {
+            GrossErrors::Keep => Self::Keep,
+            GrossErrors::Drop => Self::Drop,
+        }
+    }
 }
 
 /// What to do with rows that are none.
@@ -62,73 +67,10 @@ impl RecordArguments {
         }
         Ok(format)
     }
-}
 
-/// A record and what was noticed while reading it.
-#[derive(Debug)]
-pub struct Noticed {
-    pub record: Record,
-    pub gross_errors: Vec<GrossErrorJson>,
-    pub gaps: usize,
-}
-
-/// Says what was skipped, assumed or looks odd.
-pub fn remark(path: &Path, skipped_rows: usize, remarks: &[String], screen: &Screen) {
-    for remark in remarks {
-        screen.note(&format!("note: {}: {remark}", path.display()));
+    /// Reads records.
+    pub fn read(&self, paths: &[PathBuf], model: Option<&ModelFile>) -> Result<Vec<Measurement>, CliError> {
+        let format = self.format(model)?;
+        Ok(paths.iter().map(|path| Measurement::read(path, &format)).collect::<Result<_, _>>()?)
     }
-    if skipped_rows > 0 {
-        screen.note(&format!(
-            "note: {}: {skipped_rows} rows skipped: a cell without a number, or a stamp that repeats or jumps back",
-            path.display()
-        ));
-    }
-}
-
-/// Reads a record and says what was noticed.
-pub fn read_remarked(
-    path: &Path,
-    format: &RecordFormat,
-    model: Option<&ModelFile>,
-    screen: &Screen,
-) -> Result<Record, CliError> {
-    let mut read = read_record_as(path, format)?;
-    read.remarks.extend(model.and_then(|m| contradicts_mean(read.record.interval_s(), m.model.rate_mean_s)));
-    remark(path, read.skipped_rows, &read.remarks, screen);
-    Ok(read.record)
-}
-
-/// Says how many gross errors there are and what becomes of them.
-pub fn remark_gross(path: &Path, found: &[GrossErrorJson], dropped: bool, screen: &Screen) {
-    let Some(first) = found.first() else { return };
-    let fate = if dropped { "left out" } else { "used all the same: --gross-errors drop leaves them out" };
-    screen.note(&format!(
-        "note: {}: {} gross errors, the first in {} at {} s; {fate}",
-        path.display(),
-        found.len(),
-        first.column,
-        first.time_s
-    ));
-}
-
-/// Reads a record, finds its gross errors and does with them what the user said.
-pub fn read_noticed(
-    path: &Path,
-    wish: GrossErrors,
-    format: &RecordFormat,
-    model: Option<&ModelFile>,
-    screen: &Screen,
-) -> Result<Noticed, CliError> {
-    let record = read_remarked(path, format, model, screen)?;
-    let found = record.gross_errors();
-    let dropped = wish == GrossErrors::Drop;
-    let gross_errors: Vec<GrossErrorJson> = found
-        .iter()
-        .map(|e| GrossErrorJson { time_s: record.times_s()[e.row], column: e.column.to_owned(), dropped })
-        .collect();
-    remark_gross(path, &gross_errors, dropped, screen);
-    let rows: Vec<usize> = found.iter().map(|e| e.row).collect();
-    let record = if dropped && !rows.is_empty() { record.without_rows(&rows)? } else { record };
-    let gaps = record.gaps().len();
-    Ok(Noticed { record, gross_errors, gaps })
 }

@@ -2,19 +2,14 @@
 
 use std::path::PathBuf;
 
+use super::pattern_asked::pattern_asked;
 use super::screen::{Screen, held, table};
 use super::{CliError, Ending};
 use crate::io::files::write_atomically;
 use crate::io::json::schedule::{ScheduleJson, crossover_words};
-use crate::io::model::{ModelFile, NamedPattern};
 use crate::io::read::model_file::read_model;
-use crate::io::read::pattern_file::resolve_pattern;
-use crate::io::write::machine_program::{gcode, machine_program};
-use crate::io::write::traveller::traveller;
-use crate::report::cross_section::cross_section;
-use crate::report::traveller::traveller_page;
 use crate::schedule::Schedule;
-use crate::search::cost::worst_case::SolvedProfiles;
+use crate::task::schedule::{Request, run as plan};
 
 /// The winding of a coil step by step, from the inside out
 #[derive(Debug, clap::Args)]
@@ -35,67 +30,18 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
-    let named = pattern_of(&file, arguments.pattern.as_deref())?;
-    let (schedule, document) = plan(&file, &named)?;
+    let pattern = pattern_asked(&file, arguments.pattern.as_deref())?;
+    let answer = plan(&Request { model: &file, pattern: pattern.as_ref() })?;
     if let Some(folder) = &arguments.output {
         let _held = held(folder, "schedule")?;
-        for (name, text) in files(&file, &named, &schedule, &document)? {
+        for (name, text) in answer.files(&file)? {
             let path = folder.join(name);
             write_atomically(&path, text.as_bytes())?;
             screen.note(&format!("wrote {}", path.display()));
         }
     }
-    screen.document(&document, |document| text(&schedule, document))?;
+    screen.document(&answer.document, |document| text(&answer.schedule, document))?;
     Ok(Ending::Done)
-}
-
-/// Everything that leaves for the shop floor, by file name.
-fn files(
-    file: &ModelFile,
-    named: &NamedPattern,
-    schedule: &Schedule,
-    document: &ScheduleJson,
-) -> Result<Vec<(&'static str, String)>, CliError> {
-    let axial_pitch_m = file.model.coil.axial_pitch_m();
-    let traveller = traveller(document, schedule, &file.production, axial_pitch_m);
-    let program = machine_program(document, schedule, &file.production, axial_pitch_m);
-    let title = format!("{}, {}", file.model.name, named.name);
-    Ok(vec![
-        ("schedule.csv", csv(document)?),
-        ("schedule.json", json(document)?),
-        ("traveller.html", traveller_page(&traveller, &named.pattern)),
-        ("traveller.csv", csv(&traveller)?),
-        ("traveller.json", json(&traveller)?),
-        ("program.gcode", gcode(&program)),
-        ("program.csv", csv(&program)?),
-        ("cross-section.svg", cross_section(&title, &named.pattern)),
-    ])
-}
-
-fn csv(document: &ScheduleJson) -> Result<String, CliError> {
-    document.csv().map_err(|e| CliError::Stdout(e.into()))
-}
-
-fn json(document: &ScheduleJson) -> Result<String, CliError> {
-    Ok(serde_json::to_string_pretty(document).map_err(|e| CliError::Stdout(e.into()))? + "\n")
-}
-
-/// The pattern that was asked for, else the model's own.
-pub(super) fn pattern_of(file: &ModelFile, stated: Option<&str>) -> Result<NamedPattern, CliError> {
-    match stated {
-        Some(stated) => Ok(resolve_pattern(stated, file.model.coil.layers(), None)?),
-        None => file.pattern.clone().ok_or(CliError::PatternMissing),
-    }
-}
-
-/// The schedule and the document that claims it.
-pub(super) fn plan(file: &ModelFile, named: &NamedPattern) -> Result<(Schedule, ScheduleJson), CliError> {
-    let coil = file.model.wound_coil().map_err(crate::rate::RateError::from)?;
-    let schedule = Schedule::new(&coil, &named.pattern)?;
-    let solved = SolvedProfiles::new(&file.model, &file.profiles.profiles())?;
-    let worst = solved.worst_case(&file.model, &named.pattern)?;
-    let document = ScheduleJson::new(file, named, &schedule, &worst);
-    Ok((schedule, document))
 }
 
 fn text(schedule: &Schedule, document: &ScheduleJson) -> String {

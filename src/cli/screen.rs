@@ -18,17 +18,11 @@ pub struct Screen {
     format: Format,
     quiet: bool,
     progress: ProgressMode,
-    is_silent: bool,
 }
 
 impl Screen {
     pub fn new(options: &OutputOptions) -> Self {
-        Self { format: options.format, quiet: options.quiet, progress: options.progress, is_silent: false }
-    }
-
-    /// Shows nothing at all.
-    pub fn silent() -> Self {
-        Self { format: Format::Json, quiet: true, progress: ProgressMode::None, is_silent: true }
+        Self { format: options.format, quiet: options.quiet, progress: options.progress }
     }
 
     pub fn is_json(&self) -> bool {
@@ -78,9 +72,6 @@ impl Screen {
     /// # Errors
     /// A stdout that cannot be written.
     pub fn own(&self, text: &str) -> Result<(), CliError> {
-        if self.is_silent {
-            return Ok(());
-        }
         let mut stdout = std::io::stdout().lock();
         stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()).map_err(CliError::Stdout)
     }

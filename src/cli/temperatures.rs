@@ -2,20 +2,17 @@
 
 use std::path::PathBuf;
 
-use super::records::{GrossErrors, RecordArguments, read_noticed};
+use super::records::RecordArguments;
 use super::screen::{Screen, held};
+use super::watching::Watching;
 use super::{CliError, Ending};
 use crate::io::files::write_atomically;
 use crate::io::json::temperatures::TemperaturesJson;
-use crate::io::model::ModelFile;
 use crate::io::read::model_file::read_model;
 use crate::io::read::profile_file::read_profile_file;
-use crate::pattern::classic::Classic;
-use crate::predict::predict;
 use crate::report::temperatures::{rate_chart, temperature_chart};
-use crate::search::cost::worst_case::SearchError;
-use crate::thermal::{Drive, Instant, ThermalHistory, solve};
-use crate::units::REFERENCE_TEMPERATURE_K;
+use crate::task::measurement::Measurement;
+use crate::task::temperatures::{Driver, Request, run as solve};
 
 /// Temperature and rate of every layer, as CSV and pictures
 #[derive(Debug, clap::Args)]
@@ -47,23 +44,13 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     if let Some(path) = &arguments.profiles {
         file.profiles = read_profile_file(path)?;
     }
-    for advice in &file.advice {
-        screen.note(&format!("note: {advice}"));
-    }
-    let (name, history) = match &arguments.record {
-        Some(path) => {
-            let noticed =
-                read_noticed(path, GrossErrors::Keep, &arguments.reading.format(Some(&file))?, Some(&file), screen)?;
-            let layers = file.model.coil.layers();
-            let own = file.pattern.as_ref().map(|named| named.pattern.clone());
-            // Temperatures don't depend on the pattern; the boundary's estimate weighs the layers by it.
-            let pattern = own.or_else(|| Classic::Zyl.pattern(layers).ok());
-            let pattern = pattern.expect("every even layer count has a cylindrical winding");
-            (noticed.record.name().to_owned(), predict(&file.model, &pattern, &noticed.record)?.history)
-        }
-        None => of_profile(arguments, &file)?,
+    let format = arguments.reading.format(Some(&file))?;
+    let measurement = arguments.record.as_ref().map(|path| Measurement::read(path, &format)).transpose()?;
+    let driver = match &measurement {
+        Some(measurement) => Driver::Measurement(measurement),
+        None => Driver::Profile { name: arguments.profile.as_deref(), rows: arguments.rows },
     };
-    let body = TemperaturesJson::new(&file.model.name, &name, &history);
+    let body = solve(&Request { model: &file, driver }, &Watching::quiet(screen))?.document();
     if let Some(folder) = &arguments.output {
         let _held = held(folder, "temperatures")?;
         for (file, content) in [
@@ -80,24 +67,4 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     }
     screen.answer(body, TemperaturesJson::csv)?;
     Ok(Ending::Done)
-}
-
-fn of_profile(arguments: &Arguments, file: &ModelFile) -> Result<(String, ThermalHistory), CliError> {
-    let profiles = file.profiles.profiles();
-    let chosen = match &arguments.profile {
-        None => profiles.first(),
-        Some(name) => profiles.iter().find(|p| p.name() == name),
-    };
-    let Some(profile) = chosen else {
-        let stated = arguments.profile.clone().unwrap_or_default();
-        let known = profiles.iter().take(8).map(|p| p.name().to_owned()).collect::<Vec<_>>().join(", ");
-        return Err(CliError::UnknownProfile { stated, known });
-    };
-    let path = file.model.heat_path().map_err(SearchError::from)?;
-    let drive = Drive::boundary(profile.temperature(REFERENCE_TEMPERATURE_K));
-    let field = solve(&path, &drive).map_err(SearchError::from)?;
-    let last = f64::from(arguments.rows - 1);
-    let instants: Vec<Instant> =
-        (0..arguments.rows).map(|i| Instant::after(profile.duration_s() * f64::from(i) / last)).collect();
-    Ok((profile.name().to_owned(), field.at(&instants)))
 }

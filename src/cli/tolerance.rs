@@ -2,16 +2,13 @@
 
 use std::path::PathBuf;
 
-use super::evaluate::own_and_classics;
+use super::pattern_asked::patterns_asked;
 use super::screen::{Screen, table};
+use super::watching::Watching;
 use super::{CliError, Ending};
-use crate::io::json::tolerance::{DistributionJson, ToleranceJson};
-use crate::io::model::NamedPattern;
+use crate::io::json::tolerance::ToleranceJson;
 use crate::io::read::model_file::read_model;
-use crate::io::read::pattern_file::resolve_pattern;
-use crate::pattern::Pattern;
-use crate::pattern::classic::Classic;
-use crate::search::cost::tolerance::{ToleranceSpec, measure, study};
+use crate::task::tolerance::{Request, run as study};
 use crate::units::rad_per_s_from_deg_per_h;
 
 /// Monte Carlo of the worst case under the spreads of the model's [tolerance]
@@ -40,34 +37,15 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
-    for advice in &file.advice {
-        screen.note(&format!("note: {advice}"));
-    }
-    let Some(declared) = &file.tolerance else {
-        return Err(CliError::NoTolerance { path: arguments.model.display().to_string() });
+    let patterns = patterns_asked(&file, &arguments.pattern)?;
+    let request = Request {
+        model: &file,
+        patterns: &patterns,
+        samples: arguments.samples.map(|n| n as usize),
+        seed: arguments.seed,
+        limit_rad_per_s: arguments.limit.map(rad_per_s_from_deg_per_h),
     };
-    let spec = ToleranceSpec {
-        samples: arguments.samples.map_or(declared.samples, |n| n as usize),
-        seed: arguments.seed.unwrap_or(declared.seed),
-        limit_rad_per_s: arguments.limit.map(rad_per_s_from_deg_per_h).or(declared.limit_rad_per_s),
-        ..declared.clone()
-    };
-    let layers = file.model.coil.layers();
-    let mut named = if arguments.pattern.is_empty() {
-        own_and_classics(&file)
-    } else {
-        arguments.pattern.iter().map(|stated| resolve_pattern(stated, layers, None)).collect::<Result<_, _>>()?
-    };
-    if let Ok(pattern) = Classic::Qua.pattern(layers)
-        && !named.iter().any(|n| n.pattern == pattern)
-    {
-        named.push(NamedPattern { name: Classic::Qua.key().to_owned(), pattern });
-    }
-    let patterns: Vec<Pattern> = named.iter().map(|n| n.pattern.clone()).collect();
-    let found = study(&file.model, &file.profiles, &spec, &patterns)?;
-    let measure = measure(&file.model, file.profiles.max_rate_k_per_s)?;
-    let rows = named.iter().zip(&found).map(|(named, found)| DistributionJson::new(&named.name, found)).collect();
-    screen.answer(ToleranceJson::new(&file.model.name, &spec, measure, rows), text)?;
+    screen.answer(study(&request, &Watching::quiet(screen))?, text)?;
     Ok(Ending::Done)
 }
 

@@ -4,14 +4,10 @@ use std::path::PathBuf;
 
 use super::screen::Screen;
 use super::{CliError, Ending};
-use crate::io::files::sha256_hex;
-use crate::io::json::{VerifyJson, ViolationJson};
 use crate::io::read::model_file::read_model;
-use crate::io::read::schedule_reader::{read_claim, shop_of};
-use crate::report::page::assets;
+use crate::io::read::schedule_reader::read_claim;
+use crate::task::verify::{Answer, Request, run as verify};
 use crate::text::sink::Line;
-use crate::units::deg_per_h_from_rad_per_s;
-use crate::verify::{RateCheck, Truth, verify};
 
 /// Checks an emitted file against the coil with code of its own: all violations at once
 #[derive(Debug, clap::Args)]
@@ -28,49 +24,9 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
     let claim = read_claim(&arguments.schedule)?;
-    let truth = Truth {
-        model: &file.model,
-        profiles: &file.profiles,
-        model_sha256: &sha256_hex(&file.source),
-        shop: &shop_of(&file.production),
-        assets: &assets(),
-    };
-    let found = verify(&truth, &claim);
-    let clean = found.violations.is_empty();
-    let deg_per_h = deg_per_h_from_rad_per_s;
-    let (rate_check, worst, tolerance, finer, profiles) = match found.rate_check {
-        RateCheck::None => ("not claimed or not possible", None, None, None, 0),
-        RateCheck::Independent { worst_rad_per_s, tolerance_rad_per_s, finer_rad_per_s, profiles } => (
-            "independent solution",
-            Some(deg_per_h(worst_rad_per_s)),
-            Some(deg_per_h(tolerance_rad_per_s)),
-            finer_rad_per_s.map(deg_per_h),
-            profiles,
-        ),
-    };
-    let body = VerifyJson {
-        model: arguments.model.display().to_string(),
-        schedule: arguments.schedule.display().to_string(),
-        checks: found.checks,
-        rate_check: rate_check.to_owned(),
-        independent_worst_rate_deg_per_h: worst,
-        rate_tolerance_deg_per_h: tolerance,
-        finer_worst_rate_deg_per_h: finer,
-        recomputed: found.recomputed,
-        taken_as_given: found.taken_as_given,
-        violations: found
-            .violations
-            .iter()
-            .map(|v| ViolationJson {
-                row: v.row,
-                field: v.field.clone(),
-                expected: v.expected.clone(),
-                found: v.found.clone(),
-                remedy: v.remedy.to_owned(),
-                message: v.to_string(),
-            })
-            .collect(),
-    };
+    let claim_name = arguments.schedule.display().to_string();
+    let Answer { document: body, profiles } = verify(&Request { model: &file, claim: &claim, claim_name: &claim_name });
+    let clean = body.violations.is_empty();
     screen.answer(body, |body| {
         let mut text: String = body.violations.iter().map(|v| format!("{}\n", Line::of(&v.message))).collect();
         let rate = match body.independent_worst_rate_deg_per_h {

@@ -159,6 +159,17 @@ impl Compensator {
         }
     }
 
+    /// What a row of a record holds for a stream.
+    pub fn reading(&self, record: &Record, row: usize) -> Reading {
+        Reading {
+            time_s: record.times_s()[row],
+            temperature_k: Some(record.temperature_k()[row]),
+            inner_k: record.inner_k().map(|k| k[row]),
+            channel_rad_per_s: self.channel_bias_of(record, row),
+            rate_rad_per_s: Some(record.rate_rad_per_s()[row]),
+        }
+    }
+
     /// The compensated rate of every row of a record [rad/s].
     pub fn batch(&self, record: &Record) -> Vec<f64> {
         let mut found = Vec::with_capacity(record.rows());
@@ -166,14 +177,7 @@ impl Compensator {
         let keep = |row: Compensated<f64>| row.rate_rad_per_s.unwrap_or(row.tag);
         for row in 0..record.rows() {
             let rate = record.rate_rad_per_s()[row];
-            let reading = Reading {
-                time_s: record.times_s()[row],
-                temperature_k: Some(record.temperature_k()[row]),
-                inner_k: record.inner_k().map(|k| k[row]),
-                channel_rad_per_s: self.channel_bias_of(record, row),
-                rate_rad_per_s: Some(rate),
-            };
-            stream.push(rate, Some(reading), |row| found.push(keep(row)));
+            stream.push(rate, Some(self.reading(record, row)), |row| found.push(keep(row)));
         }
         stream.finish(|row| found.push(keep(row)));
         found

@@ -5,6 +5,7 @@ pub mod answer;
 pub mod companions;
 pub mod compile;
 pub mod cost;
+pub mod custom;
 pub mod evaluator;
 pub mod gain;
 mod outlook;

@@ -17,6 +17,7 @@ pub mod tolerance;
 
 use serde::Serialize;
 
+use crate::io::fault::{Fault, Faults};
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindingGraph;
 use crate::search::cost::worst_case::WorstCase;
@@ -155,6 +156,17 @@ pub struct FaultJson {
     /// Counted from 1; null for a fault of the file as a whole.
     pub line: Option<usize>,
     pub note: Option<String>,
+}
+
+impl FaultJson {
+    pub fn all(faults: &Faults) -> Vec<Self> {
+        let shown = |fault: &Fault| Self {
+            message: fault.message.clone(),
+            line: fault.span.as_ref().map(|s| faults.source[..s.start].matches('\n').count() + 1),
+            note: fault.note.clone(),
+        };
+        faults.faults.iter().map(shown).collect()
+    }
 }
 
 #[derive(Debug, Serialize)]

@@ -23,7 +23,7 @@ const LEAST_SWING_K: f64 = 5.0;
 /// Times above this are seconds of a calendar; they count from the first row.
 const CALENDAR_S: f64 = 1e8;
 /// Rows of a stream that are handed on together.
-const CHUNK: usize = 65_536;
+pub const CHUNK: usize = 65_536;
 const MOST_FAULTS: usize = 50;
 
 /// What is wrong with a row, or with one of its cells.

@@ -36,6 +36,21 @@ pub struct StreamSummary {
     pub compensated_deviation_deg_per_h: Option<f64>,
 }
 
+impl StreamSummary {
+    /// Counts what happened to a row.
+    pub fn count(&mut self, flag: Flag) {
+        *match flag {
+            Flag::Malformed => &mut self.malformed,
+            Flag::ClockBack => &mut self.clock_back,
+            Flag::Gap => &mut self.gap,
+            Flag::TemperatureHeld => &mut self.temperature_held,
+            Flag::ChannelHeld => &mut self.channel_held,
+            Flag::RateHeld => &mut self.rate_held,
+            Flag::RateRejected => &mut self.rate_rejected,
+        } += 1;
+    }
+}
+
 /// Why a stream ended before its input did.
 #[derive(Debug, thiserror::Error)]
 pub enum StreamError {
@@ -263,16 +278,7 @@ impl<W: Write> Sink<W> {
                 self.text.push('|');
             }
             self.text.push_str(flag.word());
-            let count = match flag {
-                Flag::Malformed => &mut self.summary.malformed,
-                Flag::ClockBack => &mut self.summary.clock_back,
-                Flag::Gap => &mut self.summary.gap,
-                Flag::TemperatureHeld => &mut self.summary.temperature_held,
-                Flag::ChannelHeld => &mut self.summary.channel_held,
-                Flag::RateHeld => &mut self.summary.rate_held,
-                Flag::RateRejected => &mut self.summary.rate_rejected,
-            };
-            *count += 1;
+            self.summary.count(*flag);
         }
         if let (true, Some(before), Some(after)) = (row.flags.is_empty(), row.tag.rate_rad_per_s, row.rate_rad_per_s) {
             self.before.push(before);

@@ -119,6 +119,18 @@ impl SampleMatrix {
         Ok((Self::new(model, &responses)?, origins))
     }
 
+    /// From an array of sensitivities to 2 P(j) − 1 − N, row-major, one row a sample: layers of one metre whose halves
+    /// respond alike. Read once, in place; `constant` may be empty.
+    pub fn of_sensitivities(layers: usize, sensitivities: &[f64], constant: &[f64]) -> Self {
+        let samples = sensitivities.len() / layers;
+        let zero = vec![0.0; if constant.is_empty() { samples } else { 0 }];
+        let constant = if constant.is_empty() { &zero } else { constant };
+        let column = |j: usize| sensitivities[j..].iter().step_by(layers).copied().collect::<Vec<f64>>();
+        let columns: Vec<Vec<f64>> = (0..layers).map(column).collect();
+        let layout = Layout { layers, halves_alike: true, axial: false };
+        Self { layout, columns: Columns::new(constant, &columns), lengths_m: vec![1.0; layers] }
+    }
+
     /// The same matrix with the samples in another order, or fewer of them.
     pub fn select(&self, samples: &[usize]) -> Self {
         Self { layout: self.layout, columns: self.columns.select(samples), lengths_m: self.lengths_m.clone() }

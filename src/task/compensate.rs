@@ -1,0 +1,239 @@
+//! Takes the predictable part out of a gyro's rate: a compensator as it was asked for, and all methods beside each other.
+
+use crate::compensate::learned::Learned;
+use crate::compensate::stream::{Compensated, Flag, Stream};
+use crate::compensate::{CompensateError, Compensator, Method};
+use crate::io::model::{ModelFile, NamedPattern};
+use crate::io::write::compensation_file::{BiasLineJson, CompensateJson, MeasuresJson, MethodJson, StreamSummary};
+use crate::io::write::difference_equation::DifferenceEquation;
+use crate::metrics::Metrics;
+use crate::numeric::statistics::{RunningDeviation, rms};
+use crate::predict::noise_floor_rad_per_s;
+use crate::record::Record;
+use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s, percent_from_fraction};
+
+use super::measurement::{GrossErrors, Measurement};
+use super::metrics::DEFAULT_AVERAGE_S;
+use super::{Observer, TaskError, pattern_or_own};
+
+/// How to compensate.
+#[derive(Debug, Clone, Copy)]
+pub struct Request<'a> {
+    pub model: &'a ModelFile,
+    /// None for the model's own.
+    pub pattern: Option<&'a NamedPattern>,
+    pub method: Method,
+    /// What film, noise, delay and offset (or the lines, or the regression) are fitted to.
+    pub fit: Option<&'a Measurement>,
+    /// One difference equation of fixed gains, without hypotheses about breaks of the air's slope.
+    pub linear: bool,
+    /// Looks so far ahead; none for as far as the fitted record says is worth it.
+    pub delay_s: Option<f64>,
+}
+
+impl<'a> Request<'a> {
+    /// The model's own physics and pattern, as declared.
+    pub fn new(model: &'a ModelFile) -> Self {
+        Self { model, pattern: None, method: Method::Physical, fit: None, linear: false, delay_s: None }
+    }
+}
+
+/// A compensator, and what belongs to it.
+#[derive(Debug)]
+pub struct Answer {
+    pub compensator: Compensator,
+    /// The fitted record, without its gross errors.
+    pub fitted: Option<Record>,
+    model: String,
+}
+
+/// Makes the compensator.
+///
+/// # Errors
+/// No pattern; a model that no compensator can hold; a record that says nothing.
+pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskError> {
+    let named = pattern_or_own(request.model, request.pattern)?;
+    let model = &request.model.model;
+    let fitted = fitted(request, observer)?;
+    let mut compensator = match &fitted {
+        Some(record) => Compensator::fit(request.method, model, &named.pattern, record)?,
+        None => Compensator::declared(request.method, model, &named.pattern)?,
+    };
+    if let Compensator::Physical(physical) = &mut compensator {
+        if request.linear {
+            physical.hypotheses = 1;
+            if let Some(record) = &fitted {
+                physical.tune(record);
+            }
+        }
+        if let Some(delay_s) = request.delay_s.filter(|d| *d >= 0.0) {
+            physical.delay_s = delay_s;
+        }
+        if let Some(linearised) = physical.linearised() {
+            observer.note(&format!(
+                "the conductivity is taken at {:.1} °C; over the fitted record it differs by up to {:.1} %",
+                celsius_from_kelvin(linearised.at_k),
+                percent_from_fraction(linearised.conductivity_error)
+            ));
+        }
+    }
+    Ok(Answer { compensator, fitted, model: model.name.clone() })
+}
+
+fn fitted(request: &Request, observer: &dyn Observer) -> Result<Option<Record>, TaskError> {
+    let noticed = request.fit.map(|m| m.noticed(GrossErrors::Drop, Some(request.model), observer)).transpose()?;
+    Ok(noticed.map(|noticed| noticed.record))
+}
+
+impl Answer {
+    /// As the program prints it.
+    pub fn document(&self, summary: Option<StreamSummary>) -> CompensateJson {
+        CompensateJson {
+            model: self.model.clone(),
+            method: self.compensator.method().key(),
+            summary,
+            noise_floor_deg_per_h: None,
+            before: None,
+            methods: Vec::new(),
+            lines: BiasLineJson::all(&self.compensator),
+        }
+    }
+
+    /// The compensator as a difference equation, for this interval or that of the fitted record; none where no such equation
+    /// holds it or the interval is not known.
+    pub fn difference_equation(&self, interval_s: Option<f64>) -> Option<DifferenceEquation> {
+        let interval_s = interval_s.or(self.fitted.as_ref().map(Record::interval_s));
+        let interval_s = interval_s.filter(|i| *i > 0.0 && i.is_finite())?;
+        let Compensator::Physical(physical) = &self.compensator else { return None };
+        DifferenceEquation::new(&self.model, physical, interval_s, self.compensator.delay_rows(interval_s))
+    }
+}
+
+/// A record, compensated row by row.
+#[derive(Debug)]
+pub struct CompensatedRecord {
+    /// Where nothing is known yet, NaN.
+    pub rate_rad_per_s: Vec<f64>,
+    /// The rows to which something happened, and what.
+    pub flags: Vec<(usize, Vec<Flag>)>,
+    pub summary: StreamSummary,
+}
+
+/// Compensates a record as a stream does.
+///
+/// # Errors
+/// A record that lacks what the compensator reads.
+pub fn compensate_record(compensator: &Compensator, record: &Record) -> Result<CompensatedRecord, TaskError> {
+    let has = |name: &&str| record.channels().iter().any(|c| c.name == **name);
+    if let Some(name) = compensator.channel_names().into_iter().find(|name| !has(name)) {
+        return Err(CompensateError::MissingChannel { name: name.to_owned() }.into());
+    }
+    let (mut before, mut after) = (RunningDeviation::default(), RunningDeviation::default());
+    let mut found = CompensatedRecord {
+        rate_rad_per_s: Vec::with_capacity(record.rows()),
+        flags: Vec::new(),
+        summary: StreamSummary::default(),
+    };
+    let mut take = |row: Compensated<f64>| {
+        if row.flags.is_empty() {
+            if let Some(rate) = row.rate_rad_per_s {
+                before.push(row.tag);
+                after.push(rate);
+            }
+        } else {
+            row.flags.iter().for_each(|flag| found.summary.count(*flag));
+            found.flags.push((found.rate_rad_per_s.len(), row.flags));
+        }
+        found.rate_rad_per_s.push(row.rate_rad_per_s.unwrap_or(f64::NAN));
+    };
+    let mut stream = Stream::new(compensator);
+    for row in 0..record.rows() {
+        stream.push(record.rate_rad_per_s()[row], Some(compensator.reading(record, row)), &mut take);
+    }
+    let delay_rows = stream.delay_rows();
+    stream.finish(take);
+    found.summary.rows = found.rate_rad_per_s.len();
+    found.summary.delay_rows = delay_rows;
+    found.summary.rate_deviation_deg_per_h = before.deviation().map(deg_per_h_from_rad_per_s);
+    found.summary.compensated_deviation_deg_per_h = after.deviation().map(deg_per_h_from_rad_per_s);
+    Ok(found)
+}
+
+/// A rate before compensation, and what each method leaves of it, row by row.
+pub type Curves = Vec<(&'static str, Vec<f64>)>;
+
+/// Every method, fitted to one record and tried on another.
+#[derive(Debug)]
+pub struct AllMethods {
+    pub document: CompensateJson,
+    /// In rad/s.
+    pub curves: Curves,
+    /// What they were tried on.
+    pub record: Record,
+}
+
+/// Fits every method to the request's record and tries it on another.
+///
+/// # Errors
+/// No pattern or no record to fit to; records that cannot be measured.
+pub fn all_methods(request: &Request, holdout: &Measurement, observer: &dyn Observer) -> Result<AllMethods, TaskError> {
+    let file = request.model;
+    let named = pattern_or_own(file, request.pattern)?;
+    let Some(fitted) = fitted(request, observer)? else {
+        let method = Method::Piecewise;
+        return Err(CompensateError::NeedsRecord { method }.into());
+    };
+    let record = holdout.noticed(GrossErrors::Keep, Some(file), observer)?.record;
+    let rate = |values: &[f64]| deg_per_h_from_rad_per_s(rms(values));
+    let measures = |rates: Vec<f64>| -> Result<MeasuresJson, TaskError> {
+        let left = Record::new("left", record.times_s().to_vec(), record.temperature_k().to_vec(), rates)?;
+        Ok(MeasuresJson::new(&Metrics::of(&left, DEFAULT_AVERAGE_S)?))
+    };
+    let mut curves = vec![("before", record.rate_rad_per_s().to_vec())];
+    let mut methods = Vec::new();
+    for method in Method::ALL {
+        methods.push(match Compensator::fit(method, &file.model, &named.pattern, &fitted) {
+            Ok(compensator) => {
+                let left = compensator.batch(&record);
+                curves.push((method.key(), left.clone()));
+                MethodJson {
+                    method: method.key(),
+                    rms_deg_per_h: Some(rate(&left)),
+                    delay_rows: Some(compensator.delay_rows(record.interval_s())),
+                    reason: worth(&compensator),
+                    measures: Some(measures(left)?),
+                }
+            }
+            Err(error) => MethodJson {
+                method: method.key(),
+                rms_deg_per_h: None,
+                delay_rows: None,
+                reason: Some(error.to_string()),
+                measures: None,
+            },
+        });
+    }
+    let document = CompensateJson {
+        model: file.model.name.clone(),
+        method: "all",
+        summary: None,
+        noise_floor_deg_per_h: Some(deg_per_h_from_rad_per_s(noise_floor_rad_per_s(&record))),
+        before: Some(measures(record.rate_rad_per_s().to_vec())?),
+        methods,
+        lines: Vec::new(),
+    };
+    Ok(AllMethods { document, curves, record })
+}
+
+/// What a learned compensator leaves of days that it was not shown, where that is not what it leaves of its own.
+fn worth(compensator: &Compensator) -> Option<String> {
+    let Compensator::Learned(learned) = compensator else { return None };
+    let Learned { left_rad_per_s, cross_validated_rad_per_s, .. } = learned;
+    learned.only_fits().then(|| {
+        format!(
+            "leaves {:.5} °/h of the record it was fitted to, {:.5} °/h of the parts of it that it was not shown: it only fits",
+            deg_per_h_from_rad_per_s(*left_rad_per_s),
+            deg_per_h_from_rad_per_s(*cross_validated_rad_per_s)
+        )
+    })
+}

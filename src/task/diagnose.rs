@@ -1,0 +1,182 @@
+//! Which piece of physics a model lacks, judged by records.
+
+use std::path::Path;
+
+use crate::compare::suspicion;
+use crate::diagnose::experiment::{Chamber, Experiment, design};
+use crate::diagnose::{self, Diagnosis, Verdict};
+use crate::effect;
+use crate::io::files::write_atomically;
+use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow, FindingJson};
+use crate::io::json::inputs::InputsJson;
+use crate::io::json::schedule::{RATE_DECIMALS, rounded};
+use crate::io::model::{ModelFile, NamedPattern};
+use crate::io::read::profile_file::print_profile;
+use crate::io::write::measurement_folder::{
+    DIAGNOSIS_FILE, MODEL_FILE, before_and_after_name, write_document, write_table,
+};
+use crate::io::write::model_edit::{Remark, with_effect};
+use crate::pattern::Pattern;
+use crate::predict::{noise_floor_rad_per_s, predict};
+use crate::rate::CoilModel;
+use crate::record::Record;
+use crate::report::diagnosis::{before_and_after_chart, before_and_after_name as picture_name, value_in_words};
+use crate::report::ladder::ladder_chart;
+use crate::text::sink::TomlComment;
+use crate::units::deg_per_h_from_rad_per_s;
+
+use super::measurement::Measurement;
+use super::page::{REPORT_FILE, write_report};
+use super::{Observer, TaskError, pattern_or_own};
+
+/// What is to be diagnosed.
+#[derive(Debug, Clone, Copy)]
+pub struct Request<'a> {
+    pub model: &'a ModelFile,
+    /// None for the model's own.
+    pub pattern: Option<&'a NamedPattern>,
+    pub measurements: &'a [Measurement],
+    /// Only judged by.
+    pub holdout: &'a [Measurement],
+    /// Whether to plan the experiment that would tell the candidates apart, and the seed it is drawn by.
+    pub experiment_seed: Option<u64>,
+}
+
+impl<'a> Request<'a> {
+    /// With the model's own pattern; no hold-out and no experiment.
+    pub fn new(model: &'a ModelFile, measurements: &'a [Measurement]) -> Self {
+        Self { model, pattern: None, measurements, holdout: &[], experiment_seed: None }
+    }
+}
+
+/// What was found.
+#[derive(Debug)]
+pub struct Answer {
+    pub document: DiagnosisJson,
+    pub diagnosis: Diagnosis,
+    /// None where it was not asked for or there is nothing to tell apart.
+    pub experiment: Option<Experiment>,
+    pub pattern: Pattern,
+    records: Vec<Record>,
+    holdout: Vec<Record>,
+}
+
+/// Diagnoses. Gross errors are left out by the diagnosis itself, which says so.
+///
+/// # Errors
+/// No pattern; records that cannot be fitted.
+pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskError> {
+    let file = request.model;
+    let pattern = pattern_or_own(file, request.pattern)?.pattern;
+    let taken = |measurements: &[Measurement]| -> Vec<Record> {
+        let said = measurements.iter().inspect(|m| m.say(Some(file), observer));
+        said.map(|m| m.record.clone()).collect()
+    };
+    let (records, holdout) = (taken(request.measurements), taken(request.holdout));
+    let asked = diagnose::Request { model: &file.model, pattern: &pattern, records: &records, holdout: &holdout };
+    let diagnosis = diagnose::diagnose(&asked, &|share| observer.at(share, ""))?;
+    let all: Vec<&Record> = records.iter().chain(&holdout).collect();
+    let seed = request.experiment_seed.filter(|_| !diagnosis.effects.is_empty());
+    let experiment = match Chamber::of(&all).zip(seed) {
+        Some((chamber, seed)) => design(&diagnose::contest(&asked, &diagnosis)?, &pattern, &chamber, seed),
+        None => None,
+    };
+    let holdout_noise = (!holdout.is_empty()).then(|| noise_of(&holdout));
+    let fitted = request.measurements.iter().map(|m| m.input("fitted"));
+    let inputs = fitted.chain(request.holdout.iter().map(|m| m.input("held out"))).collect();
+    let inputs = InputsJson::new(Some(file), inputs);
+    let mut document = DiagnosisJson::new(&file.model.name, &diagnosis, holdout_noise, experiment.as_ref(), inputs);
+    document.cautions.extend(suspicions(&file.model, &all, &diagnosis));
+    Ok(Answer { document, diagnosis, experiment, pattern, records, holdout })
+}
+
+/// What the records and the fitted factors make one suspect.
+fn suspicions(model: &CoilModel, records: &[&Record], diagnosis: &Diagnosis) -> Vec<String> {
+    let factors = diagnosis.effects.iter().filter(|f| f.effect.is_at(effect::THERMO_OPTIC_FACTOR));
+    let of_factors = factors.filter_map(|f| suspicion::of_factor(f.effect.values()[0]));
+    let of_records = records.iter().flat_map(|record| suspicion::of_record(record, model.rate_mean_s));
+    of_factors.chain(of_records).map(|s| s.to_string()).collect()
+}
+
+/// Root mean square of the records' noises, each by its rows.
+fn noise_of(records: &[Record]) -> f64 {
+    let square = |r: &Record| noise_floor_rad_per_s(r).powi(2) * r.rows() as f64;
+    let rows: usize = records.iter().map(Record::rows).sum();
+    (records.iter().map(square).sum::<f64>() / rows as f64).sqrt()
+}
+
+/// What stands behind an effect's values in a model file.
+pub(super) fn remarks(effect: &FindingJson) -> Vec<Remark> {
+    let fitted = effect.parameters.iter().filter(|(_, p)| p.fitted);
+    fitted.map(|(key, p)| Remark { key: key.clone(), text: TomlComment::of(value_in_words(p)) }).collect()
+}
+
+impl Answer {
+    pub fn is_adequate(&self) -> bool {
+        self.diagnosis.verdict == Verdict::Adequate
+    }
+
+    /// The model file with the effects that were found; none where there are none.
+    ///
+    /// # Errors
+    /// A text that is no model file.
+    pub fn extended_source(&self, model: &ModelFile) -> Result<Option<String>, TaskError> {
+        if self.document.effects.is_empty() {
+            return Ok(None);
+        }
+        let mut source = model.source.clone();
+        let name = model.path.display().to_string();
+        for (finding, shown) in self.diagnosis.effects.iter().zip(&self.document.effects) {
+            source = with_effect(&name, &source, &finding.effect, &remarks(shown))?;
+        }
+        Ok(Some(source))
+    }
+
+    /// The experiment as a file of profiles; none where there is none.
+    pub fn experiment_source(&self, model: &ModelFile) -> Option<String> {
+        let (found, shown) = self.experiment.as_ref().zip(self.document.experiment.as_ref())?;
+        let first = format!("For {}: the chamber's air.", model.model.name);
+        let words = [&first, &shown.statement].into_iter().chain(&shown.expectations);
+        Some(print_profile(&found.profile, &words.map(TomlComment::of).collect::<Vec<_>>()))
+    }
+
+    /// Everything about the diagnosis, and the page.
+    ///
+    /// # Errors
+    /// Files that cannot be written.
+    pub fn write(&self, folder: &Path, model: &ModelFile) -> Result<(), TaskError> {
+        write_atomically(&folder.join("ladder.svg"), ladder_chart(&self.document).svg().as_bytes())?;
+        write_atomically(&folder.join(MODEL_FILE), model.source.as_bytes())?;
+        if let Some(source) = self.extended_source(model)? {
+            write_atomically(&folder.join("extended.toml"), source.as_bytes())?;
+            for (index, record) in self.records.iter().chain(&self.holdout).enumerate() {
+                let rows = self.before_and_after(model, record)?;
+                let noise = deg_per_h_from_rad_per_s(noise_floor_rad_per_s(record));
+                let chart = before_and_after_chart(&format!("Residual of {}", record.name()), &rows, noise);
+                write_table(folder, &before_and_after_name(index + 1), &rows)?;
+                write_atomically(&folder.join(picture_name(index + 1)), chart.svg().as_bytes())?;
+            }
+        }
+        write_document(folder, DIAGNOSIS_FILE, &self.document)?;
+        write_report(folder, &folder.join(REPORT_FILE))?;
+        Ok(())
+    }
+
+    /// What the declared and the extended model leave of a record.
+    fn before_and_after(&self, model: &ModelFile, record: &Record) -> Result<Vec<DiagnosisRow>, TaskError> {
+        let left = |model: &CoilModel| -> Result<Vec<f64>, TaskError> {
+            let predicted = predict(model, &self.pattern, record)?.rate_rad_per_s;
+            let residuals = record.rate_rad_per_s().iter().zip(predicted);
+            Ok(residuals.map(|(m, p)| rounded(deg_per_h_from_rad_per_s(m - p), RATE_DECIMALS)).collect())
+        };
+        let (declared, extended) = (left(&model.model)?, left(&self.diagnosis.extended)?);
+        let rows = record.times_s().iter().zip(declared).zip(extended);
+        Ok(rows
+            .map(|((&time_s, residual_declared_deg_per_h), residual_extended_deg_per_h)| DiagnosisRow {
+                time_s,
+                residual_declared_deg_per_h,
+                residual_extended_deg_per_h,
+            })
+            .collect())
+    }
+}

@@ -1,0 +1,90 @@
+//! What the rate error of given windings is at worst.
+
+use crate::effect::FILM;
+use crate::io::json::{EvaluateJson, PatternJson};
+use crate::io::model::{Advice, ModelFile, NamedPattern};
+use crate::profile::Profile;
+use crate::rate::RateModel;
+use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
+use crate::search::cost::worst_case::{SolvedProfiles, WorstCase};
+use crate::units::deg_per_h_from_rad_per_s;
+
+use super::{Observer, TaskError, advise, own_and_classics};
+
+/// What is to be evaluated.
+#[derive(Debug, Clone, Copy)]
+pub struct Request<'a> {
+    pub model: &'a ModelFile,
+    /// Empty for the model's own and all classics that fit.
+    pub patterns: &'a [NamedPattern],
+}
+
+/// The document, and the profiles that attain the guaranteed worst cases.
+#[derive(Debug)]
+pub struct Answer {
+    pub document: EvaluateJson,
+    /// One a pattern, in their order; or why there is none.
+    pub extremes: Result<Vec<Profile>, GuaranteedError>,
+}
+
+/// Evaluates.
+///
+/// # Errors
+/// A model that cannot be solved, patterns of another layer count.
+pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskError> {
+    let file = request.model;
+    advise(file, observer);
+    let all = if request.patterns.is_empty() { own_and_classics(file) } else { request.patterns.to_vec() };
+    let solved = SolvedProfiles::new(&file.model, &file.profiles.profiles())?;
+    let step = UnitStep::new(&file.model, file.profiles.max_rate_k_per_s);
+    if let Err(reason @ GuaranteedError::Effect { .. }) = &step {
+        observer.note(&format!("note: {reason}"));
+    }
+    let after = SolvedProfiles::after_the_ends(&file.model, &file.profiles.profiles())?;
+    let mut patterns = Vec::with_capacity(all.len());
+    let mut extremes = Vec::new();
+    for (index, NamedPattern { name, pattern }) in all.iter().enumerate() {
+        observer.at(index as f64 / all.len() as f64, name);
+        let worst = solved.worst_case(&file.model, pattern)?;
+        if let Some(after) = &after {
+            warn_of_growth(name, &worst, &after.worst_case(&file.model, pattern)?, observer);
+        }
+        let phase_rad = RateModel::new(&file.model, pattern, &[])?.phase_rad(worst.rate_rad_per_s);
+        let bound = match &step {
+            Ok(step) => Some(step.guaranteed(&file.model, pattern)?),
+            Err(_) => None,
+        };
+        let bound_rad_per_s = bound.as_ref().map(|b| b.rate_rad_per_s);
+        patterns.push(PatternJson::new(name, pattern, &worst, phase_rad, bound_rad_per_s));
+        extremes.extend(bound.map(|b| b.profile(&format!("bang-bang-{name}"))));
+    }
+    if file.model.prescribes_outermost_layer() && holds_a_tie(&patterns) {
+        observer.note(&format!("note: {}", Advice::PrescribedBoundary { film: FILM.spec.kind }));
+    }
+    let document = EvaluateJson { model: file.model.name.clone(), patterns };
+    Ok(Answer { document, extremes: step.map(|_| extremes) })
+}
+
+/// Whether two different windings have the same guaranteed worst rate.
+fn holds_a_tie(answers: &[PatternJson]) -> bool {
+    const SAME: f64 = 1e-6;
+    let bound = |p: &PatternJson| p.guaranteed_worst_rate_deg_per_h;
+    answers.iter().enumerate().any(|(i, a)| {
+        let ties = |b: &PatternJson| bound(a).zip(bound(b)).is_some_and(|(x, y)| (x - y).abs() <= SAME * x.abs());
+        answers[..i].iter().any(|b| b.segments != a.segments && ties(b))
+    })
+}
+
+/// Profiles end with their last piece; the error may still grow while the pack settles.
+fn warn_of_growth(name: &str, within: &WorstCase, after: &WorstCase, observer: &dyn Observer) {
+    const GROWTH: f64 = 1e-3;
+    if after.rate_rad_per_s.abs() > within.rate_rad_per_s.abs() * (1.0 + GROWTH) {
+        observer.note(&format!(
+            "note: with {name} the error still grows after the end of profile {}, to {:.4} °/h at {:.0} s if the drive stands \
+             still: end the profile with a soak to have it counted",
+            after.profile,
+            deg_per_h_from_rad_per_s(after.rate_rad_per_s.abs()),
+            after.time_s
+        ));
+    }
+}

@@ -1,0 +1,85 @@
+//! What the layers do under a profile or a record.
+
+use crate::io::json::temperatures::TemperaturesJson;
+use crate::io::model::ModelFile;
+use crate::pattern::classic::Classic;
+use crate::predict::predict;
+use crate::search::cost::worst_case::SearchError;
+use crate::thermal::{Drive, Instant, ThermalHistory, solve};
+use crate::units::REFERENCE_TEMPERATURE_K;
+
+use super::measurement::{GrossErrors, Measurement};
+use super::{Observer, TaskError, advise};
+
+/// What drives the pack.
+#[derive(Debug, Clone, Copy)]
+pub enum Driver<'a> {
+    /// A profile of the model by its name, or its first; so many rows, evenly spaced.
+    Profile { name: Option<&'a str>, rows: u32 },
+    /// A record; its rows are its own.
+    Measurement(&'a Measurement),
+}
+
+/// What is asked.
+#[derive(Debug, Clone, Copy)]
+pub struct Request<'a> {
+    pub model: &'a ModelFile,
+    pub driver: Driver<'a>,
+}
+
+/// The field in the layers.
+#[derive(Debug)]
+pub struct Answer {
+    pub model: String,
+    /// The profile's or the record's name.
+    pub drive: String,
+    pub history: ThermalHistory,
+}
+
+impl Answer {
+    /// As the program prints it.
+    pub fn document(&self) -> TemperaturesJson {
+        TemperaturesJson::new(&self.model, &self.drive, &self.history)
+    }
+}
+
+/// Solves the heat.
+///
+/// # Errors
+/// A profile that is not there, a model that cannot be solved.
+pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskError> {
+    let file = request.model;
+    advise(file, observer);
+    let (drive, history) = match request.driver {
+        Driver::Profile { name, rows } => of_profile(file, name, rows)?,
+        Driver::Measurement(measurement) => {
+            let noticed = measurement.noticed(GrossErrors::Keep, Some(file), observer)?;
+            let own = file.pattern.as_ref().map(|named| named.pattern.clone());
+            // Temperatures don't depend on the pattern; the boundary's estimate weighs the layers by it.
+            let pattern = own.or_else(|| Classic::Zyl.pattern(file.model.coil.layers()).ok());
+            let pattern = pattern.expect("every even layer count has a cylindrical winding");
+            (noticed.record.name().to_owned(), predict(&file.model, &pattern, &noticed.record)?.history)
+        }
+    };
+    Ok(Answer { model: file.model.name.clone(), drive, history })
+}
+
+fn of_profile(file: &ModelFile, name: Option<&str>, rows: u32) -> Result<(String, ThermalHistory), TaskError> {
+    let profiles = file.profiles.profiles();
+    let chosen = match name {
+        None => profiles.first(),
+        Some(name) => profiles.iter().find(|p| p.name() == name),
+    };
+    let Some(profile) = chosen else {
+        let stated = name.unwrap_or_default().to_owned();
+        let known = profiles.iter().take(8).map(|p| p.name().to_owned()).collect::<Vec<_>>().join(", ");
+        return Err(TaskError::UnknownProfile { stated, known });
+    };
+    let path = file.model.heat_path().map_err(SearchError::from)?;
+    let drive = Drive::boundary(profile.temperature(REFERENCE_TEMPERATURE_K));
+    let field = solve(&path, &drive).map_err(SearchError::from)?;
+    let last = f64::from(rows - 1);
+    let instants: Vec<Instant> =
+        (0..rows).map(|i| Instant::after(profile.duration_s() * f64::from(i) / last)).collect();
+    Ok((profile.name().to_owned(), field.at(&instants)))
+}
