@@ -199,4 +199,6 @@ class Field:
 
 
 def _restored(name: str, *arrays: Array) -> Field:
-    return Field._of(_coilwright.field_of(name, *arrays, True))
+    time, temperature, rate, ambient, ambient_rate, moment, moment_rate = arrays
+    handle = _coilwright.field_of(name, time, temperature, rate, ambient, ambient_rate, moment, moment_rate, True)
+    return Field._of(handle)

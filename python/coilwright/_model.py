@@ -269,5 +269,5 @@ def pattern_arguments(stated: PatternLike | Sequence[PatternLike] | None) -> lis
         return [pattern_argument(stated)]
     entries = list(stated)
     if entries and all(isinstance(entry, (int, np.integer)) for entry in entries):
-        return [pattern_argument(entries)]  # type: ignore[arg-type]
-    return [pattern_argument(entry) for entry in entries]  # type: ignore[arg-type]
+        return [pattern_argument(entries)]
+    return [pattern_argument(entry) for entry in entries]

@@ -106,7 +106,7 @@ impl FieldHandle {
     }
 
     #[getter]
-    fn time_s<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray1<f64>> {
+    fn time_s<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         view1(this.clone().into_any(), &this.get().answer.history.times_s)
     }
 
@@ -123,12 +123,12 @@ impl FieldHandle {
     }
 
     #[getter]
-    fn ambient_k<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray1<f64>> {
+    fn ambient_k<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         view1(this.clone().into_any(), &this.get().answer.history.ambient_k)
     }
 
     #[getter]
-    fn ambient_rate_k_per_s<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray1<f64>> {
+    fn ambient_rate_k_per_s<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         view1(this.clone().into_any(), &this.get().answer.history.ambient_rate_k_per_s)
     }
 

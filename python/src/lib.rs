@@ -4,6 +4,7 @@
 //! same to the last digit.
 
 mod arrays;
+mod arrow;
 mod compensation;
 mod custom;
 mod error;
@@ -27,6 +28,8 @@ fn command(py: Python, words: Vec<String>) -> u8 {
 mod _coilwright {
     use pyo3::prelude::*;
 
+    #[pymodule_export]
+    use super::arrow::{arrow_columns, arrow_stream};
     #[pymodule_export]
     use super::command;
     #[pymodule_export]

@@ -160,28 +160,30 @@ impl RecordHandle {
     }
 
     #[getter]
-    fn time_s<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray1<f64>> {
+    fn time_s<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         view1(this.clone().into_any(), this.get().measurement.record.times_s())
     }
 
     #[getter]
-    fn temperature_k<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray1<f64>> {
+    fn temperature_k<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         view1(this.clone().into_any(), this.get().measurement.record.temperature_k())
     }
 
     #[getter]
-    fn rate_rad_per_s<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray1<f64>> {
+    fn rate_rad_per_s<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         view1(this.clone().into_any(), this.get().measurement.record.rate_rad_per_s())
     }
 
     #[getter]
-    fn inner_k<'py>(this: &Bound<'py, Self>) -> Option<Bound<'py, PyArray1<f64>>> {
-        Some(view1(this.clone().into_any(), this.get().measurement.record.inner_k()?))
+    fn inner_k<'py>(this: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
+        let found = this.get().measurement.record.inner_k();
+        found.map(|values| view1(this.clone().into_any(), values)).transpose()
     }
 
     #[getter]
-    fn ambient_k<'py>(this: &Bound<'py, Self>) -> Option<Bound<'py, PyArray1<f64>>> {
-        Some(view1(this.clone().into_any(), this.get().measurement.record.ambient_k()?))
+    fn ambient_k<'py>(this: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
+        let found = this.get().measurement.record.ambient_k();
+        found.map(|values| view1(this.clone().into_any(), values)).transpose()
     }
 
     #[getter]
@@ -189,9 +191,9 @@ impl RecordHandle {
         self.measurement.record.channels().iter().map(|c| c.name.clone()).collect()
     }
 
-    fn channel<'py>(this: &Bound<'py, Self>, name: &str) -> Option<Bound<'py, PyArray1<f64>>> {
-        let channel = this.get().measurement.record.channels().iter().find(|c| c.name == name)?;
-        Some(view1(this.clone().into_any(), &channel.values))
+    fn channel<'py>(this: &Bound<'py, Self>, name: &str) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
+        let channel = this.get().measurement.record.channels().iter().find(|c| c.name == name);
+        channel.map(|channel| view1(this.clone().into_any(), &channel.values)).transpose()
     }
 
     /// Rows after which the interval is at least twice the usual one, and its length.

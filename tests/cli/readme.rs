@@ -87,6 +87,10 @@ fn assert_is_known_outside_the_program(line: usize, command: &str) {
     match command {
         "cargo test" => assert_eq!(gate.lines().last(), Some("step cargo test")),
         ".ci/run" => assert!(gate.starts_with("#!/usr/bin/env bash\n")),
+        "pip install \"./python[test]\" && pytest python/tests" => {
+            assert!(gate.contains("-m pip install") && gate.contains("\"./python[test"), "the gate installs it");
+            assert!(gate.contains("-m pytest -q python/tests"), "the gate tests it");
+        }
         other => panic!("README.md:{line}: no test knows how to run `{other}`"),
     }
 }

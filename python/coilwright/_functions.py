@@ -1,0 +1,451 @@
+"""The use cases: each does what the command of its name does and answers with its document."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
+
+from . import _coilwright, _progress
+from ._field import Field
+from ._model import Model, PatternLike, pattern_argument, pattern_arguments
+from ._progress import Progress
+from ._record import RecordLike, record_argument, record_arguments
+from ._results import (
+    CompareResult,
+    Comparison,
+    DiagnoseResult,
+    EvaluateResult,
+    ExactResult,
+    ExtendResult,
+    FieldEvaluateResult,
+    ImproveResult,
+    MetricsResult,
+    OptimiseResult,
+    ParetoResult,
+    Result,
+    ScheduleResult,
+    ToleranceResult,
+    VerifyResult,
+)
+
+_log = logging.getLogger("coilwright")
+
+R = TypeVar("R", bound=Result)
+
+PathLike = str | os.PathLike[str]
+ModelLike = Model | str | os.PathLike[str]
+"""A model, or the path of a model file."""
+
+
+def model_of(stated: ModelLike) -> Model:
+    return stated if isinstance(stated, Model) else Model.read(stated)
+
+
+def result_of(kind: type[R], answered: tuple[str, list[str]]) -> R:
+    """A document as a result; what was said on the way goes to the logger ``coilwright`` too."""
+    text, notes = answered
+    for note in notes:
+        _log.info("%s", note.removeprefix("note: "))
+    return kind(json.loads(text), notes)
+
+
+def _optional_pattern(pattern: PatternLike | None) -> Any:
+    return None if pattern is None else pattern_argument(pattern)
+
+
+def _optional_path(path: PathLike | None) -> str | None:
+    return None if path is None else os.fspath(path)
+
+
+def evaluate(
+    model: ModelLike,
+    patterns: PatternLike | Sequence[PatternLike] | None = None,
+    *,
+    profiles: PathLike | None = None,
+    field: Field | None = None,
+    progress: bool | Progress | None = None,
+) -> EvaluateResult:
+    """Worst rate error of windings over the model's profiles, or under a temperature field of one's own.
+
+    Args:
+        model: a :class:`Model` or a model file.
+        patterns: one or several: patterns, classic names, pattern files, segments. Without it, the model's own and all classics
+            that fit.
+        profiles: a file with a ``[profiles]`` table, used instead of the model's.
+        field: temperatures that were computed elsewhere; the result then has ``rates_deg_per_h`` over the field's times.
+
+    Raises:
+        RequestError: a name that is none, a pattern of another layer count.
+        ModelError: a model that cannot be solved.
+
+    >>> import coilwright as cw
+    >>> result = cw.evaluate("examples/paper-200m.toml", ["qua", "dip"])
+    >>> [p.name for p in result.patterns]
+    ['qua', 'dip']
+    """
+    asked = model_of(model)
+    if profiles is not None:
+        asked = asked.with_profiles(profiles)
+    if field is not None:
+        answered, rates = _coilwright.evaluate_field(asked._handle, field._handle, pattern_arguments(patterns))
+        result = result_of(FieldEvaluateResult, answered)
+        object.__setattr__(result, "rates_deg_per_h", rates)
+        return result
+    with _progress.shown(progress, "evaluate") as at:
+        return result_of(EvaluateResult, _coilwright.evaluate(asked._handle, pattern_arguments(patterns), at))
+
+
+def optimise(
+    model: ModelLike,
+    *,
+    seed: int | None = None,
+    windability: str | None = None,
+    objective: str | None = None,
+    budget_s: float | None = None,
+    rounds: int | None = None,
+    moves: int | None = None,
+    patience: int | None = None,
+    target_deg_per_h: float | None = None,
+    restarts: int | None = None,
+    moves_per_restart: int | None = None,
+    init: PatternLike | None = None,
+    compare_with: PatternLike | None = None,
+    prove_s: float | None = None,
+    output: PathLike | None = None,
+    progress: bool | Progress | None = None,
+) -> OptimiseResult:
+    """Searches the winding pattern with the smallest error. The same seed gives the same answer, unless a clock ends the search.
+
+    Args:
+        seed: of everything random; without it, the model's own.
+        windability: "standard", "captive:K" or "any"; without it, the model's own.
+        objective: "worst-rate", "worst-phase", "rms", "guaranteed-rate" or "p95"; without it, the model's own.
+        budget_s: ends after this time.
+        rounds, moves, patience, target_deg_per_h: further rules; the first that fires ends the search.
+        restarts, moves_per_restart: effort of a round.
+        init: a pattern to begin with.
+        compare_with: a former pattern, or the folder of a search.
+        prove_s: tries for so long to prove that the best pattern is the best of its class.
+        output: a folder for the run's results, as ``optimise -o`` leaves it.
+        progress: True for a bar, or a callable that takes the share done and words.
+
+    Raises:
+        RequestError: a class, an objective or a pattern that is none.
+        KeyboardInterrupt: on Ctrl-C, at once.
+    """
+    options = {
+        "seed": seed,
+        "windability": windability,
+        "objective": objective,
+        "budget_s": budget_s,
+        "rounds": rounds,
+        "moves": moves,
+        "patience": patience,
+        "target": target_deg_per_h,
+        "restarts": restarts,
+        "moves_per_restart": moves_per_restart,
+    }
+    with _progress.shown(progress, "optimise") as at:
+        answered = _coilwright.optimise(
+            model_of(model)._handle,
+            options,
+            _optional_pattern(init),
+            _optional_pattern(compare_with),
+            prove_s,
+            _optional_path(output),
+            at,
+        )
+    return result_of(OptimiseResult, answered)
+
+
+optimize = optimise
+
+
+def exact(
+    model: ModelLike,
+    *,
+    windability: str | None = None,
+    objective: str | None = None,
+    budget_s: float = 60.0,
+    patterns: PatternLike | Sequence[PatternLike] | None = None,
+    seed: int | None = None,
+    progress: bool | Progress | None = None,
+) -> ExactResult:
+    """The best winding of a class with a proof, or a lower bound on what any winding can reach.
+
+    Args:
+        windability: "standard", "captive:K" or "any"; without it, the model's own.
+        objective: "worst-rate", "rms" or "guaranteed-rate"; without it, "worst-rate".
+        budget_s: gives up after this time, with the bound reached until then.
+        patterns: patterns to begin with, besides the classics and what a short search finds.
+    """
+    with _progress.shown(progress, "exact") as at:
+        answered = _coilwright.exact(
+            model_of(model)._handle, pattern_arguments(patterns), windability, objective, budget_s, seed, at
+        )
+    return result_of(ExactResult, answered)
+
+
+def pareto(
+    model: ModelLike,
+    *,
+    seed: int | None = None,
+    most_captive: int = 2,
+    rounds: int = 3,
+    output: PathLike | None = None,
+    progress: bool | Progress | None = None,
+) -> ParetoResult:
+    """The front of worst-case error against windability and, where the model has tolerances, robustness.
+
+    Args:
+        most_captive: the most captive reels that are tried one by one; any number is tried besides.
+        rounds: rounds of restarts a class.
+        output: a folder for the table, the pictures and one pattern file a point; an interrupted front goes on from it.
+    """
+    with _progress.shown(progress, "pareto") as at:
+        answered = _coilwright.pareto(model_of(model)._handle, seed, most_captive, rounds, _optional_path(output), at)
+    return result_of(ParetoResult, answered)
+
+
+def tolerance(
+    model: ModelLike,
+    patterns: PatternLike | Sequence[PatternLike] | None = None,
+    *,
+    samples: int | None = None,
+    seed: int | None = None,
+    limit_deg_per_h: float | None = None,
+    progress: bool | Progress | None = None,
+) -> ToleranceResult:
+    """Monte Carlo of the worst case under the spreads of the model's ``[tolerance]``.
+
+    Args:
+        patterns: without it, the model's own and all classics; QUA always joins where it fits.
+        samples: coils to draw.
+        limit_deg_per_h: a coil whose worst case is larger is scrap.
+    """
+    with _progress.shown(progress, "tolerance") as at:
+        answered = _coilwright.tolerance(
+            model_of(model)._handle, pattern_arguments(patterns), samples, seed, limit_deg_per_h, at
+        )
+    return result_of(ToleranceResult, answered)
+
+
+def schedule(
+    model: ModelLike, pattern: PatternLike | None = None, *, output: PathLike | None = None
+) -> ScheduleResult:
+    """The winding of a coil step by step, from the inside out.
+
+    Args:
+        pattern: without it, the model's own.
+        output: a folder for the schedule, the traveller, the winder's program and the cross-section.
+    """
+    answered = _coilwright.schedule(model_of(model)._handle, _optional_pattern(pattern), _optional_path(output))
+    return result_of(ScheduleResult, answered)
+
+
+def verify(model: ModelLike, schedule: PathLike | ScheduleResult) -> VerifyResult:
+    """Checks a schedule, a traveller or a machine program with code of its own; the result is true if nothing is violated.
+
+    Args:
+        schedule: a file (JSON, CSV, HTML or G-code), or what :func:`schedule` answered.
+    """
+    handle = model_of(model)._handle
+    if isinstance(schedule, ScheduleResult):
+        return result_of(VerifyResult, _coilwright.verify(handle, "schedule.json", schedule.to_json()))
+    return result_of(VerifyResult, _coilwright.verify(handle, os.fspath(schedule)))
+
+
+def compare(
+    model: ModelLike,
+    records: RecordLike | Sequence[RecordLike],
+    *,
+    pattern: PatternLike | None = None,
+    gross_errors: str = "keep",
+    output: PathLike | None = None,
+    progress: bool | Progress | None = None,
+) -> CompareResult:
+    """A model's prediction beside measured records, and where it fails.
+
+    Args:
+        records: one or several: records, record files, tables with named columns.
+        pattern: the winding that was measured; without it, the model's own.
+        gross_errors: "keep" or "drop" values that stand alone.
+        output: a folder for the document, tables, pictures and the page.
+    """
+    with _progress.shown(progress, "compare") as at:
+        answered, curves = _coilwright.compare(
+            model_of(model)._handle,
+            record_arguments(records),
+            _optional_pattern(pattern),
+            gross_errors,
+            _optional_path(output),
+            at,
+        )
+    result = result_of(CompareResult, answered)
+    object.__setattr__(result, "curves", [Comparison(*curve) for curve in curves])
+    return result
+
+
+def diagnose(
+    model: ModelLike,
+    records: RecordLike | Sequence[RecordLike],
+    *,
+    holdout: RecordLike | Sequence[RecordLike] | None = None,
+    pattern: PatternLike | None = None,
+    output: PathLike | None = None,
+    experiment: bool = False,
+    seed: int = 1,
+    progress: bool | Progress | None = None,
+) -> DiagnoseResult:
+    """Which piece of physics a model lacks: fits every known effect to records and says what is missing, and how sure.
+
+    Args:
+        records: records to fit.
+        holdout: records that are only judged by.
+        experiment: plans the profile that would tell the candidates apart (``experiment_source``).
+        seed: of the profiles that the experiment is chosen from.
+        output: a folder for the document, the ladder, the extended model, residuals and the page.
+    """
+    asked = model_of(model)
+    wanted = experiment or output is not None
+    with _progress.shown(progress, "diagnose") as at:
+        answered, extended, source = _coilwright.diagnose(
+            asked._handle,
+            record_arguments(records),
+            record_arguments(holdout),
+            _optional_pattern(pattern),
+            _optional_path(output),
+            seed if wanted else None,
+            at,
+        )
+    result = result_of(DiagnoseResult, answered)
+    model_extended = None if extended is None else Model.parse(extended, path=asked.path)
+    object.__setattr__(result, "extended", model_extended)
+    object.__setattr__(result, "experiment_source", source)
+    return result
+
+
+def extend(
+    model: ModelLike,
+    effect: str,
+    *,
+    fit: RecordLike | Sequence[RecordLike] | None = None,
+    holdout: RecordLike | Sequence[RecordLike] | None = None,
+    formula: str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    pattern: PatternLike | None = None,
+    output: PathLike | None = None,
+) -> ExtendResult:
+    """Adds an effect to a model, fitted to records; comments and layout of the file are kept.
+
+    Args:
+        effect: its name in files, such as "strain_mismatch" or "channel:supply_v"; "custom" takes a formula.
+        fit: records to fit to; without any the effect gets its start values.
+        holdout: records to show before and after without fitting to them.
+        formula: of a custom effect, in °/h.
+        parameters: of the formula, with their start values.
+        output: the new model file.
+    """
+    asked = model_of(model)
+    answered, source = _coilwright.extend(
+        asked._handle,
+        effect,
+        record_arguments(fit),
+        record_arguments(holdout),
+        formula,
+        [(name, float(value)) for name, value in (parameters or {}).items()],
+        _optional_pattern(pattern),
+        _optional_path(output),
+    )
+    result = result_of(ExtendResult, answered)
+    place = asked.path if output is None else os.fspath(output)
+    object.__setattr__(result, "extended", Model.parse(source, path=place))
+    return result
+
+
+def metrics(
+    records: RecordLike | Sequence[RecordLike],
+    *,
+    average_s: float = 10.0,
+    gross_errors: str = "keep",
+    output: PathLike | None = None,
+) -> MetricsResult:
+    """Bias, stability, Allan deviation and temperature sensitivity of records.
+
+    Args:
+        average_s: averaging time of the bias stability.
+        gross_errors: "keep" or "drop" values that stand alone.
+        output: a folder for the document, the pictures of the Allan deviation and the page.
+    """
+    answered = _coilwright.metrics(record_arguments(records), average_s, gross_errors, _optional_path(output))
+    return result_of(MetricsResult, answered)
+
+
+def improve(
+    model: ModelLike,
+    records: RecordLike | Sequence[RecordLike],
+    *,
+    output: PathLike,
+    holdout: RecordLike | Sequence[RecordLike] | None = None,
+    pattern: PatternLike | None = None,
+    seed: int | None = None,
+    progress: bool | Progress | None = None,
+) -> ImproveResult:
+    """The whole loop: compares and diagnoses records, extends the model, searches the next winding and writes its schedule.
+
+    Args:
+        records: of the coil as it is; the first is the one that is predicted for the new coil.
+        output: the folder of all steps.
+    """
+    with _progress.shown(progress, "improve") as at:
+        answered = _coilwright.improve(
+            model_of(model)._handle,
+            record_arguments(records),
+            record_arguments(holdout),
+            os.fspath(output),
+            _optional_pattern(pattern),
+            seed,
+            at,
+        )
+    return result_of(ImproveResult, answered)
+
+
+def temperatures(
+    model: ModelLike,
+    record: RecordLike | None = None,
+    *,
+    profile: str | None = None,
+    profiles: PathLike | None = None,
+    rows: int = 601,
+) -> Field:
+    """Temperature and rate of every layer under a profile of the model, or under a record.
+
+    Args:
+        record: a record whose temperature drives the pack; without it, a profile.
+        profile: its name; without it, the model's first.
+        profiles: a file with a ``[profiles]`` table, used instead of the model's.
+        rows: of the answer for a profile, evenly spaced; a record's rows are its own.
+    """
+    asked = model_of(model)
+    if profiles is not None:
+        asked = asked.with_profiles(profiles)
+    taken = None if record is None else record_argument(record)
+    handle, notes = _coilwright.temperatures(asked._handle, taken, profile, rows)
+    for note in notes:
+        _log.info("%s", note.removeprefix("note: "))
+    return Field._of(handle)
+
+
+def check(path: PathLike) -> Result:
+    """All faults of a model file at once, without raising: ``faults`` and ``advice``."""
+    return Result(json.loads(_coilwright.check_model(os.fspath(path))))
+
+
+def effects(*kinds: str) -> list[Result]:
+    """The effects that a model can declare, with equations, parameters, bounds and sources; all, or those named."""
+    return [Result(effect) for effect in json.loads(_coilwright.effects(list(kinds)))["effects"]]
+
+
