@@ -12,6 +12,7 @@ Progress = Callable[[float, str], object] | None
 
 __version__: str
 threads: int
+optimised: bool
 
 def command(words: Sequence[str]) -> int: ...
 def arrow_stream(columns: list[tuple[str, Array]]) -> object: ...

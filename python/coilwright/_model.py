@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _coilwright
+from ._errors import RequestError
 from ._pattern import Pattern
 
 _TABLES = {
@@ -49,7 +50,7 @@ _NESTED = ("fibre", "winding", "thermal", "sensor", "profiles", "search", "toler
 def _plain(value: Any) -> Any:
     """Plain Python of NumPy's numbers and arrays, patterns and paths."""
     if isinstance(value, Pattern):
-        return value.name
+        return _named(value)
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, np.ndarray):
@@ -61,6 +62,19 @@ def _plain(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [_plain(inner) for inner in value]
     return value
+
+
+def _named(pattern: Pattern) -> str:
+    """A pattern as a model file has it: by name, or as a file."""
+    try:
+        known = _coilwright.classic(pattern.name, pattern.layers)
+    except RequestError:
+        known = []
+    if known == list(pattern):
+        return pattern.name
+    raise RequestError(
+        f"pattern: a model names a classic winding or a pattern file, and {pattern.name} is neither: write it, and give the path"
+    )
 
 
 def _tables(keywords: Mapping[str, Any]) -> dict[str, Any]:

@@ -592,8 +592,8 @@ class CompensateResult(Result):
     """A record with the predictable part taken out of its rate.
 
     Attributes:
-        time_s: of each row; None where the lines were written to a file.
-        rate_compensated_deg_per_h: of each row; NaN where nothing is known yet.
+        time_s: of each row; None where a file went through line by line.
+        rate_compensated_deg_per_h: of each row, NaN where nothing is known yet; None where the lines were written to a file.
         flags: by row (counted from 0), what happened to it.
         csv: the lines that the command prints, where a file was compensated without an output.
         curves: by method what is left, where all were asked for.

@@ -98,7 +98,8 @@ pub fn arrow_stream<'py>(
     let rows = columns.first().map_or(0, |(_, array)| array.len().unwrap_or(0));
     let kept = columns.into_iter().map(|(name, array)| {
         let read = array.readonly();
-        let values = read.as_slice().map_err(|_| wrong(py, format!("{name}: expected numbers one behind the other")))?;
+        let values =
+            read.as_slice().map_err(|_| wrong(py, format!("{name}: expected numbers one behind the other")))?;
         if values.len() != rows {
             return Err(wrong(py, format!("{name}: expected {rows} numbers, found {}", values.len())));
         }
@@ -311,7 +312,9 @@ pub fn arrow_columns<'py>(
         let columns: Vec<(String, String)> = (0..schema.n_children as usize)
             .map(|i| {
                 let child = *schema.children.add(i);
-                let text = |p: *const c_char| if p.is_null() { String::new() } else { CStr::from_ptr(p).to_string_lossy().into_owned() };
+                let text = |p: *const c_char| {
+                    if p.is_null() { String::new() } else { CStr::from_ptr(p).to_string_lossy().into_owned() }
+                };
                 (text((*child).name), text((*child).format))
             })
             .collect();

@@ -53,6 +53,7 @@ mod _coilwright {
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         module.add("threads", rayon_threads())?;
+        module.add("optimised", !cfg!(debug_assertions))?;
         Ok(())
     }
 

@@ -68,11 +68,6 @@ impl Watcher {
         self.until = budget.and_then(|budget| Instant::now().checked_add(budget));
         self
     }
-
-    /// Where the work stands, said at once.
-    pub fn say(&self, share_done: f64, words: String) {
-        (self.send)(Said::At(share_done, words));
-    }
 }
 
 impl Observer for Watcher {

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import coilwright as cw
+from coilwright import _coilwright
 
 COIL = "examples/chamber-coil.toml"
 
@@ -91,8 +92,13 @@ def test_a_million_rows_go_through_in_time(day_1: cw.Record) -> None:
     t = np.arange(rows) * 1.0
     record = cw.Record(time_s=t, temperature_c=25 + 10 * np.sin(t / 7000), rate_deg_per_h=0.1 * np.cos(t / 7000))
     compensator = cw.Compensator(COIL, fit=day_1, method="regression")
-    start = time.perf_counter()
-    found = compensator(record)
-    seconds = time.perf_counter() - start
+    # Processor time, best of three: what else the machine does is not measured.
+    seconds = []
+    for _ in range(3):
+        start = time.process_time()
+        found = compensator(record)
+        seconds.append(time.process_time() - start)
     assert found.rate_compensated_deg_per_h is not None and found.rate_compensated_deg_per_h.size == rows
-    print(f"a million rows in {seconds:.2f} s")
+    print(f"a million rows in {min(seconds):.2f} s")
+    if _coilwright.optimised:
+        assert min(seconds) < 1.2

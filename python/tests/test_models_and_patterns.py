@@ -39,6 +39,9 @@ def test_a_copy_changes_what_it_is_told_and_keeps_comments_and_all_else(paper: c
     assert changed.to_dict() == expected
     without = changed.copy(pattern=None)
     assert without.pattern is None and "pattern" not in without.to_dict()["winding"]
+    assert paper.copy(pattern=cw.classic("dip", 12)).pattern == cw.classic("dip", 12)
+    with pytest.raises(cw.RequestError, match="write it, and give the path"):
+        paper.copy(pattern=cw.Pattern(list(range(1, 13)), name="mine"))
     with_effect = paper.copy(effects=[{"kind": "strain_mismatch", "mismatch": 0.004}])
     assert with_effect.effects == ["strain_mismatch"] and with_effect.copy(effects=None).effects == []
 
