@@ -190,6 +190,7 @@ impl SearchOptions {
             restarts_per_round: self.restarts,
             moves_per_restart: positive("moves_per_restart", self.moves_per_restart)?,
             start: None,
+            cutting_planes: false,
         })
     }
 }

@@ -7,7 +7,54 @@ use super::known::Reference;
 use super::parameter::{Place, Scale};
 use super::prior::Quantity;
 
+/// A parameter of an effect that a fit moved.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EffectEstimate {
+    /// Place among the fitted model's effects, and among that effect's parameters.
+    pub effect: usize,
+    pub parameter: usize,
+    /// Whether the logarithm of the value is what is normal.
+    pub is_logarithmic: bool,
+    /// The value, or its logarithm; SI.
+    pub coordinate: f64,
+}
+
+/// The parameters of effects that a fit moved, and the joint covariance of their coordinates, whatever the chamber was.
+///
+/// # Shapes
+/// `covariance` is row-major, one row an estimate.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct EffectEstimates {
+    pub of: Vec<EffectEstimate>,
+    pub covariance: Vec<f64>,
+}
+
 impl Fit {
+    /// What the records say of the effects' parameters together; empty where they determine nothing.
+    pub fn effect_estimates(&self) -> EffectEstimates {
+        let places: Vec<(usize, EffectEstimate)> = self
+            .parameters
+            .iter()
+            .enumerate()
+            .filter_map(|(i, p)| match p.place {
+                Place::Effect { effect, parameter } => {
+                    let is_logarithmic = p.scale == Scale::Logarithm;
+                    Some((i, EffectEstimate { effect, parameter, is_logarithmic, coordinate: self.coordinates[i] }))
+                }
+                _ => None,
+            })
+            .collect();
+        let Some(factor) = self.information.clone().cholesky().filter(|_| !places.is_empty()) else {
+            return EffectEstimates::default();
+        };
+        let inverse = factor.inverse();
+        let covariance = places.iter().flat_map(|&(i, _)| places.iter().map(move |&(k, _)| (i, k)));
+        EffectEstimates {
+            covariance: covariance.map(|at| inverse[at]).collect(),
+            of: places.iter().map(|&(_, estimate)| estimate).collect(),
+        }
+    }
+
     /// The parameter's value and its standard error, both in SI; that of a logarithm is relative.
     pub fn value(&self, place: Place) -> Option<(f64, f64)> {
         let at = self.parameters.iter().position(|p| p.place == place)?;

@@ -58,6 +58,7 @@ use system::driven_by_air;
 pub use course::{Noise, Prediction};
 pub use filter::Innovation;
 pub use fit::{Effort, Fit};
+pub use fitted::{EffectEstimate, EffectEstimates};
 pub use known::Reference;
 pub use parameter::{Free, Parameter, Place, Scale};
 pub use prior::{PRIORS, Prior, Quantity};

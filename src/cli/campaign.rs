@@ -131,6 +131,8 @@ fn search(
         former: None,
         prove: false,
         recommend: false,
+        cuts: false,
+        uncertain: &[],
     };
     let answer = match search::run(&request, &mut UntilStopped(stop)) {
         Ok(answer) => answer.filter(|answer| answer.ended != Ended::Signal),

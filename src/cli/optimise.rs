@@ -11,9 +11,12 @@ use super::screen::{Screen, held, table};
 use super::watch::Watch;
 use super::{CliError, Ending};
 use crate::io::fault::Faults;
+use crate::io::files::read_text;
+use crate::io::json::diagnosis::DiagnosisJson;
 use crate::io::json::search::OptimiseJson;
 use crate::io::model::ModelFile;
 use crate::io::read::model_file::read_model;
+use crate::io::read::posterior::drawn_models;
 use crate::io::write::checkpoint::{BROKEN_FILE, CHECKPOINT_FILE, read_checkpoint, set_broken_aside};
 use crate::io::write::run_directory::Request;
 use crate::pattern::windability::WindabilityClass;
@@ -22,7 +25,7 @@ use crate::search::anneal::rounds::{DEFAULT_RESTARTS_PER_ROUND, State};
 use crate::search::answer::Ended;
 use crate::search::cost::objective::Objective;
 use crate::search::run::RunError;
-use crate::task::optimise::{self, Wishes};
+use crate::task::optimise::{self, DRAWN_MODELS, Wishes};
 
 /// Search the winding pattern with the smallest error
 #[derive(Debug, Clone, clap::Args)]
@@ -55,6 +58,14 @@ pub struct Arguments {
     /// pattern file, or the folder of a search; without it, the pattern of --init
     #[arg(long, value_name = "PATTERN")]
     compare_with: Option<String>,
+    /// Lets the worst admissible profiles of what is found join the searched ones until sampled and guaranteed worst rate
+    /// agree; for the objectives worst-rate and worst-phase
+    #[arg(long)]
+    cutting_planes: bool,
+    /// The diagnosis that the model comes from (diagnosis.json): every set of explanations counts by its probability and
+    /// every parameter with its error, and the recommended winding is the one that is best over all of them
+    #[arg(long, value_name = "FILE")]
+    diagnosis: Option<PathBuf>,
     /// Tries for so long to prove that the best pattern is the best of its class
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     pub(super) prove: Option<Duration>,
@@ -138,6 +149,7 @@ impl SearchOptions {
             restarts_per_round: Some(self.restarts.into()),
             moves_per_restart: self.moves_per_restart,
             start: pattern_asked(file, self.init.as_deref())?,
+            cutting_planes: false,
         })
     }
 }
@@ -153,13 +165,29 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         screen.note(&format!("note: {advice}"));
     }
     let options = &arguments.search;
-    let (budget, wishes) = (options.budget()?, options.wishes(&file)?);
+    let budget = options.budget()?;
+    let wishes = Wishes { cutting_planes: arguments.cutting_planes, ..options.wishes(&file)? };
     let former = arguments.compare_with.as_ref().or(options.init.as_ref());
     let former = former.map(|stated| former_pattern(stated, file.model.coil.layers())).transpose()?;
     let mut searched = wishes.request(&file, arguments.prove.is_some(), former)?;
     let plan = searched.plan.clone();
     let (class, objective) = (searched.class, searched.objective);
-    let request = Request { file: &file, class, objective, plan: &plan, budget: options.budget.as_deref() };
+    let request = Request {
+        file: &file,
+        class,
+        objective,
+        plan: &plan,
+        budget: options.budget.as_deref(),
+        cutting_planes: arguments.cutting_planes,
+    };
+    let uncertain = match &arguments.diagnosis {
+        None => Vec::new(),
+        Some(path) => {
+            let found = read_diagnosis(path)?;
+            drawn_models(&file.model, &found.posterior, &found.refitted, DRAWN_MODELS, plan.seed)
+        }
+    };
+    searched.uncertain = &uncertain;
     let folder = arguments.output.as_deref();
     let _held = folder.map(|folder| held(folder, "optimise")).transpose()?;
     searched.saved = match folder {
@@ -232,6 +260,17 @@ fn saved_state(
     Ok(None)
 }
 
+fn read_diagnosis(path: &Path) -> Result<DiagnosisJson, CliError> {
+    let text = read_text(path)?;
+    serde_json::from_str(&text).map_err(|error| {
+        let message = format!(
+            "line {}: cannot be understood: {error}; give the diagnosis.json that `coilwright diagnose … -o DIR` writes",
+            error.line()
+        );
+        Faults::of_file(path.display().to_string(), message).into()
+    })
+}
+
 /// Shown only where the search was over built coils.
 const P95_COLUMN: usize = 3;
 
@@ -264,7 +303,8 @@ fn text(answer: &OptimiseJson) -> String {
         format!("{}\n{reasons}  segments, innermost layer first: {segments}\n\n", recommendation.sentence)
     });
     format!(
-        "{recommendation}{}\n{}\n{}\nbest pattern, innermost layer first: {}\n{} moves judged in {} rounds, ended by: {}{}\n",
+        "{recommendation}{}{}\n{}\n{}\nbest pattern, innermost layer first: {}\n{} moves judged in {} rounds, ended by: {}{}\n",
+        answer.predicted_gain.as_ref().map_or_else(String::new, |gain| gain.words() + "\n"),
         answer.statement,
         answer.compared_with.as_ref().map_or_else(String::new, |former| former.statement.clone() + "\n"),
         table(&header, rows),

@@ -74,22 +74,8 @@ fn interrupted(output: &Option<PathBuf>, screen: &Screen) -> Ending {
     Ending::Interrupted
 }
 
-/// A point with at most this share of the error of all that are easier to wind is a knee.
-const KNEE: f64 = 0.8;
-
-/// Whether the point buys much: its error is well below that of every point that asks no more of the winding shop.
-fn is_knee(point: &PointJson, points: &[PointJson]) -> bool {
-    let effort = |p: &PointJson| [p.pattern.windability.captive, p.pattern.windability.max_climb, p.long_crossovers];
-    let error = |p: &PointJson| p.pattern.worst_rate_deg_per_h;
-    let is_easier = |p: &&PointJson| {
-        effort(p) != effort(point) && effort(p).iter().zip(effort(point)).all(|(theirs, mine)| *theirs <= mine)
-    };
-    points.iter().filter(is_easier).all(|p| error(point) <= KNEE * error(p))
-}
-
 fn text(answer: &ParetoJson) -> String {
-    let (knees, others): (Vec<&PointJson>, Vec<&PointJson>) =
-        answer.points.iter().partition(|point| is_knee(point, &answer.points));
+    let (knees, others): (Vec<&PointJson>, Vec<&PointJson>) = answer.points.iter().partition(|point| point.knee);
     let mut shown: Vec<Vec<String>> = Vec::new();
     let row = |p: &PointJson| {
         vec![

@@ -3,8 +3,8 @@
 //! On a terminal a bar; as JSON lines on request; otherwise nothing, so that logs stay readable.
 
 use std::io::{IsTerminal, Write};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use clap::ValueEnum;
@@ -116,15 +116,20 @@ pub struct StopFlag(Arc<AtomicBool>);
 
 impl StopFlag {
     /// Begins to listen for signals. Without signals (an embedding that has taken them) the flag is simply never set.
+    /// One flag a process: a command that carries out others ends with any of them.
     pub fn listen() -> Self {
-        let flag = Arc::new(AtomicBool::new(false));
-        let seen = Arc::clone(&flag);
-        let _ = ctrlc::set_handler(move || {
-            if seen.swap(true, Ordering::Relaxed) {
-                std::process::exit(130);
-            }
+        static FLAG: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+        let flag = FLAG.get_or_init(|| {
+            let flag = Arc::new(AtomicBool::new(false));
+            let seen = Arc::clone(&flag);
+            let _ = ctrlc::set_handler(move || {
+                if seen.swap(true, Ordering::Relaxed) {
+                    std::process::exit(130);
+                }
+            });
+            flag
         });
-        Self(flag)
+        Self(Arc::clone(flag))
     }
 
     pub fn is_set(&self) -> bool {

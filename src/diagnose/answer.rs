@@ -140,7 +140,12 @@ fn posterior(question: &Question, found: &Found) -> Vec<Share> {
         let effects = names(question, explanation);
         match shares.iter_mut().find(|s| s.effects == effects) {
             Some(share) => share.probability += explanation.probability,
-            None => shares.push(Share { effects, probability: explanation.probability }),
+            None => shares.push(Share {
+                effects,
+                probability: explanation.probability,
+                members: explanation.fit.assumed.model.effects.clone(),
+                estimates: explanation.fit.effect_estimates(),
+            }),
         }
     }
     shares

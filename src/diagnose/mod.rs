@@ -26,7 +26,7 @@ pub mod plain;
 
 use thiserror::Error;
 
-use crate::chamber::{Assumption, Chamber, ChamberError, Effort, Noise};
+use crate::chamber::{Assumption, Chamber, ChamberError, EffectEstimates, Effort, Noise};
 use crate::coil::CoilError;
 use crate::effect::DeclaredEffect;
 use crate::numeric::noise::white_noise;
@@ -219,10 +219,14 @@ pub struct Diagnosis {
 }
 
 /// What one set of explanations holds of the posterior mass.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Share {
     pub effects: Vec<String>,
     pub probability: f64,
+    /// All effects of the model that the set makes of the declared one, the declared ones first.
+    pub members: Vec<DeclaredEffect>,
+    /// Of the members' parameters.
+    pub estimates: EffectEstimates,
 }
 
 /// A stated number that the records contradict; SI.

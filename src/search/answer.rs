@@ -1,8 +1,11 @@
 //! What a search answers: the best pattern beside the classics, what is known about it, and what to wind.
 
 use super::anneal::rounds::{State, Stop};
+use super::cutting::Cuts;
 use super::evaluator::{GridCheck, Judged};
+use super::outlook::OtherBoundary;
 use super::proof::{Certificate, Status};
+use super::prospect::{Gain, Prospect};
 use super::recommendation::Recommendation;
 use super::validation::Validation;
 use crate::units::deg_per_h_from_rad_per_s;
@@ -92,6 +95,17 @@ pub struct Former {
     pub statement: String,
 }
 
+/// What patterns promise where the model is not known for certain.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outlook {
+    /// Models that may be the true one.
+    pub models: usize,
+    /// By their names; the best first.
+    pub prospects: Vec<(String, Prospect)>,
+    /// Of the recommended pattern over the former one, or over QUA where there is none.
+    pub gain: Option<Gain>,
+}
+
 /// The answer of `super::run`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Answer {
@@ -116,6 +130,12 @@ pub struct Answer {
     /// None where the search was interrupted.
     pub validation: Option<Validation>,
     pub recommendation: Option<Recommendation>,
+    /// None where the model is known or the search was interrupted.
+    pub outlook: Option<Outlook>,
+    /// What the candidates would cost with the other boundary; none for a half space or an interrupted search.
+    pub boundary: Option<OtherBoundary>,
+    /// None unless worst admissible profiles were to join the searched ones.
+    pub cuts: Option<Cuts>,
 }
 
 impl Answer {

@@ -6,9 +6,11 @@ use super::anneal::restart::generator;
 use super::anneal::rounds::{Optimisation, Plan, Rounds, Rules, State};
 use super::anneal::sample_cost::SampleCost;
 use super::cost::Cost;
+use super::cost::columns::Norm;
 use super::cost::guaranteed::UnitStep;
 use super::cost::objective::Objective;
 use super::cost::sampled_coils::SampledCoils;
+use super::cost::samples::SampleMatrix;
 use super::cost::tolerance::Measure;
 use super::evaluator::{Evaluator, JudgeError};
 use crate::pattern::Pattern;
@@ -53,19 +55,27 @@ impl Evaluator<'_> {
                 }
                 (objective, _) => objective.of_profiles(self.model, self.solved)?,
             };
-            let cost = SampleCost::new(matrix, class, self.objective.norm());
-            let cost =
-                match Classic::Qua.pattern(self.model.coil.layers()).or(Classic::Dip.pattern(self.model.coil.layers()))
-                {
-                    Ok(near) => cost.frozen_at(
-                        &LayerWeights::new(&self.model.wound_coil().map_err(SearchError::from)?, &near)
-                            .map_err(SearchError::from)?,
-                    ),
-                    Err(_) => cost,
-                };
-            return Ok(begun(cost, plan, saved));
+            return Ok(begun(self.sample_cost(matrix, class, self.objective.norm())?, plan, saved));
         };
         Ok(begun(QuantileCost::new(coils, class), plan, saved))
+    }
+
+    /// A norm of samples as the annealer runs on it.
+    ///
+    /// # Errors
+    /// Effects that leave a layer no turns.
+    pub(super) fn sample_cost(
+        &self,
+        matrix: SampleMatrix,
+        class: WindabilityClass,
+        norm: Norm,
+    ) -> Result<SampleCost, SearchError> {
+        let cost = SampleCost::new(matrix, class, norm);
+        let layers = self.model.coil.layers();
+        match Classic::Qua.pattern(layers).or(Classic::Dip.pattern(layers)) {
+            Ok(near) => Ok(cost.frozen_at(&LayerWeights::new(&self.model.wound_coil()?, &near)?)),
+            Err(_) => Ok(cost),
+        }
     }
 
     /// The declared coil alone, or all coils built with the tolerances, ready to be searched within `Limits`.

@@ -273,7 +273,7 @@ impl Evaluator<'_> {
         if pattern == best.pattern {
             return Ok((best, is_optimal));
         }
-        Ok((self.judge(&format!("searched-{}", pattern.layers()), &pattern)?, is_optimal))
+        Ok((self.judge(&name_of(&pattern), &pattern)?, is_optimal))
     }
 
     /// The best of what was found and of the baselines of the class, by the reference.
@@ -301,7 +301,7 @@ impl Evaluator<'_> {
         }
         let named = |candidate: &Found| {
             let pattern = Pattern::new(candidate.segments.clone()).expect("a walk visits permutations only");
-            (format!("searched-{}", pattern.layers()), pattern)
+            (name_of(&pattern), pattern)
         };
         for candidates in found.chunks(self.judged_at_once()) {
             let promising: Vec<_> = candidates.iter().filter(|c| is_better(c.cost, &best)).map(named).collect();
@@ -370,6 +370,13 @@ impl Evaluator<'_> {
             shown(qua)
         )
     }
+}
+
+/// The name of a pattern that a search found: the same pattern has the same name in every search, another one another.
+pub fn name_of(pattern: &Pattern) -> String {
+    // FNV-1a, folded to sixteen bits.
+    let hash = pattern.segments().iter().fold(0x811c_9dc5_u32, |h, &s| (h ^ s as u32).wrapping_mul(0x0100_0193));
+    format!("searched-{}-{:04x}", pattern.layers(), (hash >> 16) ^ (hash & 0xffff))
 }
 
 /// QUA's objective over the best pattern's; none where QUA does not fit the layer count or the error is zero.

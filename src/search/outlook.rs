@@ -1,16 +1,19 @@
 //! What lies beside a recommendation: one more captive reel, the workshop's spreads, the other boundary.
 
+use super::anneal::rounds::{DEFAULT_RESTARTS_PER_ROUND, Plan, Rules};
 use super::cost::guaranteed::UnitStep;
+use super::cost::objective::Objective;
 use super::cost::tolerance::{Measure, ToleranceSpec, measure, study};
 use super::cost::worst_case::{SearchError, SolvedProfiles};
-use super::evaluator::{Evaluator, JudgeError};
+use super::evaluator::{Evaluator, JudgeError, name_of};
 use super::proof::permutation_tree::MOST_LAYERS;
 use super::proof::{Effort, Goal, Task, improve};
-use super::recommendation::{TIE, Weighed};
+use super::prospect::worst_rates_rad_per_s;
+use super::weighing::{TIE, Weighed};
 use crate::effect::DeclaredEffect;
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
-use crate::profile::Profile;
+use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;
 use crate::thermal::{Extent, Location};
 use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
@@ -23,6 +26,9 @@ const COILS_FOR_SHARES: usize = 48;
 
 /// A quantile this much above the declared coil's worst case is the workshop's doing.
 const MOSTLY_SPREAD: f64 = 1.5;
+
+/// The search for what the other boundary would have takes this part of a search's own moves.
+const SHORTENED: u64 = 4;
 
 /// Still air in a gyro's housing, for models that prescribe the outermost layer \[W/(m²K)\].
 const STILL_AIR_W_PER_M2_K: f64 = 20.0;
@@ -45,7 +51,7 @@ impl Evaluator<'_> {
         let task = Task { model: self.model, solved: self.solved, class: WindabilityClass::Captive(1), goal };
         let effort = Effort { most_nodes: 0, beam_width: 0, good_enough_rad_per_s: 0.0 };
         let pattern = improve(&task, std::slice::from_ref(&recommended.judged.pattern), effort)?.pattern;
-        let judged = self.under(super::cost::objective::Objective::WorstRate).judge("captive-1", &pattern)?;
+        let judged = self.under(Objective::WorstRate).judge("captive-1", &pattern)?;
         let now = recommended.judged.guaranteed_rad_per_s.unwrap_or(recommended.judged.worst.rate_rad_per_s.abs());
         let then = judged.guaranteed_rad_per_s.unwrap_or(judged.worst.rate_rad_per_s.abs());
         let shown = deg_per_h_from_rad_per_s;
@@ -83,56 +89,97 @@ impl Evaluator<'_> {
         )))
     }
 
-    /// What the candidates would cost with the other boundary: behind a film, or with the outermost layer prescribed.
-    pub(super) fn boundary_reason(
+    /// What the candidates, and what a short search for it finds, would cost with the other boundary.
+    pub(super) fn other_boundary(
         &self,
-        recommended: &Weighed,
+        class: WindabilityClass,
         weighed: &[Weighed],
-    ) -> Result<Option<String>, JudgeError> {
+        seed: u64,
+    ) -> Result<Option<OtherBoundary>, JudgeError> {
         let Some((model, words)) = other_boundary(self.model)? else { return Ok(None) };
-        let patterns: Vec<Pattern> = weighed.iter().map(|w| w.judged.pattern.clone()).collect();
-        let profiles: Vec<Profile> = self.solved.profiles().iter().map(|p| p.profile.clone()).collect();
-        let costs = costs(&model, self.profiles.max_rate_k_per_s, &profiles, &patterns)?;
-        let of = |w: &Weighed| weighed.iter().position(|o| o.judged.pattern == w.judged.pattern);
-        let Some(mine) = of(recommended).map(|i| costs[i]) else { return Ok(None) };
-        let Some((least, name)) = costs
-            .iter()
-            .zip(weighed)
-            .map(|(cost, w)| (*cost, w.judged.name.as_str()))
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-        else {
-            return Ok(None);
-        };
-        let shown = deg_per_h_from_rad_per_s;
-        Ok(Some(if mine > least * (1.0 + TIE) {
-            format!(
-                "the answer hangs on the boundary: {words} it would cost {:.4} °/h and {name} {:.4}",
-                shown(mine),
-                shown(least)
-            )
-        } else {
-            format!(
-                "{words} it would cost {:.4} °/h, and none of these patterns less by more than {:.0} %",
-                shown(mine),
-                percent_from_fraction(TIE)
-            )
-        }))
+        let mut named: Vec<(String, Pattern)> =
+            weighed.iter().map(|w| (w.judged.name.clone(), w.judged.pattern.clone())).collect();
+        // In the other classes a search takes longer than its answer is worth here.
+        if class == WindabilityClass::Standard {
+            let solved = SolvedProfiles::new(&model, &self.profiles.profiles())?;
+            let step = UnitStep::new(&model, self.profiles.max_rate_k_per_s).ok();
+            let objective = if step.is_some() { Objective::GuaranteedRate } else { Objective::WorstRate };
+            let there = Evaluator { model: &model, solved: &solved, objective, unit_step: step.as_ref(), ..*self };
+            let plan = Plan {
+                seed,
+                restarts_per_round: DEFAULT_RESTARTS_PER_ROUND,
+                moves_per_restart: objective.default_moves_per_restart(model.coil.layers()) / SHORTENED,
+                rules: Rules { rounds: 1, patience: 1, moves: None, target: None },
+                starts: Vec::new(),
+            };
+            let found = there.short(class, &plan, &|| true)?;
+            let is_new = |p: &Pattern| !named.iter().any(|(_, known)| known == p);
+            if let Some(pattern) = found.into_iter().next().filter(is_new) {
+                named.push((name_of(&pattern), pattern));
+            }
+        }
+        Ok(Some(OtherBoundary::of(&model, words, self.profiles, &named)?))
     }
 }
 
-/// The guaranteed worst rate of patterns, or where there is none the worst over profiles.
-fn costs(
-    model: &CoilModel,
-    max_rate_k_per_s: f64,
-    profiles: &[Profile],
-    patterns: &[Pattern],
-) -> Result<Vec<f64>, JudgeError> {
-    match UnitStep::new(model, max_rate_k_per_s) {
-        Ok(step) => patterns.iter().map(|p| Ok(step.guaranteed(model, p)?.rate_rad_per_s)).collect(),
-        Err(_) => {
-            let solved = SolvedProfiles::new(model, profiles)?;
-            patterns.iter().map(|p| Ok(solved.worst_case(model, p)?.rate_rad_per_s.abs())).collect()
-        }
+/// The worst rates of patterns with the boundary that the model has not.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OtherBoundary {
+    /// Which boundary that is.
+    pub words: String,
+    /// By the patterns' names: guaranteed where the model has that, else over the profiles.
+    pub worst_rad_per_s: Vec<(String, f64)>,
+}
+
+impl OtherBoundary {
+    /// What patterns would cost with the boundary that the model has not; `None` for a half space.
+    ///
+    /// # Errors
+    /// Models that cannot be solved.
+    pub fn under(
+        model: &CoilModel,
+        profiles: &ProfileSpec,
+        named: &[(String, Pattern)],
+    ) -> Result<Option<Self>, SearchError> {
+        let Some((model, words)) = other_boundary(model)? else { return Ok(None) };
+        Ok(Some(Self::of(&model, words, profiles, named)?))
+    }
+
+    fn of(
+        model: &CoilModel,
+        words: String,
+        profiles: &ProfileSpec,
+        named: &[(String, Pattern)],
+    ) -> Result<Self, SearchError> {
+        let patterns: Vec<Pattern> = named.iter().map(|(_, pattern)| pattern.clone()).collect();
+        let rates = worst_rates_rad_per_s(model, profiles, &patterns)?;
+        let worst_rad_per_s = named.iter().zip(rates).map(|((name, _), rate)| (name.clone(), rate)).collect();
+        Ok(Self { words, worst_rad_per_s })
+    }
+
+    /// The pattern that would be best there, and its worst rate.
+    pub fn best(&self) -> Option<&(String, f64)> {
+        self.worst_rad_per_s.iter().min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// Whether a pattern that is wound for the model's own boundary is as good as any here.
+    pub fn sentence(&self, name: &str) -> Option<String> {
+        let mine = self.worst_rad_per_s.iter().find(|(own, _)| own == name)?.1;
+        let (best, least) = self.best()?;
+        let (words, shown) = (&self.words, deg_per_h_from_rad_per_s);
+        Some(if mine > least * (1.0 + TIE) {
+            format!(
+                "the answer hangs on the boundary: {words} {name} would cost {:.4} °/h and {best} {:.4}",
+                shown(mine),
+                shown(*least)
+            )
+        } else {
+            format!(
+                "{words} {name} would cost {:.4} °/h, and none of these patterns less by more than {:.0} %",
+                shown(mine),
+                percent_from_fraction(TIE)
+            )
+        })
     }
 }
 

@@ -36,6 +36,19 @@ impl Point {
     }
 }
 
+/// A point with at most this share of the error of all that are easier to wind is a knee.
+const KNEE: f64 = 0.8;
+
+/// Whether a point buys much: its error is well below that of every point that asks no more of the winding shop.
+pub fn is_knee(point: &Point, points: &[Point]) -> bool {
+    let effort = |p: &Point| [p.windability.captive, p.windability.max_climb, p.windability.long_crossovers];
+    let error = |p: &Point| p.judged.objective_rad_per_s;
+    let is_easier = |p: &&Point| {
+        effort(p) != effort(point) && effort(p).iter().zip(effort(point)).all(|(theirs, mine)| *theirs <= mine)
+    };
+    points.iter().filter(is_easier).all(|p| error(point) <= KNEE * error(p))
+}
+
 fn is_same(a: f64, b: f64) -> bool {
     (a - b).abs() <= SAME_ERROR * b.abs()
 }

@@ -5,30 +5,33 @@
 //!
 //! | figure | why |
 //! |---|---|
+//! | 95 % quantile over models that may be the true one | where records leave the model uncertain |
 //! | 95 % quantile over built coils | what leaves the workshop |
 //! | guaranteed worst rate | holds for every profile within the largest rate, searched or not |
 //! | worst rate on unseen profiles | what is left of a gain on the searched ones |
 //!
-//! A pattern that was found takes the place of the best classic only if it is better by more than [`TIE`] in that figure
-//! and no worse in any of them, on any set of unseen profiles. Of what is equally good to [`TIE`] the pattern is taken
-//! that is easiest to wind: fewest captive runs, then the smallest climb, then the fewest long crossovers.
-
-use std::cmp::Ordering;
+//! How far a pattern is behind the best classic where it is furthest behind, in any of these figures or on any set of
+//! unseen profiles, is its regret. The classic with the least regret stays unless a pattern that was found is better by
+//! more than [`TIE`] in the figure and has no more regret than that classic or none at all; or unless every classic is
+//! behind another one by more than [`TIE`] somewhere and a found pattern is not ([`rehearsal`](super::rehearsal) searches
+//! such). Of what is equally good to [`TIE`] the pattern is taken that is easiest to wind: fewest captive runs, then the
+//! smallest climb, then the fewest long crossovers.
 
 use super::anneal::rounds::Found;
-use super::answer::Proof;
+use super::answer::{Outlook, Proof};
 use super::cost::objective::Objective;
 use super::cost::tolerance::ToleranceError;
-use super::evaluator::{Evaluator, JudgeError, Judged};
+use super::evaluator::{Evaluator, JudgeError, Judged, name_of};
+use super::outlook::OtherBoundary;
 use super::proof::Status;
+use super::prospect::{Prospect, predicted_gain, prospects};
 use super::validation::{Unseen, Validation};
+use super::weighing::{TIE, Weighed, chosen, over_least};
 use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
 use crate::pattern::windability::{Windability, WindabilityClass, WindingGraph};
+use crate::rate::CoilModel;
 use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
-
-/// Two figures closer than this count as equal: less than what a coil's own material values are known to.
-pub const TIE: f64 = 0.02;
 
 /// Found patterns that are weighed besides the best: the best of each figure.
 const MOST_FOUND: usize = 3;
@@ -53,76 +56,20 @@ pub(super) struct Context<'a> {
     pub best: &'a Judged,
     pub baselines: &'a [Judged],
     pub proof: &'a Proof,
+    /// The pattern that was wound so far, by its name.
+    pub former: Option<&'a (String, Pattern)>,
+    /// Models that may be the true one.
+    pub uncertain: &'a [CoilModel],
+    pub seed: u64,
 }
 
-/// A pattern with all that it is weighed by.
-#[derive(Debug, Clone)]
-pub(super) struct Weighed {
-    pub judged: Judged,
-    pub windability: Windability,
-    pub is_classic: bool,
-    pub unseen_rad_per_s: f64,
-    pub p95_rad_per_s: Option<f64>,
-    pub yield_share: Option<f64>,
-    /// Over the best classic of the class, the worst of all sets of unseen profiles.
-    over_classics: Option<f64>,
-}
-
-impl Weighed {
-    pub(super) fn figure(&self) -> f64 {
-        self.p95_rad_per_s.or(self.judged.guaranteed_rad_per_s).unwrap_or(self.unseen_rad_per_s)
-    }
-
-    pub(super) fn figure_words(&self) -> &'static str {
-        match (self.p95_rad_per_s, self.judged.guaranteed_rad_per_s) {
-            (Some(_), _) => "95 % quantile over built coils",
-            (None, Some(_)) => "guaranteed worst rate error",
-            (None, None) => "worst rate error on unseen profiles",
-        }
-    }
-
-    /// Nowhere worse than a classic: in no figure, and on no set of unseen profiles.
-    fn is_no_worse(&self, classic: &Weighed, tolerated: f64) -> bool {
-        let within = |mine: Option<f64>, its: Option<f64>| mine.zip(its).is_none_or(|(m, i)| m <= i * tolerated);
-        within(self.judged.guaranteed_rad_per_s, classic.judged.guaranteed_rad_per_s)
-            && within(self.p95_rad_per_s, classic.p95_rad_per_s)
-            && self.yield_share.zip(classic.yield_share).is_none_or(|(m, i)| m + (tolerated - 1.0) >= i)
-            && self.over_classics.is_none_or(|ratio| ratio <= tolerated)
-    }
-
-    fn easier(&self, other: &Self) -> Ordering {
-        let effort =
-            |w: &Self| (w.windability.captive, w.windability.max_climb, w.windability.long_crossovers, !w.is_classic);
-        effort(self).cmp(&effort(other)).then(self.figure().total_cmp(&other.figure()))
-    }
-}
-
-/// The one to wind, and the best classic where there is one.
-fn chosen(weighed: &[Weighed]) -> (usize, Option<usize>) {
-    let by_figure = |a: &usize, b: &usize| weighed[*a].figure().total_cmp(&weighed[*b].figure());
-    let all = || 0..weighed.len();
-    let least_figure = all().filter(|&i| weighed[i].is_classic).min_by(by_figure).map_or(0.0, |i| weighed[i].figure());
-    // The classic that is furthest behind the best one nowhere: neither in the figure nor on any set of unseen profiles.
-    let regret = |i: usize| (weighed[i].figure() / least_figure).max(weighed[i].over_classics.unwrap_or(1.0));
-    let best_classic = all().filter(|&i| weighed[i].is_classic).min_by(|&a, &b| regret(a).total_cmp(&regret(b)));
-    let eligible: Vec<usize> = match best_classic {
-        None => all().collect(),
-        Some(classic) => all()
-            .filter(|&i| {
-                let (mine, its) = (&weighed[i], &weighed[classic]);
-                i == classic
-                    || if mine.is_classic {
-                        regret(i) <= regret(classic) * (1.0 + TIE)
-                    } else {
-                        mine.is_no_worse(its, 1.0) && mine.figure() < its.figure() * (1.0 - TIE)
-                    }
-            })
-            .collect(),
-    };
-    let least = eligible.iter().map(|&i| weighed[i].figure()).fold(f64::INFINITY, f64::min);
-    let equal = eligible.iter().copied().filter(|&i| weighed[i].figure() <= least * (1.0 + TIE));
-    let easiest = equal.min_by(|&a, &b| weighed[a].easier(&weighed[b]));
-    (easiest.or(best_classic).unwrap_or(0), best_classic)
+/// What a search has to say on what it was not searched on.
+#[derive(Debug)]
+pub(super) struct Advised {
+    pub validation: Validation,
+    pub recommendation: Recommendation,
+    pub outlook: Option<Outlook>,
+    pub boundary: Option<OtherBoundary>,
 }
 
 impl Evaluator<'_> {
@@ -130,14 +77,14 @@ impl Evaluator<'_> {
     ///
     /// # Errors
     /// None that a model which could be solved would cause.
-    pub(super) fn recommended(
+    pub(super) fn advised(
         &self,
         context: &Context,
         found: &[Found],
         shared: &[Pattern],
-    ) -> Result<(Validation, Recommendation), JudgeError> {
+    ) -> Result<Advised, JudgeError> {
         let candidates = self.candidates(context, found, shared)?;
-        let (weighed, unseen) = self.weighed(context.class, candidates)?;
+        let (weighed, unseen) = self.weighed(context, candidates)?;
         let (choice, best_classic) = chosen(&weighed);
         let of = |pattern: &Pattern| weighed.iter().find(|w| w.judged.pattern == *pattern);
         let qua = context.baselines.iter().find(|b| b.name == Classic::Qua.key());
@@ -149,13 +96,35 @@ impl Evaluator<'_> {
         };
         let recommended = &weighed[choice];
         let classic = best_classic.map(|i| &weighed[i]);
+        let boundary = self.other_boundary(context.class, &weighed, context.seed)?;
         let recommendation = Recommendation {
             name: recommended.judged.name.clone(),
             pattern: recommended.judged.pattern.clone(),
             sentence: sentence(recommended, classic, unseen.profiles),
-            reasons: self.reasons(context, recommended, &weighed, &validation)?,
+            reasons: self.reasons(context, recommended, &weighed, &validation, boundary.as_ref())?,
         };
-        Ok((validation, recommendation))
+        let outlook = self.outlook(context, recommended, &weighed)?;
+        Ok(Advised { validation, recommendation, outlook, boundary })
+    }
+
+    /// What the candidates promise over the models that may be the true one.
+    fn outlook(
+        &self,
+        context: &Context,
+        recommended: &Weighed,
+        weighed: &[Weighed],
+    ) -> Result<Option<Outlook>, JudgeError> {
+        if context.uncertain.is_empty() {
+            return Ok(None);
+        }
+        let mut prospects: Vec<(String, Prospect)> =
+            weighed.iter().filter_map(|w| Some((w.judged.name.clone(), w.prospect?))).collect();
+        prospects.sort_by(|a, b| a.1.p95_rad_per_s.total_cmp(&b.1.p95_rad_per_s));
+        let qua = context.baselines.iter().find(|b| b.name == Classic::Qua.key()).map(|b| &b.pattern);
+        let old = context.former.map(|(_, pattern)| pattern).or(qua);
+        let new = &recommended.judged.pattern;
+        let gain = old.map(|old| predicted_gain(self.model, context.uncertain, self.profiles, old, new)).transpose()?;
+        Ok(Some(Outlook { models: context.uncertain.len(), prospects, gain }))
     }
 
     /// The classics, the best pattern, and of what was found the best in each figure.
@@ -170,7 +139,7 @@ impl Evaluator<'_> {
         let mut others = Vec::new();
         for pattern in of_found.chain(shared.iter().cloned()) {
             if context.class.admits(&pattern) && is_new(&pattern, &candidates) && is_new(&pattern, &others) {
-                others.push(plain.judge(&format!("searched-{}", pattern.layers()), &pattern)?);
+                others.push(plain.judge(&name_of(&pattern), &pattern)?);
             }
         }
         let bound = |j: &Judged| j.guaranteed_rad_per_s.unwrap_or(f64::INFINITY);
@@ -180,36 +149,60 @@ impl Evaluator<'_> {
         let least =
             rest.into_iter().min_by(|a, b| a.worst.rate_rad_per_s.abs().total_cmp(&b.worst.rate_rad_per_s.abs()));
         candidates.extend(others.into_iter().chain(least));
-        let mut number = 1;
-        for judged in candidates.iter_mut().skip(context.baselines.len()) {
-            if judged.pattern != context.best.pattern {
-                number += 1;
-                judged.name = format!("{}-{number}", judged.name);
+        let classics = self.classics_of(context.class);
+        let starts: Vec<Pattern> = candidates.iter().map(|j| j.pattern.clone()).collect();
+        let rehearsed = self.rehearsed(context.class, &classics, &starts, context.seed)?;
+        let hedged = self.hedged(context.class, context.uncertain, &starts, context.seed)?;
+        for pattern in rehearsed.into_iter().take(MOST_FOUND).chain(hedged) {
+            if is_new(&pattern, &candidates) {
+                candidates.push(plain.judge(&name_of(&pattern), &pattern)?);
             }
+        }
+        if let Some((name, pattern)) = context.former.filter(|(_, p)| context.class.admits(p) && is_new(p, &candidates))
+        {
+            candidates.push(plain.judge(name, pattern)?);
         }
         Ok(candidates)
     }
 
-    fn weighed(&self, class: WindabilityClass, candidates: Vec<Judged>) -> Result<(Vec<Weighed>, Unseen), JudgeError> {
+    fn classics_of(&self, class: WindabilityClass) -> Vec<Pattern> {
+        let layers = self.model.coil.layers();
+        Classic::ALL.into_iter().filter_map(|c| c.pattern(layers).ok()).filter(|p| class.admits(p)).collect()
+    }
+
+    fn weighed(&self, context: &Context, candidates: Vec<Judged>) -> Result<(Vec<Weighed>, Unseen), JudgeError> {
+        let class = context.class;
         let patterns: Vec<Pattern> = candidates.iter().map(|j| j.pattern.clone()).collect();
         let unseen = self.unseen(&patterns)?;
-        let layers = self.model.coil.layers();
-        let classics: Vec<Pattern> = Classic::ALL.into_iter().filter_map(|c| c.pattern(layers).ok()).collect();
-        let in_class: Vec<usize> =
-            (0..patterns.len()).filter(|&i| classics.contains(&patterns[i]) && class.admits(&patterns[i])).collect();
+        let classics = self.classics_of(class);
+        let in_class: Vec<usize> = (0..patterns.len()).filter(|&i| classics.contains(&patterns[i])).collect();
         type Built = Option<(f64, Option<f64>)>;
         let built: Vec<Built> = match self.coils() {
             Ok(coils) => coils.p95_and_yield(&patterns)?.into_iter().map(Some).collect(),
             Err(ToleranceError::NoTolerance | ToleranceError::NoSpread) => vec![None; patterns.len()],
             Err(error) => return Err(error.into()),
         };
+        let guaranteed: Vec<Option<f64>> = candidates.iter().map(|j| j.guaranteed_rad_per_s).collect();
+        let p95: Vec<Option<f64>> = built.iter().map(|b| b.map(|(p95, _)| p95)).collect();
+        let prospects = prospects(context.uncertain, self.profiles, &patterns)?;
+        let expected: Vec<Option<f64>> =
+            (0..patterns.len()).map(|i| prospects.get(i).map(|p| p.expected_rad_per_s)).collect();
+        let likely: Vec<Option<f64>> = (0..patterns.len()).map(|i| prospects.get(i).map(|p| p.p95_rad_per_s)).collect();
+        let scrap: Vec<Option<f64>> = built.iter().map(|b| b.and_then(|(_, share)| share).map(|y| 2.0 - y)).collect();
+        let regret = |i: usize| {
+            let ratios =
+                [&guaranteed, &p95, &scrap, &expected, &likely].map(|figures| over_least(figures, i, &in_class));
+            ratios.into_iter().chain([unseen.largest_ratio(i, &in_class)]).flatten().fold(0.0, f64::max)
+        };
+        let regrets: Vec<f64> = (0..patterns.len()).map(regret).collect();
         let weigh = |(i, (judged, built)): (usize, (Judged, Built))| Weighed {
             windability: WindingGraph::new(&judged.pattern).windability(),
             is_classic: in_class.contains(&i),
             unseen_rad_per_s: unseen.worst_rad_per_s(i),
             p95_rad_per_s: built.map(|(p95, _)| p95),
             yield_share: built.and_then(|(_, share)| share),
-            over_classics: unseen.largest_ratio(i, &in_class),
+            prospect: prospects.get(i).copied(),
+            regret: regrets[i],
             judged,
         };
         let weighed: Vec<Weighed> = candidates.into_iter().zip(built).enumerate().map(weigh).collect();
@@ -254,6 +247,7 @@ impl Evaluator<'_> {
         recommended: &Weighed,
         weighed: &[Weighed],
         validation: &Validation,
+        boundary: Option<&OtherBoundary>,
     ) -> Result<Vec<String>, JudgeError> {
         let shown = deg_per_h_from_rad_per_s;
         let mut reasons = vec![facts(recommended, validation.profiles)];
@@ -288,7 +282,7 @@ impl Evaluator<'_> {
         }
         reasons.extend(self.captive_reason(context.class, recommended)?);
         reasons.extend(self.spread_reason(recommended)?);
-        reasons.extend(self.boundary_reason(recommended, weighed)?);
+        reasons.extend(boundary.and_then(|b| b.sentence(&recommended.judged.name)));
         if context.proof.status != Status::Optimal && !recommended.is_classic {
             reasons.push(match context.proof.status {
                 Status::Gap => format!(
@@ -306,14 +300,34 @@ fn sentence(recommended: &Weighed, classic: Option<&Weighed>, profiles: usize) -
     let shown = |w: &Weighed| deg_per_h_from_rad_per_s(w.figure());
     let name = &recommended.judged.name;
     let what = recommended.figure_words();
+    let behind = |w: &Weighed| format!("{:.1} %", percent_from_fraction(w.regret - 1.0));
     match classic {
-        Some(classic) if !recommended.is_classic => format!(
-            "Wind {name}: its {what} of {:.4} °/h is {:.0} % less than that of the best classic, {} with {:.4} °/h, and it is \
-             no worse on any set of {profiles} unseen profiles.",
+        Some(classic) if !recommended.is_classic => {
+            let change = percent_from_fraction((recommended.figure() / classic.figure() - 1.0).abs());
+            let than = if recommended.figure() <= classic.figure() { "less" } else { "more" };
+            let nowhere = if recommended.regret <= 1.0 {
+                format!("it is no worse on any set of {profiles} unseen profiles")
+            } else {
+                format!(
+                    "it is nowhere further than {} behind the best classic, {} up to {}",
+                    behind(recommended),
+                    classic.judged.name,
+                    behind(classic)
+                )
+            };
+            format!(
+                "Wind {name}: its {what} of {:.4} °/h is {change:.0} % {than} than that of the best classic, {} with {:.4} °/h, \
+                 and {nowhere}.",
+                shown(recommended),
+                classic.judged.name,
+                shown(classic),
+            )
+        }
+        Some(_) if recommended.regret > 1.0 + TIE => format!(
+            "Wind {name}: its {what} is {:.4} °/h; the classics change places by up to {} between sets of unseen profiles, \
+             and nothing that was found is ahead everywhere.",
             shown(recommended),
-            percent_from_fraction(1.0 - recommended.figure() / classic.figure()),
-            classic.judged.name,
-            shown(classic),
+            behind(recommended),
         ),
         Some(_) => format!(
             "Wind {name}: with a {what} of {:.4} °/h nothing that was found beats it by more than {:.0} % on what it was not \
@@ -334,57 +348,11 @@ fn facts(weighed: &Weighed, profiles: usize) -> String {
     parts.extend(weighed.judged.guaranteed_rad_per_s.map(|g| format!("{:.4} guaranteed", shown(g))));
     parts.extend(weighed.p95_rad_per_s.map(|p| format!("{:.4} for 95 % of built coils", shown(p))));
     parts.extend(weighed.yield_share.map(|y| format!("yield {:.1} %", percent_from_fraction(y))));
+    parts.extend(weighed.prospect.map(|p| {
+        let (expected, p95) = (shown(p.expected_rad_per_s), shown(p.p95_rad_per_s));
+        format!("{expected:.4} expected and {p95:.4} for 95 % of the models that the records allow")
+    }));
     let Windability { captive, max_climb, long_crossovers, .. } = weighed.windability;
     parts.push(format!("captive runs {captive}, climb {max_climb}, long crossovers {long_crossovers}"));
     format!("{}: {}", weighed.judged.name, parts.join(", "))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::search::cost::worst_case::WorstCase;
-
-    fn weighed(segments: &[usize], is_classic: bool, guaranteed_rad_per_s: f64, over_classics: f64) -> Weighed {
-        let pattern = Pattern::new(segments.to_vec()).unwrap();
-        let judged = Judged {
-            name: "test".into(),
-            pattern: pattern.clone(),
-            worst: WorstCase { rate_rad_per_s: 1.0, profile: "p".into(), profile_index: 0, time_s: 0.0 },
-            phase_rad: 0.0,
-            guaranteed_rad_per_s: Some(guaranteed_rad_per_s),
-            p95_rad_per_s: None,
-            objective_rad_per_s: 1.0,
-        };
-        let windability = WindingGraph::new(&pattern).windability();
-        let over_classics = Some(over_classics);
-        let unseen_rad_per_s = 1.0;
-        Weighed {
-            judged,
-            windability,
-            is_classic,
-            unseen_rad_per_s,
-            p95_rad_per_s: None,
-            yield_share: None,
-            over_classics,
-        }
-    }
-
-    #[test]
-    fn the_classic_stays_unless_something_beats_it_everywhere_by_more_than_a_tie() {
-        let qua = weighed(&[2, 3, 4, 1], true, 1.0, 1.0);
-        let of = |found: Weighed| chosen(&[qua.clone(), found]).0;
-        assert_eq!(of(weighed(&[3, 2, 4, 1], false, 0.9, 0.99)), 1);
-        assert_eq!(of(weighed(&[3, 2, 4, 1], false, 0.985, 0.9)), 0, "a tie");
-        assert_eq!(of(weighed(&[3, 2, 4, 1], false, 0.5, 1.01)), 0, "worse on a set of unseen profiles");
-        assert_eq!(of(weighed(&[3, 2, 4, 1], false, 1.2, 0.5)), 0, "wins only on what it was searched on");
-    }
-
-    #[test]
-    fn of_equals_the_one_that_is_easier_to_wind_is_taken() {
-        let quadrupole = weighed(&[2, 3, 4, 1], true, 1.0, 1.0);
-        let cylinder = weighed(&[1, 2, 3, 4], true, 1.01, 1.01);
-        let worse = weighed(&[1, 2, 3, 4], true, 1.05, 1.05);
-        assert_eq!(chosen(&[quadrupole.clone(), cylinder]).0, 1);
-        assert_eq!(chosen(&[quadrupole, worse]).0, 0);
-    }
 }

@@ -10,9 +10,10 @@ use super::cost::guaranteed::UnitStep;
 use super::cost::objective::Objective;
 use super::cost::tolerance::ToleranceSpec;
 use super::cost::worst_case::{SearchError, SolvedProfiles};
+use super::cutting::run_with_cuts;
 use super::evaluator::{EQUALLY_GOOD, Evaluator, JudgeError, Judged, improvement_over_qua};
 use super::proof::{self, Progress, prove};
-use super::recommendation::Context;
+use super::recommendation::{Advised, Context};
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::profile::ProfileSpec;
@@ -37,6 +38,10 @@ pub struct Request<'a> {
     pub prove: bool,
     /// Whether to judge what was found on unseen profiles and say what to wind.
     pub recommend: bool,
+    /// Whether worst admissible profiles join the searched ones ([`super::cutting`]).
+    pub cuts: bool,
+    /// Models that may be the true one, all as likely; empty: the model is known.
+    pub uncertain: &'a [CoilModel],
 }
 
 /// Why an observer ends a search.
@@ -95,6 +100,9 @@ impl From<SearchError> for RunError {
 /// # Errors
 /// A model that cannot be solved, an objective that it has not; a saved state of another search.
 pub fn run(request: &Request, observer: &mut dyn Observer) -> Result<Option<Answer>, RunError> {
+    if request.cuts {
+        return run_with_cuts(request, observer);
+    }
     let solved = SolvedProfiles::new(request.model, &request.profiles.profiles())?;
     let unit_step = UnitStep::new(request.model, request.profiles.max_rate_k_per_s).ok();
     let evaluator = request.evaluator(&solved, unit_step.as_ref());
@@ -136,12 +144,19 @@ pub fn run(request: &Request, observer: &mut dyn Observer) -> Result<Option<Answ
     let grid_check = if is_over { None } else { evaluator.grid_check(&best, &baselines)? };
     let compared_with =
         request.former.as_ref().map(|f| compare_with_former(&evaluator, class, &best, f)).transpose()?;
-    let (validation, recommendation) = if is_over || !request.recommend {
-        (None, None)
+    let advised = if is_over || !request.recommend {
+        None
     } else {
-        let context = Context { class, best: &best, baselines: &baselines, proof: &proof };
-        let (validation, recommendation) = evaluator.recommended(&context, &found, &shared)?;
-        (Some(validation), Some(recommendation))
+        let (seed, uncertain) = (request.plan.seed, request.uncertain);
+        let former = request.former.as_ref();
+        let context = Context { class, best: &best, baselines: &baselines, proof: &proof, former, uncertain, seed };
+        Some(evaluator.advised(&context, &found, &shared)?)
+    };
+    let (validation, recommendation, outlook, boundary) = match advised {
+        Some(Advised { validation, recommendation, outlook, boundary }) => {
+            (Some(validation), Some(recommendation), outlook, boundary)
+        }
+        None => (None, None, None, None),
     };
     let caution = grid_check.as_ref().and_then(|check| check.caution()).map(|words| format!(" {words}"));
     let on_unseen = validation.as_ref().map(|v| evaluator.words_on_unseen(v, &best, &baselines));
@@ -168,6 +183,9 @@ pub fn run(request: &Request, observer: &mut dyn Observer) -> Result<Option<Answ
         ended,
         validation,
         recommendation,
+        outlook,
+        boundary,
+        cuts: None,
         best,
         baselines,
     }))
@@ -317,102 +335,4 @@ fn compare_with_former(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::coil::LayerLength;
-    use crate::search::anneal::rounds::Rules;
-    use crate::search::cost::samples::tests::{model, profiles};
-    use crate::search::cost::signs::segments_of_signs;
-
-    fn request<'a>(
-        model: &'a CoilModel,
-        profiles: &'a ProfileSpec,
-        tolerance: &'a ToleranceSpec,
-        objective: Objective,
-    ) -> Request<'a> {
-        Request {
-            model,
-            profiles,
-            tolerance: Some(tolerance),
-            objective,
-            class: WindabilityClass::Standard,
-            plan: Plan {
-                seed: 1,
-                restarts_per_round: 4,
-                moves_per_restart: 400,
-                rules: Rules { rounds: 4, patience: 2, moves: None, target: None },
-                starts: Vec::new(),
-            },
-            saved: None,
-            former: None,
-            prove: false,
-            recommend: true,
-        }
-    }
-
-    fn spread() -> ToleranceSpec {
-        ToleranceSpec {
-            turns_per_layer_sd: 0.5,
-            radial_pitch_sd: 0.01,
-            midpoint_offset_sd_m: 0.01,
-            diffusivity_sd: 0.1,
-            film_sd: 0.2,
-            mismatch_sd: 0.0,
-            samples: 12,
-            seed: 5,
-            limit_rad_per_s: None,
-        }
-    }
-
-    fn spec(listed: usize) -> ProfileSpec {
-        let listed = profiles()[..listed].to_vec();
-        ProfileSpec { max_rate_k_per_s: 0.003, count: 4, segments: 3, duration_s: 400.0, seed: 1, listed }
-    }
-
-    #[test]
-    fn under_every_objective_the_answer_is_the_best_of_all_standard_patterns_also_where_the_halves_differ() {
-        let (profiles, tolerance) = (spec(1), spread());
-        for effects in [&["surface_film"][..], &["surface_film", "strain_mismatch"]] {
-            let model = model(8, LayerLength::Actual, effects);
-            let solved = SolvedProfiles::new(&model, &profiles.profiles()).unwrap();
-            let step = UnitStep::new(&model, profiles.max_rate_k_per_s).ok();
-            for objective in Objective::ALL {
-                let request = request(&model, &profiles, &tolerance, objective);
-                let answer = run(&request, &mut Unobserved).unwrap().unwrap();
-                let evaluator = request.evaluator(&solved, step.as_ref());
-                let all: Vec<(String, Pattern)> = (0..1u32 << 7)
-                    .map(|bits| {
-                        let high: Vec<bool> = (0..7).map(|m| bits >> m & 1 == 1).collect();
-                        (String::new(), Pattern::new(segments_of_signs(&high)).unwrap())
-                    })
-                    .collect();
-                let judged = evaluator.judge_all(&all).unwrap();
-                let least = judged.iter().map(|j| j.objective_rad_per_s).fold(f64::INFINITY, f64::min);
-                let found = answer.best.objective_rad_per_s;
-                assert!((found / least - 1.0).abs() < 1e-6, "{effects:?} {}: {found} {least}", objective.key());
-            }
-        }
-    }
-
-    #[test]
-    fn what_is_recommended_is_nowhere_far_behind_the_best_classic_on_profiles_that_nobody_has_seen() {
-        let tolerance = spread();
-        for layers in [8, 12] {
-            let model = model(layers, LayerLength::Actual, &["surface_film"]);
-            for seed in 1..=3 {
-                let profiles = ProfileSpec { seed, ..spec(0) };
-                let request =
-                    Request { tolerance: None, ..request(&model, &profiles, &tolerance, Objective::WorstRate) };
-                let answer = run(&request, &mut Unobserved).unwrap().unwrap();
-                let recommended = answer.recommendation.unwrap().pattern;
-                let fresh = ProfileSpec { seed: 1000 + seed, count: 40, ..profiles.clone() };
-                let solved = SolvedProfiles::new(&model, &fresh.profiles()).unwrap();
-                let worst = |p: &Pattern| solved.worst_case(&model, p).unwrap().rate_rad_per_s.abs();
-                let classic = answer.baselines.iter().map(|b| worst(&b.pattern)).fold(f64::INFINITY, f64::min);
-                let mine = worst(&recommended);
-                // Seven per cent where eight layers' classics trade places between sets of profiles.
-                assert!(mine <= 1.1 * classic, "{layers} {seed}: {mine} {classic}");
-            }
-        }
-    }
-}
+mod tests;

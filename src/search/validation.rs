@@ -19,6 +19,15 @@ const MOST_PROFILES: usize = 64;
 /// From the searched profiles' seed to the unseen ones'.
 const SEED_STEP: u64 = 1_000_003;
 
+/// What profiles are drawn for, besides the search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Draw {
+    /// To judge what was found: nothing was chosen by them.
+    Validation,
+    /// To search what is nowhere far behind.
+    Rehearsal,
+}
+
 /// The best pattern and QUA on unseen profiles.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Validation {
@@ -58,18 +67,22 @@ impl Unseen {
 }
 
 impl Evaluator<'_> {
-    /// What the unseen profiles are: the model's own, drawn with another seed.
-    fn unseen_spec(&self) -> ProfileSpec {
+    /// Sets of profiles as the model's own, drawn with another seed.
+    pub(super) fn drawn_spec(&self, sets: usize, draw: Draw) -> ProfileSpec {
         let of_set = self.profiles.count.clamp(FEWEST_PROFILES, MOST_PROFILES);
+        let steps = match draw {
+            Draw::Validation => 1,
+            Draw::Rehearsal => 2,
+        };
         // Seeds stay numbers that JSON can hold.
-        let seed = (self.profiles.seed % (1 << 52)) + SEED_STEP;
-        ProfileSpec { count: SETS * of_set, seed, ..self.profiles.clone() }
+        let seed = (self.profiles.seed % (1 << 52)) + steps * SEED_STEP;
+        ProfileSpec { count: sets * of_set, seed, ..self.profiles.clone() }
     }
 
     /// # Errors
     /// None that a model which could be solved would cause.
     pub fn unseen(&self, patterns: &[Pattern]) -> Result<Unseen, SearchError> {
-        let spec = self.unseen_spec();
+        let spec = self.drawn_spec(SETS, Draw::Validation);
         let profiles = spec.profiles();
         let (listed, drawn) = profiles.split_at(spec.listed.len());
         let worst_of = |profiles: &[crate::profile::Profile]| -> Result<Vec<f64>, SearchError> {

@@ -1,12 +1,15 @@
 //! What the rate error of given windings is at worst.
 
 use crate::effect::FILM;
+use crate::io::json::search::OtherBoundaryJson;
 use crate::io::json::{EvaluateJson, PatternJson};
 use crate::io::model::{Advice, ModelFile, NamedPattern};
+use crate::pattern::Pattern;
 use crate::profile::Profile;
 use crate::rate::RateModel;
 use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
 use crate::search::cost::worst_case::{SolvedProfiles, WorstCase};
+use crate::search::outlook::OtherBoundary;
 use crate::units::deg_per_h_from_rad_per_s;
 
 use super::{Observer, TaskError, advise, own_and_classics};
@@ -61,8 +64,20 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
     if file.model.prescribes_outermost_layer() && holds_a_tie(&patterns) {
         observer.note(&format!("note: {}", Advice::PrescribedBoundary { film: FILM.spec.kind }));
     }
-    let document = EvaluateJson { model: file.model.name.clone(), patterns };
+    let named: Vec<(String, Pattern)> = all.iter().map(|p| (p.name.clone(), p.pattern.clone())).collect();
+    let other = OtherBoundary::under(&file.model, &file.profiles, &named)?;
+    if let Some(sentence) = other.as_ref().and_then(|other| other.sentence(&best_of(&patterns)?.name)) {
+        observer.note(&format!("note: {sentence}"));
+    }
+    let other_boundary = other.as_ref().map(OtherBoundaryJson::of);
+    let document = EvaluateJson { model: file.model.name.clone(), patterns, other_boundary };
     Ok(Answer { document, extremes: step.map(|_| extremes) })
+}
+
+/// The winding that one would take: the smallest guaranteed worst rate, or worst rate where nothing is guaranteed.
+fn best_of(answers: &[PatternJson]) -> Option<&PatternJson> {
+    let figure = |p: &PatternJson| p.guaranteed_worst_rate_deg_per_h.unwrap_or(p.worst_rate_deg_per_h);
+    answers.iter().filter(|_| answers.len() > 1).min_by(|a, b| figure(a).total_cmp(&figure(b)))
 }
 
 /// Whether two different windings have the same guaranteed worst rate.

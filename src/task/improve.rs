@@ -5,19 +5,19 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
-use statrs::distribution::{ContinuousCDF, Normal};
 
-use crate::effect::DeclaredEffect;
-use crate::io::files::{WriteError, write_atomically};
-use crate::io::json::improve::{GainJson, ImproveJson, PredictedRow, StepJson};
-use crate::io::json::search::OptimiseJson;
+use crate::effect::{DeclaredEffect, FILM};
+use crate::io::fault::Faults;
+use crate::io::files::{WriteError, read_text, write_atomically};
+use crate::io::json::diagnosis::{DiagnosisJson, RefittedJson};
+use crate::io::json::improve::{ImproveJson, PredictedRow, StepJson};
+use crate::io::json::search::{GainJson, OptimiseJson};
 use crate::io::model::{ModelFile, NamedPattern};
 use crate::io::read::model_file::read_model;
 use crate::io::read::pattern_file::print_pattern;
-use crate::io::write::checkpoint::write_checkpoint;
+use crate::io::read::posterior::drawn_models;
+use crate::io::write::checkpoint::{read_checkpoint, write_checkpoint};
 use crate::io::write::measurement_folder::{check_free, write_table};
 use crate::io::write::model_edit::{Remark, with_effect, with_sensor_and_pattern};
 use crate::io::write::run_directory::{self, write_request};
@@ -28,14 +28,15 @@ use crate::record::Record;
 use crate::report::improvement::improvement_page;
 use crate::search;
 use crate::search::anneal::rounds::Rounds;
-use crate::search::gain::predicted_gain;
+use crate::search::prospect::predicted_gain;
 use crate::search::run::Halt;
 use crate::text::sink::TomlComment;
 use crate::thermal::Location;
 use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s};
 
 use super::measurement::{GrossErrors, Measurement};
-use super::optimise::Wishes;
+use super::optimise::{DRAWN_MODELS, Wishes};
+use super::steps::{Steps, made_of, name_of};
 use super::{Observer, TaskError, compare, diagnose, optimise, pattern_or_own, schedule};
 
 /// What was measured, and where everything goes.
@@ -53,9 +54,6 @@ pub struct Request<'a> {
     pub seed: Option<u64>,
 }
 
-/// Models that are drawn within the errors of the parameters.
-const DRAWN_MODELS: usize = 24;
-
 /// Of the profiles that the next experiment is chosen from.
 const EXPERIMENT_SEED: u64 = 1;
 
@@ -68,57 +66,45 @@ impl Observer for Quietly<'_> {
     }
 }
 
-/// Goes the whole way; `None` if the observer ended it.
+/// Goes the whole way; `None` if the observer ended it. The same request goes on from the steps that are done.
 ///
 /// # Errors
 /// As its steps.
 pub fn run(request: &Request, observer: &dyn Observer) -> Result<Option<ImproveJson>, TaskError> {
     let (file, folder) = (request.model, request.folder);
-    let quietly = Quietly(observer);
     let old = pattern_or_own(file, request.pattern)?;
     let old_path = folder.join("measured-pattern.toml");
     let comment = TomlComment::of("the winding that was measured");
-    write_atomically(&old_path, print_pattern(&old, &[comment]).as_bytes())?;
-    let (before, diagnosis) = (folder.join("before"), folder.join("diagnosis"));
-    let all: Vec<Measurement> = request.measurements.iter().chain(request.holdout).cloned().collect();
-    compared(file, &all, &old, &before, &quietly)?;
-    observer.note("compared; now diagnosing");
+    let old_source = print_pattern(&old, &[comment]);
+    write_atomically(&old_path, old_source.as_bytes())?;
+    let mut way = Way { request, old: &old, old_source: &old_source, steps: Steps::of(folder), observer };
+    let (before, after) = (folder.join("before"), folder.join("after"));
+    way.compared(file, &before)?;
     observer.at(0.1, "compared; now diagnosing");
-    let next_experiment = folder.join("next-experiment.toml");
-    check_free(&diagnosis)?;
-    let found = diagnose::run(
-        &diagnose::Request {
-            model: file,
-            pattern: Some(&old),
-            measurements: request.measurements,
-            holdout: request.holdout,
-            experiment_seed: Some(EXPERIMENT_SEED),
-        },
-        &quietly,
-    )?;
-    let experiment = found.experiment_source(file);
-    if let Some(experiment) = &experiment {
-        write_atomically(&next_experiment, experiment.as_bytes())?;
-    }
-    found.write(&diagnosis, file)?;
+    let diagnosis = folder.join("diagnosis");
+    way.diagnosed(&diagnosis)?;
     if !observer.goes_on() {
         return Ok(None);
     }
+    let diagnosed = diagnosis.join(DIAGNOSIS);
+    let found = read_json(&diagnosed)?;
 
     let extended_path = folder.join("extended.toml");
-    let source = found.extended_source(file)?.unwrap_or_else(|| file.source.clone());
-    let found = serde_json::to_value(&found.document)?;
+    let stated = diagnosis.join("extended.toml");
+    let source = if stated.is_file() { read_text(&stated)? } else { file.source.clone() };
     let source = with_sensor_and_pattern(&shown(&file.path), &source, None, "measured-pattern.toml")?;
     write_atomically(&extended_path, source.as_bytes())?;
     let extended = read_model(&extended_path)?;
-    let after = folder.join("after");
-    let comparison = compared(&extended, &all, &old, &after, &quietly)?;
+    let comparison = way.compared(&extended, &after)?;
     let film = learned_film(&extended, &comparison);
     let design_path = folder.join("design.toml");
     let source = match &film {
         None => source,
         Some(film) => {
-            let remark = Remark { key: "film_w_per_m2_k".to_owned(), text: TomlComment::of(film.words()) };
+            let remark = Remark {
+                key: FILM.spec.parameters[FILM.parameter].key.to_owned(),
+                text: TomlComment::of(film.words()),
+            };
             let effect = DeclaredEffect::film(film.value_w_per_m2_k);
             let source = with_effect(&shown(&extended_path), &source, &effect, &[remark])?;
             with_sensor_and_pattern(&shown(&extended_path), &source, Some("ambient"), "measured-pattern.toml")?
@@ -127,10 +113,14 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Option<ImproveJ
     write_atomically(&design_path, source.as_bytes())?;
     let design = read_model(&design_path)?;
 
-    observer.note("diagnosed; now searching");
     observer.at(0.5, "diagnosed; now searching");
     let search = folder.join("search");
-    let Some(summary) = searched(&design, &old, request.seed, &search, observer)? else { return Ok(None) };
+    let document: DiagnosisJson = serde_json::from_value(found.clone())?;
+    let seed = request.seed.unwrap_or(design.search.seed);
+    let refitted: Vec<RefittedJson> =
+        document.refitted.iter().cloned().chain(film.as_ref().map(LearnedFilm::as_refitted)).collect();
+    let drawn = drawn_models(&design.model, &document.posterior, &refitted, DRAWN_MODELS, seed);
+    let Some(summary) = way.searched(&design, &drawn, &search)? else { return Ok(None) };
     let new = recommended(&summary, &old);
     let new_path = folder.join("recommended.toml");
     let comments = [TomlComment::of(summary["recommendation"]["sentence"].as_str().unwrap_or_default())];
@@ -144,8 +134,12 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Option<ImproveJ
     let predicted_path = folder.join(PREDICTED);
     let rows = predicted_rows(&extended, &new.pattern, &request.measurements[0].record)?;
     write_table(folder, PREDICTED, &rows)?;
-    let drawn = drawn_models(&design, &found, film.as_ref());
-    let gain = predicted_gain(&design.model, &drawn, &design.profiles, &old.pattern, &new.pattern)?;
+    let gain = match serde_json::from_value::<GainJson>(summary["predicted_gain"].clone()) {
+        Ok(gain) => gain,
+        // Nothing in the model is uncertain.
+        Err(_) => GainJson::of(&predicted_gain(&design.model, &[], &design.profiles, &old.pattern, &new.pattern)?),
+    };
+    let next_experiment = folder.join(EXPERIMENT);
     let body = ImproveJson {
         model: file.model.name.clone(),
         measured_pattern: old.name.clone(),
@@ -154,10 +148,11 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Option<ImproveJ
         film_w_per_m2_k: film.as_ref().map(|f| f.value_w_per_m2_k),
         recommendation: summary["recommendation"].clone(),
         validation: summary["validation"].clone(),
+        uncertainty: summary["uncertainty"].clone(),
         measured_pattern_under_new_model: summary["compared_with"].clone(),
-        predicted_gain: GainJson::of(&gain),
+        predicted_gain: gain,
         predicted_record: shown(&predicted_path),
-        next_experiment: experiment.map(|_| shown(&next_experiment)),
+        next_experiment: next_experiment.is_file().then(|| shown(&next_experiment)),
         suggested_experiment: found["suggested_experiment"].clone(),
         steps: steps(&[&before, &diagnosis, &after, &search, &schedule_folder]),
         page: shown(&folder.join("index.html")),
@@ -166,53 +161,133 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Option<ImproveJ
     Ok(Some(body))
 }
 
+/// What the steps have in common.
+struct Way<'a> {
+    request: &'a Request<'a>,
+    /// The winding that was measured, and as a file.
+    old: &'a NamedPattern,
+    old_source: &'a str,
+    steps: Steps,
+    observer: &'a dyn Observer,
+}
+
+impl Way<'_> {
+    fn all(&self) -> Vec<&Measurement> {
+        self.request.measurements.iter().chain(self.request.holdout).collect()
+    }
+
+    /// What a step that judges records is made of; `None` where nobody can say.
+    fn of_records(&self, model: &ModelFile) -> Option<String> {
+        let roles = format!("{} fitted", self.request.measurements.len());
+        made_of(&[&model.source, self.old_source, &roles], &self.all())
+    }
+
+    /// Whether a step need not be taken.
+    fn is_done(&self, into: &Path, made_of: Option<&str>, results: &[&str]) -> bool {
+        let is_done = made_of.is_some_and(|made_of| self.steps.is_taken(into, made_of, results));
+        let step = name_of(into);
+        self.observer.note(&if is_done { format!("{step}: done before") } else { format!("{step} …") });
+        is_done
+    }
+
+    fn note_done(&mut self, into: &Path, made_of: Option<&str>) -> Result<(), TaskError> {
+        made_of.map_or(Ok(()), |made_of| self.steps.take(into, made_of))
+    }
+
+    /// The comparison as a document; its folder is written.
+    fn compared(&mut self, model: &ModelFile, folder: &Path) -> Result<Value, TaskError> {
+        let made_of = self.of_records(model);
+        if !self.is_done(folder, made_of.as_deref(), &[COMPARISON]) {
+            check_free(folder)?;
+            let measurements: Vec<Measurement> = self.all().into_iter().cloned().collect();
+            let request = compare::Request {
+                model,
+                pattern: Some(self.old),
+                measurements: &measurements,
+                gross_errors: GrossErrors::Keep,
+            };
+            compare::run(&request, &Quietly(self.observer))?.write(folder, model)?;
+            self.note_done(folder, made_of.as_deref())?;
+        }
+        read_json(&folder.join(COMPARISON))
+    }
+
+    /// Writes the folder of the diagnosis, and the next experiment beside it.
+    fn diagnosed(&mut self, folder: &Path) -> Result<(), TaskError> {
+        let file = self.request.model;
+        let made_of = self.of_records(file);
+        if self.is_done(folder, made_of.as_deref(), &[DIAGNOSIS]) {
+            return Ok(());
+        }
+        check_free(folder)?;
+        let request = diagnose::Request {
+            model: file,
+            pattern: Some(self.old),
+            measurements: self.request.measurements,
+            holdout: self.request.holdout,
+            experiment_seed: Some(EXPERIMENT_SEED),
+        };
+        let found = diagnose::run(&request, &Quietly(self.observer))?;
+        if let Some(experiment) = found.experiment_source(file) {
+            write_atomically(&self.request.folder.join(EXPERIMENT), experiment.as_bytes())?;
+        }
+        found.write(folder, file)?;
+        self.note_done(folder, made_of.as_deref())
+    }
+
+    /// What a search for the next winding found; its folder is written. None if the observer ended it.
+    fn searched(&mut self, design: &ModelFile, drawn: &[CoilModel], folder: &Path) -> Result<Option<Value>, TaskError> {
+        let seed = self.request.seed;
+        // The drawn models follow from the diagnosis, which follows from the records.
+        let stated = format!("{seed:?}\n{:?}", self.of_records(self.request.model));
+        let made_of = made_of(&[&design.source, self.old_source, &stated], &[]);
+        if self.is_done(folder, made_of.as_deref(), &[SUMMARY]) {
+            return read_json(&folder.join(SUMMARY)).map(Some);
+        }
+        let wishes = Wishes { seed, ..Wishes::default() };
+        let mut request = wishes.request(design, false, Some(self.old.clone()))?;
+        request.uncertain = drawn;
+        let plan = request.plan.clone();
+        let written = run_directory::Request {
+            file: design,
+            class: request.class,
+            objective: request.objective,
+            plan: &plan,
+            budget: None,
+            cutting_planes: false,
+        };
+        // A search of something else, or none, is begun anew.
+        request.saved = read_checkpoint(folder, &written.fingerprint()).ok().flatten();
+        let mut kept = Kept { folder, request: &written, observer: self.observer, fault: None };
+        let answer = search::run(&request, &mut kept)?;
+        kept.fault.map_or(Ok(()), Err)?;
+        let Some(answer) = answer.filter(|_| self.observer.goes_on()) else { return Ok(None) };
+        let document = OptimiseJson::of(&design.model.name, &request, &answer, 0.0, 0.0);
+        optimise::write(folder, design, &document, &answer)?;
+        self.note_done(folder, made_of.as_deref())?;
+        read_json(&folder.join(SUMMARY)).map(Some)
+    }
+}
+
+/// What the steps leave in their folders.
+const COMPARISON: &str = "comparison.json";
+const DIAGNOSIS: &str = "diagnosis.json";
+const SUMMARY: &str = "summary.json";
+const EXPERIMENT: &str = "next-experiment.toml";
+
+fn read_json(path: &Path) -> Result<Value, TaskError> {
+    let text = read_text(path)?;
+    serde_json::from_str(&text).map_err(|error| {
+        let message = format!("line {}: cannot be understood: {error}; remove it to have it made again", error.line());
+        Faults::of_file(shown(path), message).into()
+    })
+}
+
 /// The name of the predicted record in the folder.
 const PREDICTED: &str = "predicted-record.csv";
 
 fn shown(path: &Path) -> String {
     path.display().to_string()
-}
-
-/// The comparison as a document; its folder is written.
-fn compared(
-    model: &ModelFile,
-    measurements: &[Measurement],
-    pattern: &NamedPattern,
-    folder: &Path,
-    observer: &dyn Observer,
-) -> Result<Value, TaskError> {
-    check_free(folder)?;
-    let pattern = Some(pattern);
-    let request = compare::Request { model, pattern, measurements, gross_errors: GrossErrors::Keep };
-    let answer = compare::run(&request, observer)?;
-    answer.write(folder, model)?;
-    Ok(serde_json::to_value(&answer.document)?)
-}
-
-/// What a search for the next winding found; its folder is written. None if the observer ended it.
-fn searched(
-    design: &ModelFile,
-    old: &NamedPattern,
-    seed: Option<u64>,
-    folder: &Path,
-    observer: &dyn Observer,
-) -> Result<Option<Value>, TaskError> {
-    let wishes = Wishes { seed, ..Wishes::default() };
-    let request = wishes.request(design, false, Some(old.clone()))?;
-    let written = run_directory::Request {
-        file: design,
-        class: request.class,
-        objective: request.objective,
-        plan: &request.plan,
-        budget: None,
-    };
-    let mut kept = Kept { folder, request: &written, observer, fault: None };
-    let answer = search::run(&request, &mut kept)?;
-    kept.fault.map_or(Ok(()), Err)?;
-    let Some(answer) = answer.filter(|_| observer.goes_on()) else { return Ok(None) };
-    let document = OptimiseJson::of(&design.model.name, &request, &answer, 0.0, 0.0);
-    optimise::write(folder, design, &document, &answer)?;
-    Ok(Some(serde_json::to_value(&document)?))
 }
 
 /// Writes a search's request and checkpoint where they belong.
@@ -269,6 +344,19 @@ impl LearnedFilm {
     fn words(&self) -> String {
         let error = self.standard_error.map_or_else(String::new, |error| format!("± {error:.2}, "));
         format!("{error}learned from {} records", self.records)
+    }
+
+    /// As a diagnosis says what it learned of a number.
+    fn as_refitted(&self) -> RefittedJson {
+        let parameter = &FILM.spec.parameters[FILM.parameter];
+        RefittedJson {
+            kind: FILM.spec.kind.to_owned(),
+            parameter: parameter.key.to_owned(),
+            declared: self.value_w_per_m2_k,
+            value: self.value_w_per_m2_k,
+            standard_error: self.standard_error,
+            unit: parameter.unit.symbol().to_owned(),
+        }
     }
 }
 
@@ -327,40 +415,6 @@ fn predicted_rows(file: &ModelFile, pattern: &Pattern, record: &Record) -> Resul
 
 /// 95 % of a normal distribution lie within so many standard deviations.
 const TWO_SIGMA: f64 = 1.96;
-
-/// Models with the fitted parameters and the film drawn within their errors.
-fn drawn_models(design: &ModelFile, found: &Value, film: Option<&LearnedFilm>) -> Vec<CoilModel> {
-    let error_of = |kind: &str, key: &str| -> Option<f64> {
-        let effects = found["effects"].as_array()?;
-        let effect = effects.iter().find(|e| e["kind"].as_str() == Some(kind))?;
-        effect["parameters"][key]["standard_error"].as_f64()
-    };
-    let film_kind = DeclaredEffect::film(1.0).kind();
-    let mut random = ChaCha8Rng::seed_from_u64(design.search.seed);
-    let normal = Normal::standard();
-    let mut has_errors = false;
-    let mut drawn = Vec::with_capacity(DRAWN_MODELS);
-    for _ in 0..DRAWN_MODELS {
-        let effects = design.model.effects.iter().map(|effect| {
-            let parameters = effect.parameters();
-            let values = parameters.iter().zip(effect.values()).map(|(parameter, &value)| {
-                let z = normal.inverse_cdf(random.random::<f64>().clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON));
-                let learned = film.and_then(|f| f.standard_error).filter(|_| effect.kind() == film_kind);
-                match learned.or_else(|| error_of(&effect.kind(), &parameter.key)) {
-                    None => value,
-                    Some(error) => {
-                        has_errors = true;
-                        (value + z * parameter.unit.to_si(error)).clamp(parameter.lower, parameter.upper)
-                    }
-                }
-            });
-            effect.with_values(values.collect()).unwrap_or_else(|_| effect.clone())
-        });
-        let effects = effects.collect();
-        drawn.push(CoilModel { effects, ..design.model.clone() });
-    }
-    if has_errors { drawn } else { Vec::new() }
-}
 
 fn steps(folders: &[&PathBuf]) -> Vec<StepJson> {
     folders

@@ -26,6 +26,8 @@ pub mod improve;
 #[cfg(feature = "report")]
 pub mod page;
 #[cfg(feature = "report")]
+mod steps;
+#[cfg(feature = "report")]
 pub mod verify;
 
 use thiserror::Error;

@@ -32,7 +32,12 @@ pub struct Wishes {
     pub moves_per_restart: Option<u64>,
     /// A pattern to begin with.
     pub start: Option<NamedPattern>,
+    /// Whether worst admissible profiles join the searched ones.
+    pub cutting_planes: bool,
 }
+
+/// Models that are drawn from a diagnosis.
+pub const DRAWN_MODELS: usize = 40;
 
 impl Wishes {
     pub fn class(&self, file: &ModelFile) -> WindabilityClass {
@@ -92,6 +97,11 @@ impl Wishes {
             let message = format!("proofs are of worst, guaranteed and rms rates, not of {}", objective.key());
             return Err(TaskError::Option { option: "--prove", message });
         }
+        if self.cutting_planes && !matches!(objective, Objective::WorstRate | Objective::WorstPhase) {
+            let message =
+                format!("worst profiles join a search for the worst rate, not for {}: leave it out", objective.key());
+            return Err(TaskError::Option { option: "--cutting-planes", message });
+        }
         let former: Option<(String, Pattern)> = former.map(|former| (former.name, former.pattern));
         Ok(search::Request {
             model: &file.model,
@@ -104,6 +114,8 @@ impl Wishes {
             former,
             prove,
             recommend: true,
+            cuts: self.cutting_planes,
+            uncertain: &[],
         })
     }
 }
@@ -115,6 +127,7 @@ mod folder {
     use super::{ModelFile, NamedPattern, TaskError};
     use crate::io::files::write_atomically;
     use crate::io::json::search::OptimiseJson;
+    use crate::io::write::model_edit::with_ramps;
     use crate::io::write::run_directory::write_results;
     use crate::search::Answer;
     use crate::task::page::{REPORT_FILE, write_report};
@@ -130,6 +143,11 @@ mod folder {
         let schedule = schedule::run(&schedule::Request { model: file, pattern: Some(&named) })?;
         for (name, text) in schedule.tables()? {
             write_atomically(&folder.join(name), text.as_bytes())?;
+        }
+        if let Some(cuts) = answer.cuts.as_ref().filter(|cuts| !cuts.joined.is_empty()) {
+            // The worst profile that is stated may be one that joined.
+            let listed = with_ramps(&file.path.display().to_string(), &file.source, &cuts.joined)?;
+            write_atomically(&folder.join("model.toml"), listed.as_bytes())?;
         }
         write_results(folder, document, best, &answer.state)?;
         write_report(folder, &folder.join(REPORT_FILE))?;

@@ -20,7 +20,7 @@ use crate::search::cost::sampled_coils::SampledCoils;
 use crate::search::cost::tolerance::Coils;
 use crate::search::cost::worst_case::SolvedProfiles;
 use crate::search::evaluator::{Evaluator, Judged};
-use crate::search::pareto::{Point, front};
+use crate::search::pareto::{Point, front, is_knee};
 
 use super::{Observer, TaskError};
 
@@ -60,8 +60,9 @@ impl Answer {
     /// As the program prints it; `files` are the pattern files that were written, one a point, or none.
     pub fn document(&self, files: Option<&[String]>) -> ParetoJson {
         let file = |index: usize| files.and_then(|files| files.get(index).cloned());
-        let points = self.points.iter().enumerate().map(|(index, point)| PointJson::of(point, file(index))).collect();
-        ParetoJson { model: self.model.clone(), seed: self.seed, points }
+        let point = |(index, point): (usize, &Point)| PointJson::of(point, is_knee(point, &self.points), file(index));
+        let points = self.points.iter().enumerate().map(point).collect();
+        ParetoJson { model: self.model.clone(), seed: self.seed, status: "best found", points }
     }
 }
 
@@ -119,6 +120,9 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Option<Answer>,
         observer.at((number + 1) as f64 / parts.len() as f64, &words);
     }
     let mut points = front(&with_spreads(file, judged)?);
+    // Knees first; stable, so that each part keeps its order by error.
+    let all = points.clone();
+    points.sort_by_key(|point| !is_knee(point, &all));
     let names = named(points.iter().map(|p| p.judged.name.as_str()));
     for (point, name) in points.iter_mut().zip(names) {
         point.judged.name = name;

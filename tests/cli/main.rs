@@ -12,6 +12,7 @@ mod examples;
 mod experiment;
 mod extend;
 mod help;
+mod improve;
 mod mangled;
 mod metrics;
 mod names;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::chamber::EffectEstimate;
 use crate::diagnose::experiment::Experiment;
 use crate::diagnose::{
     Contender, Diagnosis, Equivalent, Finding, FittedParameter, Hypothesis, OffsetStep, Plain, RecordNoise, Refitted,
@@ -53,6 +54,34 @@ pub struct DiagnosisJson {
 pub struct ShareJson {
     pub effects: Vec<String>,
     pub probability: f64,
+    /// All effects of the model that the set makes of the declared one, the declared ones first.
+    #[serde(default)]
+    pub members: Vec<MemberJson>,
+    /// What the records say of the members' parameters.
+    #[serde(default)]
+    pub estimates: Vec<EstimateJson>,
+    /// Of the estimates, or of their logarithms where that is what is normal.
+    #[serde(default)]
+    pub correlation: Vec<Vec<f64>>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MemberJson {
+    pub kind: String,
+    pub choices: BTreeMap<String, String>,
+    pub values: BTreeMap<String, f64>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EstimateJson {
+    /// Place among the members, counted from 0.
+    pub member: usize,
+    pub parameter: String,
+    pub value: f64,
+    pub standard_error: f64,
+    pub unit: String,
+    /// Whether the logarithm of the value is what is normal; its error is then that over the value.
+    pub logarithmic: bool,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -270,7 +299,41 @@ impl DiagnosisJson {
 
 impl ShareJson {
     fn new(share: &Share) -> Self {
-        Self { effects: share.effects.clone(), probability: share.probability }
+        let member = |effect: &DeclaredEffect| {
+            let values = effect.parameters().into_iter().zip(effect.values());
+            MemberJson {
+                kind: effect.kind(),
+                choices: choices(effect),
+                values: values.map(|(p, &si)| (p.key, p.unit.from_si(si))).collect(),
+            }
+        };
+        let (of, covariance) = (&share.estimates.of, &share.estimates.covariance);
+        let count = of.len();
+        let deviation = |i: usize| covariance[i * count + i].sqrt();
+        let estimate = |(i, estimate): (usize, &EffectEstimate)| {
+            let effect = &share.members[estimate.effect];
+            let parameter = &effect.parameters()[estimate.parameter];
+            let si = effect.values()[estimate.parameter];
+            let error = if estimate.is_logarithmic { deviation(i) * si } else { deviation(i) };
+            EstimateJson {
+                member: estimate.effect,
+                parameter: parameter.key.clone(),
+                value: parameter.unit.from_si(si),
+                standard_error: parameter.unit.difference_from_si(error),
+                unit: parameter.unit.symbol().to_owned(),
+                logarithmic: estimate.is_logarithmic,
+            }
+        };
+        let correlation = |i: usize| -> Vec<f64> {
+            (0..count).map(|k| covariance[i * count + k] / (deviation(i) * deviation(k))).collect()
+        };
+        Self {
+            effects: share.effects.clone(),
+            probability: share.probability,
+            members: share.members.iter().map(member).collect(),
+            estimates: of.iter().enumerate().map(estimate).collect(),
+            correlation: (0..count).map(correlation).collect(),
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::search::gain::Gain;
+use super::search::GainJson;
 
 /// The parts that other commands have answered are theirs word for word.
 #[derive(Debug, Clone, Serialize)]
@@ -16,6 +16,8 @@ pub struct ImproveJson {
     pub film_w_per_m2_k: Option<f64>,
     pub recommendation: Value,
     pub validation: Value,
+    /// What windings promise over the models that the records allow; null where nothing is uncertain.
+    pub uncertainty: Value,
     /// What the measured winding costs under the model as it is now.
     pub measured_pattern_under_new_model: Value,
     pub predicted_gain: GainJson,
@@ -32,30 +34,6 @@ pub struct ImproveJson {
 pub struct StepJson {
     pub step: String,
     pub folder: String,
-}
-
-/// How many times smaller the recommended winding's error is than the measured one's.
-#[derive(Debug, Clone, Serialize)]
-pub struct GainJson {
-    pub value: f64,
-    /// 5 and 95 % of models drawn within the parameters' errors lie below.
-    pub low: f64,
-    pub high: f64,
-}
-
-impl GainJson {
-    pub fn of(gain: &Gain) -> Self {
-        let Gain { value, low, high } = *gain;
-        Self { value, low, high }
-    }
-
-    /// In one sentence.
-    pub fn words(&self) -> String {
-        format!(
-            "predicted gain over the measured winding: {:.2} times less error (5 to 95 % of what the parameters' errors allow: {:.2} to {:.2})",
-            self.value, self.low, self.high
-        )
-    }
 }
 
 /// A row of the record that the new coil should show.

@@ -105,6 +105,8 @@ impl PatternJson {
 pub struct EvaluateJson {
     pub model: String,
     pub patterns: Vec<PatternJson>,
+    /// Null for a half space.
+    pub other_boundary: Option<search::OtherBoundaryJson>,
 }
 
 /// What was proved about the best pattern.

@@ -13,6 +13,8 @@ pub struct PointJson {
     #[serde(flatten)]
     pub pattern: PatternJson,
     pub long_crossovers: usize,
+    /// Whether its error is well below that of every point that is easier to wind.
+    pub knee: bool,
     /// The pattern file, where one was written.
     pub file: Option<String>,
 }
@@ -22,12 +24,16 @@ pub struct PointJson {
 pub struct ParetoJson {
     pub model: String,
     pub seed: u64,
+    /// "best found": no point is proved to be the best of its kind.
+    pub status: &'static str,
+    /// Knees first, each part smallest error first.
     pub points: Vec<PointJson>,
 }
 
 impl PointJson {
-    pub fn of(point: &Point, file: Option<String>) -> Self {
-        Self { pattern: PatternJson::of(&point.judged), long_crossovers: point.windability.long_crossovers, file }
+    pub fn of(point: &Point, knee: bool, file: Option<String>) -> Self {
+        let long_crossovers = point.windability.long_crossovers;
+        Self { pattern: PatternJson::of(&point.judged), long_crossovers, knee, file }
     }
 }
 

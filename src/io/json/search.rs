@@ -1,15 +1,19 @@
 //! The answer of `optimise` as a document.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{PatternJson, ProofJson};
+use crate::profile::Piece;
 use crate::search::Request;
-use crate::search::answer::{Answer, Former, FoundBy, Proof};
+use crate::search::answer::{Answer, Former, FoundBy, Outlook, Proof};
+use crate::search::cutting::Cuts;
 use crate::search::evaluator::{GridCheck, Judged};
+use crate::search::outlook::OtherBoundary;
 use crate::search::proof::Status;
+use crate::search::prospect::{Gain, Prospect};
 use crate::search::recommendation::Recommendation;
 use crate::search::validation::Validation;
-use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
+use crate::units::{c_per_h_from_k_per_s, deg_per_h_from_rad_per_s, percent_from_fraction};
 
 impl PatternJson {
     /// Of a pattern that was judged by the reference.
@@ -38,11 +42,19 @@ pub struct OptimiseJson {
     pub recommendation: Option<RecommendationJson>,
     /// The best pattern and QUA on profiles that were not searched; null where the search was interrupted.
     pub validation: Option<ValidationJson>,
+    /// Null for a half space or an interrupted search.
+    pub other_boundary: Option<OtherBoundaryJson>,
+    /// Null where the model is known.
+    pub uncertainty: Option<UncertaintyJson>,
+    /// Of the recommended winding over the former one, or over QUA; null where the model is known.
+    pub predicted_gain: Option<GainJson>,
     /// Null where the temperature has no grid or the search was interrupted.
     pub grid_check: Option<GridCheckJson>,
     /// Null where no former pattern was stated.
     pub compared_with: Option<FormerJson>,
     pub proof: ProofJson,
+    /// Null unless worst admissible profiles were to join the searched ones.
+    pub cutting_planes: Option<CutsJson>,
     pub evaluations: u64,
     /// On the screen only: files don't depend on the clock.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -56,6 +68,130 @@ pub struct OptimiseJson {
     pub stopped_by: String,
     /// False where the clock or a signal ended the search: the same request may then end elsewhere.
     pub reproducible: bool,
+}
+
+/// What windings would cost with the boundary that the model has not.
+#[derive(Debug, Clone, Serialize)]
+pub struct OtherBoundaryJson {
+    pub boundary: String,
+    /// The winding that would be best there.
+    pub best: Option<String>,
+    pub patterns: Vec<BoundaryCostJson>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct BoundaryCostJson {
+    pub name: String,
+    /// Guaranteed where the model has that, else over the profiles.
+    pub worst_rate_deg_per_h: f64,
+}
+
+impl OtherBoundaryJson {
+    pub fn of(other: &OtherBoundary) -> Self {
+        let cost = |(name, rate): &(String, f64)| BoundaryCostJson {
+            name: name.clone(),
+            worst_rate_deg_per_h: deg_per_h_from_rad_per_s(*rate),
+        };
+        Self {
+            boundary: other.words.clone(),
+            best: other.best().map(|(name, _)| name.clone()),
+            patterns: other.worst_rad_per_s.iter().map(cost).collect(),
+        }
+    }
+}
+
+/// What windings promise over the models that the records allow.
+#[derive(Debug, Clone, Serialize)]
+pub struct UncertaintyJson {
+    pub models: usize,
+    /// The best first.
+    pub patterns: Vec<ProspectJson>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct ProspectJson {
+    pub name: String,
+    pub expected_worst_rate_deg_per_h: f64,
+    pub p95_worst_rate_deg_per_h: f64,
+}
+
+impl UncertaintyJson {
+    fn of(outlook: &Outlook) -> Self {
+        let prospect = |(name, prospect): &(String, Prospect)| ProspectJson {
+            name: name.clone(),
+            expected_worst_rate_deg_per_h: deg_per_h_from_rad_per_s(prospect.expected_rad_per_s),
+            p95_worst_rate_deg_per_h: deg_per_h_from_rad_per_s(prospect.p95_rad_per_s),
+        };
+        Self { models: outlook.models, patterns: outlook.prospects.iter().map(prospect).collect() }
+    }
+}
+
+/// How many times smaller the recommended winding's error is than that of the winding that it replaces.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct GainJson {
+    pub value: f64,
+    /// 5 and 95 % of the models that the records allow lie below.
+    pub low: f64,
+    pub high: f64,
+}
+
+impl GainJson {
+    pub fn of(gain: &Gain) -> Self {
+        let Gain { value, low, high } = *gain;
+        Self { value, low, high }
+    }
+
+    /// In one sentence.
+    pub fn words(&self) -> String {
+        format!(
+            "predicted gain over the winding so far: {:.2} times less error (5 to 95 % of what the records allow: {:.2} to {:.2})",
+            self.value, self.low, self.high
+        )
+    }
+}
+
+/// Worst admissible profiles that joined the searched ones.
+#[derive(Debug, Clone, Serialize)]
+pub struct CutsJson {
+    /// The best pattern's worst rate over all searched profiles, and over all admissible ones.
+    pub sampled_worst_rate_deg_per_h: f64,
+    pub admissible_worst_rate_deg_per_h: f64,
+    /// False where many drawn profiles stand for all admissible ones.
+    pub guaranteed: bool,
+    pub agree: bool,
+    pub joined: Vec<JoinedProfileJson>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct JoinedProfileJson {
+    pub name: String,
+    pub pieces: Vec<JoinedPieceJson>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct JoinedPieceJson {
+    pub rate_c_per_h: f64,
+    pub duration_s: f64,
+}
+
+impl CutsJson {
+    fn of(cuts: &Cuts) -> Self {
+        let piece = |piece: &Piece| JoinedPieceJson {
+            rate_c_per_h: c_per_h_from_k_per_s(piece.rate_k_per_s),
+            duration_s: piece.duration_s,
+        };
+        let joined = cuts.joined.iter().map(|profile| JoinedProfileJson {
+            name: profile.name().to_owned(),
+            pieces: profile.pieces().iter().map(piece).collect(),
+        });
+        Self {
+            sampled_worst_rate_deg_per_h: deg_per_h_from_rad_per_s(cuts.sampled_rad_per_s),
+            admissible_worst_rate_deg_per_h: deg_per_h_from_rad_per_s(cuts.worst_rad_per_s),
+            guaranteed: cuts.is_guaranteed,
+            agree: cuts.agree(),
+            joined: joined.collect(),
+        }
+    }
 }
 
 /// Worst rates on a grid twice as fine.
@@ -190,9 +326,13 @@ impl OptimiseJson {
             statement: answer.statement.clone(),
             recommendation: answer.recommendation.as_ref().map(RecommendationJson::of),
             validation: answer.validation.as_ref().map(ValidationJson::of),
+            other_boundary: answer.boundary.as_ref().map(OtherBoundaryJson::of),
+            uncertainty: answer.outlook.as_ref().map(UncertaintyJson::of),
+            predicted_gain: answer.outlook.as_ref().and_then(|o| o.gain.as_ref()).map(GainJson::of),
             grid_check: answer.grid_check.as_ref().map(GridCheckJson::of),
             compared_with: answer.compared_with.as_ref().map(|former| FormerJson::of(former, &answer.best)),
             proof: ProofJson::of_search(&answer.proof),
+            cutting_planes: answer.cuts.as_ref().map(CutsJson::of),
             evaluations: answer.evaluations,
             evaluations_per_s: Some(answer.evaluations_now as f64 / seconds),
             seconds: Some(seconds),

@@ -8,6 +8,7 @@ pub mod effect_tables;
 pub mod model_file;
 pub mod pattern_file;
 pub mod plausibility;
+pub mod posterior;
 mod production_table;
 pub mod profile_file;
 mod profile_tables;

@@ -27,6 +27,8 @@ pub struct Request<'a> {
     pub plan: &'a Plan,
     /// As given on the command line, if it was.
     pub budget: Option<&'a str>,
+    /// Whether worst admissible profiles join the searched ones.
+    pub cutting_planes: bool,
 }
 
 impl Request<'_> {
@@ -52,6 +54,9 @@ impl Request<'_> {
         }
         if let Some(target) = plan.rules.target {
             table["target_deg_per_h"] = toml_edit::value(deg_per_h_from_rad_per_s(target));
+        }
+        if self.cutting_planes {
+            table["cutting_planes"] = toml_edit::value(true);
         }
         for start in &plan.starts {
             let segments: toml_edit::Array = start.iter().map(|&s| s as i64).collect();

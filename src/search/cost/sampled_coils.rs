@@ -26,7 +26,7 @@ use rayon::prelude::*;
 use crate::pattern::{Pattern, axial_direction};
 use crate::profile::ProfileSpec;
 use crate::rate::{CoilModel, WeightResponse, segment_weights_m2};
-use crate::search::cost::guaranteed::UnitStep;
+use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
 use crate::search::cost::samples::{SampleMatrix, any_rate_model};
 use crate::search::cost::tolerance::{Coils, Measure, ToleranceError};
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
@@ -261,6 +261,26 @@ impl SampledCoils {
                     .collect::<Result<Vec<SampledCoil>, ToleranceError>>()?
             }
         };
+        Ok(Self { layers, share: SHARE, coils })
+    }
+
+    /// Models that are all as likely: each coil's guaranteed worst case where it has one, else that over the profiles.
+    ///
+    /// # Errors
+    /// Models that cannot be solved.
+    pub fn of_models(models: &[CoilModel], profiles: &ProfileSpec, probes: &[Pattern]) -> Result<Self, ToleranceError> {
+        let compile = |model: &CoilModel| -> Result<SampledCoil, ToleranceError> {
+            match UnitStep::new(model, profiles.max_rate_k_per_s) {
+                Ok(step) => SampledCoil::guaranteed(model, &step, STRIDE),
+                Err(GuaranteedError::Search(error)) => Err(error.into()),
+                Err(GuaranteedError::Effect { .. }) => {
+                    let instants = binding_instants(model, profiles, probes)?;
+                    Ok(SampledCoil::sampled(model, profiles, &instants)?)
+                }
+            }
+        };
+        let coils = models.par_iter().map(compile).collect::<Result<Vec<SampledCoil>, ToleranceError>>()?;
+        let layers = models.first().map_or(0, |model| model.coil.layers());
         Ok(Self { layers, share: SHARE, coils })
     }
 

@@ -1,0 +1,162 @@
+//! Whole searches against enumeration, on profiles that they have not seen, and with worst admissible ones.
+
+use super::*;
+use crate::coil::LayerLength;
+use crate::search::anneal::rounds::Rules;
+use crate::search::cost::samples::tests::{model, profiles};
+use crate::search::cost::signs::segments_of_signs;
+
+fn request<'a>(
+    model: &'a CoilModel,
+    profiles: &'a ProfileSpec,
+    tolerance: &'a ToleranceSpec,
+    objective: Objective,
+) -> Request<'a> {
+    Request {
+        model,
+        profiles,
+        tolerance: Some(tolerance),
+        objective,
+        class: WindabilityClass::Standard,
+        plan: Plan {
+            seed: 1,
+            restarts_per_round: 4,
+            moves_per_restart: 400,
+            rules: Rules { rounds: 4, patience: 2, moves: None, target: None },
+            starts: Vec::new(),
+        },
+        saved: None,
+        former: None,
+        prove: false,
+        recommend: true,
+        cuts: false,
+        uncertain: &[],
+    }
+}
+
+fn spread() -> ToleranceSpec {
+    ToleranceSpec {
+        turns_per_layer_sd: 0.5,
+        radial_pitch_sd: 0.01,
+        midpoint_offset_sd_m: 0.01,
+        diffusivity_sd: 0.1,
+        film_sd: 0.2,
+        mismatch_sd: 0.0,
+        samples: 12,
+        seed: 5,
+        limit_rad_per_s: None,
+    }
+}
+
+fn spec(listed: usize) -> ProfileSpec {
+    let listed = profiles()[..listed].to_vec();
+    ProfileSpec { max_rate_k_per_s: 0.003, count: 4, segments: 3, duration_s: 400.0, seed: 1, listed }
+}
+
+#[test]
+fn under_every_objective_the_answer_is_the_best_of_all_standard_patterns_also_where_the_halves_differ() {
+    let (profiles, tolerance) = (spec(1), spread());
+    for effects in [&["surface_film"][..], &["surface_film", "strain_mismatch"]] {
+        let model = model(8, LayerLength::Actual, effects);
+        let solved = SolvedProfiles::new(&model, &profiles.profiles()).unwrap();
+        let step = UnitStep::new(&model, profiles.max_rate_k_per_s).ok();
+        for objective in Objective::ALL {
+            let request = request(&model, &profiles, &tolerance, objective);
+            let answer = run(&request, &mut Unobserved).unwrap().unwrap();
+            let evaluator = request.evaluator(&solved, step.as_ref());
+            let all: Vec<(String, Pattern)> = (0..1u32 << 7)
+                .map(|bits| {
+                    let high: Vec<bool> = (0..7).map(|m| bits >> m & 1 == 1).collect();
+                    (String::new(), Pattern::new(segments_of_signs(&high)).unwrap())
+                })
+                .collect();
+            let judged = evaluator.judge_all(&all).unwrap();
+            let least = judged.iter().map(|j| j.objective_rad_per_s).fold(f64::INFINITY, f64::min);
+            let found = answer.best.objective_rad_per_s;
+            assert!((found / least - 1.0).abs() < 1e-6, "{effects:?} {}: {found} {least}", objective.key());
+        }
+    }
+}
+
+/// All orders of 1 … n.
+fn permutations(n: usize) -> Vec<Vec<usize>> {
+    if n == 1 {
+        return vec![vec![1]];
+    }
+    let longer = |shorter: Vec<usize>| {
+        (0..n).map(move |at| {
+            let mut segments = shorter.clone();
+            segments.insert(at, n);
+            segments
+        })
+    };
+    permutations(n - 1).into_iter().flat_map(longer).collect()
+}
+
+#[test]
+fn under_every_objective_the_answer_is_the_best_of_all_permutations_and_of_those_with_one_captive_run() {
+    let (profiles, tolerance) = (spec(1), spread());
+    let model = model(6, LayerLength::Actual, &["surface_film"]);
+    let solved = SolvedProfiles::new(&model, &profiles.profiles()).unwrap();
+    let step = UnitStep::new(&model, profiles.max_rate_k_per_s).ok();
+    let all: Vec<Pattern> = permutations(6).into_iter().map(|s| Pattern::new(s).unwrap()).collect();
+    assert_eq!(all.len(), 720);
+    for objective in Objective::ALL {
+        let plain = Request { recommend: false, ..request(&model, &profiles, &tolerance, objective) };
+        let evaluator = plain.evaluator(&solved, step.as_ref());
+        let named: Vec<(String, Pattern)> = all.iter().map(|p| (String::new(), p.clone())).collect();
+        let judged = evaluator.judge_all(&named).unwrap();
+        for class in [WindabilityClass::Captive(1), WindabilityClass::Any] {
+            let admitted = judged.iter().filter(|j| class.admits(&j.pattern));
+            let least = admitted.map(|j| j.objective_rad_per_s).fold(f64::INFINITY, f64::min);
+            let answer = run(&Request { class, ..plain.clone() }, &mut Unobserved).unwrap().unwrap();
+            let found = answer.best.objective_rad_per_s;
+            assert!((found / least - 1.0).abs() < 1e-6, "{class} {}: {found} {least}", objective.key());
+        }
+    }
+}
+
+#[test]
+fn with_cutting_planes_what_was_sampled_says_what_is_guaranteed_and_is_as_small_as_a_search_for_that_finds() {
+    let (profiles, tolerance) = (spec(1), spread());
+    let model = model(8, LayerLength::Actual, &["surface_film"]);
+    let plain = request(&model, &profiles, &tolerance, Objective::WorstRate);
+    let cut = run(&Request { cuts: true, ..plain.clone() }, &mut Unobserved).unwrap().unwrap();
+    let cuts = cut.cuts.clone().unwrap();
+    assert!(cuts.is_guaranteed && cuts.agree() && !cuts.joined.is_empty(), "{cuts:?}");
+    assert_eq!(cut.best.guaranteed_rad_per_s, Some(cuts.worst_rad_per_s));
+    let uncut = run(&plain, &mut Unobserved).unwrap().unwrap();
+    assert!(uncut.cuts.is_none());
+    let guaranteed = Request { objective: Objective::GuaranteedRate, ..plain };
+    let least = run(&guaranteed, &mut Unobserved).unwrap().unwrap().best.objective_rad_per_s;
+    assert!(cuts.worst_rad_per_s <= 1.01 * least, "{} {least}", cuts.worst_rad_per_s);
+}
+
+#[test]
+fn without_a_guaranteed_bound_cutting_planes_take_the_worst_of_profiles_drawn_besides() {
+    let (profiles, tolerance) = (spec(1), spread());
+    let model = model(6, LayerLength::Actual, &["heating_cooling_asymmetry"]);
+    let plain = request(&model, &profiles, &tolerance, Objective::WorstRate);
+    let cuts = run(&Request { cuts: true, ..plain }, &mut Unobserved).unwrap().unwrap().cuts.unwrap();
+    assert!(!cuts.is_guaranteed && cuts.agree(), "{cuts:?}");
+}
+
+#[test]
+fn what_is_recommended_is_never_two_per_cent_behind_the_best_classic_on_profiles_that_nobody_has_seen() {
+    let tolerance = spread();
+    for layers in [8, 12] {
+        let model = model(layers, LayerLength::Actual, &["surface_film"]);
+        for seed in 1..=3 {
+            let profiles = ProfileSpec { seed, ..spec(0) };
+            let request = Request { tolerance: None, ..request(&model, &profiles, &tolerance, Objective::WorstRate) };
+            let answer = run(&request, &mut Unobserved).unwrap().unwrap();
+            let recommended = answer.recommendation.unwrap().pattern;
+            let fresh = ProfileSpec { seed: 1000 + seed, count: 40, ..profiles.clone() };
+            let solved = SolvedProfiles::new(&model, &fresh.profiles()).unwrap();
+            let worst = |p: &Pattern| solved.worst_case(&model, p).unwrap().rate_rad_per_s.abs();
+            let classic = answer.baselines.iter().map(|b| worst(&b.pattern)).fold(f64::INFINITY, f64::min);
+            let mine = worst(&recommended);
+            assert!(mine <= 1.02 * classic, "{layers} {seed}: {mine} {classic}");
+        }
+    }
+}
