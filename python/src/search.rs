@@ -229,7 +229,8 @@ pub fn optimise(
         let plan = request.plan.clone();
         let (class, objective) = (request.class, request.objective);
         let stated = budget.map(|budget| format!("{}s", budget.as_secs_f64()));
-        let run = Run { file: &file, class, objective, plan: &plan, budget: stated.as_deref() };
+        let budget_stated = stated.as_deref();
+        let run = Run { file: &file, class, objective, plan: &plan, budget: budget_stated, cutting_planes: false };
         let mut watch = SearchWatch {
             prove,
             kept: output.clone().map(|folder| (folder, run)),
