@@ -1,26 +1,13 @@
-//! What a fitted model says of a record: its rate, its noise told apart, and its score where nothing is fitted.
+//! What a fitted model says of a record: its rate, and its score where nothing is fitted.
 
 use super::filter::{Innovation, RATE};
 use super::fit::{Effort, Fit};
 use super::known::Reference;
+use super::noise::Remedy;
 use super::point::{BLIND_RAD2_PER_S2, CoilSide, Rates, smoothed};
 use super::prior::Quantity;
 use super::system::Numbers;
 use super::{Chamber, ChamberError};
-
-/// What the rate of a record consists of beside the coil [rad/s].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Noise {
-    /// Of one value as logged.
-    pub white_rad_per_s: f64,
-    pub white_standard_error_rad_per_s: f64,
-    /// Slow wander of the gyro, drift and cycle included.
-    pub wander_rad_per_s: f64,
-    /// What the air does that the sensor cannot see, on a row of the chamber.
-    pub unresolved_air_rad_per_s: f64,
-    /// Root mean square of the innovations of the rate in units of their expected deviation: 1 for a right model.
-    pub whiteness: f64,
-}
 
 /// What a model says a record's rate was, from its readings alone.
 ///
@@ -47,48 +34,6 @@ impl Chamber<'_> {
         self.fit(&fit.assumed, &[], &[record], Some(fit), Effort::FULL)
     }
 
-    /// White noise, wander and unresolved air of a fitted record.
-    ///
-    /// # Errors
-    /// As [`Chamber::held_out`].
-    pub fn noise(&self, fit: &Fit, record: usize) -> Result<Noise, ChamberError> {
-        let numbers = self.numbers_for(fit, record);
-        let white = numbers.get(Quantity::RateNoise);
-        let place = super::Place::Quantity { quantity: Quantity::RateNoise, record: Some(record) };
-        let error = fit.value(place).map_or(f64::NAN, |(_, error)| error);
-        let mut wander = (white * numbers.get(Quantity::WanderShare)).powi(2);
-        if fit.assumed.drift {
-            wander += numbers.get(Quantity::DriftSize).powi(2);
-        }
-        if fit.assumed.cycle {
-            wander += numbers.get(Quantity::CycleSize).powi(2);
-        }
-        let (places, innovations) = self.pass(fit, &numbers, record, false)?;
-        let own = white * white / self.averaged(record) as f64 + wander;
-        let (mut air, mut count) = (0.0, 0);
-        for ((row, measurement), i) in places.into_iter().zip(innovations) {
-            if measurement == RATE && row >= SETTLING_ROWS {
-                air += (i.variance - own).max(0.0);
-                count += 1;
-            }
-        }
-        let (rows, innovations) = self.pass(fit, &numbers, record, true)?;
-        let (mut squares, mut rates) = (0.0, 0);
-        for ((_, measurement), i) in rows.iter().zip(&innovations) {
-            if *measurement == RATE {
-                squares += i.value * i.value / i.variance;
-                rates += 1;
-            }
-        }
-        Ok(Noise {
-            white_rad_per_s: white,
-            white_standard_error_rad_per_s: error,
-            wander_rad_per_s: wander.sqrt(),
-            unresolved_air_rad_per_s: (air / count.max(1) as f64).sqrt(),
-            whiteness: (squares / rates.max(1) as f64).sqrt(),
-        })
-    }
-
     /// The rate that a record's readings imply, smoothed over the whole record, the gyro's own rates being only compared
     /// with it; the offset is fitted. Its variance is that of a filter, which knows the readings so far.
     ///
@@ -110,7 +55,7 @@ impl Chamber<'_> {
             residual_rad_per_s: vec![f64::NAN; rows],
             course,
         };
-        let (places, innovations) = self.pass(fit, &numbers, record, false)?;
+        let (places, innovations) = self.pass(fit, &numbers, record, false, None)?;
         for ((row, measurement), i) in places.into_iter().zip(innovations) {
             if measurement == RATE {
                 let measured = observed.series.values[RATE][row];
@@ -129,7 +74,14 @@ impl Chamber<'_> {
     }
 
     /// The innovations of a record, and of each its row and which measurement it is.
-    fn pass(&self, fit: &Fit, numbers: &Numbers, record: usize, with_rates: bool) -> Result<Pass, ChamberError> {
+    pub(super) fn pass(
+        &self,
+        fit: &Fit,
+        numbers: &Numbers,
+        record: usize,
+        with_rates: bool,
+        otherwise: Option<Remedy>,
+    ) -> Result<Pass, ChamberError> {
         let observed = &self.observed[record];
         let (assumed, film) = (&fit.assumed, numbers.get(Quantity::Film));
         let side = CoilSide::new(assumed, film, self.modes, observed)?;
@@ -141,11 +93,19 @@ impl Chamber<'_> {
         }
         let values = side.values(assumed, observed, record, course.as_ref().filter(|_| side.needs_reference()))?;
         let rows = &observed.series.rows;
-        let mut system = super::system::system(&side.parts(assumed), numbers, &observed.series);
+        let mut parts = side.parts(assumed);
+        let mut numbers = *numbers;
+        if let Some(remedy) = otherwise {
+            remedy.apply(&mut parts, &mut numbers);
+        }
+        let mut system = super::system::system(&parts, &numbers, &observed.series);
+        if let Some(Remedy::FinerResolution) = otherwise {
+            system.variances[0] -= observed.series.resolution_k.powi(2) / 12.0;
+        }
         if !with_rates {
             // Rates are looked at, not taken in: their gain is as good as zero.
             system.variances[RATE] += BLIND_RAD2_PER_S2;
-            system.forget_offset(&side.parts(assumed), observed.series.averaged > 1);
+            system.forget_offset(&parts, &observed.series);
         }
         let trace = super::filter::forward(&system, rows, &values, false);
         let mut places = Vec::with_capacity(trace.innovations.len());
@@ -165,10 +125,7 @@ impl Chamber<'_> {
 }
 
 /// Of each innovation its row and which measurement it is; and the innovations.
-type Pass = (Vec<(usize, usize)>, Vec<Innovation>);
-
-/// Rows after which the start is forgotten.
-const SETTLING_ROWS: usize = 30;
+pub(super) type Pass = (Vec<(usize, usize)>, Vec<Innovation>);
 
 impl Prediction {
     /// Moves the prediction by the offset that leaves the least.

@@ -5,7 +5,7 @@
 mod tests {
     use nalgebra::{DMatrix, DVector};
 
-    use crate::chamber::filter::{self, System};
+    use crate::chamber::filter::{self, Move, System};
     use crate::chamber::point::{CoilSide, Observed};
     use crate::chamber::prior::Quantity;
     use crate::chamber::series::Series;
@@ -79,6 +79,8 @@ mod tests {
         /// Covariance of the states at the row asked for with the measurements, and their own mean.
         cross: DMatrix<f64>,
         states: DVector<f64>,
+        /// What a change of the slope by one where that row's steps begin makes of all measurements.
+        kink: DVector<f64>,
     }
 
     fn joint(system: &System, series: &Series, asked: usize) -> Joint {
@@ -100,16 +102,20 @@ mod tests {
                 *noise = &phi * &*noise * phi.transpose() + own;
                 *map = &phi * &*map;
             };
-            row.before.iter().for_each(|&s| step(s, &mut map, &mut noise));
-            if row.keeps {
-                let mut keep = DMatrix::identity(n, n);
-                for (place, &state) in system.keep.iter().enumerate() {
-                    keep.set_row(state, &kept.row(place));
+            noise[(system.slope, system.slope)] += row.kink;
+            for movement in &row.moves {
+                match movement {
+                    Move::Step(index) => step(*index, &mut map, &mut noise),
+                    Move::Keep(slot) => {
+                        let mut keep = DMatrix::identity(n, n);
+                        for &(state, place) in &system.keeps[*slot as usize] {
+                            keep.set_row(state, &kept.row(place));
+                        }
+                        map = &keep * map;
+                        noise = &keep * noise * keep.transpose();
+                    }
                 }
-                map = &keep * map;
-                noise = &keep * noise * keep.transpose();
             }
-            row.after.iter().for_each(|&s| step(s, &mut map, &mut noise));
             let (mean, covariance) = &prior[k];
             prior.push((&map * mean, &map * covariance * map.transpose() + noise));
             maps.push(map);
@@ -142,7 +148,13 @@ mod tests {
         let cross = DMatrix::from_columns(
             &measured.iter().map(|&(k, _, h)| covariance_of(asked, k) * rows.row(h).transpose()).collect::<Vec<_>>(),
         );
+        let mut shock = DVector::zeros(n);
+        shock[system.slope] = 1.0;
+        let kink = measured.iter().map(|&(k, _, h)| {
+            if k < asked { 0.0 } else { (rows.row(h) * carried(asked, k) * &maps[asked] * &shock)[(0, 0)] }
+        });
         Joint {
+            kink: DVector::from_iterator(count, kink),
             mean: DVector::from_iterator(
                 count,
                 measured.iter().map(|&(k, _, h)| (rows.row(h) * &prior[k + 1].0)[(0, 0)]),
@@ -159,11 +171,15 @@ mod tests {
     }
 
     fn check(assumed: &Assumption, averaged: bool) {
-        let record = if averaged { one_hertz() } else { record(48) };
-        let (series, mean_k) = observed(&assumed.model, &record);
+        check_on(assumed, &if averaged { one_hertz() } else { record(48) }, averaged);
+    }
+
+    fn check_on(assumed: &Assumption, record: &Record, averaged: bool) {
+        let (mut series, mean_k) = observed(&assumed.model, record);
+        series.rows[9].kink = 1e-6;
         assert_eq!(series.averaged > 1, averaged);
         let numbers = Numbers::medians(&series);
-        let seen = Observed { record: &record, series, channels: Vec::new(), mean_k };
+        let seen = Observed { record, series, channels: Vec::new(), mean_k };
         let side = CoilSide::new(assumed, numbers.get(Quantity::Film), 4, &seen).unwrap();
         let system = system(&side.parts(assumed), &numbers, &seen.series);
         let values = filter::Values { of: seen.series.values.clone() };
@@ -177,6 +193,16 @@ mod tests {
         let exact = -0.5 * (apart.dot(&solved) + determinant + apart.len() as f64 * std::f64::consts::TAU.ln());
         println!("{} measurements, log likelihood {} and {exact}", apart.len(), trace.log_likelihood);
         assert!((trace.log_likelihood - exact).abs() < 1e-8 * exact.abs());
+        let inverse = factor.inverse();
+        let doubts = filter::doubts(&system, &seen.series.rows, &trace);
+        for (i, found) in doubts.values.iter().enumerate() {
+            let exact = solved[i] / inverse[(i, i)].sqrt();
+            assert!((found - exact).abs() < 1e-6 * (1.0 + exact.abs()), "measurement {i}: {found} for {exact}");
+        }
+        let (along, change) = (dense.kink.dot(&solved), (dense.kink.transpose() * &inverse * &dense.kink)[(0, 0)]);
+        let (found, exact) = (doubts.kinks[asked], (along / change.sqrt(), along / change));
+        assert!((found.0 - exact.0).abs() < 1e-5 * (1.0 + exact.0.abs()), "kink: {found:?} for {exact:?}");
+        assert!((found.1 - exact.1).abs() < 1e-5 * exact.1.abs(), "kink: {found:?} for {exact:?}");
         let states = &dense.states + &dense.cross * solved;
         let smoothed = filter::smooth(&system, &seen.series.rows, &trace);
         for (i, exact) in states.iter().enumerate() {
@@ -204,9 +230,9 @@ mod tests {
     }
 
     #[test]
-    fn with_a_lag_a_spool_a_drift_a_cycle_and_an_unsteady_start_they_are_too() {
+    fn with_a_lag_a_spool_a_drift_and_a_cycle_they_are_too() {
         let effects = vec![effect("sensor_lag", &[40.0]), effect("spool_mass", &[4000.0, 300.0, 5.0])];
-        let assumed = Assumption { drift: true, cycle: true, unsteady: true, ..Assumption::new(model(effects), dip()) };
+        let assumed = Assumption { drift: true, cycle: true, ..Assumption::new(model(effects), dip()) };
         check(&assumed, false);
     }
 
@@ -219,6 +245,39 @@ mod tests {
         half_space.extent = Extent::HalfSpace;
         half_space.rate_mean_s = 0.0;
         check(&Assumption::new(half_space, dip()), false);
+    }
+
+    #[test]
+    fn windows_that_begin_before_the_row_before_are_too() {
+        let even = record(48);
+        let times_s: Vec<f64> = (0..48).map(|i| 10.0 * f64::from(i) + 2.9 * (1.7 * f64::from(i * i)).sin()).collect();
+        let uneven =
+            Record::new("uneven", times_s, even.temperature_k().to_vec(), even.rate_rad_per_s().to_vec()).unwrap();
+        let series = Series::new(&uneven, 10.0, 30.0);
+        // A mean over ten seconds is one, however soon the next row comes.
+        assert!(series.overlaps && series.shapes.iter().any(|s| s.window_s == 10.0 && s.slot == 1));
+        check_on(&Assumption::new(model(Vec::new()), dip()), &uneven, false);
+    }
+
+    #[test]
+    fn spikes_on_a_steep_signal_are_left_out_and_nothing_else() {
+        use rand::{RngExt, SeedableRng};
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        let mut noise = |size: f64| size * (0..12).map(|_| random.random::<f64>() - 0.5).sum::<f64>();
+        let times_s: Vec<f64> = (0..400).map(|i| 10.0 * f64::from(i)).collect();
+        let steep = |t: f64| (t / 90.0).sin();
+        let temperature_k = times_s.iter().map(|t| 293.0 + 3.0 * steep(*t) + noise(0.004)).collect();
+        let mut rate: Vec<f64> = times_s.iter().map(|t| 4e-6 * steep(*t) + noise(1e-7)).collect();
+        let spikes = [61, 140, 233, 322];
+        spikes.iter().for_each(|&k| rate[k] += 1.5e-6);
+        let record = Record::new("steep", times_s, temperature_k, rate).unwrap();
+        assert!(record.gross_errors().is_empty(), "what neighbours say is not enough here");
+        let model = model(Vec::new());
+        let assumed = Assumption::new(model.clone(), dip());
+        let (chamber, _) = Chamber::new(&model, &[&record]).unwrap().settled(&assumed, &[0]).unwrap();
+        let left_out = |k: &usize| chamber.observed[0].series.values[filter::RATE][*k].is_nan();
+        assert!(spikes.iter().all(left_out));
+        assert!(chamber.spikes(0) <= spikes.len() + 1, "{}", chamber.spikes(0));
     }
 
     #[test]

@@ -2,16 +2,21 @@
 //!
 //! ```text
 //! predict  x ← Φ x,  P ← Φ P Φᵀ + Q_0 + q Q_1                 q: the trend's noise at this row
+//!          where the air has a kink, first P_ss ← P_ss + κ²    κ: how large it seems; s: the trend's slope
 //! keep     z ← c·x                                             where a rate's window begins
 //! take in  v = y − h·x,  S = h P hᵀ + R,  x ← x + P h v/S,  P ← P − P h hᵀ P/S
 //! smooth   r ← h v/S + (I − K h)ᵀ r,  r ← Φᵀ r,  x̂ = x + P r
+//! doubt    e = v/S − K·r,  D = 1/S + Kᵀ N K,  N ← h hᵀ D + N − h (N K)ᵀ − (N K) hᵀ,  N ← Φᵀ N Φ
+//!          e/D is a measurement less what all others make of it, e/√D its standardised value; r_s/√N_ss likewise says
+//!          whether the slope changed here
 //! ```
 //!
 //! Once S has settled while rows are alike, gains stay as they are until a row differs (a gap, a missing value, another
 //! noise of the trend): the covariance has then converged to the accuracy of [`SETTLED`].
 //!
 //! # Source
-//! Kalman, J. Basic Eng. 82 (1960) 35; de Jong, J. Am. Stat. Assoc. 84 (1989) 1085 (smoothing without inverses).
+//! Kalman, J. Basic Eng. 82 (1960) 35; de Jong, J. Am. Stat. Assoc. 84 (1989) 1085 (smoothing without inverses); de Jong and
+//! Penzer, J. Am. Stat. Assoc. 93 (1998) 796 (values and shocks that do not belong to a record).
 
 // Loops over an index that the compiler knows the end of: iterators stay calls in functions as large as these.
 #![allow(clippy::needless_range_loop)]
@@ -49,26 +54,36 @@ pub(super) struct System {
     pub steps: Vec<Step>,
     /// Slope noise of the air's trend at rest and where readings bend [K²/s³].
     pub trend: (f64, f64),
+    /// The state that is the trend's slope.
+    pub slope: usize,
     /// Rows of the thermometers and of the rate, each for the shares of a window: see [`Row::window`].
     pub rows: Sparse,
     pub variances: [f64; MEASURED],
-    /// What is kept where a window begins: states and the rows (of `kept`) that they take.
-    pub keep: Vec<usize>,
+    /// What is kept where a window begins, by the window's slot: states and the rows (of `kept`) that they take.
+    pub keeps: Vec<Vec<(usize, usize)>>,
     pub kept: Sparse,
     pub mean: Vec<f64>,
     pub covariance: Vec<f64>,
 }
 
+/// What happens between two rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Move {
+    /// One of [`System::steps`] passes.
+    Step(u16),
+    /// A window begins, which this slot remembers.
+    Keep(u8),
+}
+
 /// What happens up to and at one row of a record.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Row {
-    /// Steps to where the row's window begins, and from there to the row; indices into [`System::steps`].
-    pub before: Vec<u16>,
-    pub after: Vec<u16>,
-    /// Whether a window begins in between.
-    pub keeps: bool,
+    /// From the row before to this one.
+    pub moves: Vec<Move>,
     /// Of how much the readings bend here: 0 at rest to 1.
     pub bend: f64,
+    /// Variance of a kink of the air's slope where this row's steps begin [K²/s²].
+    pub kink: f64,
     /// Rows of [`System::rows`] to measure with; None where there is no value.
     pub measured: [Option<u16>; MEASURED],
     /// Values that were averaged into this one: variances are divided by it.
@@ -151,6 +166,35 @@ pub(super) fn respond(system: &System, rows: &[Row], trace: &Trace, inputs: &Val
     Arch::new().dispatch(Respond { system, rows, trace, inputs })
 }
 
+/// What does not belong to a record, by a trace that kept its gains.
+pub(super) fn doubts(system: &System, rows: &[Row], trace: &Trace) -> Doubts {
+    Arch::new().dispatch(Doubt { system, rows, trace })
+}
+
+/// Standardised values of what every measurement, and every row's change of the slope, is beyond what all others say.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Doubts {
+    /// In the order of the innovations.
+    pub values: Vec<f64>,
+    /// One entry a row: standardised, and the change of slope that it stands for [K/s].
+    pub kinks: Vec<(f64, f64)>,
+}
+
+struct Doubt<'a> {
+    system: &'a System,
+    rows: &'a [Row],
+    trace: &'a Trace,
+}
+
+impl NullaryFnOnce for Doubt<'_> {
+    type Output = Doubts;
+
+    #[inline(always)]
+    fn call(self) -> Doubts {
+        dispatch!(self.system.size, doubts_of(self.system, self.rows, self.trace))
+    }
+}
+
 struct Forward<'a> {
     system: &'a System,
     rows: &'a [Row],
@@ -209,15 +253,16 @@ struct Noise<'a, const N: usize> {
 }
 
 #[inline(always)]
-fn keep_window<const N: usize>(system: &System, covariance: &mut Square<N>) {
-    for (place, &state) in system.keep.iter().enumerate() {
+fn keep_window<const N: usize>(system: &System, slot: u8, covariance: &mut Square<N>) {
+    let keeps = &system.keeps[slot as usize];
+    for (place, &(state, row)) in keeps.iter().enumerate() {
         // Cov(c·x, x), the state's own former content being forgotten.
-        let mut along = system.kept.combine(place, covariance);
+        let mut along = system.kept.combine(row, covariance);
         along[state] = 0.0;
-        for &other in &system.keep[place + 1..] {
+        for &(other, _) in &keeps[place + 1..] {
             along[other] = 0.0;
         }
-        let own = system.kept.dot(place, &along);
+        let own = system.kept.dot(row, &along);
         for i in 0..N {
             covariance[i][state] = along[i];
             covariance[state][i] = along[i];
@@ -228,16 +273,29 @@ fn keep_window<const N: usize>(system: &System, covariance: &mut Square<N>) {
 
 #[inline(always)]
 fn advance<const N: usize>(system: &System, row: &Row, mean: &mut [f64; N]) {
-    for &step in &row.before {
-        *mean = system.steps[step as usize].phi.times(mean);
-    }
-    if row.keeps {
-        for (place, &state) in system.keep.iter().enumerate() {
-            mean[state] = system.kept.dot(place, mean);
+    for &movement in &row.moves {
+        match movement {
+            Move::Step(step) => *mean = system.steps[step as usize].phi.times(mean),
+            Move::Keep(slot) => {
+                for &(state, kept) in &system.keeps[slot as usize] {
+                    mean[state] = system.kept.dot(kept, mean);
+                }
+            }
         }
     }
-    for &step in &row.after {
-        *mean = system.steps[step as usize].phi.times(mean);
+}
+
+/// r ← Mᵀ r over what happened between the row before and this one.
+#[inline(always)]
+fn retreat<const N: usize>(system: &System, movement: Move, r: &mut [f64; N]) {
+    match movement {
+        Move::Step(step) => *r = system.steps[step as usize].phi_turned.times(r),
+        Move::Keep(slot) => {
+            for &(state, kept) in system.keeps[slot as usize].iter().rev() {
+                let weight = std::mem::take(&mut r[state]);
+                system.kept.add_to(kept, weight, r);
+            }
+        }
     }
 }
 
@@ -269,11 +327,13 @@ fn forward_of<const N: usize>(system: &System, rows: &[Row], values: &Values, ke
         if !frozen {
             trace.thawed += 1;
             let density = system.trend.0 + row.bend * (system.trend.1 - system.trend.0);
-            row.before.iter().for_each(|&s| predict(&steps[s as usize], density, &mut covariance));
-            if row.keeps {
-                keep_window(system, &mut covariance);
+            covariance[system.slope][system.slope] += row.kink;
+            for &movement in &row.moves {
+                match movement {
+                    Move::Step(step) => predict(&steps[step as usize], density, &mut covariance),
+                    Move::Keep(slot) => keep_window(system, slot, &mut covariance),
+                }
             }
-            row.after.iter().for_each(|&s| predict(&steps[s as usize], density, &mut covariance));
             if keep {
                 let mut flat = Vec::with_capacity(n * n);
                 covariance[..n].iter().for_each(|line| flat.extend_from_slice(&line[..n]));
@@ -364,14 +424,76 @@ fn smooth_of<const N: usize>(system: &System, rows: &[Row], trace: &Trace) -> Ve
             let correction: f64 = line.iter().zip(&r).map(|(p, r)| p * r).sum();
             states[k * n + i] = trace.means[k * n + i] + correction;
         }
-        row.after.iter().rev().for_each(|&s| r = system.steps[s as usize].phi_turned.times(&r));
-        if row.keeps {
-            for (place, &state) in system.keep.iter().enumerate().rev() {
-                let weight = std::mem::take(&mut r[state]);
-                system.kept.add_to(place, weight, &mut r);
-            }
-        }
-        row.before.iter().rev().for_each(|&s| r = system.steps[s as usize].phi_turned.times(&r));
+        row.moves.iter().rev().for_each(|&movement| retreat(system, movement, &mut r));
     }
     states
+}
+
+#[inline(always)]
+fn doubts_of<const N: usize>(system: &System, rows: &[Row], trace: &Trace) -> Doubts {
+    let n = system.size;
+    let mut found = Doubts { values: vec![0.0; trace.innovations.len()], kinks: vec![(0.0, 0.0); rows.len()] };
+    let mut r = [0.0; N];
+    let mut spread: Square<N> = [[0.0; N]; N];
+    let mut taken = trace.innovations.len();
+    for (k, row) in rows.iter().enumerate().rev() {
+        let gains = &trace.gains[trace.gains_of[k] as usize].gain;
+        let present: Vec<usize> = row.measured.iter().flatten().map(|&h| h as usize).collect();
+        for (place, &h) in present.iter().enumerate().rev() {
+            taken -= 1;
+            let Innovation { value, variance } = trace.innovations[taken];
+            let gain: [f64; N] = wide(&gains[place * (n + 1)..place * (n + 1) + n]);
+            let mut along = [0.0; N];
+            let (mut error, mut precision) = (value / variance, 1.0 / variance);
+            for i in 0..N {
+                for j in 0..N {
+                    along[i] += spread[i][j] * gain[j];
+                }
+                error -= gain[i] * r[i];
+            }
+            for i in 0..N {
+                precision += gain[i] * along[i];
+            }
+            found.values[taken] = error / precision.sqrt();
+            system.rows.add_to(h, error, &mut r);
+            let mut line = [0.0; N];
+            system.rows.add_to(h, 1.0, &mut line);
+            for i in 0..N {
+                for j in 0..N {
+                    spread[i][j] += precision * line[i] * line[j] - line[i] * along[j] - along[i] * line[j];
+                }
+            }
+        }
+        for &movement in row.moves.iter().rev() {
+            retreat(system, movement, &mut r);
+            match movement {
+                Move::Step(step) => spread = system.steps[step as usize].phi_turned.surround(&spread),
+                Move::Keep(slot) => forget_window(system, slot, &mut spread),
+            }
+        }
+        let own = spread[system.slope][system.slope];
+        if own > 0.0 {
+            found.kinks[k] = (r[system.slope] / own.sqrt(), r[system.slope] / own);
+        }
+    }
+    found
+}
+
+/// N ← Mᵀ N M where a window begins: columns and then rows.
+#[inline(always)]
+fn forget_window<const N: usize>(system: &System, slot: u8, spread: &mut Square<N>) {
+    for &(state, kept) in system.keeps[slot as usize].iter().rev() {
+        for i in 0..N {
+            let weight = std::mem::take(&mut spread[i][state]);
+            system.kept.add_to(kept, weight, &mut spread[i]);
+        }
+        let lost = std::mem::replace(&mut spread[state], [0.0; N]);
+        let mut line = [0.0; N];
+        system.kept.add_to(kept, 1.0, &mut line);
+        for i in 0..N {
+            for j in 0..N {
+                spread[i][j] += line[i] * lost[j];
+            }
+        }
+    }
 }

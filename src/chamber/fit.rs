@@ -99,39 +99,6 @@ impl Chamber<'_> {
         Ok(finished(assumed, free, records, parameters, coordinates, log_likelihood, information, numbers, courses))
     }
 
-    /// As [`Chamber::fit`] from several chambers that differ in their ripple; the best goes on.
-    ///
-    /// # Errors
-    /// As [`Chamber::fit`].
-    pub fn fit_anew(&self, assumed: &Assumption, free: &[Free], records: &[usize]) -> Result<Fit, ChamberError> {
-        let mut base = self.fit(assumed, free, records, None, Effort { iterations: 0, tolerance: 0.0, rounds: 1 })?;
-        base.courses = vec![None; self.records()];
-        let starts: Vec<(f64, f64, f64)> = RIPPLES
-            .iter()
-            .flat_map(|&(period_s, size_k)| RATE_NOISES.iter().map(move |&n| (period_s, size_k, n)))
-            .collect();
-        let tried: Vec<Result<Fit, ChamberError>> = starts
-            .into_par_iter()
-            .map(|(period_s, size_k, noise)| {
-                let mut start = base.clone();
-                for numbers in &mut start.numbers {
-                    numbers.set(Quantity::RipplePeriod, period_s);
-                    numbers.set(Quantity::RippleSize, size_k);
-                    numbers.set(Quantity::RateNoise, noise * numbers.get(Quantity::RateNoise));
-                }
-                self.fit(assumed, free, records, Some(&start), Effort::SHORT)
-            })
-            .collect();
-        let mut best: Option<Fit> = None;
-        for fit in tried.into_iter().flatten() {
-            if best.as_ref().is_none_or(|b| fit.posterior() > b.posterior()) {
-                best = Some(fit);
-            }
-        }
-        let best = best.ok_or(ChamberError::Unsolvable)?;
-        self.fit(&best.assumed.clone(), free, records, Some(&best), Effort::FULL)
-    }
-
     /// Numbers for all records: those that were not fitted take the first fitted one's, each relative to its own noise.
     fn completed(&self, fit: &Fit, records: &[usize]) -> Vec<Numbers> {
         let first = fit.records.first().copied().unwrap_or(0);
@@ -392,10 +359,6 @@ impl Chamber<'_> {
         Ok((score, information))
     }
 }
-
-/// Ripples to begin with: period [s] and size [K]; and shares of the noise floor.
-const RIPPLES: [(f64, f64); 4] = [(90.0, 0.08), (160.0, 0.08), (300.0, 0.08), (200.0, 0.005)];
-const RATE_NOISES: [f64; 2] = [1.0, 0.2];
 
 struct State<'c> {
     place: Place0<'c>,

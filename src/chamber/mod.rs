@@ -13,7 +13,7 @@
 //! # How to use it
 //! 1. [`Chamber::new`] takes records: gross errors are left out and counted, fast rows are averaged to the pack's own time.
 //! 2. An [`Assumption`] says what is assumed: a coil model with its effects, a pattern, and what else may be there (drift,
-//!    cycle, a start that is not at rest, further known inputs to the rate with unknown amplitudes).
+//!    cycle, further known inputs to the rate with unknown amplitudes).
 //! 3. [`Chamber::fit`] maximises over the chamber's numbers and whatever of the effects is [`Free`]; the [`Fit`] has the
 //!    evidence, each number with its error, and a smoothed course of every record: layers and air (`Fit::courses`).
 //! 4. [`Chamber::held_out`] scores records that were not fitted with everything frozen; [`Chamber::noise`] tells white
@@ -36,11 +36,13 @@ mod filter;
 mod fit;
 mod fitted;
 mod known;
+mod noise;
 mod parameter;
 mod point;
 pub mod prior;
 mod score;
 mod series;
+mod settle;
 mod sparse;
 mod system;
 
@@ -55,11 +57,12 @@ use point::Observed;
 use series::Series;
 use system::driven_by_air;
 
-pub use course::{Noise, Prediction};
+pub use course::Prediction;
 pub use filter::Innovation;
 pub use fit::{Effort, Fit};
 pub use fitted::{EffectEstimate, EffectEstimates};
 pub use known::Reference;
+pub use noise::{Noise, Remedy};
 pub use parameter::{Free, Parameter, Place, Scale};
 pub use prior::{PRIORS, Prior, Quantity};
 pub use score::{Column, Direction, Scores};
@@ -73,14 +76,12 @@ pub struct Assumption {
     pub drift: bool,
     /// A cycle that nothing in the model makes.
     pub cycle: bool,
-    /// The record may begin in the middle of a ramp.
-    pub unsteady: bool,
     pub inputs: Vec<Input>,
 }
 
 impl Assumption {
     pub fn new(model: CoilModel, pattern: Pattern) -> Self {
-        Self { model, pattern, drift: false, cycle: false, unsteady: false, inputs: Vec::new() }
+        Self { model, pattern, drift: false, cycle: false, inputs: Vec::new() }
     }
 }
 

@@ -85,7 +85,7 @@ impl Parameter {
             mean,
             deviation: prior.deviation,
             lower: mean - 12.0,
-            upper: mean + 12.0,
+            upper: (mean + 12.0).min(prior.most.ln()),
         }
     }
 

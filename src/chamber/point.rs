@@ -66,7 +66,6 @@ impl CoilSide {
             lag_s: self.lag_s,
             drift: assumed.drift,
             cycle: assumed.cycle,
-            unsteady: assumed.unsteady,
         }
     }
 
@@ -154,7 +153,7 @@ impl CoilSide {
         states: &[f64],
         before: Option<&Reference>,
     ) -> Result<Reference, ChamberError> {
-        let layout = Layout::new(&self.parts(assumed), observed.series.averaged > 1);
+        let layout = Layout::new(&self.parts(assumed), &observed.series);
         let rows = observed.series.times_s.len();
         let outputs = self.reduced.outputs;
         let air: Vec<f64> =
@@ -295,6 +294,7 @@ pub(super) fn quantities(assumed: &Assumption, observed: &Observed) -> Result<Ve
         Quantity::RippleCoherence,
         Quantity::WanderShare,
         Quantity::WanderTime,
+        Quantity::StartSlope,
     ]);
     if assumed.drift {
         all.extend([Quantity::DriftSize, Quantity::DriftTime]);

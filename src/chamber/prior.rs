@@ -33,6 +33,8 @@ pub enum Quantity {
     /// A cycle that no part of the model makes: its size \[rad/s\] and period \[s\].
     CycleSize,
     CyclePeriod,
+    /// Deviation of the air's slope where a record begins \[K/s\]; what pack and sensor lag behind it follows.
+    StartSlope,
 }
 
 /// One line of the table.
@@ -44,11 +46,13 @@ pub struct Prior {
     /// Of the natural logarithm.
     pub deviation: f64,
     pub relative: bool,
+    /// What is larger is not this any more.
+    pub most: f64,
     pub reason: &'static str,
 }
 
 /// Every prior of the chamber.
-pub const PRIORS: [Prior; 18] = [
+pub const PRIORS: [Prior; 19] = [
     line(Quantity::Film, 25.0, 0.8, "free to moderately forced convection in a chamber: 8 … 80 W/(m²K)"),
     line(Quantity::ReadingNoise, 0.005, 1.0, "platinum sensors and their bridges read to a few millikelvin"),
     line(Quantity::InnerNoise, 0.005, 1.0, "as the sensor"),
@@ -66,7 +70,10 @@ pub const PRIORS: [Prior; 18] = [
     line(Quantity::RippleSize, 0.08, 1.2, "a tenth of a kelvin from a compressor or a valve"),
     line(Quantity::RipplePeriod, 200.0, 0.6, "switching periods of one to ten minutes"),
     line(Quantity::RippleCoherence, 600.0, 1.0, "a few periods: switching depends on the load"),
-    line(Quantity::WanderShare, 0.15, 0.8, "flicker of gyros lies under the white noise of a row of seconds"),
+    Prior {
+        most: 1.0,
+        ..line(Quantity::WanderShare, 0.15, 0.8, "flicker of gyros lies under the white noise of a row of seconds")
+    },
     line(Quantity::WanderTime, 1500.0, 1.2, "flicker is nearly even over the decades that a record sees"),
     relative(
         Quantity::DriftSize,
@@ -77,14 +84,15 @@ pub const PRIORS: [Prior; 18] = [
     line(Quantity::DriftTime, 1500.0, 1.2, "as the gyro's wander"),
     relative(Quantity::CycleSize, 2.0, 1.2, "as the drift"),
     line(Quantity::CyclePeriod, 5000.0, 0.8, "below a record's length, above what an air conditioning makes"),
+    line(Quantity::StartSlope, 2e-4, 2.0, "a record begins at rest, or in a ramp of up to a kelvin or two a minute"),
 ];
 
 const fn line(quantity: Quantity, median: f64, deviation: f64, reason: &'static str) -> Prior {
-    Prior { quantity, median, deviation, relative: false, reason }
+    Prior { quantity, median, deviation, relative: false, most: f64::INFINITY, reason }
 }
 
 const fn relative(quantity: Quantity, median: f64, deviation: f64, reason: &'static str) -> Prior {
-    Prior { quantity, median, deviation, relative: true, reason }
+    Prior { quantity, median, deviation, relative: true, most: f64::INFINITY, reason }
 }
 
 impl Quantity {
@@ -101,15 +109,19 @@ impl Quantity {
 
 /// Standard deviation of the pack's first temperature about the first reading \[K\].
 pub(super) const START_K: f64 = 1.0;
-/// … of what pack and sensor differ from the air at the start \[K\].
+/// … of what pack and sensor differ from the air at the start, besides what a slope makes \[K\]; with a slope they differ by
+/// what it does in a time such as a pack behind a film has \[s\], each mode by this share of it of its own.
 pub(super) const START_APART_K: f64 = 0.1;
-/// … of the air's slope at the start: of a record that begins at rest, and of one that begins anywhere \[K/s\].
-pub(super) const START_SLOPE_K_PER_S: f64 = 1e-4;
-pub(super) const UNSTEADY_SLOPE_K_PER_S: f64 = 0.02;
-/// … and of pack and air of such a record \[K\].
-pub(super) const UNSTEADY_APART_K: f64 = 3.0;
+pub(super) const START_APART_S: f64 = 150.0;
+pub(super) const START_APART_MODES: f64 = 0.1;
 /// … of the rate's offset about the record's median [rad/s]: the earth's rate is 7.3e-5.
 pub(super) const OFFSET_RAD_PER_S: f64 = 2.5e-5;
+
+/// One measurement in a thousand is a gross error, of tens of deviations.
+pub(super) const GROSS_SHARE: f64 = 1e-3;
+pub(super) const GROSS_FACTOR: f64 = 30.0;
+/// An air of straight lines turns some ten times in a record of 1500 rows.
+pub(super) const KINKS_PER_ROW: f64 = 1.0 / 150.0;
 
 #[cfg(test)]
 mod tests {

@@ -5,7 +5,7 @@
 //! mean of b rates      = (c·x(t) − c·x(t − b Δ))/(b Δ), exactly, where each is itself a mean over Δ
 //! ```
 
-use super::filter::{MEASURED, RATE, Row};
+use super::filter::{MEASURED, Move, RATE, Row};
 use crate::numeric::noise::white_noise;
 use crate::numeric::statistics::median;
 use crate::record::Record;
@@ -36,6 +36,8 @@ pub(super) struct Series {
     pub duration_s: f64,
     /// The record's first instant [s].
     pub start_s: f64,
+    /// Whether a rate's window may begin before the row before it.
+    pub overlaps: bool,
     shape_of: Vec<u16>,
 }
 
@@ -46,6 +48,8 @@ pub(super) struct Shape {
     pub window_s: f64,
     /// Share of the window's end in the readings, the rest being its beginning's.
     pub end_share: f64,
+    /// Of the two slots that remember a window's beginning.
+    pub slot: u8,
 }
 
 /// Rows are averaged while they are shorter than this share of the pack's own time …
@@ -55,7 +59,7 @@ const SHORT_ROW_S: f64 = 10.0;
 const MANY_ROWS: f64 = 3000.0;
 const LONG_ROW_S: f64 = 60.0;
 /// More distinct steps than this are put together from binary fractions of the usual one.
-const MOST_STEPS: usize = 12;
+const MOST_STEPS: usize = 128;
 const FINEST_S: f64 = 0.05;
 /// Two times that differ by less are the same [s].
 const SAME_S: f64 = 1e-6;
@@ -117,10 +121,18 @@ impl Series {
             noise_floor_rad_per_s: white_noise(times_s, record.rate_rad_per_s()).deviation,
             duration_s,
             start_s: times_s[0],
+            overlaps: false,
             shape_of: Vec::new(),
         };
         series.plan(rate_mean_s, averaged as f64 * interval_s);
         series
+    }
+
+    /// Takes a gross error out.
+    pub fn leave_out(&mut self, row: usize, measurement: usize) {
+        self.values[measurement][row] = f64::NAN;
+        self.rows[row].measured[measurement] = None;
+        self.spikes += 1;
     }
 
     pub fn shape_of(&self, row: usize) -> usize {
@@ -136,19 +148,56 @@ impl Series {
     /// Steps, windows and bends of all rows.
     fn plan(&mut self, rate_mean_s: f64, block_s: f64) {
         let bends = bends(&self.times_s, &self.values[0]);
-        let mut lengths: Vec<(f64, f64)> = Vec::with_capacity(self.times_s.len());
-        for k in 0..self.times_s.len() {
-            let gap_s = if k > 0 { self.times_s[k] - self.times_s[k - 1] } else { 0.0 };
-            let wanted_s = if self.averaged > 1 { block_s } else { rate_mean_s };
-            let window_s = if (gap_s - wanted_s).abs() < 0.05 * wanted_s { gap_s } else { wanted_s.min(gap_s) };
-            lengths.push((gap_s - window_s, window_s));
-        }
-        let steps = StepTable::new(&lengths, block_s);
+        let wanted_s = if self.averaged > 1 { block_s } else { rate_mean_s };
+        let times_s = &self.times_s;
+        let windows_s: Vec<f64> = (0..times_s.len())
+            .map(|k| {
+                let gap_s = if k > 0 { times_s[k] - times_s[k - 1] } else { 0.0 };
+                if (gap_s - wanted_s).abs() < 0.05 * wanted_s {
+                    gap_s
+                } else if wanted_s <= gap_s || (k > 1 && times_s[k] - wanted_s >= times_s[k - 2]) {
+                    wanted_s
+                } else {
+                    gap_s
+                }
+            })
+            .collect();
+        self.overlaps = (1..times_s.len()).any(|k| windows_s[k] > times_s[k] - times_s[k - 1] + SAME_S);
+        let begins_s: Vec<f64> = (0..times_s.len()).map(|k| times_s[k] - windows_s[k]).collect();
+        let slot_of = |k: usize| if self.overlaps { (k % 2) as u8 } else { 0 };
+        // Of each row: what happens before it, and how long after the last.
+        let happens = |k: usize| -> Vec<(f64, u8)> {
+            let last_s = if k > 0 { times_s[k - 1] } else { times_s[k] };
+            let mut begun: Vec<(f64, u8)> = [k, k + 1]
+                .into_iter()
+                // At the first row no window has begun yet.
+                .filter(|&j| k > 0 && j < times_s.len() && windows_s[j] > 0.0)
+                .filter(|&j| if j == k { begins_s[j] >= last_s - SAME_S } else { begins_s[j] < times_s[k] - SAME_S })
+                .map(|j| (begins_s[j].max(last_s), slot_of(j)))
+                .collect();
+            begun.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let mut at_s = last_s;
+            for event in &mut begun {
+                let after_s = event.0 - at_s;
+                at_s = event.0;
+                event.0 = after_s;
+            }
+            begun
+        };
+        let events: Vec<Vec<(f64, u8)>> = (0..times_s.len()).map(happens).collect();
+        let rest_s = |k: usize| {
+            let gap_s = if k > 0 { times_s[k] - times_s[k - 1] } else { 0.0 };
+            gap_s - events[k].iter().map(|e| e.0).sum::<f64>()
+        };
+        let steps = StepTable::new(
+            (0..times_s.len()).flat_map(|k| events[k].iter().map(|e| e.0).chain([rest_s(k)]).collect::<Vec<_>>()),
+            block_s,
+        );
         let end_share = if self.averaged > 1 { 0.5 * (self.averaged as f64 + 1.0) / self.averaged as f64 } else { 1.0 };
-        for (k, &(before_s, window_s)) in lengths.iter().enumerate() {
-            // At the first row no window has begun yet.
+        for k in 0..times_s.len() {
+            let window_s = windows_s[k];
             let keeps = k > 0 && window_s > 0.0;
-            let shape = Shape { window_s, end_share: if keeps { end_share } else { 1.0 } };
+            let shape = Shape { window_s, end_share: if keeps { end_share } else { 1.0 }, slot: slot_of(k) };
             let place = self.shapes.iter().position(|s| same(s, &shape)).unwrap_or_else(|| {
                 self.shapes.push(shape);
                 self.shapes.len() - 1
@@ -158,21 +207,20 @@ impl Series {
                 let there = self.values[m][k].is_finite() && (m != RATE || k > 0);
                 there.then_some((place * MEASURED + m) as u16)
             });
-            self.rows.push(Row {
-                before: steps.of(before_s),
-                after: steps.of(window_s),
-                keeps,
-                bend: bends[k],
-                measured,
-                averaged: self.averaged as f64,
-            });
+            let mut moves = Vec::new();
+            for &(after_s, slot) in &events[k] {
+                moves.extend(steps.of(after_s).into_iter().map(Move::Step));
+                moves.push(Move::Keep(slot));
+            }
+            moves.extend(steps.of(rest_s(k)).into_iter().map(Move::Step));
+            self.rows.push(Row { moves, bend: bends[k], kink: 0.0, measured, averaged: self.averaged as f64 });
         }
         self.steps_s = steps.lengths_s;
     }
 }
 
 fn same(a: &Shape, b: &Shape) -> bool {
-    (a.window_s - b.window_s).abs() < SAME_S && (a.end_share - b.end_share).abs() < SAME_S
+    (a.window_s - b.window_s).abs() < SAME_S && (a.end_share - b.end_share).abs() < SAME_S && a.slot == b.slot
 }
 
 /// Rows that become one.
@@ -229,10 +277,10 @@ struct StepTable {
 }
 
 impl StepTable {
-    fn new(lengths: &[(f64, f64)], usual_s: f64) -> Self {
+    fn new(lengths: impl Iterator<Item = f64>, usual_s: f64) -> Self {
         let mut lengths_s: Vec<f64> = Vec::new();
         let mut longest_s = usual_s;
-        for length_s in lengths.iter().flat_map(|l| [l.0, l.1]).filter(|&l| l > SAME_S) {
+        for length_s in lengths.filter(|&l| l > SAME_S) {
             longest_s = longest_s.max(length_s);
             if lengths_s.len() <= MOST_STEPS && !lengths_s.iter().any(|l| (l - length_s).abs() < SAME_S) {
                 lengths_s.push(length_s);

@@ -4,7 +4,7 @@
 //! dx_i = λ_i (a − x_i) dt                     modes of the pack behind the film; a = u + f + o, the air
 //! du = s dt,   ds = √q dW                     trend; q between the noise at rest and that where readings bend
 //! df = −f/τ_f dt + σ_f √(2/τ_f) dW            turbulence
-//! d(o, p) = (−γ, ω; −ω, −γ)(o, p) dt + σ_o √(2γ) dW        ripple
+//! d(o, p) = R (o, p) dt + γ (d, e) dt,   d(d, e) = R (d, e) dt + 2 σ_o √γ dW,   R = (−γ, ω; −ω, −γ)        ripple
 //! dl = (sensor's place − l)/τ dt              lag
 //! dw = −w/τ_w dt + σ_w √(2/τ_w) dW            wander; drift and cycle likewise where they are asked for
 //! reading = l or the sensor's place + noise,   rate = (c·x(t) − c·x(t − W))/W + b + w + noise
@@ -15,16 +15,16 @@
 //! | x_i, λ_i, c | modes, their decays and the rate per kelvin a second of each | K, 1/s, rad |
 //! | τ, W, b | sensor's lag, the rate's window, offset | s, s, rad/s |
 //!
+//! The ripple's size and phase are what a compressor makes of its load, and as smooth: driven by noise itself the oscillator
+//! would have a tail that falls as 1/f², which the coil sees as white noise of its own.
+//!
 //! A half space, or a pack whose heat capacity is unknown, is driven by its outermost layer, which follows the air with the
 //! time that a film over the pack's capacity would have.
 
 use super::discretise::discretise;
 use super::filter::{RATE, Step, System};
-use super::prior::{
-    OFFSET_RAD_PER_S, PRIORS, Quantity, START_APART_K, START_K, START_SLOPE_K_PER_S, UNSTEADY_APART_K,
-    UNSTEADY_SLOPE_K_PER_S,
-};
-use super::series::Series;
+use super::prior::{OFFSET_RAD_PER_S, PRIORS, Quantity, START_APART_K, START_APART_MODES, START_APART_S, START_K};
+use super::series::{Series, Shape};
 use super::sparse::Sparse;
 use crate::numeric::statistics::median;
 use crate::thermal::reduced::Reduced;
@@ -73,7 +73,6 @@ pub(super) struct Parts<'a> {
     pub lag_s: f64,
     pub drift: bool,
     pub cycle: bool,
-    pub unsteady: bool,
 }
 
 /// Heat capacity that a pack is taken to have where only its diffusivity is known [J/(m³K)].
@@ -113,19 +112,22 @@ pub(super) struct Layout {
     pub trend: usize,
     pub turbulence: usize,
     pub ripple: usize,
+    /// What drives the ripple.
+    driver: usize,
     lag: Option<usize>,
     wander: usize,
     drift: Option<usize>,
     cycle: Option<usize>,
     offset: usize,
-    window: usize,
+    /// What the rate's window began with; two where windows overlap.
+    windows: [usize; 2],
     /// What readings were where a window begins; only where readings are averaged.
     reading: Option<usize>,
     pub size: usize,
 }
 
 impl Layout {
-    pub fn new(parts: &Parts, averaged: bool) -> Self {
+    pub fn new(parts: &Parts, series: &Series) -> Self {
         let mut size = 0;
         let mut take = |count: usize| {
             size += count;
@@ -134,15 +136,31 @@ impl Layout {
         let modes = take(parts.reduced.modes());
         let _ = modes;
         let skin = parts.skin_s.map(|_| take(1));
-        let (trend, turbulence, ripple) = (take(2), take(1), take(2));
+        let (trend, turbulence, ripple, driver) = (take(2), take(1), take(2), take(2));
         let lag = (parts.lag_s > 0.0).then(|| take(1));
         let wander = take(1);
         let drift = parts.drift.then(|| take(1));
         let cycle = parts.cycle.then(|| take(2));
         let (offset, window) = (take(1), take(1));
-        let reading = averaged.then(|| take(1));
+        let windows = [window, if series.overlaps { take(1) } else { window }];
+        let reading = (series.averaged > 1).then(|| take(1));
         let modes = parts.reduced.modes();
-        Self { modes, skin, trend, turbulence, ripple, lag, wander, drift, cycle, offset, window, reading, size }
+        Self {
+            modes,
+            skin,
+            trend,
+            turbulence,
+            ripple,
+            driver,
+            lag,
+            wander,
+            drift,
+            cycle,
+            offset,
+            windows,
+            reading,
+            size,
+        }
     }
 
     /// The states whose sum is the air.
@@ -170,7 +188,7 @@ impl Layout {
 
 /// The system for one record.
 pub(super) fn system(parts: &Parts, numbers: &Numbers, series: &Series) -> System {
-    let layout = Layout::new(parts, series.averaged > 1);
+    let layout = Layout::new(parts, series);
     let n = layout.size;
     let (f, noise, trend_noise) = dynamics(parts, &layout, numbers);
     let steps = series
@@ -203,12 +221,12 @@ pub(super) fn system(parts: &Parts, numbers: &Numbers, series: &Series) -> Syste
             }
             rows.extend(row);
         }
-        rows.extend(rate_row(&layout, &f, &response, shape.window_s));
+        rows.extend(rate_row(&layout, &f, &response, shape));
     }
-    let mut keep = vec![layout.window];
+    let mut keeps: Vec<Vec<(usize, usize)>> = layout.windows.iter().map(|&window| vec![(window, 0)]).collect();
     let mut kept = response;
     if let Some(reading) = layout.reading {
-        keep.push(reading);
+        keeps[0].push((reading, 1));
         kept.extend(&places[0]);
     }
     let (mean, covariance) = start(parts, &layout, numbers, series);
@@ -218,6 +236,7 @@ pub(super) fn system(parts: &Parts, numbers: &Numbers, series: &Series) -> Syste
         size: n,
         steps,
         trend: (numbers.get(Quantity::RestNoise), numbers.get(Quantity::BendNoise)),
+        slope: layout.trend + 1,
         rows: Sparse::new(&rows, n),
         variances: [
             square(Quantity::ReadingNoise) + grid,
@@ -225,7 +244,7 @@ pub(super) fn system(parts: &Parts, numbers: &Numbers, series: &Series) -> Syste
             square(Quantity::AmbientNoise),
             square(Quantity::RateNoise),
         ],
-        keep,
+        keeps,
         kept: Sparse::new(&kept, n),
         mean,
         covariance,
@@ -256,12 +275,12 @@ fn sensor_place(parts: &Parts, layout: &Layout) -> Vec<f64> {
     if parts.shows_air { layout.air_row() } else { layout.output(parts.reduced, parts.reduced.layers - 1) }
 }
 
-fn rate_row(layout: &Layout, f: &[f64], response: &[f64], window_s: f64) -> Vec<f64> {
-    let n = layout.size;
+fn rate_row(layout: &Layout, f: &[f64], response: &[f64], shape: &Shape) -> Vec<f64> {
+    let (n, window_s) = (layout.size, shape.window_s);
     let mut row = vec![0.0; n];
     if window_s > 0.0 {
         row.iter_mut().zip(response).for_each(|(r, c)| *r = c / window_s);
-        row[layout.window] = -1.0 / window_s;
+        row[layout.windows[shape.slot as usize]] = -1.0 / window_s;
     } else {
         // The rate at an instant: c·F x.
         for (i, c) in response.iter().enumerate() {
@@ -305,10 +324,16 @@ fn dynamics(parts: &Parts, layout: &Layout, numbers: &Numbers) -> (Vec<f64>, Vec
     }
     let (size, period_s, coherence_s) =
         (get(Quantity::RippleSize), get(Quantity::RipplePeriod), get(Quantity::RippleCoherence));
-    for i in [layout.ripple, layout.ripple + 1] {
-        relax(i, size, coherence_s);
+    for (i, driver) in [(layout.ripple, layout.driver), (layout.ripple + 1, layout.driver + 1)] {
+        // A driver of √2 the size, as slow as what it drives, gives this size.
+        relax(i, 0.0, coherence_s);
+        relax(driver, std::f64::consts::SQRT_2 * size, coherence_s);
+    }
+    for (i, driver) in [(layout.ripple, layout.driver), (layout.ripple + 1, layout.driver + 1)] {
+        f[i * n + driver] = 1.0 / coherence_s;
     }
     rotate(&mut f, n, layout.ripple, period_s);
+    rotate(&mut f, n, layout.driver, period_s);
     if let Some(cycle) = layout.cycle {
         rotate(&mut f, n, cycle, get(Quantity::CyclePeriod));
     }
@@ -352,8 +377,8 @@ fn start(parts: &Parts, layout: &Layout, numbers: &Numbers, series: &Series) -> 
     parts.reduced.decay_per_s.iter().enumerate().for_each(|(i, l)| ramp[i] = -1.0 / l - skin_s);
     layout.skin.into_iter().for_each(|i| ramp[i] = -skin_s);
     layout.lag.into_iter().for_each(|i| ramp[i] = -parts.lag_s + ramp[0]);
-    let (slope, apart) =
-        if parts.unsteady { (UNSTEADY_SLOPE_K_PER_S, UNSTEADY_APART_K) } else { (START_SLOPE_K_PER_S, START_APART_K) };
+    let slope = numbers.get(Quantity::StartSlope);
+    let apart = START_APART_K.hypot(START_APART_S * slope);
     add(&ramp, slope);
     add(&together, apart);
     together[layout.trend] = 1.0;
@@ -364,12 +389,8 @@ fn start(parts: &Parts, layout: &Layout, numbers: &Numbers, series: &Series) -> 
         add(&direction, size);
     };
     one(layout.trend + 1, slope);
-    if parts.unsteady {
-        (0..layout.modes).for_each(|i| one(i, 0.1 * apart));
-    }
+    (0..layout.modes).for_each(|i| one(i, START_APART_MODES * apart));
     one(layout.turbulence, numbers.get(Quantity::TurbulenceSize));
-    one(layout.ripple, numbers.get(Quantity::RippleSize));
-    one(layout.ripple + 1, numbers.get(Quantity::RippleSize));
     one(layout.wander, numbers.get(Quantity::WanderShare) * numbers.get(Quantity::RateNoise));
     layout.drift.into_iter().for_each(|i| one(i, numbers.get(Quantity::DriftSize)));
     layout
@@ -377,13 +398,22 @@ fn start(parts: &Parts, layout: &Layout, numbers: &Numbers, series: &Series) -> 
         .into_iter()
         .for_each(|i| [i, i + 1].into_iter().for_each(|i| one(i, numbers.get(Quantity::CycleSize))));
     one(layout.offset, OFFSET_RAD_PER_S);
+    // ⟨o²⟩ = ⟨o d⟩ = σ², ⟨d²⟩ = 2 σ².
+    let ripple = numbers.get(Quantity::RippleSize);
+    for (i, driver) in [(layout.ripple, layout.driver), (layout.ripple + 1, layout.driver + 1)] {
+        let mut direction = vec![0.0; n];
+        (direction[i], direction[driver]) = (1.0, 1.0);
+        add(&direction, ripple);
+        direction[i] = 0.0;
+        add(&direction, ripple);
+    }
     (mean, covariance)
 }
 
 impl System {
     /// Takes the offset as known and the gyro as steady: what is left of a rate's variance is air and white noise.
-    pub fn forget_offset(&mut self, parts: &Parts, averaged: bool) {
-        let layout = Layout::new(parts, averaged);
+    pub fn forget_offset(&mut self, parts: &Parts, series: &Series) {
+        let layout = Layout::new(parts, series);
         for i in 0..self.size {
             self.covariance[i * self.size + layout.offset] = 0.0;
             self.covariance[layout.offset * self.size + i] = 0.0;

@@ -12,9 +12,9 @@ use crate::io::json::diagnosis::{DiagnosisJson, FindingJson};
 use crate::io::read::model_file::read_model;
 use crate::io::write::measurement_folder::check_free;
 use crate::report::diagnosis::{
-    explanations, noise_in_words, posterior_in_words, refitted_in_words, rest_in_words, value_in_words,
-    verdict_in_words,
+    explanations, posterior_in_words, refitted_in_words, rest_in_words, value_in_words, verdict_in_words,
 };
+use crate::report::noise::noise_in_words;
 use crate::task::diagnose::{Request, run as diagnose};
 use crate::task::page::REPORT_FILE;
 

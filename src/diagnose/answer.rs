@@ -8,12 +8,11 @@ use rayon::prelude::*;
 
 use super::describe::{contenders, findings, ladder, unexplained};
 use super::joint::{Explanation, Found, Member, Question};
+use super::standing::CERTAIN;
 use super::{Caution, DiagnoseError, Diagnosis, Hypothesis, OffsetStep, RecordNoise, Refitted, Share, Verdict};
 use crate::chamber::{Chamber, Fit, Place};
 use crate::record::Record;
 
-/// What one set, or the smallest family, must hold.
-pub(super) const CERTAIN: f64 = 0.95;
 /// What sets with something unknown in them must hold for that to be the answer.
 const HALF: f64 = 0.5;
 
@@ -134,7 +133,7 @@ pub(super) fn names(question: &Question, explanation: &Explanation) -> Vec<Strin
     explanation.members.iter().map(word).collect()
 }
 
-fn posterior(question: &Question, found: &Found) -> Vec<Share> {
+pub(super) fn posterior(question: &Question, found: &Found) -> Vec<Share> {
     let mut shares: Vec<Share> = Vec::new();
     for explanation in found.explanations.iter().filter(|e| e.probability > 1e-6) {
         let effects = names(question, explanation);

@@ -149,7 +149,7 @@ pub(super) fn ladder(
     let named = settled.explanation;
     let effects = named.effects(question);
     let expected = |place: usize| {
-        let n = noise[place].noise;
+        let n = &noise[place].noise;
         n.white_rad_per_s.powi(2) + n.wander_rad_per_s.powi(2) + n.unresolved_air_rad_per_s.powi(2)
     };
     let rung = |kept: usize| -> Result<Rung, DiagnoseError> {

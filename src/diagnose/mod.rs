@@ -23,6 +23,7 @@ pub mod experiment;
 mod field;
 mod joint;
 pub mod plain;
+mod standing;
 
 use thiserror::Error;
 
@@ -41,6 +42,7 @@ use joint::Question;
 
 pub use candidate::{is_declared_number, is_empirical};
 pub use plain::{Plain, Shape};
+pub use standing::{Standing, is_adequate, standing};
 
 /// What is asked.
 #[derive(Debug, Clone, Copy)]
@@ -293,6 +295,8 @@ pub enum DiagnoseError {
     Unsolvable,
 }
 
+/// Effects that a model may lack at once.
+const MOST_MEMBERS: usize = 4;
 /// Fewer rows than this determine no effect.
 const LEAST_ROWS: usize = 100;
 
@@ -314,10 +318,9 @@ pub fn extend(request: &Request, effect: &DeclaredEffect) -> Result<Extension, D
     let mut without = request.model.clone();
     without.effects.retain(|e| e.kind() != effect.kind());
     let records = checked(request)?;
-    let chamber = Chamber::new(&without, &records)?;
     let fitted: Vec<usize> = (0..request.records.len()).collect();
     let declared = Assumption::new(without.clone(), request.pattern.clone());
-    let base = chamber.fit_anew(&declared, &[], &fitted)?;
+    let (chamber, base) = Chamber::new(&without, &records)?.settled(&declared, &fitted)?;
     let all = candidate::of_kind(&without, &records, effect);
     let question = Question {
         chamber: &chamber,
@@ -326,6 +329,7 @@ pub fn extend(request: &Request, effect: &DeclaredEffect) -> Result<Extension, D
         candidates: &all,
         fitted,
         held_out: Vec::new(),
+        depth: 1,
     };
     joint::settle_one(&question, &base)
         .map(|(best, reduced)| Extension {
@@ -375,18 +379,21 @@ const PROMISING: f64 = 12.0;
 pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Diagnosis, DiagnoseError> {
     let records = checked(request)?;
     progress(0.0);
-    let chamber = Chamber::new(request.model, &records)?;
-    let candidates = candidate::candidates(request.model, &records);
     let given = request.records.len();
+    let declared = Assumption::new(request.model.clone(), request.pattern.clone());
+    let fitted: Vec<usize> = (0..given).collect();
+    let (chamber, null) = Chamber::new(request.model, &records)?.settled(&declared, &fitted)?;
+    let candidates = candidate::candidates(request.model, &records);
     let question = Question {
         chamber: &chamber,
         model: request.model,
         pattern: request.pattern,
         candidates: &candidates,
-        fitted: (0..given).collect(),
+        fitted,
         held_out: (given..records.len()).collect(),
+        depth: MOST_MEMBERS,
     };
-    let found = joint::search(&question, &|share| progress(0.8 * share))?;
+    let found = joint::search(&question, null, &|share| progress(0.8 * share))?;
     let mut diagnosis = answer::answer(&question, &found, &records)?;
     // Where what is to be fitted shows nothing, the other records may; the former then confirm it.
     if let (Verdict::Adequate, Some(declared), false) =
@@ -395,7 +402,7 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
         let other = Question { fitted: question.held_out.clone(), held_out: question.fitted.clone(), ..question };
         let day = chamber.fit(&declared.fit.assumed, &[], &other.fitted, Some(&declared.fit), Effort::FULL)?;
         if joint::promise(&other, &day)? > PROMISING {
-            let found = joint::search(&other, &|share| progress(0.8 + 0.2 * share))?;
+            let found = joint::search(&other, day, &|share| progress(0.8 + 0.2 * share))?;
             let elsewhere = answer::answer(&other, &found, &records)?;
             if elsewhere.verdict != Verdict::Adequate {
                 diagnosis = elsewhere;

@@ -3,9 +3,10 @@
 use maud::{Markup, html};
 
 use super::ladder::ladder_chart;
+use super::noise::{noise_chart, noise_in_words};
 use super::page::figure;
 use super::plot::{Axis, Chart, Mark, Series};
-use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow, FindingJson, NoiseJson, ParameterJson, RefittedJson};
+use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow, FindingJson, ParameterJson, RefittedJson};
 use crate::io::json::experiment::ExperimentJson;
 use crate::units::{h_from_s, min_from_s, percent_from_fraction};
 
@@ -68,25 +69,6 @@ pub fn refitted_in_words(body: &DiagnosisJson) -> Vec<String> {
         )
     };
     body.refitted.iter().map(line).collect()
-}
-
-/// White noise, wander and unresolved air of each record, and what limits it most.
-pub fn noise_in_words(body: &DiagnosisJson) -> Vec<String> {
-    let line = |n: &NoiseJson| {
-        let (white, wander, air) = (n.white_deg_per_h, n.wander_deg_per_h, n.unresolved_air_deg_per_h);
-        let limit = if air > white && air > wander {
-            "what limits it most is what the air does and the sensor does not see: a finer or faster sensor, or calmer air, would help"
-        } else if wander > white {
-            "what limits it most is the gyro's wander: shorter records, or an average of several, would help"
-        } else {
-            "what limits it most is the gyro's white noise: a longer record would help"
-        };
-        format!(
-            "{}: white noise {white:.4} ± {:.4} °/h a row, wander {wander:.4} °/h, unresolved air {air:.4} °/h; {limit}",
-            n.record, n.white_standard_error_deg_per_h
-        )
-    };
-    body.noise.iter().map(line).collect()
 }
 
 /// The sets that hold the posterior mass, a line each.
@@ -194,6 +176,7 @@ pub(super) fn section(body: &DiagnosisJson, tables: &[Vec<DiagnosisRow>]) -> Mar
             ul { @for line in refitted_in_words(body) { li { (line) } } }
         }
         h2 { "Noise, told apart" }
+        (figure(&noise_chart(body).svg(), "What the rate consists of beside what the coil does, and how much of the air would stay unseen if it were measured otherwise."))
         ul { @for line in noise_in_words(body) { li { (line) } } }
         h2 { "How sure" }
         ul { @for line in posterior_in_words(body) { li { (line) } } }

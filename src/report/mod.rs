@@ -8,6 +8,7 @@ pub mod diagnosis;
 pub mod improvement;
 pub mod ladder;
 pub mod measurement;
+pub mod noise;
 pub mod page;
 pub mod plot;
 pub mod search_run;

@@ -22,6 +22,7 @@ use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::report::diagnosis::{before_and_after_chart, before_and_after_name as picture_name, value_in_words};
 use crate::report::ladder::ladder_chart;
+use crate::report::noise::noise_chart;
 use crate::text::sink::TomlComment;
 use crate::units::deg_per_h_from_rad_per_s;
 
@@ -146,6 +147,7 @@ impl Answer {
     /// Files that cannot be written.
     pub fn write(&self, folder: &Path, model: &ModelFile) -> Result<(), TaskError> {
         write_atomically(&folder.join("ladder.svg"), ladder_chart(&self.document).svg().as_bytes())?;
+        write_atomically(&folder.join("noise.svg"), noise_chart(&self.document).svg().as_bytes())?;
         write_atomically(&folder.join(MODEL_FILE), model.source.as_bytes())?;
         if let Some(source) = self.extended_source(model)? {
             write_atomically(&folder.join("extended.toml"), source.as_bytes())?;

@@ -1,7 +1,8 @@
 //! One set of explanations, fitted.
 
-use super::{EFFECT, EXCHANGE, OUTSIDE, Question, REFITTED, STEP, WINDING, Winding, rates};
-use crate::chamber::{Assumption, Effort, Fit, Free, Input, Place, Quantity, Scale};
+use super::odds::{EFFECT, EXCHANGE, OUTSIDE, PHYSICAL, REFITTED, STATED_WITHIN, STEP, WINDING};
+use super::{Question, Winding, rates};
+use crate::chamber::{Assumption, Effort, Fit, Free, Input, Place, Scale};
 use crate::effect::DeclaredEffect;
 
 /// One thing that a set assumes beside the declared model.
@@ -42,31 +43,29 @@ pub struct Explanation {
     pub probability: f64,
 }
 
-/// How far a stated number of a model file may be off: one deviation.
-const STATED_WITHIN: f64 = 0.25;
-/// An estimate so many prior deviations away is beyond what is physical …
-const PHYSICAL: f64 = 3.5;
-/// … and a gyro's wander of so many of its white noises is no flicker any more.
-const FLICKER: f64 = 1.2;
-
 impl Explanation {
     pub fn new(question: &Question, windings: &[Winding], members: Vec<Member>, fit: Fit) -> Self {
         let prior: f64 = members
             .iter()
             .map(|m| match m {
-                Member::Effect(_) => EFFECT.0,
-                Member::Refitted(_) => REFITTED.0,
+                Member::Effect(_) => EFFECT.log,
+                Member::Refitted(_) => REFITTED.log,
                 Member::Winding(w) if windings[*w].exchanged.is_some() => {
                     let n = windings[*w].pattern.layers() as f64;
-                    EXCHANGE.0 - (0.5 * n * (n - 1.0)).ln()
+                    EXCHANGE.log - (0.5 * n * (n - 1.0)).ln()
                 }
-                Member::Winding(_) => WINDING.0,
-                Member::Step { record, .. } => STEP.0 - (question.chamber.times_s(*record).len() as f64).ln(),
-                Member::Drift | Member::Cycle => OUTSIDE.0,
+                Member::Winding(_) => WINDING.log,
+                Member::Step { record, .. } => STEP.log - (question.chamber.times_s(*record).len() as f64).ln(),
+                Member::Drift | Member::Cycle => OUTSIDE.log,
             })
             .sum();
         let merit = fit.merit(rates(question.chamber, &fit)) + prior;
-        Self { members, fit, merit, held_out: None, probability: 0.0 }
+        let mut explanation = Self { members, fit, merit, held_out: None, probability: 0.0 };
+        if explanation.is_beyond_physical() {
+            // Whatever it is, it is not what it is called.
+            explanation.merit += OUTSIDE.log;
+        }
+        explanation
     }
 
     /// The members in an order of their own.
@@ -80,11 +79,9 @@ impl Explanation {
         self.merit + self.held_out.unwrap_or(0.0)
     }
 
-    /// Whether something is in it that no known effect explains: a member that says so, a gyro that wanders more than
-    /// gyros do, an estimate beyond what is physical.
+    /// Whether something is in it that no known effect explains: a member that says so, an estimate beyond what is physical.
     pub fn is_outside(&self) -> bool {
-        let wanders = self.fit.records.iter().any(|&r| self.fit.number(Quantity::WanderShare, r) > FLICKER);
-        wanders || self.members.iter().any(|m| m.is_outside()) || self.is_beyond_physical()
+        self.members.iter().any(|m| m.is_outside()) || self.is_beyond_physical()
     }
 
     pub fn is_beyond_physical(&self) -> bool {

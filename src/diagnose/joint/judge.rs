@@ -2,28 +2,42 @@
 
 use rayon::prelude::*;
 
-use super::explanation::fitted;
+use super::explanation::{fitted, without};
+use super::odds::{CERTAIN, WINDOW};
 use super::{Explanation, Question, Winding};
 use crate::chamber::{ChamberError, Effort};
 
-/// Sets so much worse than the best are forgotten.
-const WINDOW: f64 = 20.0;
 /// Sets that are judged by held-out records at most.
 const JUDGED: usize = 8;
-/// A set that is better than one within it by less than this is that one.
-const AS_GOOD: f64 = 3.0;
-/// What a set with an estimate beyond what is physical must be better by to be heard.
-const UNPHYSICAL: f64 = 30.0;
+/// … and sets whose smaller ones begin again from what was found with them.
+const LOOKED_INTO: usize = 3;
 
 /// Held-out records, posterior masses, and what is as good without some of its members.
 pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mut Vec<Explanation>) {
-    // A size that no coil has is no explanation beside one that does nearly as well.
-    let physical =
-        explanations.iter().filter(|e| !e.is_beyond_physical()).map(|e| e.merit).fold(f64::NEG_INFINITY, f64::max);
-    explanations.retain(|e| e.members.is_empty() || !e.is_beyond_physical() || e.merit > physical + UNPHYSICAL);
     let order = |list: &mut Vec<Explanation>| {
         list.sort_by(|a, b| b.total().total_cmp(&a.total()).then_with(|| a.key().cmp(&b.key())))
     };
+    order(explanations);
+    // What a larger set has found of the chamber may be better for a smaller one, too.
+    let again: Vec<Explanation> = explanations
+        .iter()
+        .take(LOOKED_INTO)
+        .flat_map(|e| (0..e.members.len()).map(move |place| (e, place)))
+        .collect::<Vec<_>>()
+        .into_par_iter()
+        .filter_map(|(large, place)| {
+            let mut members = large.members.clone();
+            members.remove(place);
+            fitted(question, windings, members, &without(question, large, place), &large.fit, Effort::QUICK)
+        })
+        .collect();
+    for small in again {
+        match explanations.iter_mut().find(|e| e.key() == small.key()) {
+            Some(known) if small.merit > known.merit => *known = small,
+            Some(_) => {}
+            None => explanations.push(small),
+        }
+    }
     order(explanations);
     let least = explanations.first().map_or(0.0, |e| e.merit) - WINDOW;
     let mut kept = 0;
@@ -66,7 +80,7 @@ pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mu
                 let (a, b) = (&explanations[small], &explanations[large]);
                 a.members.len() < b.members.len()
                     && a.members.iter().all(|m| b.members.contains(m))
-                    && a.total() > b.total() - AS_GOOD
+                    && a.total() > b.total() - CERTAIN.log
             })
             .max_by(|&a, &b| explanations[a].total().total_cmp(&explanations[b].total()));
         if let Some(small) = within {

@@ -10,6 +10,7 @@
 
 mod explanation;
 mod judge;
+mod odds;
 mod search;
 mod winding;
 
@@ -31,6 +32,8 @@ pub struct Question<'a> {
     /// Places of the records to fit, and of those that are held out.
     pub fitted: Vec<usize>,
     pub held_out: Vec<usize>,
+    /// Members that a set may have.
+    pub depth: usize,
 }
 
 /// What the search found.
@@ -49,23 +52,6 @@ impl Found {
         self.explanations.iter().find(|e| e.members.is_empty())
     }
 }
-
-/// A natural logarithm of a prior odds, with its reason.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Odds(pub f64);
-
-/// One effect of the catalogue is missing in one coil of twenty.
-pub(super) const EFFECT: Odds = Odds(-3.0);
-/// A number of a model file is wrong in one of ten.
-pub(super) const REFITTED: Odds = Odds(-2.3);
-/// One coil in fifty is wound, or connected, as another classic or the other way round …
-pub(super) const WINDING: Odds = Odds(-3.9);
-/// … and one in a hundred has two of its layers exchanged, whichever they are.
-pub(super) const EXCHANGE: Odds = Odds(-4.6);
-/// Wander, or a cycle, that belongs to nothing in the model.
-pub(super) const OUTSIDE: Odds = Odds(-3.0);
-/// A step of the offset somewhere in a record.
-pub(super) const STEP: Odds = Odds(-3.9);
 
 pub(super) type Outcome<T> = Result<T, ChamberError>;
 

@@ -12,8 +12,6 @@ use crate::chamber::{Assumption, Effort, Fit, Free, Quantity};
 use crate::effect::DeclaredEffect;
 use crate::units::Unit;
 
-/// Effects that a model may lack at once.
-const MOST_MEMBERS: usize = 4;
 /// Members that are fitted after each score test, as far as they promise this much …
 const TRIED: usize = 6;
 const WORTH_A_FIT: f64 = 3.0;
@@ -23,8 +21,6 @@ const WORTH_BESIDE: f64 = 0.08;
 const PLAIN: f64 = 25.0;
 /// A set must be better by so much to go on from.
 const WORTH_A_STEP: f64 = 1.0;
-/// The record begins in a ramp if that gains so much: it is a property of the day, not of the coil.
-const UNSTEADY: f64 = 3.0;
 /// Periods of a cycle and times of an offset step, as shares of the record.
 const CYCLES: [f64; 3] = [0.06, 0.15, 0.4];
 const STEPS: usize = 60;
@@ -35,28 +31,18 @@ type Begin = (Assumption, Vec<Free>);
 /// Sets that were fitted, by their members.
 type Cache = BTreeMap<Vec<Member>, Explanation>;
 
-/// Searches sets of explanations; `progress` is told the share that is done.
+/// Searches sets of explanations from a fit of the declared model; `progress` is told the share that is done.
 ///
 /// # Errors
 /// A declared model that cannot be solved for these records.
-pub fn search(question: &Question, progress: &(dyn Fn(f64) + Sync)) -> Outcome<Found> {
-    let chamber = question.chamber;
-    let declared = Assumption::new(question.model.clone(), question.pattern.clone());
-    let mut null = chamber.fit_anew(&declared, &[], &question.fitted)?;
-    let mut moving = declared;
-    moving.unsteady = true;
-    if let Ok(unsteady) = chamber.fit(&moving, &[], &question.fitted, Some(&null), Effort::FULL)
-        && unsteady.evidence > null.evidence + UNSTEADY
-    {
-        null = unsteady;
-    }
+pub fn search(question: &Question, null: Fit, progress: &(dyn Fn(f64) + Sync)) -> Outcome<Found> {
     progress(0.2);
     let mut windings: Vec<Winding> = Vec::new();
     let mut cache = Cache::new();
     let mut best = Explanation::new(question, &windings, Vec::new(), null);
     cache.insert(best.key(), best.clone());
     let mut promised = Vec::new();
-    for stage in 0..MOST_MEMBERS {
+    for stage in 0..question.depth {
         let mut proposals = proposals(question, &best)?;
         if stage == 0 {
             // Where a gyro that wanders as gyros do is enough, nothing is wound otherwise.
@@ -78,7 +64,7 @@ pub fn search(question: &Question, progress: &(dyn Fn(f64) + Sync)) -> Outcome<F
             }
             keep(&mut cache, explanation);
         }
-        progress(0.2 + 0.6 * (stage + 1) as f64 / MOST_MEMBERS as f64);
+        progress(0.2 + 0.6 * (stage + 1) as f64 / question.depth as f64);
         let Some(next) = next else { break };
         let next = calmed(question, &windings, next);
         keep(&mut cache, next.clone());

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use crate::chamber::EffectEstimate;
 use crate::diagnose::experiment::Experiment;
 use crate::diagnose::{
-    Contender, Diagnosis, Equivalent, Finding, FittedParameter, Hypothesis, OffsetStep, Plain, RecordNoise, Refitted,
-    Rung, Shape, Share, Unexplained, Verdict,
+    Contender, Diagnosis, Equivalent, Finding, FittedParameter, Hypothesis, OffsetStep, Plain, Refitted, Rung, Shape,
+    Share, Unexplained, Verdict,
 };
 use crate::effect::DeclaredEffect;
 use crate::units::deg_per_h_from_rad_per_s;
@@ -16,6 +16,7 @@ use crate::units::deg_per_h_from_rad_per_s;
 use super::comparison::CompareJson;
 use super::experiment::ExperimentJson;
 use super::inputs::InputsJson;
+pub use super::noise::{NoiseJson, RemedyJson};
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DiagnosisJson {
@@ -109,17 +110,6 @@ pub struct OffsetStepJson {
     pub record: String,
     pub time_s: f64,
     pub size_deg_per_h: f64,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct NoiseJson {
-    pub record: String,
-    /// Of one logged rate.
-    pub white_deg_per_h: f64,
-    pub white_standard_error_deg_per_h: f64,
-    pub wander_deg_per_h: f64,
-    /// What the air did and the sensor could not see.
-    pub unresolved_air_deg_per_h: f64,
 }
 
 /// One row of a record: what the declared model and the one with the accepted effects leave.
@@ -363,18 +353,6 @@ impl HypothesisJson {
             reversed: hypothesis.reversed,
             exchanged_layers: hypothesis.exchanged.map(|(a, b)| [a, b]),
             offset_steps: hypothesis.offset_steps.iter().map(step).collect(),
-        }
-    }
-}
-
-impl NoiseJson {
-    fn new(of: &RecordNoise) -> Self {
-        Self {
-            record: of.record.clone(),
-            white_deg_per_h: deg_per_h_from_rad_per_s(of.noise.white_rad_per_s),
-            white_standard_error_deg_per_h: deg_per_h_from_rad_per_s(of.noise.white_standard_error_rad_per_s),
-            wander_deg_per_h: deg_per_h_from_rad_per_s(of.noise.wander_rad_per_s),
-            unresolved_air_deg_per_h: deg_per_h_from_rad_per_s(of.noise.unresolved_air_rad_per_s),
         }
     }
 }

@@ -8,6 +8,7 @@ pub mod further_schemas;
 pub mod improve;
 pub mod inputs;
 pub mod metrics;
+pub mod noise;
 pub mod pareto;
 pub mod schedule;
 pub mod schema;

@@ -1,0 +1,214 @@
+//! Before anything is concluded: what does not belong to a record, and where its air has kinks.
+//!
+//! Both are asked of the model itself, by what all other measurements make of each one ([`super::filter::doubts`]): a steep
+//! signal is no gross error to a model that has its slope, and a spike on it is none the less one.
+
+use rayon::prelude::*;
+
+use super::filter::{self, RATE};
+use super::fit::{Effort, Fit};
+use super::point::{BLIND_RAD2_PER_S2, CoilSide, run_kept};
+use super::prior::{GROSS_FACTOR, GROSS_SHARE, KINKS_PER_ROW, Quantity};
+use super::system::system;
+use super::{Assumption, Chamber, ChamberError};
+
+/// Times that a record is looked through for gross errors, and for kinks.
+const GROSS_ROUNDS: usize = 5;
+const KINK_ROUNDS: usize = 3;
+const KINK_PASSES: usize = 3;
+/// A value so many rows beside a worse one waits for the next round: the worse one may be why it seems one.
+const BESIDE_ROWS: usize = 4;
+/// … and a kink so many seconds beside a larger one.
+const BESIDE_S: f64 = 250.0;
+/// A record with more kinks than one in so many rows has no kinks but a curve.
+const FEWEST_ROWS_A_KINK: usize = 30;
+
+impl<'a> Chamber<'a> {
+    /// The chamber without what the model says are gross errors and with the kinks of each record's air, and the fit of
+    /// the assumption to `records`; the others are looked through with what was found for the first.
+    ///
+    /// # Errors
+    /// As [`Chamber::fit`].
+    pub fn settled(mut self, assumed: &Assumption, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
+        let mut fit = self.best_start(assumed, &[], records)?;
+        fit = self.looked_through(fit, records)?;
+        for other in (0..self.records()).filter(|r| !records.contains(r)) {
+            let day = self.fit(assumed, &[], &[other], Some(&fit), Effort::SHORT)?;
+            self.looked_through(day, &[other])?;
+        }
+        let fit = self.fit(&fit.assumed.clone(), &[], records, Some(&fit), Effort::FULL)?;
+        Ok((self, fit))
+    }
+
+    fn looked_through(&mut self, mut fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
+        for _ in 0..GROSS_ROUNDS {
+            let mut found = 0;
+            for &r in records {
+                let gross = self.gross(&fit, r)?;
+                found += gross.len();
+                gross.iter().for_each(|&(row, m)| self.observed[r].series.leave_out(row, m));
+            }
+            if found == 0 {
+                break;
+            }
+            fit = self.fit(&fit.assumed.clone(), &fit.free.clone(), records, Some(&fit), Effort::SHORT)?;
+        }
+        for &r in records {
+            // Either the air bends wherever readings do, or it is straight but for its kinks, which must be worth being
+            // looked for: the record itself says which, by itself.
+            let curved = self.fit(&fit.assumed, &[], &[r], Some(&fit), Effort::QUICK)?;
+            let before = self.observed[r].series.clone();
+            self.observed[r].series.rows.iter_mut().for_each(|row| row.bend = 0.0);
+            let price = (self.times_s(r).len() as f64).ln();
+            match self.straightened(&curved, r) {
+                Ok(Some((straight, kinks))) if straight.posterior() > curved.posterior() + price * kinks as f64 => {
+                    fit.numbers[r] = straight.numbers[r];
+                }
+                _ => {
+                    self.observed[r].series = before;
+                    fit.numbers[r] = curved.numbers[r];
+                }
+            }
+        }
+        Ok(fit)
+    }
+
+    /// Rows and measurements that are gross errors beside what all others say.
+    fn gross(&self, fit: &Fit, record: usize) -> Result<Vec<(usize, usize)>, ChamberError> {
+        let place = self.place(fit.assumed.clone(), fit.numbers.clone(), &[record], &fit.courses)?;
+        let (Some(side), Some(values)) = (&place.sides[record], &place.values[record]) else {
+            return Err(ChamberError::Unsolvable);
+        };
+        let observed = &self.observed[record];
+        let rows = &observed.series.rows;
+        let (system, trace) = run_kept(side, &place.assumed, &place.numbers[record], observed, values);
+        let doubts = filter::doubts(&system, rows, &trace);
+        let mut by_measurement: Vec<Vec<f64>> = vec![vec![0.0; rows.len()]; filter::MEASURED];
+        let mut next = 0;
+        for (k, row) in rows.iter().enumerate() {
+            for (m, _) in row.measured.iter().enumerate().filter(|(_, h)| h.is_some()) {
+                by_measurement[m][k] = doubts.values[next].abs();
+                next += 1;
+            }
+        }
+        // Where a normal value is as likely as one of the few that are so much wider.
+        let limit = (2.0 * (GROSS_FACTOR * (1.0 - GROSS_SHARE) / GROSS_SHARE).ln()).sqrt();
+        let mut found = Vec::new();
+        for (m, doubts) in by_measurement.iter().enumerate() {
+            found.extend(peaks(doubts, BESIDE_ROWS).filter(|&k| doubts[k] > limit).map(|k| (k, m)));
+        }
+        Ok(found)
+    }
+
+    /// Finds the kinks of a record whose air is straight but for them, and the fit with them; None where there are so many
+    /// that it is all curves.
+    fn straightened(&mut self, fit: &Fit, record: usize) -> Result<Option<(Fit, usize)>, ChamberError> {
+        let mut day = self.fit(&fit.assumed, &[], &[record], Some(fit), Effort::SHORT)?;
+        let rows = self.times_s(record).len();
+        let mut count = 0;
+        for _ in 0..KINK_ROUNDS {
+            let mut found = 0;
+            // With numbers as they are until nothing is found, and again once they have been fitted to that.
+            for _ in 0..KINK_PASSES {
+                let new = self.kinks(&day, record)?;
+                for &(row, size) in &new {
+                    // Between two rows a kink is one at either.
+                    let near = row.saturating_sub(1)..(row + KINK_ROWS - 1).min(rows);
+                    self.observed[record].series.rows[near].iter_mut().for_each(|r| r.kink += size * size);
+                }
+                found += new.len();
+                if new.is_empty() {
+                    break;
+                }
+            }
+            count += found;
+            if count > rows / FEWEST_ROWS_A_KINK {
+                return Ok(None);
+            }
+            day = self.fit(&fit.assumed, &[], &[record], Some(&day), Effort::SHORT)?;
+            if found == 0 {
+                break;
+            }
+        }
+        let day = self.fit(&fit.assumed, &[], &[record], Some(&day), Effort::QUICK)?;
+        Ok(Some((day, count)))
+    }
+
+    /// Rows before which the air has a kink by the readings, and how large it seems [K/s].
+    fn kinks(&self, fit: &Fit, record: usize) -> Result<Vec<(usize, f64)>, ChamberError> {
+        let observed = &self.observed[record];
+        let numbers = &fit.numbers[record];
+        let side = CoilSide::new(&fit.assumed, numbers.get(Quantity::Film), self.modes, observed)?;
+        let reference = fit.courses.get(record).and_then(Option::as_ref).filter(|_| side.needs_reference());
+        let values = side.values(&fit.assumed, observed, record, reference)?;
+        let series = &observed.series;
+        let mut system = system(&side.parts(&fit.assumed), numbers, series);
+        system.variances[RATE] += BLIND_RAD2_PER_S2;
+        let trace = filter::forward(&system, &series.rows, &values, true);
+        let doubts = filter::doubts(&system, &series.rows, &trace);
+        let sizes: Vec<f64> = doubts.kinks.iter().map(|(z, _)| z.abs()).collect();
+        let beside = (BESIDE_S / series.shortest_s()).ceil() as usize;
+        // The gain must be worth a place that might have been anywhere, and the uncertainty of its size.
+        let worth = |z: f64| 0.5 * z * z > z.max(1.0).ln() - KINKS_PER_ROW.ln();
+        Ok(peaks(&sizes, beside).filter(|&k| worth(sizes[k])).map(|k| (k, doubts.kinks[k].1)).collect())
+    }
+
+    /// The best of several starts, and what it has become.
+    fn best_start(&self, assumed: &Assumption, free: &[super::Free], records: &[usize]) -> Result<Fit, ChamberError> {
+        let mut best: Option<Fit> = None;
+        let base = self.fit(assumed, free, records, None, Effort { iterations: 0, tolerance: 0.0, rounds: 1 })?;
+        let tried: Vec<Result<Fit, ChamberError>> = self
+            .starts(&base)
+            .into_par_iter()
+            .map(|start| self.fit(assumed, free, records, Some(&start), Effort::SHORT))
+            .collect();
+        for fit in tried.into_iter().flatten() {
+            if best.as_ref().is_none_or(|b| fit.posterior() > b.posterior()) {
+                best = Some(fit);
+            }
+        }
+        best.ok_or(ChamberError::Unsolvable)
+    }
+
+    /// As [`Chamber::fit`] from several chambers that differ in their ripple; the best goes on.
+    ///
+    /// # Errors
+    /// As [`Chamber::fit`].
+    pub fn fit_anew(&self, assumed: &Assumption, free: &[super::Free], records: &[usize]) -> Result<Fit, ChamberError> {
+        let best = self.best_start(assumed, free, records)?;
+        self.fit(&best.assumed.clone(), free, records, Some(&best), Effort::FULL)
+    }
+
+    fn starts(&self, base: &Fit) -> Vec<Fit> {
+        let mut base = base.clone();
+        base.courses = vec![None; self.records()];
+        let each = |&(period_s, size_k): &(f64, f64)| {
+            let base = &base;
+            RATE_NOISES.iter().map(move |noise| {
+                let mut start = base.clone();
+                for numbers in &mut start.numbers {
+                    numbers.set(Quantity::RipplePeriod, period_s);
+                    numbers.set(Quantity::RippleSize, size_k);
+                    numbers.set(Quantity::RateNoise, noise * numbers.get(Quantity::RateNoise));
+                }
+                start
+            })
+        };
+        RIPPLES.iter().flat_map(each).collect()
+    }
+}
+
+/// Ripples to begin with: period [s] and size [K]; and shares of the noise floor.
+const RIPPLES: [(f64, f64); 4] = [(90.0, 0.08), (160.0, 0.08), (300.0, 0.08), (200.0, 0.005)];
+const RATE_NOISES: [f64; 2] = [1.0, 0.2];
+/// Rows over which one kink may be spread.
+const KINK_ROWS: usize = 3;
+
+/// Places that no other within reach exceeds, from the first on.
+fn peaks(values: &[f64], reach: usize) -> impl Iterator<Item = usize> {
+    let count = values.len();
+    (0..count).filter(move |&k| {
+        let (from, to) = (k.saturating_sub(reach), (k + reach + 1).min(count));
+        values[k] > 0.0 && (from..to).all(|j| j == k || values[j] < values[k] || (values[j] <= values[k] && j > k))
+    })
+}
