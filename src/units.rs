@@ -6,7 +6,7 @@
 /// Speed of light in vacuum [m/s], exact by definition of the metre.
 pub const LIGHT_SPEED_M_PER_S: f64 = 299_792_458.0;
 
-const SECONDS_PER_HOUR: f64 = 3600.0;
+pub const SECONDS_PER_HOUR: f64 = 3600.0;
 const HOURS_PER_DAY: f64 = 24.0;
 const SECONDS_PER_MINUTE: f64 = 60.0;
 const DEGREES_PER_RADIAN: f64 = 180.0 / std::f64::consts::PI;

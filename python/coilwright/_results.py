@@ -207,6 +207,9 @@ class PatternResult(Result):
     worst_profile: str
     worst_time_s: float
     guaranteed_worst_rate_deg_per_h: float | None
+    grid_margin_deg_per_h: float | None
+    worst_pointing_error_deg: float | None
+    guaranteed_pointing_error_deg: float | None
     windability: Windability
 
     _parts = {"windability": Windability}
@@ -228,6 +231,7 @@ class Proof(Result):
     __slots__ = ()
     status: str
     lower_bound_deg_per_h: float | None
+    grid_margin_deg_per_h: float | None
 
 
 _PATTERN_COLUMNS = (

@@ -265,7 +265,7 @@ pub fn exact(
     let file = Arc::clone(&model.file);
     let starts = all_named(py, &patterns, file.model.coil.layers())?;
     let class = class_of(py, windability)?.unwrap_or(file.search.windability);
-    let objective = objective_of(py, objective)?.unwrap_or(Objective::WorstRate);
+    let objective = objective_of(py, objective)?.unwrap_or(file.search.objective);
     let budget = duration_of(py, "budget_s", budget_s)?;
     let worked = work(py, progress, move |watcher| {
         let started = Instant::now();

@@ -158,7 +158,7 @@ mod tests {
             ("lagging", plain.clone(), 40.0),
             ("bent", HeatPath { conductivity_slope_per_k: 0.003, ..plain.clone() }, 0.0),
             ("half space", HeatPath { extent: Extent::HalfSpace, ..plain.clone() }, 0.0),
-            ("flange", HeatPath { flange, axial_slices: 8, ..plain.clone() }, 0.0),
+            ("flange", HeatPath { flange, ..plain.clone() }, 0.0),
             ("in the air", HeatPath { location: Location::Ambient, film_w_per_m2_k: Some(25.0), ..plain }, 20.0),
         ];
         for (name, path, lag_s) in paths {

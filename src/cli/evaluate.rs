@@ -52,6 +52,8 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
                 p.name.clone(),
                 format!("{:.4}", p.worst_rate_deg_per_h),
                 p.guaranteed_worst_rate_deg_per_h.map_or("-".to_owned(), |g| format!("{g:.4}")),
+                p.grid_margin_deg_per_h.map_or("-".to_owned(), |m| format!("{m:.1e}")),
+                p.worst_pointing_error_deg.map_or("-".to_owned(), |p| format!("{p:.5}")),
                 format!("{:.3e}", p.worst_phase_rad),
                 p.worst_profile.clone(),
                 format!("{:.2}", p.worst_time_s),
@@ -61,7 +63,19 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
             ]
         });
         table(
-            &["pattern", "worst °/h", "guaranteed °/h", "phase rad", "profile", "at s", "class", "reels", "climb"],
+            &[
+                "pattern",
+                "worst °/h",
+                "guaranteed °/h",
+                "grid ± °/h",
+                "pointing °",
+                "phase rad",
+                "profile",
+                "at s",
+                "class",
+                "reels",
+                "climb",
+            ],
             rows,
         )
     })?;

@@ -23,7 +23,7 @@ use crate::text::sink::TomlComment;
 /// The best winding of a class with a proof, or a lower bound on what any winding can reach
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "The proof holds for the worst rate over all times of the model's profiles, or for another --objective. \"optimal\": no winding of the class is\n\
+    after_help = "The proof holds for the worst rate over all times of the model's profiles, or for another objective, the model's own or --objective. \"optimal\": no winding of the class is\n\
     better by more than one part in 10^9; \"gap\": none is better than the lower bound.\n\n\
     Examples:\n  coilwright exact examples/paper-200m.toml\n  \
     coilwright exact examples/paper-200m.toml --windability any --budget 5m -o best.toml"
@@ -34,7 +34,7 @@ pub struct Arguments {
     /// What can be wound: standard, captive:K or any; without it, the model's own
     #[arg(long, value_name = "CLASS", value_parser = parse_class)]
     windability: Option<WindabilityClass>,
-    /// What is proved to be small: worst-rate, rms or guaranteed-rate; without it, worst-rate
+    /// What is proved to be small: worst-rate, rms or guaranteed-rate; without it, the model's own
     #[arg(long, value_name = "WHAT", value_parser = parse_objective)]
     objective: Option<Objective>,
     /// Gives up after this time, e.g. 30s or 5m, with the lower bound reached until then
@@ -62,7 +62,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let class = arguments.windability.unwrap_or(file.search.windability);
     let request = Request {
         class,
-        objective: arguments.objective.unwrap_or(Objective::WorstRate),
+        objective: arguments.objective.unwrap_or(file.search.objective),
         starts: patterns_asked(&file, &arguments.pattern)?.into_iter().map(|named| named.pattern).collect(),
         seed: arguments.seed.unwrap_or(file.search.seed),
         ..Request::new(&file)
@@ -100,7 +100,14 @@ fn text(body: &ExactJson) -> String {
     let best = &body.best;
     let segments: Vec<String> = best.segments.iter().map(ToString::to_string).collect();
     let proof = match (body.proof.status.as_str(), body.proof.lower_bound_deg_per_h) {
-        ("optimal", _) => format!("optimal: no winding of the class {} is better", body.windability),
+        ("optimal", _) => format!(
+            "optimal: no winding of the class {} is better by more than {}",
+            body.windability,
+            body.proof
+                .grid_margin_deg_per_h
+                .filter(|m| *m > 0.0)
+                .map_or_else(|| "rounding".to_owned(), |m| format!("the {m:.1e} °/h that the grid may be off"))
+        ),
         (_, Some(bound)) => format!(
             "gap: no winding of the class {} is below {bound:.6} °/h, {:.1} % under the best known",
             body.windability,
@@ -114,11 +121,12 @@ fn text(body: &ExactJson) -> String {
         format!("proof is of the {}\n", body.objective)
     };
     format!(
-        "{what}best     {}: {}\nworst    {:.6} °/h, under {} at {:.2} s\nproof    {proof}\n\
+        "{what}best     {}: {}\nworst    {:.6} °/h{}, under {} at {:.2} s\nproof    {proof}\n\
          effort   {} nodes, {} windings judged in full, {:.2} s\n",
         best.name,
         segments.join(" "),
         best.worst_rate_deg_per_h,
+        best.grid_margin_deg_per_h.filter(|m| *m > 0.0).map_or_else(String::new, |m| format!(" ± {m:.1e} by the grid")),
         best.worst_profile,
         best.worst_time_s,
         body.nodes,

@@ -29,6 +29,7 @@ mod schema;
 pub mod screen;
 mod temperatures;
 mod tolerance;
+mod trim;
 mod verify;
 mod watch;
 mod watching;
@@ -110,6 +111,7 @@ enum Command {
     Metrics(metrics::Arguments),
     Diagnose(diagnose::Arguments),
     Extend(extend::Arguments),
+    Trim(trim::Arguments),
     Improve(improve::Arguments),
     Schema(schema::Arguments),
     Completions(completions::Arguments),
@@ -239,6 +241,7 @@ fn carry_out(command: &Command, screen: &Screen) -> Result<Ending, CliError> {
         Command::Metrics(arguments) => metrics::run(arguments, screen),
         Command::Diagnose(arguments) => diagnose::run(arguments, screen),
         Command::Extend(arguments) => extend::run(arguments, screen),
+        Command::Trim(arguments) => trim::run(arguments, screen),
         Command::Improve(arguments) => improve::run(arguments, screen),
         Command::Schema(arguments) => schema::run(arguments, screen),
         Command::Completions(arguments) => completions::run(arguments, screen),

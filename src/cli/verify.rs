@@ -43,10 +43,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         text.push_str(&format!("worked out again:\n{}", listed(&body.recomputed)));
         if let Some(tolerance) = body.rate_tolerance_deg_per_h {
             let of_profiles = if profiles == 1 { "1 profile".to_owned() } else { format!("{profiles} profiles") };
-            let finer = body.finer_worst_rate_deg_per_h.map_or(String::new(), |finer| {
-                format!("; a finer heat network gives {finer:.4} °/h for the same winding")
-            });
-            text.push_str(&format!("  (over {of_profiles}, compared to ±{tolerance:.1e} °/h{finer})\n"));
+            text.push_str(&format!("  (over {of_profiles}, compared to ±{tolerance:.1e} °/h)\n"));
         }
         text.push_str(&format!("taken as given:\n{}", listed(&body.taken_as_given)));
         text

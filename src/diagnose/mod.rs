@@ -24,6 +24,7 @@ mod field;
 mod joint;
 pub mod plain;
 mod standing;
+pub mod trim;
 
 use thiserror::Error;
 

@@ -5,6 +5,7 @@ pub mod coloured;
 pub mod exponential;
 pub mod expression;
 mod kalman;
+pub mod lobatto;
 pub mod maximise;
 pub mod noise;
 pub mod piecewise;

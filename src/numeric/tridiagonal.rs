@@ -1,15 +1,16 @@
-//! Eigenvalues of a symmetric tridiagonal matrix, with its eigenvectors seen through given rows only.
+//! Eigenvalues of a symmetric matrix, with its eigenvectors seen through given rows only.
 //!
 //! ```text
-//! T = V diag(λ) Vᵀ,   wanted: λ and R V for a few rows R
+//! S = Q T Qᵀ,   T = V diag(λ) Vᵀ,   wanted: λ and R Q V for a few rows R
 //! ```
 //!
-//! A general symmetric solver first reduces a full matrix and then rotates all n rows of V. Here the matrix is
-//! tridiagonal already and the rotations act on the wanted rows only, which takes a little more than half the time (see
-//! `benches/thermal.rs`); a test compares the result with the general solver of nalgebra.
+//! A general symmetric solver rotates all n rows of Q V. Here reflections and rotations act on the wanted rows only, which
+//! takes a little more than half the time (see `benches/thermal.rs`); a test compares the result with the general solver
+//! of nalgebra.
 //!
 //! # Source
-//! Implicit QL with Wilkinson's shift: Bowdler, Martin, Reinsch, Wilkinson, Numer. Math. 11 (1968) 293 (`tql2`).
+//! Reflections: Householder, after Golub and Van Loan, Matrix Computations, section 8.3. Implicit QL with Wilkinson's
+//! shift: Bowdler, Martin, Reinsch, Wilkinson, Numer. Math. 11 (1968) 293 (`tql2`).
 
 use nalgebra::DMatrix;
 
@@ -19,6 +20,78 @@ pub struct NotConverged;
 
 /// Sweeps for one eigenvalue before giving up; two are usual.
 const MAX_SWEEPS: usize = 60;
+
+/// The eigenvalues of a full symmetric matrix, in no particular order; `rows` becomes `rows · Q V`.
+///
+/// # Shapes
+/// `matrix` is n × n and symmetric, `rows` has n columns.
+///
+/// # Errors
+/// As [`diagonalise`].
+pub fn diagonalise_full(matrix: DMatrix<f64>, rows: &mut DMatrix<f64>) -> Result<Vec<f64>, NotConverged> {
+    let (mut diagonal, off) = reduced(matrix, rows);
+    diagonalise(&mut diagonal, &off, rows)?;
+    Ok(diagonal)
+}
+
+/// The diagonal and off-diagonal of Qᵀ S Q; `rows` becomes `rows · Q`.
+fn reduced(matrix: DMatrix<f64>, rows: &mut DMatrix<f64>) -> (Vec<f64>, Vec<f64>) {
+    let n = matrix.nrows();
+    let height = rows.nrows();
+    let mut data: Vec<f64> = matrix.data.into();
+    let seen = rows.as_mut_slice();
+    let (mut diagonal, mut off) = (Vec::with_capacity(n), Vec::with_capacity(n.saturating_sub(1)));
+    let (mut mirror, mut image, mut through) = (vec![0.0; n], vec![0.0; n], vec![0.0; height]);
+    for k in 0..n.saturating_sub(2) {
+        diagonal.push(data[k * n + k]);
+        let size = data[k * n + k + 1..(k + 1) * n].iter().map(|v| v * v).sum::<f64>().sqrt();
+        let first = data[k * n + k + 1];
+        let below = &mut mirror[k + 1..];
+        below.copy_from_slice(&data[k * n + k + 1..(k + 1) * n]);
+        off.push(-size.copysign(first));
+        // A column that is tridiagonal already needs no reflection.
+        if data[k * n + k + 2..(k + 1) * n].iter().all(|v| *v == 0.0) {
+            off[k] = first;
+            continue;
+        }
+        below[0] += size.copysign(first);
+        let twice_over_square = 2.0 / below.iter().map(|v| v * v).sum::<f64>();
+        // p = 2 S v/(vᵀv), then S ← S − v wᵀ − w vᵀ with w = p − (pᵀv/vᵀv) v.
+        image[k + 1..].fill(0.0);
+        for (j, v) in (k + 1..n).zip(below.iter()) {
+            let factor = twice_over_square * v;
+            let column = &data[j * n + k + 1..(j + 1) * n];
+            image[k + 1..].iter_mut().zip(column).for_each(|(p, s)| *p += factor * s);
+        }
+        let along = image[k + 1..].iter().zip(below.iter()).map(|(p, v)| p * v).sum::<f64>();
+        let share = 0.5 * twice_over_square * along;
+        image[k + 1..].iter_mut().zip(below.iter()).for_each(|(p, v)| *p -= share * v);
+        for j in k + 1..n {
+            let (v, w) = (mirror[j], image[j]);
+            let column = &mut data[j * n + k + 1..(j + 1) * n];
+            for ((s, a), b) in column.iter_mut().zip(&mirror[k + 1..]).zip(&image[k + 1..]) {
+                *s -= a * w + b * v;
+            }
+        }
+        through.fill(0.0);
+        for j in k + 1..n {
+            let column = &seen[j * height..(j + 1) * height];
+            through.iter_mut().zip(column).for_each(|(t, r)| *t += mirror[j] * r);
+        }
+        for j in k + 1..n {
+            let factor = twice_over_square * mirror[j];
+            let column = &mut seen[j * height..(j + 1) * height];
+            column.iter_mut().zip(&through).for_each(|(r, t)| *r -= factor * t);
+        }
+    }
+    for k in n.saturating_sub(2)..n {
+        diagonal.push(data[k * n + k]);
+        if k + 1 < n {
+            off.push(data[k * n + k + 1]);
+        }
+    }
+    (diagonal, off)
+}
 
 /// Replaces `diagonal` by the eigenvalues and `rows` by `rows · V`, both in the same (no particular) order.
 ///
@@ -127,6 +200,24 @@ mod tests {
             for (found, expected) in values.iter().zip(&expected) {
                 assert!((found - expected).abs() < 1e-13 * scale, "{n}: {found} {expected}");
             }
+        }
+    }
+
+    #[test]
+    fn a_full_matrix_is_rebuilt_from_its_eigenvalues_and_rows() {
+        for n in [1, 2, 3, 8, 41] {
+            let half = DMatrix::from_fn(n, n, |i, j| ((3 * i + 7 * j) % 11) as f64 - 4.0 + 10f64.powi((i % 3) as i32));
+            let mut full = &half + half.transpose();
+            // A band, as of spectral elements, beside what couples everything.
+            if n == 41 {
+                full =
+                    DMatrix::from_fn(n, n, |i, j| if i / 8 == j / 8 || i.abs_diff(j) < 2 { full[(i, j)] } else { 0.0 });
+            }
+            let mut rows = DMatrix::identity(n, n);
+            let values = diagonalise_full(full.clone(), &mut rows).unwrap();
+            let rebuilt = &rows * DMatrix::from_diagonal(&nalgebra::DVector::from_vec(values)) * rows.transpose();
+            assert!((rebuilt - &full).amax() < 1e-13 * full.amax(), "{n}");
+            assert!((&rows * rows.transpose() - DMatrix::identity(n, n)).amax() < 1e-13, "{n}");
         }
     }
 

@@ -1,8 +1,9 @@
 //! What a search answers: the best pattern beside the classics, what is known about it, and what to wind.
 
 use super::anneal::rounds::{State, Stop};
+use super::aside::GridCheck;
 use super::cutting::Cuts;
-use super::evaluator::{GridCheck, Judged};
+use super::evaluator::Judged;
 use super::outlook::OtherBoundary;
 use super::proof::{Certificate, Status};
 use super::prospect::{Gain, Prospect};
@@ -61,16 +62,25 @@ pub struct Proof {
     pub status: Status,
     /// No pattern of the class is below this; zero where nothing is proved.
     pub lower_bound_rad_per_s: f64,
+    /// By how much the grid may put the best pattern's rate, and that of any other, off the continuum's.
+    pub grid_margin_rad_per_s: f64,
     /// The time was over before the proof was.
     pub was_cut_short: bool,
 }
 
 impl Proof {
-    pub const NONE: Proof = Proof { status: Status::None, lower_bound_rad_per_s: 0.0, was_cut_short: false };
+    pub const NONE: Proof =
+        Proof { status: Status::None, lower_bound_rad_per_s: 0.0, grid_margin_rad_per_s: 0.0, was_cut_short: false };
 
     pub fn of(certificate: &Certificate) -> Self {
         let Certificate { status, lower_bound_rad_per_s, .. } = *certificate;
-        Self { status, lower_bound_rad_per_s, was_cut_short: status != Status::Optimal }
+        Self { status, lower_bound_rad_per_s, grid_margin_rad_per_s: 0.0, was_cut_short: status != Status::Optimal }
+    }
+
+    /// With what the grid may be off for any pattern: the lower bound then holds for the continuum.
+    pub fn beside_grid(self, grid_margin_rad_per_s: f64) -> Self {
+        let lower_bound_rad_per_s = (self.lower_bound_rad_per_s - grid_margin_rad_per_s).max(0.0);
+        Self { lower_bound_rad_per_s, grid_margin_rad_per_s, ..self }
     }
 
     /// To be said after how good the best pattern is; `what` is the objective in words.

@@ -8,8 +8,10 @@ use crate::pattern::windability::WindabilityClass;
 use crate::profile::{Profile, ProfileSpec};
 use crate::rate::{CoilModel, RateModel};
 use crate::search::anneal::rounds::{Found, MOST_FOUND};
+use crate::search::aside::{Aside, GridCheck, GridChecked, PointingError};
 use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
-use crate::search::cost::objective::Objective;
+use crate::search::cost::objective::{Objective, POINTING_S};
+use crate::search::cost::pointing::worst_pointing;
 use crate::search::cost::tolerance::{Coils, ToleranceError, ToleranceSpec};
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles, WorstCase};
 use crate::search::proof::permutation_tree::MOST_LAYERS;
@@ -41,6 +43,10 @@ pub struct Judged {
     pub p95_rad_per_s: Option<f64>,
     /// The objective by the reference, in rad/s.
     pub objective_rad_per_s: f64,
+    /// By how much the worst and the guaranteed rate may be off the continuum's; None before it was asked for.
+    pub grid_margin_rad_per_s: Option<f64>,
+    /// None before it was asked for.
+    pub pointing: Option<PointingError>,
 }
 
 /// What a pattern is judged by.
@@ -75,50 +81,6 @@ const BEAM_WIDTH: usize = 1 << 14;
 
 /// Patterns that the improvement begins with, besides the best.
 const MOST_STARTS: usize = 6;
-
-/// A worst rate that a finer grid changes by more than this is not to be relied upon.
-const GRID_CAUTION: f64 = 0.005;
-
-/// A worst rate on the model's grid and on one twice as fine.
-#[derive(Debug, Clone, PartialEq)]
-pub struct GridChecked {
-    pub name: String,
-    pub rate_rad_per_s: f64,
-    pub finer_rad_per_s: f64,
-}
-
-impl GridChecked {
-    /// By how much the finer grid changes the rate, over the rate.
-    pub fn change(&self) -> f64 {
-        if self.rate_rad_per_s == 0.0 { 0.0 } else { self.finer_rad_per_s / self.rate_rad_per_s - 1.0 }
-    }
-}
-
-/// The worst rates of a search's best pattern, first, and of QUA on two grids: a search makes use of whatever a coarse
-/// grid hides, so its best gains most from the grid's error.
-#[derive(Debug, Clone, PartialEq)]
-pub struct GridCheck {
-    pub cells_per_layer: usize,
-    pub finer_cells_per_layer: usize,
-    pub patterns: Vec<GridChecked>,
-}
-
-impl GridCheck {
-    /// What to say where the grid matters.
-    pub fn caution(&self) -> Option<String> {
-        let best = self.patterns.first().filter(|best| best.change().abs() > GRID_CAUTION)?;
-        Some(format!(
-            "Caution: with {} instead of {} cells a layer its worst rate error is {:.4} °/h, {:.1} % {}. \
-             Set thermal.cells_per_layer = {} and search again.",
-            self.finer_cells_per_layer,
-            self.cells_per_layer,
-            deg_per_h_from_rad_per_s(best.finer_rad_per_s),
-            percent_from_fraction(best.change().abs()),
-            if best.change() > 0.0 { "more" } else { "less" },
-            self.finer_cells_per_layer,
-        ))
-    }
-}
 
 /// Relative difference below which two patterns count as equally good.
 pub const EQUALLY_GOOD: f64 = 1e-9;
@@ -169,6 +131,7 @@ impl Evaluator<'_> {
             Objective::RootMeanSquare => crate::search::cost::objective::rms_rad_per_s(&rate_model, self.solved),
             Objective::GuaranteedRate => or_none(guaranteed_rad_per_s),
             Objective::P95 => or_none(p95),
+            Objective::Pointing => worst_pointing(self.model, self.solved, pattern)?.rate_rad_per_s.abs() / POINTING_S,
         };
         Ok(Judged {
             name: name.to_owned(),
@@ -178,6 +141,8 @@ impl Evaluator<'_> {
             p95_rad_per_s: p95,
             worst,
             objective_rad_per_s,
+            grid_margin_rad_per_s: None,
+            pointing: None,
         })
     }
 
@@ -205,16 +170,61 @@ impl Evaluator<'_> {
         }
         let finer_cells_per_layer = 2 * path.cells_per_layer;
         let finer = CoilModel { cells_per_layer: finer_cells_per_layer, ..self.model.clone() };
-        let profiles: Vec<Profile> = self.solved.profiles().iter().map(|p| p.profile.clone()).collect();
-        let solved = SolvedProfiles::new(&finer, &profiles)?;
         let qua = baselines.iter().find(|b| b.name == Classic::Qua.key() && b.pattern != best.pattern);
-        let checked = |judged: &Judged| {
-            let finer_rad_per_s = solved.worst_case(&finer, &judged.pattern)?.rate_rad_per_s.abs();
-            let rate_rad_per_s = judged.worst.rate_rad_per_s.abs();
-            Ok(GridChecked { name: judged.name.clone(), rate_rad_per_s, finer_rad_per_s })
+        let step = (self.objective == Objective::GuaranteedRate)
+            .then(|| UnitStep::new(&finer, self.profiles.max_rate_k_per_s).ok())
+            .flatten();
+        let checked = |judged: &Judged, rate_rad_per_s: f64, finer_rad_per_s: f64| GridChecked {
+            name: judged.name.clone(),
+            rate_rad_per_s,
+            finer_rad_per_s,
         };
-        let patterns = std::iter::once(best).chain(qua).map(checked).collect::<Result<_, SearchError>>()?;
-        Ok(Some(GridCheck { cells_per_layer: path.cells_per_layer, finer_cells_per_layer, patterns }))
+        let asked = std::iter::once(best).chain(qua);
+        let patterns = match &step {
+            Some(step) => asked
+                .map(|judged| match step.guaranteed(&finer, &judged.pattern) {
+                    Ok(found) => Ok(checked(judged, judged.objective_rad_per_s, found.rate_rad_per_s)),
+                    Err(GuaranteedError::Search(error)) => Err(error),
+                    Err(GuaranteedError::Effect { .. }) => {
+                        Ok(checked(judged, judged.objective_rad_per_s, judged.objective_rad_per_s))
+                    }
+                })
+                .collect::<Result<_, SearchError>>()?,
+            None => {
+                let profiles: Vec<Profile> = self.solved.profiles().iter().map(|p| p.profile.clone()).collect();
+                let solved = SolvedProfiles::new(&finer, &profiles)?;
+                asked
+                    .map(|judged| {
+                        let finer_rad_per_s = solved.worst_case(&finer, &judged.pattern)?.rate_rad_per_s.abs();
+                        Ok(checked(judged, judged.worst.rate_rad_per_s.abs(), finer_rad_per_s))
+                    })
+                    .collect::<Result<_, SearchError>>()?
+            }
+        };
+        Ok(Some(GridCheck {
+            is_of_guaranteed: step.is_some(),
+            cells_per_layer: path.cells_per_layer,
+            finer_cells_per_layer,
+            patterns,
+        }))
+    }
+
+    /// With what the grid may put its rates off, and with its pointing error.
+    ///
+    /// # Errors
+    /// None that a model which could be solved would cause.
+    pub fn completed(&self, aside: &Aside, judged: Judged) -> Result<Judged, SearchError> {
+        let steepest = self.steepest_k_per_s();
+        let grid_margin_rad_per_s = Some(aside.margin.of(self.solved, &judged.pattern, steepest)?);
+        let pointing =
+            Some(aside.pointing(self.model, self.solved, &judged.pattern, self.profiles.max_rate_k_per_s)?);
+        Ok(Judged { grid_margin_rad_per_s, pointing, ..judged })
+    }
+
+    /// The largest rate of the drive that any number here is about.
+    pub fn steepest_k_per_s(&self) -> f64 {
+        let of_profiles = self.solved.profiles().iter().map(|p| p.profile.max_rate_k_per_s());
+        of_profiles.fold(self.profiles.max_rate_k_per_s, f64::max)
     }
 
     /// What a proof for the objective is about; `None` for a quantile over built coils, and for a guaranteed worst case
@@ -224,7 +234,7 @@ impl Evaluator<'_> {
             Objective::WorstRate | Objective::WorstPhase => Some(Goal::WorstRate),
             Objective::RootMeanSquare => Some(Goal::RootMeanSquare),
             Objective::GuaranteedRate => self.unit_step.map(Goal::Guaranteed),
-            Objective::P95 => None,
+            Objective::P95 | Objective::Pointing => None,
         }
     }
 
@@ -328,7 +338,7 @@ impl Evaluator<'_> {
             Location::OuterLayer => "with the outermost layer's temperature prescribed",
             Location::Ambient => "with the ambient temperature prescribed",
         };
-        let what = self.objective.title();
+        let (what, unit) = (self.objective.title(), self.objective.unit());
         let shown = |judged: &Judged| deg_per_h_from_rad_per_s(judged.objective_rad_per_s);
         let count = self.solved.profiles().len();
         let over = match self.objective {
@@ -341,7 +351,7 @@ impl Evaluator<'_> {
         let Some(qua) = baselines.iter().find(|b| b.name == Classic::Qua.key()) else {
             return format!(
                 "There is no QUA to compare with: {} layers are no multiple of 4. The best pattern found has a {what} \
-                 of {:.4} °/h {scope}.",
+                 of {:.4} {unit} {scope}.",
                 best.pattern.layers(),
                 shown(best)
             );
@@ -358,13 +368,13 @@ impl Evaluator<'_> {
                 .collect();
             let also = if others.is_empty() { String::new() } else { format!(" (and so is {})", others.join(", ")) };
             return format!(
-                "QUA is as good as it gets{also}: no pattern with a smaller {what} than its {:.4} °/h was found {scope}.",
+                "QUA is as good as it gets{also}: no pattern with a smaller {what} than its {:.4} {unit} was found {scope}.",
                 shown(qua)
             );
         }
         let factor = qua.objective_rad_per_s / best.objective_rad_per_s;
         format!(
-            "The best pattern found has a {what} of {:.4} °/h, {} QUA's {:.4} °/h, {scope}.",
+            "The best pattern found has a {what} of {:.4} {unit}, {} QUA's {:.4} {unit}, {scope}.",
             shown(best),
             how_much_less(factor),
             shown(qua)

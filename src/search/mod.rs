@@ -2,6 +2,7 @@
 
 pub mod anneal;
 pub mod answer;
+pub mod aside;
 pub mod companions;
 pub mod compile;
 pub mod cost;

@@ -91,6 +91,8 @@ mod tests {
             guaranteed_rad_per_s: None,
             p95_rad_per_s: None,
             objective_rad_per_s,
+            grid_margin_rad_per_s: None,
+            pointing: None,
         };
         Point::new(judged)
     }

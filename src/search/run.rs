@@ -6,13 +6,14 @@ use thiserror::Error;
 
 use super::anneal::rounds::{Plan, Rounds, State, Stop};
 use super::answer::{Answer, Ended, Former, FoundBy, Proof};
+use super::aside::Aside;
 use super::cost::guaranteed::UnitStep;
 use super::cost::objective::Objective;
 use super::cost::tolerance::ToleranceSpec;
 use super::cost::worst_case::{SearchError, SolvedProfiles};
 use super::cutting::run_with_cuts;
 use super::evaluator::{EQUALLY_GOOD, Evaluator, JudgeError, Judged, improvement_over_qua};
-use super::proof::{self, Progress, prove};
+use super::proof::{self, Progress, Status, prove};
 use super::recommendation::{Advised, Context};
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
@@ -164,6 +165,15 @@ pub fn run(request: &Request, observer: &mut dyn Observer) -> Result<Option<Answ
         + &on_unseen.unwrap_or_default()
         + &proof.words(request.objective.title())
         + &caution.unwrap_or_default();
+    let aside = Aside::new(request.model, &solved)?;
+    let best = evaluator.completed(&aside, best)?;
+    let baselines =
+        baselines.into_iter().map(|b| evaluator.completed(&aside, b)).collect::<Result<Vec<Judged>, _>>()?;
+    let proof = if proof.status == Status::None {
+        proof
+    } else {
+        proof.beside_grid(aside.margin.of_any(evaluator.steepest_k_per_s())?)
+    };
     let first = search.state().first_with_best().map_or(0, |record| record.evaluations);
     Ok(Some(Answer {
         improvement_over_qua: improvement_over_qua(&best, &baselines),
@@ -309,7 +319,8 @@ fn compare_with_former(
     let (new_cost, old_cost) = (best.objective_rad_per_s, old.objective_rad_per_s);
     let best_changed = new_cost < old_cost * (1.0 - EQUALLY_GOOD);
     let what = evaluator.objective.key();
-    let shown = |cost: f64| format!("{:.4} °/h", deg_per_h_from_rad_per_s(cost));
+    let unit = evaluator.objective.unit();
+    let shown = |cost: f64| format!("{:.4} {unit}", deg_per_h_from_rad_per_s(cost));
     let (old_shown, new_shown) = (shown(old_cost), shown(new_cost));
     let statement = if best_changed {
         format!(

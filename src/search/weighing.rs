@@ -108,6 +108,8 @@ mod tests {
             guaranteed_rad_per_s: Some(guaranteed_rad_per_s),
             p95_rad_per_s: None,
             objective_rad_per_s: 1.0,
+            grid_margin_rad_per_s: None,
+            pointing: None,
         };
         let windability = WindingGraph::new(&pattern).windability();
         let unseen_rad_per_s = 1.0;

@@ -7,6 +7,7 @@ use crate::io::model::{Advice, ModelFile, NamedPattern};
 use crate::pattern::Pattern;
 use crate::profile::Profile;
 use crate::rate::RateModel;
+use crate::search::aside::Aside;
 use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
 use crate::search::cost::worst_case::{SolvedProfiles, WorstCase};
 use crate::search::outlook::OtherBoundary;
@@ -44,6 +45,9 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
         observer.note(&format!("note: {reason}"));
     }
     let after = SolvedProfiles::after_the_ends(&file.model, &file.profiles.profiles())?;
+    let steepest = solved.profiles().iter().map(|p| p.profile.max_rate_k_per_s());
+    let steepest = steepest.fold(file.profiles.max_rate_k_per_s, f64::max);
+    let aside = Aside::new(&file.model, &solved)?;
     let mut patterns = Vec::with_capacity(all.len());
     let mut extremes = Vec::new();
     for (index, NamedPattern { name, pattern }) in all.iter().enumerate() {
@@ -58,7 +62,10 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
             Err(_) => None,
         };
         let bound_rad_per_s = bound.as_ref().map(|b| b.rate_rad_per_s);
-        patterns.push(PatternJson::new(name, pattern, &worst, phase_rad, bound_rad_per_s));
+        let grid_margin_rad_per_s = aside.margin.of(&solved, pattern, steepest)?;
+        let pointing = aside.pointing(&file.model, &solved, pattern, file.profiles.max_rate_k_per_s)?;
+        let body = PatternJson::new(name, pattern, &worst, phase_rad, bound_rad_per_s);
+        patterns.push(body.with_margin(grid_margin_rad_per_s).with_pointing(&pointing));
         extremes.extend(bound.map(|b| b.profile(&format!("bang-bang-{name}"))));
     }
     if file.model.prescribes_outermost_layer() && holds_a_tie(&patterns) {

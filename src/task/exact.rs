@@ -10,6 +10,8 @@ use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
 use crate::pattern::windability::WindabilityClass;
 use crate::rate::{RateError, RateModel};
+use crate::search::answer::Proof;
+use crate::search::aside::Aside;
 use crate::search::cost::guaranteed::UnitStep;
 use crate::search::cost::objective::Objective;
 use crate::search::cost::worst_case::SolvedProfiles;
@@ -32,10 +34,10 @@ pub struct Request<'a> {
 }
 
 impl<'a> Request<'a> {
-    /// The worst rate, in the model's own class.
+    /// The model's own objective, in its own class.
     pub fn new(model: &'a ModelFile) -> Self {
         let (class, seed) = (model.search.windability, model.search.seed);
-        Self { model, class, objective: Objective::WorstRate, starts: Vec::new(), seed }
+        Self { model, class, objective: model.search.objective, starts: Vec::new(), seed }
     }
 }
 
@@ -47,6 +49,7 @@ pub struct Answer {
     pub name: String,
     /// Profiles that the proof is over.
     pub profiles: usize,
+    proof: Proof,
     best: PatternJson,
     model: String,
     class: WindabilityClass,
@@ -63,7 +66,7 @@ impl Answer {
             objective: self.objective.key().to_owned(),
             best: self.best.clone(),
             best_objective_deg_per_h: deg_per_h_from_rad_per_s(certificate.best_rad_per_s),
-            proof: ProofJson::of(certificate),
+            proof: ProofJson::of(&self.proof),
             nodes: certificate.nodes,
             judged: certificate.judged,
             rows: certificate.rows.len(),
@@ -102,8 +105,11 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
         Objective::WorstRate | Objective::WorstPhase => Goal::WorstRate,
         Objective::RootMeanSquare => Goal::RootMeanSquare,
         Objective::GuaranteedRate => Goal::Guaranteed(step.as_ref().map_err(|error| JudgeError::from(error.clone()))?),
-        Objective::P95 => {
-            let message = "proofs are of worst, guaranteed and rms rates, not of p95".to_owned();
+        Objective::P95 | Objective::Pointing => {
+            let message = format!(
+                "there is no proof of \"{}\": state worst-rate, rms or guaranteed-rate, or use optimise",
+                request.objective.key()
+            );
             return Err(TaskError::Option { option: "--objective", message });
         }
     };
@@ -129,8 +135,14 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
     let phase_rad = RateModel::new(model, pattern, &[])?.phase_rad(worst.rate_rad_per_s);
     let bound = step.and_then(|s| s.guaranteed(model, pattern)).ok();
     let name = name_of(pattern);
-    let best = PatternJson::new(&name, pattern, &worst, phase_rad, bound.map(|b| b.rate_rad_per_s));
+    let steepest = solved.profiles().iter().map(|p| p.profile.max_rate_k_per_s());
+    let steepest = steepest.fold(file.profiles.max_rate_k_per_s, f64::max);
+    let aside = Aside::new(model, &solved)?;
+    let best = PatternJson::new(&name, pattern, &worst, phase_rad, bound.map(|b| b.rate_rad_per_s))
+        .with_margin(aside.margin.of(&solved, pattern, steepest)?)
+        .with_pointing(&aside.pointing(model, &solved, pattern, file.profiles.max_rate_k_per_s)?);
     Ok(Answer {
+        proof: Proof::of(&certificate).beside_grid(aside.margin.of_any(steepest)?),
         best,
         name,
         profiles: solved.profiles().len(),

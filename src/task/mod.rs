@@ -15,6 +15,7 @@ pub mod pareto;
 pub mod schedule;
 pub mod temperatures;
 pub mod tolerance;
+pub mod trim;
 
 // They leave pages, pictures and words that pages share.
 #[cfg(feature = "report")]

@@ -93,7 +93,7 @@ impl Wishes {
         former: Option<NamedPattern>,
     ) -> Result<search::Request<'a>, TaskError> {
         let (class, objective) = (self.class(file), self.objective(file));
-        if prove && objective == Objective::P95 {
+        if prove && matches!(objective, Objective::P95 | Objective::Pointing) {
             let message = format!("proofs are of worst, guaranteed and rms rates, not of {}", objective.key());
             return Err(TaskError::Option { option: "--prove", message });
         }

@@ -340,8 +340,7 @@ mod tests {
         let shape = PackShape { layers: 12, bore_radius_m: 0.04, radial_pitch_m: 165e-6, height_m: 8.5e-3 };
         let material = Material::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 };
         let plain = HeatPath::new(shape, Extent::Pack, material, Location::OuterLayer);
-        let film =
-            HeatPath { location: Location::Ambient, film_w_per_m2_k: Some(20.0), axial_slices: 16, ..plain.clone() };
+        let film = HeatPath { location: Location::Ambient, film_w_per_m2_k: Some(20.0), ..plain.clone() };
         let spool = Spool { heat_capacity_j_per_m2_k: 4000.0, contact_w_per_m2_k: 300.0, mount_w_per_m2_k: 20.0 };
         let bore_heat = Some(BoreHeat { power_w_per_m2: 50.0, time_constant_s: 300.0 });
         let flange = Some(FlangeFilm { flange: Flange::Second, film_w_per_m2_k: 50.0 });
@@ -349,7 +348,7 @@ mod tests {
             ("plain", plain.clone()),
             ("film", film.clone()),
             ("spool and heat", HeatPath { spool: Some(spool), bore_heat, ..plain.clone() }),
-            ("flange", HeatPath { flange, axial_slices: 16, ..plain }),
+            ("flange", HeatPath { flange, ..plain }),
             ("all", HeatPath { spool: Some(spool), bore_heat, flange, ..film }),
         ]
     }

@@ -1,123 +1,161 @@
-//! The pack as finite volumes: cells from the bore outwards, a lumped spool in front of them, slices along the axis.
+//! The pack in space: spectral elements from the bore outwards, a lumped spool in front of them, elements along the axis.
 //!
 //! ```text
-//! C dT/dt = −G T + b u(t) + b_a a(t) + b_q q(t)          per radian and height
-//! k / ln(r₂/r₁)                                           conductance between two cell centres: that of a cylinder
+//! C dT/dt = −(K + X) T + b u(t) + b_a a(t) + b_q q(t)          per radian and height
+//! K_ij = ∫ k r ℓ_i' ℓ_j' dr,   C_i = ∫ ρc r ℓ_i dr,   X: films, contacts, mount
 //! ```
 //!
-//! Exact for a steady radial flow; of second order in the cell's size otherwise. The modal solution (`pack`) and the
-//! stepped one (`stepped`) are two solutions of this one network.
+//! K holds what the pack's own material conducts, X what does not depend on it. A layer's temperature is its mean over the
+//! volume, integrated exactly. The modal solution (`pack`) and the stepped one (`stepped`) are two solutions of this one
+//! network.
 //!
 //! # Source
-//! Finite volumes after Patankar, Numerical Heat Transfer and Fluid Flow (1980), chapter 4.
+//! Spectral elements with Lobatto's quadrature, see [`super::elements`].
 
-use std::ops::Range;
+use nalgebra::DMatrix;
 
-use super::{FlangeFilm, HeatPath, Location, Material};
+use super::elements::{Elements, Grading};
+use super::{Flange, HeatPath, Location, Material};
 
-/// A conductance that partly goes through the pack's own material.
+/// The narrowest element, at a surface, in layers …
+const NARROWEST_LAYERS: f64 = 0.5;
+/// … and the widest, deep inside.
+const WIDEST_LAYERS: f64 = 8.0;
+/// The narrowest element at a heated flange, in radial pitches.
+const NARROWEST_AT_FLANGE: f64 = 2.0;
+
+/// Orders of the elements with one cell a layer, across and along the axis, and what each further cell adds, up to so many.
+const ORDER: usize = 8;
+const ORDER_ALONG: usize = 6;
+const ORDER_A_CELL: usize = 2;
+const MOST_RAISED: usize = 3;
+
+fn order(first: usize, cells_per_layer: usize) -> usize {
+    first + ORDER_A_CELL * (cells_per_layer.min(MOST_RAISED) - 1)
+}
+
+/// A conductance between two nodes that is not of the material.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Link {
-    /// Conductance of the material's part per unit of its conductivity.
-    shape: f64,
-    /// Resistance of the rest (contact, film), not of the material.
-    rest: f64,
+pub(super) struct Contact {
+    /// Its two nodes: the inner one, and the next.
+    pub inner: usize,
+    pub conductance: f64,
 }
 
-impl Link {
-    fn through(length_ratio: f64) -> Self {
-        Self { shape: 1.0 / length_ratio.ln(), rest: 0.0 }
-    }
-
-    fn with_rest(self, conductance: f64) -> Self {
-        Self { rest: self.rest + 1.0 / conductance, ..self }
-    }
-
-    /// For a given conductivity of the material.
-    pub fn conductance(&self, conductivity_w_per_m_k: f64) -> f64 {
-        1.0 / (1.0 / (self.shape * conductivity_w_per_m_k) + self.rest)
-    }
-
-    /// First, second and third derivative of the conductance with respect to the material's conductivity.
-    pub fn derivatives(&self, conductivity_w_per_m_k: f64) -> [f64; 3] {
-        let held = 1.0 + self.shape * conductivity_w_per_m_k * self.rest;
-        let first = self.shape / (held * held);
-        let second = -2.0 * first * self.shape * self.rest / held;
-        [first, second, -3.0 * second * self.shape * self.rest / held]
-    }
-}
-
-/// The radial network, for one slice of the axis.
+/// The radial network, for one place of the axis.
 #[derive(Debug, Clone)]
 pub(super) struct Network {
     pub conductivity_w_per_m_k: f64,
     /// One entry a node; the spool (if any) first.
     pub capacity: Vec<f64>,
-    /// Between node i and node i + 1.
-    pub links: Vec<Link>,
-    /// From the outermost node to the drive.
-    pub to_boundary: Link,
+    /// K at the declared conductivity.
+    pub conduction: DMatrix<f64>,
+    /// Heat that the material conducts into each node per kelvin of the drive, where the drive is the outermost node.
+    pub from_drive: Vec<f64>,
+    /// Between neighbouring nodes.
+    pub contacts: Vec<Contact>,
+    /// From the drive into the last node.
+    pub film: f64,
     /// From the spool to the ambient; zero without a mount.
     pub mount: f64,
     /// The bore's heat enters node 0; this is its share per unit flux.
     pub heated: f64,
-    /// Nodes in front of the pack's first cell.
+    /// Nodes in front of the pack's first one.
     pub spool_nodes: usize,
     pub layers: usize,
-    cells_per_layer: usize,
-    /// The outermost layer is the drive itself and no node.
-    pub outermost_is_drive: bool,
+    /// The share of each node in a layer's mean, layers × nodes …
+    pub shares: DMatrix<f64>,
+    /// … and that of the drive.
+    pub drive_share: Vec<f64>,
 }
 
 impl Network {
     pub fn new(path: &HeatPath) -> Self {
         let shape = &path.shape;
-        let cells = path.cells_per_layer;
-        let width_m = shape.radial_pitch_m / cells as f64;
+        let pitch_m = shape.radial_pitch_m;
         let (conductivity, heat_capacity) = match path.material {
             Material::Conductivity { w_per_m_k, heat_capacity_j_per_m3_k } => (w_per_m_k, heat_capacity_j_per_m3_k),
             // Only the ratio matters where nothing else exchanges heat with the pack.
             Material::Diffusivity { m2_per_s } => (m2_per_s, 1.0),
         };
-        let edge_m = |i: usize| shape.bore_radius_m + i as f64 * width_m;
-        let centre_m = |i: usize| edge_m(i) + 0.5 * width_m;
-        let outermost_is_drive = path.location == Location::OuterLayer;
-        // Where the outermost layer's middle carries the drive, only its inner half is left to solve.
-        let count = if outermost_is_drive { (shape.layers - 1) * cells + cells / 2 } else { shape.layers * cells };
+        let edge_m = |layers: f64| shape.bore_radius_m + layers * pitch_m;
+        let outer_layer_is_drive = path.location == Location::OuterLayer;
+        // The drive sits in the middle of the outermost layer, or at its surface.
+        let depth_layers = shape.layers as f64 - if outer_layer_is_drive { 0.5 } else { 0.0 };
+        let narrowest_m = NARROWEST_LAYERS * pitch_m / path.cells_per_layer as f64;
+        // The bore is a source of fronts too where heat enters there.
+        let is_heated_inside = path.bore_heat.is_some() || path.spool.is_some_and(|s| s.mount_w_per_m2_k > 0.0);
+        let grading = Grading {
+            at_start: is_heated_inside.then_some(narrowest_m),
+            at_end: Some(narrowest_m),
+            widest: WIDEST_LAYERS * pitch_m,
+        };
+        let length_m = depth_layers * pitch_m;
+        let gaps_m: Vec<f64> = path.gaps.iter().map(|gap| gap.above_layer as f64 * pitch_m).collect();
+        let elements = Elements::new(order(ORDER, path.cells_per_layer), grading.breaks(length_m), &gaps_m);
+
         let spool_nodes = usize::from(path.spool.is_some());
-        let mut capacity = Vec::with_capacity(count + spool_nodes);
-        let mut links = Vec::with_capacity(count + spool_nodes);
+        let inner = elements.nodes();
+        let drive_is_node = outer_layer_is_drive || path.film_w_per_m2_k.is_none();
+        let solved = inner - usize::from(drive_is_node);
+        let n = spool_nodes + solved;
+        let radius_m = |x: f64| shape.bore_radius_m + x;
+        let mut capacity = Vec::with_capacity(n);
+        let mut contacts = Vec::new();
         if let Some(spool) = path.spool {
             capacity.push(spool.heat_capacity_j_per_m2_k * shape.bore_radius_m);
-            let contact = spool.contact_w_per_m2_k * shape.bore_radius_m;
-            links.push(Link::through(centre_m(0) / shape.bore_radius_m).with_rest(contact));
+            contacts.push(Contact { inner: 0, conductance: spool.contact_w_per_m2_k * shape.bore_radius_m });
         }
-        for i in 0..count {
-            capacity.push(heat_capacity * 0.5 * (edge_m(i + 1).powi(2) - edge_m(i).powi(2)));
-            if i + 1 < count {
-                links.push(Link::through(centre_m(i + 1) / centre_m(i)));
+        capacity.extend(elements.masses(radius_m).iter().take(solved).map(|m| m * heat_capacity));
+        for (gap, gap_m) in path.gaps.iter().zip(&gaps_m) {
+            if let Some(behind) = elements.node_behind(*gap_m).filter(|behind| *behind > 0) {
+                let conductance = gap.conductance_w_per_m2_k * radius_m(*gap_m);
+                contacts.push(Contact { inner: spool_nodes + behind - 1, conductance });
             }
         }
-        let last_m = centre_m(count - 1);
-        let to_boundary = if outermost_is_drive {
-            let drive_m = shape.bore_radius_m + (shape.layers as f64 - 0.5) * shape.radial_pitch_m;
-            Link::through(drive_m / last_m)
-        } else {
-            let outer_m = edge_m(count);
-            let surface = Link::through(outer_m / last_m);
-            path.film_w_per_m2_k.map_or(surface, |film| surface.with_rest(film * outer_m))
-        };
+        let stiffness = elements.stiffness(radius_m) * conductivity;
+        let mut conduction = DMatrix::zeros(n, n);
+        conduction
+            .view_mut((spool_nodes, spool_nodes), (solved, solved))
+            .copy_from(&stiffness.view((0, 0), (solved, solved)));
+        let mut from_drive = vec![0.0; n];
+        if drive_is_node {
+            for i in 0..solved {
+                from_drive[spool_nodes + i] = -stiffness[(i, solved)];
+            }
+        }
+        let mut shares = DMatrix::zeros(shape.layers, n);
+        let mut drive_share = vec![0.0; shape.layers];
+        for layer in 0..shape.layers {
+            if outer_layer_is_drive && layer + 1 == shape.layers {
+                drive_share[layer] = 1.0;
+                break;
+            }
+            let (from, to) = (layer as f64 * pitch_m, (layer as f64 + 1.0) * pitch_m);
+            let factors = elements.integral(from, to.min(length_m), radius_m);
+            let volume: f64 = factors.iter().sum();
+            for (i, factor) in factors.iter().enumerate() {
+                if i < solved {
+                    shares[(layer, spool_nodes + i)] = factor / volume;
+                } else {
+                    drive_share[layer] = factor / volume;
+                }
+            }
+        }
+        let film = if drive_is_node { 0.0 } else { path.film_w_per_m2_k.unwrap_or(0.0) * edge_m(depth_layers) };
         Self {
             conductivity_w_per_m_k: conductivity,
             capacity,
-            links,
-            to_boundary,
+            conduction,
+            from_drive,
+            contacts,
+            film,
             mount: path.spool.map_or(0.0, |s| s.mount_w_per_m2_k * shape.bore_radius_m),
             heated: shape.bore_radius_m,
             spool_nodes,
             layers: shape.layers,
-            cells_per_layer: cells,
-            outermost_is_drive,
+            shares,
+            drive_share,
         }
     }
 
@@ -125,71 +163,79 @@ impl Network {
         self.capacity.len()
     }
 
-    /// Layers whose temperature follows from nodes.
-    pub fn solved_layers(&self) -> usize {
-        self.layers - usize::from(self.outermost_is_drive)
-    }
-
-    /// The nodes of a solved layer, all of one layer's volume.
-    pub fn nodes_of(&self, layer: usize) -> Range<usize> {
-        let first = self.spool_nodes + layer * self.cells_per_layer;
-        first..first + self.cells_per_layer
-    }
-
-    pub fn layer_capacity(&self, layer: usize) -> f64 {
-        self.capacity[self.nodes_of(layer)].iter().sum()
-    }
-
-    /// C^{−1/2} (G + diag(C) `extra`) C^{−1/2} at the declared conductivity, `extra` acting on the pack's cells only:
-    /// the diagonal and the off-diagonal.
-    pub fn symmetrised(&self, extra_per_s: f64) -> (Vec<f64>, Vec<f64>) {
-        let n = self.nodes();
-        let k = self.conductivity_w_per_m_k;
-        let links: Vec<f64> = self.links.iter().map(|l| l.conductance(k)).collect();
-        let diagonal = (0..n)
-            .map(|i| {
-                let inwards = if i > 0 { links[i - 1] } else { 0.0 };
-                let outwards = links.get(i).copied().unwrap_or_else(|| self.to_boundary.conductance(k));
-                let mount = if i == 0 { self.mount } else { 0.0 };
-                let extra = if i < self.spool_nodes { 0.0 } else { extra_per_s };
-                (inwards + outwards + mount) / self.capacity[i] + extra
-            })
-            .collect();
-        let off = (0..n - 1).map(|i| -links[i] / (self.capacity[i] * self.capacity[i + 1]).sqrt()).collect();
-        (diagonal, off)
-    }
-}
-
-/// Slices along the axis where a flange is heated.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Slices {
-    pub count: usize,
-    pub width_m: f64,
-    pub flange: FlangeFilm,
-}
-
-impl Slices {
-    pub fn new(path: &HeatPath, flange: FlangeFilm) -> Self {
-        Self { count: path.axial_slices, width_m: path.shape.height_m / path.axial_slices as f64, flange }
-    }
-
-    /// The slice that touches the heated flange.
-    pub fn at_flange(&self) -> usize {
-        match self.flange.flange {
-            super::Flange::First => 0,
-            super::Flange::Second => self.count - 1,
+    /// b: heat into each node per kelvin of the drive.
+    pub fn boundary(&self) -> Vec<f64> {
+        let mut boundary = self.from_drive.clone();
+        if let Some(last) = boundary.last_mut() {
+            *last += self.film;
         }
+        boundary
     }
 
-    /// From the middle of the last slice to the air behind the flange, per area.
-    pub fn flange_w_per_m2_k(&self, conductivity_w_per_m_k: f64) -> f64 {
-        1.0 / (0.5 * self.width_m / conductivity_w_per_m_k + 1.0 / self.flange.film_w_per_m2_k)
+    /// K + X.
+    pub fn operator(&self) -> DMatrix<f64> {
+        let mut operator = self.conduction.clone();
+        for &Contact { inner, conductance } in &self.contacts {
+            operator[(inner, inner)] += conductance;
+            operator[(inner + 1, inner + 1)] += conductance;
+            operator[(inner, inner + 1)] -= conductance;
+            operator[(inner + 1, inner)] -= conductance;
+        }
+        let last = self.nodes() - 1;
+        operator[(last, last)] += self.film;
+        operator[(0, 0)] += self.mount;
+        operator
     }
 
-    /// Weights of ∫ T ζ dζ over −½ … ½, scaled so that a linear profile has exactly its moment.
-    pub fn moment_weights(&self) -> Vec<f64> {
-        let n = self.count as f64;
-        let exact = 1.0 / (1.0 - 1.0 / (n * n));
-        (0..self.count).map(|i| ((i as f64 + 0.5) / n - 0.5) / n * exact).collect()
+    /// C^{−1/2} (K + X + diag(C) `extra`) C^{−1/2} at the declared conductivity, `extra` acting on the pack's nodes only.
+    pub fn symmetrised(&self, extra_per_s: f64) -> DMatrix<f64> {
+        let mut matrix = self.operator();
+        let roots: Vec<f64> = self.capacity.iter().map(|c| 1.0 / c.sqrt()).collect();
+        for (mut column, root) in matrix.column_iter_mut().zip(&roots) {
+            column.iter_mut().zip(&roots).for_each(|(v, r)| *v *= r * root);
+        }
+        for i in self.spool_nodes..self.nodes() {
+            matrix[(i, i)] += extra_per_s;
+        }
+        matrix
+    }
+}
+
+/// Elements along the axis where a flange is heated, in shares of the height.
+#[derive(Debug, Clone)]
+pub(super) struct Axis {
+    /// Shares of the nodes in a mean over the axis.
+    pub masses: Vec<f64>,
+    /// ∫ ℓ_i' ℓ_j' dz over the height [1/m²].
+    pub stiffness_per_m2: DMatrix<f64>,
+    /// Weights of ∫ T ζ dζ over −½ … ½.
+    pub moment: Vec<f64>,
+    /// The flanges' nodes and their films over the height [W/(m³ K)].
+    pub flanges: Vec<(usize, f64)>,
+}
+
+impl Axis {
+    /// None where no flange is heated.
+    pub fn new(path: &HeatPath) -> Option<Self> {
+        let flange = path.flange?;
+        let height_m = path.shape.height_m;
+        let narrowest = NARROWEST_AT_FLANGE * path.shape.radial_pitch_m / path.cells_per_layer as f64 / height_m;
+        let at = |which: Flange| (flange.flange == which).then_some(narrowest.min(0.5));
+        let grading = Grading { at_start: at(Flange::First), at_end: at(Flange::Second), widest: 0.5 };
+        let elements = Elements::new(order(ORDER_ALONG, path.cells_per_layer), grading.breaks(1.0), &[]);
+        let node = match flange.flange {
+            Flange::First => 0,
+            Flange::Second => elements.nodes() - 1,
+        };
+        Some(Self {
+            masses: elements.masses(|_| 1.0),
+            stiffness_per_m2: elements.stiffness(|_| 1.0) / (height_m * height_m),
+            moment: elements.integral(0.0, 1.0, |zeta| zeta - 0.5),
+            flanges: vec![(node, flange.film_w_per_m2_k / height_m)],
+        })
+    }
+
+    pub fn nodes(&self) -> usize {
+        self.masses.len()
     }
 }

@@ -9,8 +9,8 @@
 //!
 //! | symbol | meaning | unit | in code |
 //! |---|---|---|---|
-//! | C | heat capacity of a cell, per radian and height | J/(m K rad) | `Network::capacity` |
-//! | G | conductances between cells and to the boundary | W/(m K rad) | `Network::links` |
+//! | C | heat capacity of a node, per radian and height | J/(m K rad) | `Network::capacity` |
+//! | G | conductances between nodes and to the boundary | W/(m K rad) | `Network::operator` |
 //! | u, k | drive temperature and its rate, piecewise linear and constant | K, K/s | `Drive::boundary_k` |
 //! | a | ambient temperature, where it is known apart from the drive | K | `Drive::ambient_k` |
 //! | q | heat into the bore | W/m² | `BoreHeat` |
@@ -19,7 +19,7 @@
 //!
 //! Outputs are the layers' means and, where a flange is heated, their first axial moments. A flange makes the field
 //! two-dimensional but keeps it separable: each mode of the axial operator carries a radial network of its own, with
-//! K μ_m added to every cell of the pack (the spool does not conduct along the axis).
+//! K μ_m added to every node of the pack (the spool does not conduct along the axis).
 //!
 //! Holds for constant properties; the outermost layer's temperature is imposed at its middle (`OuterLayer`), or its
 //! surface exchanges heat with the air (`Ambient`).
@@ -31,9 +31,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::modal::Response;
-use super::network::{Network, Slices};
+use super::network::{Axis, Network};
 use super::{BoreHeat, HeatPath, ThermalError};
-use crate::numeric::tridiagonal::diagonalise;
+use crate::numeric::tridiagonal::diagonalise_full;
 
 /// The modal form of a pack's heat path.
 #[derive(Debug, Clone)]
@@ -41,6 +41,7 @@ pub struct Pack {
     pub(super) layers: usize,
     /// Layer means, then (with a heated flange) first axial moments.
     pub(super) outputs: usize,
+    shortest_s: f64,
     /// Ascending.
     pub(super) decay_per_s: Vec<f64>,
     pub(super) boundary: Response,
@@ -50,8 +51,9 @@ pub struct Pack {
     pub(super) heat: Option<(BoreHeat, DMatrix<f64>)>,
 }
 
-/// A mode whose share of every response is smaller than this is rounding.
-const NEGLIGIBLE: f64 = 1e-14;
+/// A mode whose share of every response is smaller than this is left out: a heated flange makes thousands of them, which
+/// together stay below a ten-thousandth of what the grid leaves (`tests/validation/flange.rs`).
+const NEGLIGIBLE: f64 = 1e-9;
 
 /// Eigenmodes along the axis; without a heated flange there is one, uniform.
 struct AxialModes {
@@ -70,7 +72,7 @@ struct AxialModes {
 impl AxialModes {
     fn new(path: &HeatPath, network: &Network) -> Result<Self, ThermalError> {
         let diffusivity_m2_per_s = path.material.diffusivity_m2_per_s();
-        let Some(flange) = path.flange else {
+        let Some(axis) = Axis::new(path) else {
             return Ok(Self {
                 decay_per_m2: vec![0.0],
                 mean: vec![1.0],
@@ -80,24 +82,25 @@ impl AxialModes {
                 diffusivity_m2_per_s,
             });
         };
-        let slices = Slices::new(path, flange);
-        let (n, heated) = (slices.count, slices.at_flange());
-        let link = slices.width_m.powi(-2);
         let k = network.conductivity_w_per_m_k;
-        let to_air = slices.flange_w_per_m2_k(k) / (slices.width_m * k);
-        let mut diagonal: Vec<f64> = (0..n).map(|i| link * (f64::from(i > 0) + f64::from(i + 1 < n))).collect();
-        diagonal[heated] += to_air;
-        let moment = slices.moment_weights();
+        let roots: Vec<f64> = axis.masses.iter().map(|m| m.sqrt()).collect();
+        let n = axis.nodes();
+        let mut operator = DMatrix::from_fn(n, n, |i, j| axis.stiffness_per_m2[(i, j)] / (roots[i] * roots[j]));
         let mut rows = DMatrix::from_fn(3, n, |row, i| match row {
-            0 => 1.0,
-            1 => f64::from(i == heated) * to_air,
-            _ => moment[i],
+            0 => roots[i],
+            1 => 0.0,
+            _ => axis.moment[i] / roots[i],
         });
-        diagonalise(&mut diagonal, &vec![-link; n - 1], &mut rows).map_err(|_| ThermalError::Eigen)?;
+        for &(node, film_w_per_m3_k) in &axis.flanges {
+            let to_air = film_w_per_m3_k / k;
+            operator[(node, node)] += to_air / axis.masses[node];
+            rows[(1, node)] += to_air / roots[node];
+        }
+        let decay_per_m2 = diagonalise_full(operator, &mut rows).map_err(|_| ThermalError::Eigen)?;
         let row = |r: usize| rows.row(r).iter().copied().collect::<Vec<f64>>();
         Ok(Self {
-            decay_per_m2: diagonal,
-            mean: row(0).iter().map(|v| v / n as f64).collect(),
+            decay_per_m2,
+            mean: row(0),
             uniform: row(0),
             flange_per_m2: row(1),
             moment: row(2),
@@ -154,8 +157,8 @@ impl Pack {
             steady
         };
         let mut boundary_steady = steady_of(|mode| mode.boundary);
-        if network.outermost_is_drive {
-            boundary_steady[layers - 1] = 1.0;
+        for (steady, share) in boundary_steady.iter_mut().zip(&network.drive_share) {
+            *steady += share;
         }
         let ambient_steady = steady_of(|mode| mode.ambient);
 
@@ -174,7 +177,9 @@ impl Pack {
         let heat = path.bore_heat.map(|bore_heat| {
             (bore_heat, DMatrix::from_fn(outputs, modes.len(), |j, i| modes[i].seen[j] * modes[i].heat))
         });
-        Ok(Self { layers, outputs, decay_per_s, boundary, ambient, heat })
+        // Heat crosses half a layer in about this time.
+        let shortest_s = path.shape.radial_pitch_m.powi(2) / (16.0 * path.material.diffusivity_m2_per_s());
+        Ok(Self { layers, outputs, shortest_s, decay_per_s, boundary, ambient, heat })
     }
 
     pub(super) fn modes(&self) -> usize {
@@ -224,7 +229,7 @@ impl Pack {
     }
 
     pub fn shortest_s(&self) -> f64 {
-        1.0 / self.decay_per_s[self.modes() - 1]
+        self.shortest_s
     }
 }
 
@@ -236,28 +241,26 @@ struct Radial {
 
 /// With `extra_per_s` added to every cell's decay.
 fn radial(network: &Network, axial: &AxialModes, extra_per_s: f64) -> Result<Radial, ThermalError> {
-    let (n, solved) = (network.nodes(), network.solved_layers());
-    let (mut decay_per_s, off) = network.symmetrised(extra_per_s);
+    let (n, layers) = (network.nodes(), network.layers);
     let has_moments = axial.has_moments();
-    let (boundary_row, mount_row, heat_row, flange_row) = (solved, solved + 1, solved + 2, solved + 3);
-    let mut rows = DMatrix::zeros(solved + 3 + usize::from(has_moments), n);
-    for layer in 0..solved {
-        let capacity = network.layer_capacity(layer);
-        for i in network.nodes_of(layer) {
-            rows[(layer, i)] = network.capacity[i].sqrt() / capacity;
+    let (boundary_row, mount_row, heat_row, flange_row) = (layers, layers + 1, layers + 2, layers + 3);
+    let mut rows = DMatrix::zeros(layers + 3 + usize::from(has_moments), n);
+    let boundary = network.boundary();
+    for (i, capacity) in network.capacity.iter().enumerate() {
+        let root = capacity.sqrt();
+        for layer in 0..layers {
+            rows[(layer, i)] = network.shares[(layer, i)] / root;
+        }
+        rows[(boundary_row, i)] = boundary[i] / root;
+        if i == 0 {
+            rows[(mount_row, i)] = network.mount / root;
+            rows[(heat_row, i)] = network.heated / root;
+        }
+        if has_moments && i >= network.spool_nodes {
+            rows[(flange_row, i)] = root * axial.diffusivity_m2_per_s;
         }
     }
-    let inner_root = network.capacity[0].sqrt();
-    rows[(boundary_row, n - 1)] =
-        network.to_boundary.conductance(network.conductivity_w_per_m_k) / network.capacity[n - 1].sqrt();
-    rows[(mount_row, 0)] = network.mount / inner_root;
-    rows[(heat_row, 0)] = network.heated / inner_root;
-    if has_moments {
-        for i in network.spool_nodes..n {
-            rows[(flange_row, i)] = network.capacity[i].sqrt() * axial.diffusivity_m2_per_s;
-        }
-    }
-    diagonalise(&mut decay_per_s, &off, &mut rows).map_err(|_| ThermalError::Eigen)?;
+    let decay_per_s = diagonalise_full(network.symmetrised(extra_per_s), &mut rows).map_err(|_| ThermalError::Eigen)?;
     Ok(Radial { decay_per_s, rows })
 }
 
@@ -269,13 +272,13 @@ fn radial_modes(
     axial: &AxialModes,
     m: usize,
 ) -> impl Iterator<Item = Mode> {
-    let (n, layers, solved) = (network.nodes(), network.layers, network.solved_layers());
+    let (n, layers) = (network.nodes(), network.layers);
     let has_moments = axial.has_moments();
-    let (boundary_row, mount_row, heat_row, flange_row) = (solved, solved + 1, solved + 2, solved + 3);
+    let (boundary_row, mount_row, heat_row, flange_row) = (layers, layers + 1, layers + 2, layers + 3);
     let rows = &radial.rows;
     (0..n).map(move |i| {
         let mut seen = vec![0.0; layers * if has_moments { 2 } else { 1 }];
-        for layer in 0..solved {
+        for layer in 0..layers {
             seen[layer] = axial.mean[m] * rows[(layer, i)];
             if has_moments {
                 seen[layers + layer] = axial.moment[m] * rows[(layer, i)];

@@ -1,10 +1,8 @@
 //! A conductivity that depends weakly on temperature, as a series in its slope: no time steps.
 //!
 //! ```text
-//! T = T0 + a T1 + a² T2 + a³ T3,   k = k0 (1 + a θ),   θ = T − 20 °C
-//! C dT_m/dt = −G T_m − div f_m
-//! f_1 = g' k0 θ0 ΔT0,   f_2 = g' k0 (θ0 ΔT1 + θ1 ΔT0) + ½ g'' k0² θ0² ΔT0      heat through one link, ΔT across it
-//! f_3 = g' k0 (θ0 ΔT2 + θ1 ΔT1 + θ2 ΔT0) + ½ g'' k0² (θ0² ΔT1 + 2 θ0 θ1 ΔT0) + ⅙ g''' k0³ θ0³ ΔT0
+//! T = T0 + a T1 + a² T2 + a³ T3,   k = k0 (1 + a θ),   θ = T − 20 °C,   k ∇T = k0 ∇(θ + a θ²/2)
+//! C dT_m/dt = −G T_m − K q_m,   q_1 = θ0²/2,   q_2 = θ0 T1,   q_3 = θ0 T2 + T1²/2
 //! ```
 //!
 //! Every order is the linear network driven by what the orders before leave; each is solved by the modes of that network,
@@ -14,14 +12,14 @@
 //! flanges.
 //!
 //! # Source
-//! Regular perturbation of the network of [`super::network`]; a test compares it with the stepped solution.
+//! Regular perturbation of the network of [`super::network`] in Kirchhoff's form; a test compares it with the stepped solution.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::network::Network;
 use super::{Drive, Extent, HeatPart, HeatPath, ThermalError, check, window_instants};
 use crate::numeric::piecewise::PiecewiseLinear;
-use crate::numeric::tridiagonal::diagonalise;
+use crate::numeric::tridiagonal::diagonalise_full;
 use crate::units::REFERENCE_TEMPERATURE_K;
 
 /// The layers' temperatures and rates over each row's window, per unit (squared, cubed) of the slope.
@@ -81,37 +79,26 @@ pub fn slope_series(
     let n = network.nodes();
     let boundary_k: Vec<f64> = modes.times_s.iter().map(|&t| drive.boundary_k.value(t)).collect();
 
-    let to_boundary = network.to_boundary.conductance(network.conductivity_w_per_m_k);
+    let boundary = network.boundary();
     let mut into = DMatrix::zeros(n, count);
     for (t, &time_s) in modes.times_s.iter().enumerate() {
         let heat = path
             .bore_heat
             .map_or(0.0, |heat| heat.power_w_per_m2 * -(-(time_s - drive.start_s()) / heat.time_constant_s).exp_m1());
-        into[(0, t)] += network.mount * drive.ambient_k().value(time_s) + network.heated * heat;
-        into[(n - 1, t)] += to_boundary * boundary_k[t];
+        for (into, per_k) in into.column_mut(t).iter_mut().zip(&boundary) {
+            *into = per_k * (boundary_k[t] - REFERENCE_TEMPERATURE_K);
+        }
+        into[(0, t)] +=
+            network.mount * (drive.ambient_k().value(time_s) - REFERENCE_TEMPERATURE_K) + network.heated * heat;
     }
+    // Everything in kelvins above the reference.
     let zeroth = modes.solve(&into).0;
-    let links = modes.derivatives();
-    let first_flows = modes.flows(|t, i| {
-        let (across, above) = modes.across(&zeroth, i, t, boundary_k[t], REFERENCE_TEMPERATURE_K);
-        links[i][0] * above * across
-    });
-    let (first, first_rate) = modes.solve(&first_flows);
-    let second_flows = modes.flows(|t, i| {
-        let (across, above) = modes.across(&zeroth, i, t, boundary_k[t], REFERENCE_TEMPERATURE_K);
-        let (across_1, above_1) = modes.across(&first, i, t, 0.0, 0.0);
-        links[i][0] * (above * across_1 + above_1 * across) + 0.5 * links[i][1] * above * above * across
-    });
-    let (second, second_rate) = modes.solve(&second_flows);
-    let third_flows = modes.flows(|t, i| {
-        let (across, above) = modes.across(&zeroth, i, t, boundary_k[t], REFERENCE_TEMPERATURE_K);
-        let (across_1, above_1) = modes.across(&first, i, t, 0.0, 0.0);
-        let (across_2, above_2) = modes.across(&second, i, t, 0.0, 0.0);
-        links[i][0] * (above * across_2 + above_1 * across_1 + above_2 * across)
-            + 0.5 * links[i][1] * above * (above * across_1 + 2.0 * above_1 * across)
-            + links[i][2] * above.powi(3) * across / 6.0
-    });
-    let (third, third_rate) = modes.solve(&third_flows);
+    let half_square = |k: f64| 0.5 * k * k;
+    let at_drive = boundary_k.iter().map(|k| half_square(k - REFERENCE_TEMPERATURE_K)).collect::<Vec<f64>>();
+    let (first, first_rate) = modes.solve(&modes.flows(zeroth.map(half_square), Some(&at_drive)));
+    let (second, second_rate) = modes.solve(&modes.flows(zeroth.component_mul(&first), None));
+    let curved = zeroth.component_mul(&second) + first.map(half_square);
+    let (third, third_rate) = modes.solve(&modes.flows(curved, None));
 
     let place_of = |time_s: f64| {
         let after = modes.times_s.partition_point(|t| *t < time_s - SAME_TIME_S);
@@ -170,16 +157,15 @@ impl Modes {
     fn new(path: &HeatPath, times_s: impl FnOnce(f64) -> Vec<f64>) -> Result<Self, ThermalError> {
         let network = Network::new(path);
         let n = network.nodes();
-        let (mut decay_per_s, off) = network.symmetrised(0.0);
         let mut shape = DMatrix::identity(n, n);
-        diagonalise(&mut decay_per_s, &off, &mut shape).map_err(|_| ThermalError::Eigen)?;
+        let decay_per_s = diagonalise_full(network.symmetrised(0.0), &mut shape).map_err(|_| ThermalError::Eigen)?;
         if decay_per_s.iter().any(|l| !(*l > 0.0)) {
             return Err(ThermalError::Eigen);
         }
         for (mut row, capacity) in shape.row_iter_mut().zip(&network.capacity) {
             row /= capacity.sqrt();
         }
-        let shortest_s = decay_per_s.iter().fold(f64::INFINITY, |a, l| a.min(1.0 / l));
+        let shortest_s = path.shape.radial_pitch_m.powi(2) / (16.0 * path.material.diffusivity_m2_per_s());
         Ok(Self { network, decay_per_s, shape, times_s: times_s(shortest_s) })
     }
 
@@ -209,40 +195,12 @@ impl Modes {
         (&self.shape * content, &self.shape * warming)
     }
 
-    /// k0 g', k0² g'' and k0³ g''' of the link from each node outwards; the last leads to the drive.
-    fn derivatives(&self) -> Vec<[f64; 3]> {
-        let k = self.network.conductivity_w_per_m_k;
-        let links = self.network.links.iter().chain([&self.network.to_boundary]);
-        links.map(|link| link.derivatives(k)).map(|[a, b, c]| [k * a, k * k * b, k.powi(3) * c]).collect()
-    }
-
-    /// The difference of temperature across a link, and by how much its own is above `reference_k`; as the stepped
-    /// solution takes them.
-    fn across(&self, nodes_k: &DMatrix<f64>, link: usize, t: usize, boundary_k: f64, reference_k: f64) -> (f64, f64) {
-        let own_k = nodes_k[(link, t)];
-        let last = link + 1 == self.network.nodes();
-        let next_k = if last { boundary_k } else { nodes_k[(link + 1, t)] };
-        let link_k = if link < self.network.spool_nodes {
-            next_k
-        } else if last && !self.network.outermost_is_drive {
-            own_k
-        } else {
-            0.5 * (own_k + next_k)
-        };
-        (own_k - next_k, link_k - reference_k)
-    }
-
-    /// Heat into each node at each time, from what flows outwards through each link.
-    fn flows(&self, outwards: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
-        let (n, count) = (self.network.nodes(), self.times_s.len());
-        let mut into = DMatrix::zeros(n, count);
-        for t in 0..count {
-            for i in 0..n {
-                let flow = outwards(t, i);
-                into[(i, t)] -= flow;
-                if i + 1 < n {
-                    into[(i + 1, t)] += flow;
-                }
+    /// −K q, with what the drive's own q brings.
+    fn flows(&self, q: DMatrix<f64>, at_drive: Option<&[f64]>) -> DMatrix<f64> {
+        let mut into = -(&self.network.conduction * q);
+        if let Some(at_drive) = at_drive {
+            for (mut column, drive) in into.column_iter_mut().zip(at_drive) {
+                column.iter_mut().zip(&self.network.from_drive).for_each(|(into, per_k)| *into += per_k * drive);
             }
         }
         into
@@ -250,18 +208,7 @@ impl Modes {
 
     /// Layer means, layers × times; what the drive imposes has no terms.
     fn layers(&self, nodes: &DMatrix<f64>) -> DMatrix<f64> {
-        let network = &self.network;
-        let mut means = DMatrix::zeros(network.layers, nodes.ncols());
-        for layer in 0..network.solved_layers() {
-            let capacity = network.layer_capacity(layer);
-            for i in network.nodes_of(layer) {
-                let share = network.capacity[i] / capacity;
-                for t in 0..nodes.ncols() {
-                    means[(layer, t)] += share * nodes[(i, t)];
-                }
-            }
-        }
-        means
+        &self.network.shares * nodes
     }
 }
 

@@ -1,435 +1,310 @@
-//! A pack whose conductivity depends on temperature, stepped in time by an implicit L-stable method.
+//! A pack whose conductivity depends on temperature: the linear pack's modes, driven by what the dependence adds.
 //!
 //! ```text
-//! C dT/dt = −G(T) T + b(T) u(t) + …,   k = k0 (1 + a (T − 20 °C))
-//! (I − γτA) k1 = τ F(t, T),  (I − γτA) k2 = τ F(t + τ, T + k1) − 2 k1,  T ← T + 3/2 k1 + 1/2 k2,  γ = 1 − 1/√2
+//! k = k_m (1 + a θ),   θ = T − T_m,   k ∇T = k_m ∇(θ + ν),   ν = a θ²/2
+//! T = T_linear + V c,   dc_i/dt = −λ_i c_i + g_i,   g = −V^T K ν,   e_i = dc_i/dt:   de_i/dt = −λ_i e_i + dg_i/dt
+//! e_i(t) = e_i(0) e^{−λ_i t} + ∫_0^t e^{−λ_i (t−s)} g_i'(s) ds,   c_i = (g_i − e_i)/λ_i
 //! ```
 //!
-//! The method (ROS2) is of second order whatever A is, so A holds the conductances of the step's start, and with a
-//! heated flange the product (I − γτA_r)(I − γτA_z), which leaves only tridiagonal systems. One step is compared with
-//! two half steps: the difference controls the step and its extrapolation is kept, of third order. Between steps the
-//! layers follow cubic Hermite polynomials. Steps end at every knot of the drive.
+//! | symbol | meaning | unit | in code |
+//! |---|---|---|---|
+//! | T_m | middle of the drive's range: there the modes are those of the pack itself | K | `middle_k` |
+//! | ν | Kirchhoff's transform less the temperature | K | `bent` |
+//! | λ_i, V | decay rates and modes of the linear pack at T_m | 1/s, – | `Modes` |
+//! | g, c, e | what bends a mode, by how much, and at which rate | – | `bent`, `contents`, `rate` |
 //!
-//! Holds for any drive under which the conductivity stays positive. With a = 0 it is the network that [`super::pack`]
-//! solves exactly; a test compares the two.
+//! T_linear is the exact solution of [`super::pack`] at T_m. For the rest time is cut into panels that grow behind every knot
+//! of the drive (a drive with many knots was sampled: there panels span several). On a panel g is a polynomial through
+//! Lobatto's nodes, under which every mode has a closed form however fast it is; g and the temperatures it makes are
+//! found by repeated substitution, which gains a factor a θ/2 or so each time. What the outputs gain is a polynomial
+//! through the same nodes.
+//!
+//! Holds for any drive under which the conductivity stays positive. With a = 0 it is the solution of [`super::pack`]; a
+//! test compares the two.
 //!
 //! # Source
-//! Verwer, Spee, Blom, Hundsdorfer, SIAM J. Sci. Comput. 20 (1999) 1456 (ROS2 with approximate factorisation); Hairer
-//! and Wanner, Solving Ordinary Differential Equations II, sections II.4 and IV.7.
+//! Kirchhoff's transformation: Carslaw and Jaeger (1959), section 1.6. Exponential collocation: Hochbruck and Ostermann,
+//! Acta Numerica 19 (2010) 209, section 2.2.
 
-use super::course::Course;
-use super::network::{Link, Network, Slices};
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use nalgebra::DMatrix;
+
+use super::bending::{System, Track};
+use super::modal::PackField;
 use super::pack::Pack;
+use super::panel::{DEGREE, Panel, Weights};
 use super::{Drive, HeatPath, Instant, Side, ThermalError, ThermalHistory, Wanted};
+use crate::numeric::lobatto::Lobatto;
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::units::REFERENCE_TEMPERATURE_K;
 
-const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
+/// The first panel behind a knot, in units of the time in which heat crosses half a layer; the next ones grow.
+const FIRST: f64 = 0.5;
+const GROWTH: f64 = 4.0;
+/// With so many knots the drive was sampled; a panel then spans some of them.
+const SAMPLED_KNOTS: usize = 100;
+const KNOTS_A_PANEL: usize = 4;
+/// Substitution ends where temperatures change by less than this share of what they do in a panel …
+const TOLERANCE: f64 = 1e-6;
+/// … or of the drive's span.
+const ROUNDING: f64 = 1e-12;
+const MOST_SUBSTITUTIONS: usize = 200;
+/// Lengths of panels whose weights are kept.
+const MOST_KNOWN_LENGTHS: usize = 64;
 
-/// Error allowed in one step, as a share of the span of the drive's temperatures: rates right
-/// after a change of ramp are off by far more, and a winding that cancels most of them shows it (`tests/verify`) …
-pub(super) const TOLERANCE_SHARE: f64 = 1e-8;
-/// … but no less than this [K].
-const LEAST_TOLERANCE_K: f64 = 1e-9;
-/// A step is never shorter than this share of the fastest response.
-const SHORTEST_SHARE: f64 = 1e-3;
-
-/// What acts from outside at one time.
-#[derive(Debug, Clone, Copy)]
-struct Inputs {
-    boundary_k: f64,
-    ambient_k: f64,
-    heat_w_per_m2: f64,
-}
-
-/// Conductances at one state of the pack, per radian and height.
-#[derive(Debug, Default)]
-struct Conductances {
-    /// From each node outwards; the last node's leads to the drive.
-    outwards: Vec<f64>,
-    /// From each node to the same node of the next slice.
-    along: Vec<f64>,
-    /// From each node of the slice at the flange to the air.
-    to_flange: Vec<f64>,
-}
-
-/// The network in space, and how it changes with temperature.
+/// What a solved panel leaves behind.
 #[derive(Debug, Clone)]
-struct System {
-    network: Network,
-    slices: Option<Slices>,
-    slope_per_k: f64,
-    diffusivity_m2_per_s: f64,
-    heat: Option<super::BoreHeat>,
-    start_s: f64,
+struct Piece {
+    from_s: f64,
+    length_s: f64,
+    /// Outputs × nodes: what they gain over the linear pack.
+    value: DMatrix<f64>,
+    rate: DMatrix<f64>,
 }
 
 /// A pack with variable conductivity under one drive.
 #[derive(Debug, Clone)]
 pub struct SteppedField {
     layers: usize,
-    outputs: usize,
-    outermost_is_drive: bool,
-    drive: Drive,
-    course: Course,
-}
-
-impl System {
-    fn new(path: &HeatPath, start_s: f64) -> Self {
-        Self {
-            network: Network::new(path),
-            slices: path.flange.map(|flange| Slices::new(path, flange)),
-            slope_per_k: path.conductivity_slope_per_k,
-            diffusivity_m2_per_s: path.material.diffusivity_m2_per_s(),
-            heat: path.bore_heat,
-            start_s,
-        }
-    }
-
-    fn slice_count(&self) -> usize {
-        self.slices.map_or(1, |s| s.count)
-    }
-
-    fn outputs(&self) -> usize {
-        self.network.layers * if self.slices.is_some() { 2 } else { 1 }
-    }
-
-    fn factor(&self, temperature_k: f64) -> f64 {
-        1.0 + self.slope_per_k * (temperature_k - REFERENCE_TEMPERATURE_K)
-    }
-
-    fn inputs(&self, drive: &Drive, time_s: f64) -> Inputs {
-        let heat_w_per_m2 = self.heat.map_or(0.0, |heat| {
-            let since_s = (time_s - self.start_s).max(0.0);
-            heat.power_w_per_m2 * -(-since_s / heat.time_constant_s).exp_m1()
-        });
-        Inputs { boundary_k: drive.boundary_k.value(time_s), ambient_k: drive.ambient_k().value(time_s), heat_w_per_m2 }
-    }
-
-    fn conductances(&self, state: &[f64], inputs: &Inputs, out: &mut Conductances) {
-        let (n, first) = (self.network.nodes(), self.network.spool_nodes);
-        let k0 = self.network.conductivity_w_per_m_k;
-        out.outwards.clear();
-        out.along.clear();
-        out.to_flange.clear();
-        let through = |link: &Link, temperature_k: f64| link.conductance(k0 * self.factor(temperature_k));
-        for slice in state.chunks_exact(n) {
-            for (i, link) in self.network.links.iter().enumerate() {
-                // With k linear in T the mean of both is exact for a steady flow; a contact sees the cell beside it.
-                let temperature_k = if i < first { slice[i + 1] } else { 0.5 * (slice[i] + slice[i + 1]) };
-                out.outwards.push(through(link, temperature_k));
-            }
-            let outermost_k = slice[n - 1];
-            let surface_k =
-                if self.network.outermost_is_drive { 0.5 * (outermost_k + inputs.boundary_k) } else { outermost_k };
-            out.outwards.push(through(&self.network.to_boundary, surface_k));
-        }
-        let Some(slices) = &self.slices else { return };
-        let unit = self.diffusivity_m2_per_s / (slices.width_m * slices.width_m);
-        for pair in 0..slices.count - 1 {
-            for i in 0..n {
-                let middle_k = 0.5 * (state[pair * n + i] + state[(pair + 1) * n + i]);
-                let conducts = f64::from(i >= first);
-                out.along.push(conducts * unit * self.network.capacity[i] * self.factor(middle_k));
-            }
-        }
-        let per_capacity = self.diffusivity_m2_per_s / k0 / slices.width_m;
-        let at_flange = slices.at_flange() * n;
-        for i in 0..n {
-            let film = slices.flange_w_per_m2_k(k0 * self.factor(state[at_flange + i]));
-            out.to_flange.push(f64::from(i >= first) * per_capacity * self.network.capacity[i] * film);
-        }
-    }
-
-    /// dT/dt.
-    fn rates(&self, state: &[f64], inputs: &Inputs, g: &Conductances, out: &mut [f64]) {
-        let n = self.network.nodes();
-        for (s, (slice, out)) in state.chunks_exact(n).zip(out.chunks_exact_mut(n)).enumerate() {
-            let outwards = &g.outwards[s * n..(s + 1) * n];
-            let mut inflow =
-                self.network.mount * (inputs.ambient_k - slice[0]) + self.network.heated * inputs.heat_w_per_m2;
-            for i in 0..n {
-                let next_k = if i + 1 < n { slice[i + 1] } else { inputs.boundary_k };
-                let outflow = outwards[i] * (slice[i] - next_k);
-                out[i] = (inflow - outflow) / self.network.capacity[i];
-                inflow = outflow;
-            }
-        }
-        let Some(slices) = &self.slices else { return };
-        for (pair, along) in g.along.chunks_exact(n).enumerate() {
-            for i in 0..n {
-                let flow = along[i] * (state[pair * n + i] - state[(pair + 1) * n + i]) / self.network.capacity[i];
-                out[pair * n + i] -= flow;
-                out[(pair + 1) * n + i] += flow;
-            }
-        }
-        let at_flange = slices.at_flange() * n;
-        for (i, film) in g.to_flange.iter().enumerate() {
-            out[at_flange + i] += film * (inputs.ambient_k - state[at_flange + i]) / self.network.capacity[i];
-        }
-    }
-
-    /// Solves (I − θA_r)(I − θA_z) x = b in place.
-    fn solve(&self, theta_s: f64, g: &Conductances, b: &mut [f64], scratch: &mut Vec<f64>) {
-        let n = self.network.nodes();
-        let capacity = &self.network.capacity;
-        for (s, slice) in b.chunks_exact_mut(n).enumerate() {
-            let outwards = &g.outwards[s * n..(s + 1) * n];
-            let inwards = |i: usize| if i > 0 { outwards[i - 1] } else { self.network.mount };
-            thomas(n, scratch, slice, 1, |i| {
-                let scale = theta_s / capacity[i];
-                let below = if i > 0 { -scale * outwards[i - 1] } else { 0.0 };
-                let above = if i + 1 < n { -scale * outwards[i] } else { 0.0 };
-                (below, 1.0 + scale * (inwards(i) + outwards[i]), above)
-            });
-        }
-        let Some(slices) = &self.slices else { return };
-        let (count, heated) = (slices.count, slices.at_flange());
-        for i in self.network.spool_nodes..n {
-            let scale = theta_s / capacity[i];
-            thomas(count, scratch, &mut b[i..], n, |s| {
-                let below = if s > 0 { scale * g.along[(s - 1) * n + i] } else { 0.0 };
-                let above = if s + 1 < count { scale * g.along[s * n + i] } else { 0.0 };
-                let film = if s == heated { scale * g.to_flange[i] } else { 0.0 };
-                (-below, 1.0 + below + above + film, -above)
-            });
-        }
-    }
-
-    /// Layer means, then axial moments; linear in the state, so it serves rates too. The drive's layer is left zero.
-    fn project(&self, state: &[f64], out: &mut Vec<f64>) {
-        let n = self.network.nodes();
-        let count = self.slice_count();
-        let start = out.len();
-        out.resize(start + self.outputs(), 0.0);
-        let moments = self.slices.map(|s| s.moment_weights());
-        for layer in 0..self.network.solved_layers() {
-            let nodes = self.network.nodes_of(layer);
-            let capacity = self.network.layer_capacity(layer);
-            for s in 0..count {
-                let mean: f64 =
-                    nodes.clone().map(|i| self.network.capacity[i] * state[s * n + i]).sum::<f64>() / capacity;
-                out[start + layer] += mean / count as f64;
-                if let Some(weights) = &moments {
-                    out[start + self.network.layers + layer] += weights[s] * mean;
-                }
-            }
-        }
-    }
-}
-
-/// Solves a tridiagonal system in place; `x` holds every `stride`-th entry, `row(i)` gives (below, diagonal, above).
-fn thomas(n: usize, scratch: &mut Vec<f64>, x: &mut [f64], stride: usize, row: impl Fn(usize) -> (f64, f64, f64)) {
-    scratch.clear();
-    let (mut previous, mut carried) = (0.0, 0.0);
-    for i in 0..n {
-        let (below, diagonal, above) = row(i);
-        let pivot = diagonal - below * previous;
-        previous = above / pivot;
-        carried = (x[i * stride] - below * carried) / pivot;
-        x[i * stride] = carried;
-        scratch.push(previous);
-    }
-    for i in (0..n - 1).rev() {
-        x[i * stride] -= scratch[i] * x[(i + 1) * stride];
-    }
-}
-
-/// Integrates a system and keeps the course of its outputs.
-struct Integrator<'a> {
-    system: &'a System,
-    state: Vec<f64>,
-    step_s: f64,
-    tolerance_k: f64,
-    shortest_s: f64,
-    frozen: Conductances,
-    current: Conductances,
-    stages: [Vec<f64>; 2],
-    scratch: Vec<f64>,
-}
-
-impl<'a> Integrator<'a> {
-    fn new(system: &'a System, start_k: f64, tolerance_k: f64, shortest_s: f64) -> Self {
-        let size = system.network.nodes() * system.slice_count();
-        Self {
-            system,
-            state: vec![start_k; size],
-            step_s: shortest_s,
-            tolerance_k,
-            shortest_s: shortest_s * SHORTEST_SHARE,
-            frozen: Conductances::default(),
-            current: Conductances::default(),
-            stages: [vec![0.0; size], vec![0.0; size]],
-            scratch: Vec::new(),
-        }
-    }
-
-    /// One step of ROS2 with the frozen conductances in A.
-    fn ros2(&mut self, drive: &Drive, from_s: f64, step_s: f64, state: &[f64]) -> Vec<f64> {
-        let system = self.system;
-        let [k1, k2] = &mut self.stages;
-        let inputs = system.inputs(drive, from_s);
-        system.conductances(state, &inputs, &mut self.current);
-        system.rates(state, &inputs, &self.current, k1);
-        k1.iter_mut().for_each(|k| *k *= step_s);
-        system.solve(GAMMA * step_s, &self.frozen, k1, &mut self.scratch);
-        let middle: Vec<f64> = state.iter().zip(k1.iter()).map(|(y, k)| y + k).collect();
-        let inputs = system.inputs(drive, from_s + step_s);
-        system.conductances(&middle, &inputs, &mut self.current);
-        system.rates(&middle, &inputs, &self.current, k2);
-        for (k2, k1) in k2.iter_mut().zip(k1.iter()) {
-            *k2 = *k2 * step_s - 2.0 * k1;
-        }
-        system.solve(GAMMA * step_s, &self.frozen, k2, &mut self.scratch);
-        state.iter().zip(k1.iter().zip(k2.iter())).map(|(y, (k1, k2))| y + 1.5 * k1 + 0.5 * k2).collect()
-    }
-
-    /// From one knot to the next; the drive is linear between them.
-    fn advance(
-        &mut self,
-        drive: &Drive,
-        from_s: f64,
-        to_s: f64,
-        course: Option<&mut Course>,
-    ) -> Result<(), ThermalError> {
-        let mut course = course;
-        let mut time_s = from_s;
-        self.step_s = self.step_s.min(to_s - from_s);
-        while time_s < to_s {
-            // No sliver is left for a last step.
-            let left_s = to_s - time_s;
-            let step_s = if self.step_s >= left_s * (1.0 - 1e-9) {
-                left_s
-            } else if self.step_s > 0.5 * left_s {
-                0.5 * left_s
-            } else {
-                self.step_s
-            };
-            let state = std::mem::take(&mut self.state);
-            let inputs = self.system.inputs(drive, time_s);
-            self.system.conductances(&state, &inputs, &mut self.frozen);
-            let whole = self.ros2(drive, time_s, step_s, &state);
-            let half = self.ros2(drive, time_s, 0.5 * step_s, &state);
-            let halves = self.ros2(drive, time_s + 0.5 * step_s, 0.5 * step_s, &half);
-            let error_k = whole.iter().zip(&halves).map(|(a, b)| (a - b).abs() / 3.0).fold(0.0, f64::max);
-            let factor = (0.9 * (self.tolerance_k / error_k.max(1e-300)).cbrt()).clamp(0.2, 4.0);
-            if !error_k.is_finite() {
-                return Err(ThermalError::Eigen);
-            }
-            if error_k > self.tolerance_k && step_s > self.shortest_s {
-                self.state = state;
-                self.step_s = step_s * factor;
-                continue;
-            }
-            time_s = if step_s == left_s { to_s } else { time_s + step_s };
-            self.state = halves.iter().zip(&whole).map(|(b, a)| b + (b - a) / 3.0).collect();
-            self.check_conductivity()?;
-            if step_s >= self.step_s || factor < 1.0 {
-                self.step_s = step_s * factor;
-            }
-            if let Some(course) = course.as_deref_mut() {
-                self.record(drive, time_s, course);
-            }
-        }
-        Ok(())
-    }
-
-    fn check_conductivity(&self) -> Result<(), ThermalError> {
-        let slope_per_k = self.system.slope_per_k;
-        match self.state.iter().find(|t| !(self.system.factor(**t) > 0.0)) {
-            None => Ok(()),
-            Some(&temperature_k) => Err(ThermalError::ConductivityNotPositive { temperature_k, slope_per_k }),
-        }
-    }
-
-    fn record(&mut self, drive: &Drive, time_s: f64, course: &mut Course) {
-        let inputs = self.system.inputs(drive, time_s);
-        self.system.conductances(&self.state, &inputs, &mut self.current);
-        self.system.rates(&self.state, &inputs, &self.current, &mut self.stages[0]);
-        course.times_s.push(time_s);
-        self.system.project(&self.state, &mut course.value);
-        self.system.project(&self.stages[0], &mut course.rate);
-    }
+    linear: PackField,
+    pieces: Vec<Piece>,
+    lobatto: Lobatto,
 }
 
 impl SteppedField {
     /// # Errors
     /// Values so extreme that nothing converges; a conductivity that does not stay positive.
-    pub fn new(path: &HeatPath, drive: &Drive, tolerance_share: f64) -> Result<Self, ThermalError> {
-        let system = System::new(path, drive.start_s());
-        // The linear pack at the declared conductivity tells the time scales.
-        let linear = Pack::new(path)?;
+    pub fn new(path: &HeatPath, drive: &Drive) -> Result<Self, ThermalError> {
         let values = || drive.boundary_k.values().iter().chain(drive.ambient_k().values()).copied();
         let (lowest_k, highest_k) = values().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+        let slope_per_k = path.conductivity_slope_per_k;
+        let factor = |temperature_k: f64| 1.0 + slope_per_k * (temperature_k - REFERENCE_TEMPERATURE_K);
         for temperature_k in [lowest_k, highest_k] {
-            if !(system.factor(temperature_k) > 0.0) {
-                let slope_per_k = system.slope_per_k;
+            if !(factor(temperature_k) > 0.0) {
                 return Err(ThermalError::ConductivityNotPositive { temperature_k, slope_per_k });
             }
         }
-        let tolerance_k = (tolerance_share * (highest_k - lowest_k)).max(LEAST_TOLERANCE_K);
-        let slowest = system.factor(lowest_k).min(system.factor(highest_k)).min(1.0);
-        let settling_s = linear.settling_s() / slowest;
-        let mut integrator = Integrator::new(&system, drive.boundary_k.first_value(), tolerance_k, linear.shortest_s());
-        let start_s = drive.start_s();
-        if drive.ambient_k().first_value() != drive.boundary_k.first_value() {
-            let still = Drive {
-                boundary_k: PiecewiseLinear::constant(drive.boundary_k.first_value()),
-                ambient_k: Some(PiecewiseLinear::constant(drive.ambient_k().first_value())),
-            };
-            integrator.advance(&still, start_s - settling_s, start_s, None)?;
-            integrator.step_s = linear.shortest_s();
-        }
+        let middle_k = 0.5 * (lowest_k + highest_k);
+        let at_middle = HeatPath {
+            material: path.material.scaled(factor(middle_k)),
+            conductivity_slope_per_k: slope_per_k / factor(middle_k),
+            ..path.clone()
+        };
+        let system = System::new(&at_middle, drive, middle_k)?;
+        let linear = Pack::new(&at_middle)?;
+        let settling_s = linear.settling_s() * factor(middle_k) / factor(lowest_k).min(factor(highest_k));
+        let warming_s = path.bore_heat.map_or(0.0, |heat| 40.0 * heat.time_constant_s);
         let mut knots: Vec<f64> = drive.boundary_k.knots().iter().chain(drive.ambient_k().knots()).copied().collect();
-        knots.retain(|k| *k >= start_s);
+        knots.retain(|k| *k >= drive.start_s());
         knots.sort_by(f64::total_cmp);
         knots.dedup();
-        let warming_s = path.bore_heat.map_or(0.0, |heat| 40.0 * heat.time_constant_s);
-        knots.push(knots[knots.len() - 1] + settling_s + warming_s);
-        let mut course = Course::default();
-        integrator.record(drive, start_s, &mut course);
-        for pair in knots.windows(2) {
-            integrator.advance(drive, pair[0], pair[1], Some(&mut course))?;
+        let last_s = knots[knots.len() - 1];
+        let is_sampled = knots.len() > SAMPLED_KNOTS;
+        if is_sampled {
+            let mut index = 0;
+            knots.retain(|knot| {
+                index += 1;
+                (index - 1) % KNOTS_A_PANEL == 0 || *knot == last_s
+            });
         }
-        Ok(Self {
-            layers: path.shape.layers,
-            outputs: system.outputs(),
-            outermost_is_drive: system.network.outermost_is_drive,
-            drive: drive.clone(),
-            course,
-        })
+        knots.push(last_s + settling_s + warming_s);
+        let panel = Panel::new()?;
+        let ambient = drive.ambient_k();
+        let mut march = March {
+            system: &system,
+            tracks: [(&drive.boundary_k, &system.by_boundary), (ambient, &system.by_ambient)]
+                .into_iter()
+                .filter(|(_, by_input)| by_input.iter().any(|b| *b != 0.0))
+                .map(|(input, by_input)| Track::new(input, by_input))
+                .collect(),
+            drive,
+            panel: &panel,
+            span_k: highest_k - lowest_k,
+            pieces: Vec::new(),
+            weights: HashMap::new(),
+        };
+        let mut rate = vec![0.0; system.decay_per_s.len()];
+        let mut bent = march.still()?;
+        for pair in knots.windows(2) {
+            let is_one = is_sampled && pair[1] <= last_s;
+            let first_s = if is_one { pair[1] - pair[0] } else { FIRST * linear.shortest_s() };
+            (rate, bent) = march.through(pair[0], pair[1], first_s, rate, bent)?;
+        }
+        let pieces = march.pieces;
+        Ok(Self { layers: path.shape.layers, linear: PackField::new(linear, drive), pieces, lobatto: panel.lobatto })
     }
 
     pub(super) fn at(&self, instants: &[Instant], wanted: Wanted) -> ThermalHistory {
-        let mut history = ThermalHistory::with_capacity(self.layers, instants.len());
-        let (mut value, mut rate) = (vec![0.0; self.outputs], vec![0.0; self.outputs]);
-        for &instant in instants {
-            self.course.at(instant.time_s, self.outputs, &mut value, &mut rate);
-            if self.outermost_is_drive {
-                value[self.layers - 1] = self.drive.boundary_k.value(instant.time_s);
-                rate[self.layers - 1] = match instant.side {
-                    Side::Before => self.drive.boundary_k.slope_before(instant.time_s),
-                    Side::After => self.drive.boundary_k.slope_after(instant.time_s),
-                };
-            }
+        let mut history = self.linear.at(instants, wanted);
+        let (layers, first) = (self.layers, &self.pieces[0]);
+        for (row, &instant) in instants.iter().enumerate() {
+            let before = instant.side == Side::Before;
+            let is_past = |p: &Piece| if before { p.from_s < instant.time_s } else { p.from_s <= instant.time_s };
+            let piece = &self.pieces[self.pieces.partition_point(is_past).saturating_sub(1)];
+            let place = ((instant.time_s - piece.from_s) / piece.length_s).clamp(0.0, 1.0);
+            let is_outside = instant.time_s < first.from_s || instant.time_s > piece.from_s + piece.length_s;
+            let basis = nalgebra::DVector::from_vec(self.lobatto.basis(2.0 * place - 1.0));
+            let add = |to: &mut [f64], from: &[f64]| {
+                let width = from.len();
+                to[row * width..(row + 1) * width].iter_mut().zip(from).for_each(|(to, from)| *to += from);
+            };
             if wanted.temperatures() {
-                history.temperature_k.extend_from_slice(&value[..self.layers]);
-                history.axial_moment_k.extend_from_slice(&value[self.layers..]);
+                let value = &piece.value * &basis;
+                add(&mut history.temperature_k, &value.as_slice()[..layers]);
+                add(&mut history.axial_moment_k, &value.as_slice()[layers..]);
             }
-            if wanted.rates() {
-                history.rate_k_per_s.extend_from_slice(&rate[..self.layers]);
-                history.axial_moment_k_per_s.extend_from_slice(&rate[self.layers..]);
+            if wanted.rates() && !is_outside {
+                let rate = &piece.rate * &basis;
+                add(&mut history.rate_k_per_s, &rate.as_slice()[..layers]);
+                add(&mut history.axial_moment_k_per_s, &rate.as_slice()[layers..]);
             }
-            history.times_s.push(instant.time_s);
-            super::push_ambient(&mut history, &self.drive, instant);
         }
         history
+    }
+}
+
+/// What bends each mode at a time, and how it changes.
+#[derive(Debug)]
+struct Bent {
+    value: Vec<f64>,
+    slope_per_s: Vec<f64>,
+}
+
+/// On the way through a drive.
+struct March<'a> {
+    system: &'a System,
+    tracks: Vec<Track<'a>>,
+    drive: &'a Drive,
+    panel: &'a Panel,
+    span_k: f64,
+    pieces: Vec<Piece>,
+    /// By the length's bits: panels behind every knot begin with the same lengths.
+    weights: HashMap<u64, Rc<Weights>>,
+}
+
+impl March<'_> {
+    /// What ν drives in the steady state before the start.
+    fn still(&self) -> Result<Bent, ThermalError> {
+        let system = self.system;
+        let start_s = self.drive.start_s();
+        let above = |input: &PiecewiseLinear| input.value(start_s) - system.middle_k;
+        let (boundary_k, ambient_k) = (above(&self.drive.boundary_k), above(self.drive.ambient_k()));
+        let driven = system.by_boundary.iter().zip(&system.by_ambient).map(|(b, a)| b * boundary_k + a * ambient_k);
+        let driven: Vec<f64> = driven.collect();
+        let mut bent = vec![0.0; driven.len()];
+        let mut before = DMatrix::zeros(0, 0);
+        for _ in 0..MOST_SUBSTITUTIONS {
+            let contents = driven.iter().zip(&bent).zip(&system.decay_per_s).map(|((g, n), l)| (g + n) / l);
+            let temperatures = system.temperatures(&DMatrix::from_iterator(driven.len(), 1, contents));
+            system.is_conducting(&temperatures)?;
+            bent = system.bent(&temperatures, &[boundary_k]).as_slice().to_vec();
+            let scale = temperatures.amax();
+            if before.nrows() > 0 && (&temperatures - &before).amax() <= 10.0 * ROUNDING * scale {
+                let slope_per_s = vec![0.0; bent.len()];
+                return Ok(Bent { value: bent, slope_per_s });
+            }
+            before = temperatures;
+        }
+        Err(ThermalError::Eigen)
+    }
+
+    /// From one knot to the next; `rate` and `bent` as they are at its start and then at its end.
+    fn through(
+        &mut self,
+        from_s: f64,
+        to_s: f64,
+        first_s: f64,
+        mut rate: Vec<f64>,
+        mut bent: Bent,
+    ) -> Result<(Vec<f64>, Bent), ThermalError> {
+        let (mut time_s, mut length_s) = (from_s, first_s);
+        while time_s < to_s {
+            // No sliver is left for a last panel.
+            let left_s = to_s - time_s;
+            let step_s = if length_s * 1.5 >= left_s { left_s } else { length_s };
+            (rate, bent) = self.step(time_s, step_s, &rate, &bent)?;
+            time_s = if step_s == left_s { to_s } else { time_s + step_s };
+            length_s *= GROWTH;
+        }
+        Ok((rate, bent))
+    }
+
+    fn step(
+        &mut self,
+        from_s: f64,
+        length_s: f64,
+        rate: &[f64],
+        bent: &Bent,
+    ) -> Result<(Vec<f64>, Bent), ThermalError> {
+        let system = self.system;
+        let (modes, nodes) = (rate.len(), DEGREE + 1);
+        let times_s = self.panel.places.iter().map(|x| from_s + x * length_s);
+        let mut linear = DMatrix::zeros(modes, nodes);
+        for (mut column, time_s) in linear.column_iter_mut().zip(times_s.clone()) {
+            for track in &mut self.tracks {
+                track.add_to(time_s, system.middle_k, &system.decay_per_s, column.as_mut_slice());
+            }
+            system.add_heat(time_s, column.as_mut_slice());
+        }
+        let drive_k: Vec<f64> = times_s.map(|t| self.drive.boundary_k.value(t) - system.middle_k).collect();
+        let weights = match self.weights.get(&length_s.to_bits()) {
+            Some(known) => Rc::clone(known),
+            None => {
+                let weights = Rc::new(self.panel.weights(&system.decay_per_s, length_s));
+                if self.weights.len() < MOST_KNOWN_LENGTHS {
+                    self.weights.insert(length_s.to_bits(), Rc::clone(&weights));
+                }
+                weights
+            }
+        };
+        // The first guess: what bends the pack goes on as it did.
+        let places = &self.panel.places;
+        let mut from_bent =
+            DMatrix::from_fn(modes, nodes, |i, j| bent.value[i] + bent.slope_per_s[i] * places[j] * length_s);
+        let (mut rates, mut contents) = (DMatrix::zeros(modes, nodes), DMatrix::zeros(modes, nodes));
+        let mut before = DMatrix::zeros(0, 0);
+        for _ in 0..MOST_SUBSTITUTIONS {
+            for (i, decay_per_s) in system.decay_per_s.iter().enumerate() {
+                let mut driving = [0.0; DEGREE + 1];
+                for (k, driving) in driving.iter_mut().enumerate() {
+                    *driving = from_bent[(i, k)];
+                }
+                for j in 0..nodes {
+                    let place = i * nodes + j;
+                    let made = &weights.made[place * nodes..(place + 1) * nodes];
+                    let made: f64 = made.iter().zip(&driving).map(|(w, g)| w * g).sum();
+                    rates[(i, j)] = weights.left[place] * rate[i] + made;
+                    contents[(i, j)] = (driving[j] - rates[(i, j)]) / decay_per_s;
+                }
+            }
+            let temperatures = system.temperatures(&(&linear + &contents));
+            system.is_conducting(&temperatures)?;
+            from_bent = system.bent(&temperatures, &drive_k);
+            let moved_k = (temperatures.column(DEGREE) - temperatures.column(0)).amax();
+            let enough_k = TOLERANCE * moved_k + ROUNDING * self.span_k.max(1.0);
+            let is_done = before.nrows() > 0 && (&temperatures - &before).amax() <= enough_k;
+            before = temperatures;
+            if is_done || system.slope_per_k == 0.0 {
+                let (value, rate) = (&system.seen * &contents, &system.seen * &rates);
+                self.pieces.push(Piece { from_s, length_s, value, rate });
+                let ends = self.panel.lobatto.derivative.row(DEGREE).transpose() * (2.0 / length_s);
+                let bent = Bent {
+                    value: from_bent.column(DEGREE).as_slice().to_vec(),
+                    slope_per_s: (&from_bent * ends).as_slice().to_vec(),
+                };
+                return Ok((rates.column(DEGREE).as_slice().to_vec(), bent));
+            }
+        }
+        Err(ThermalError::Eigen)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numeric::piecewise::PiecewiseLinear;
     use crate::thermal::modal::PackField;
     use crate::thermal::{BoreHeat, Extent, Flange, FlangeFilm, Location, Material, PackShape, Spool};
 
@@ -449,7 +324,7 @@ mod tests {
     fn differences(path: &HeatPath) -> [f64; 4] {
         let instants: Vec<Instant> = (0..240).map(|i| Instant::after(1.0 + 4.9 * i as f64)).collect();
         let exact = PackField::new(Pack::new(path).unwrap(), &drive()).at(&instants, Wanted::All);
-        let stepped = SteppedField::new(path, &drive(), TOLERANCE_SHARE).unwrap().at(&instants, Wanted::All);
+        let stepped = SteppedField::new(path, &drive()).unwrap().at(&instants, Wanted::All);
         let share =
             |a: &[f64], b: &[f64], scale: f64| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / scale;
         let largest = |a: &[f64]| a.iter().map(|v| v.abs()).fold(1e-300, f64::max);
@@ -481,14 +356,11 @@ mod tests {
     fn a_steep_slope_of_the_conductivity_is_refused_and_a_small_one_changes_the_field_in_proportion() {
         let mut steep = path(Location::OuterLayer);
         steep.conductivity_slope_per_k = -0.5;
-        assert!(matches!(
-            SteppedField::new(&steep, &drive(), TOLERANCE_SHARE),
-            Err(ThermalError::ConductivityNotPositive { .. })
-        ));
+        assert!(matches!(SteppedField::new(&steep, &drive()), Err(ThermalError::ConductivityNotPositive { .. })));
         let instants: Vec<Instant> = (0..50).map(|i| Instant::after(20.0 * i as f64)).collect();
         let with_slope = |slope_per_k: f64| {
             let path = HeatPath { conductivity_slope_per_k: slope_per_k, ..path(Location::OuterLayer) };
-            SteppedField::new(&path, &drive(), TOLERANCE_SHARE).unwrap().at(&instants, Wanted::All).temperature_k
+            SteppedField::new(&path, &drive()).unwrap().at(&instants, Wanted::All).temperature_k
         };
         let (none, one, two) = (with_slope(0.0), with_slope(1e-3), with_slope(2e-3));
         let change = |a: &[f64]| a.iter().zip(&none).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);

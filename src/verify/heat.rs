@@ -11,6 +11,7 @@
 //! temperature is stepped through every profile ([`super::stepping`]).
 
 use super::laplace::Response;
+use super::layers::Layers;
 use super::network::{Cut, Network};
 use super::physics::{BoreHeat, Physics};
 use super::stepping::Drive;
@@ -23,6 +24,11 @@ const CLOSER: usize = 5;
 /// … and where it is superposed: closer to its start, and evenly.
 const SPACED_TIMES: usize = 90;
 const EVEN_TIMES: usize = 40;
+
+/// Two cuts of a pack that is stepped …
+const CUTS: [Cut; 2] = [Cut { cells_per_layer: 8, slices: 1 }, Cut { cells_per_layer: 16, slices: 1 }];
+/// … and of one with a heated flange.
+const CUTS_BESIDE_FLANGE: [Cut; 2] = [Cut { cells_per_layer: 4, slices: 24 }, Cut { cells_per_layer: 8, slices: 48 }];
 
 /// The pack at one time, relative to where the profile starts.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -50,9 +56,16 @@ fn heat_at(heat: Option<BoreHeat>, time_s: f64) -> f64 {
 /// What solves the pack.
 #[derive(Debug)]
 enum Solution {
-    HalfSpace { depths_m: Vec<f64>, diffusivity_m2_per_s: f64 },
+    HalfSpace {
+        depths_m: Vec<f64>,
+        diffusivity_m2_per_s: f64,
+    },
     Linear(Response),
-    Stepped { network: Network, heat: Option<BoreHeat> },
+    /// On two networks, the second twice as fine as the first.
+    Stepped {
+        networks: [Network; 2],
+        heat: Option<BoreHeat>,
+    },
 }
 
 /// The pack's temperatures under any of a model's profiles.
@@ -68,8 +81,7 @@ pub(super) struct Heat {
 }
 
 impl Heat {
-    /// `cuts`: one, or two of which the second is twice as fine, to be extrapolated where the pack is linear.
-    pub fn new(model: &CoilModel, physics: &Physics, height_m: f64, longest_s: f64, cuts: &[Cut]) -> Self {
+    pub fn new(model: &CoilModel, physics: &Physics, height_m: f64, longest_s: f64) -> Self {
         let coil = &model.coil;
         let (layers, pitch_m) = (coil.layers(), coil.radial_pitch_m());
         let diffusivity_m2_per_s = physics.diffusivity_m2_per_s();
@@ -78,16 +90,10 @@ impl Heat {
             let depths_m = (0..layers).map(|j| (layers - 1 - j) as f64 * pitch_m).collect();
             Solution::HalfSpace { depths_m, diffusivity_m2_per_s }
         } else if physics.conductivity_slope_per_k != 0.0 {
-            let finest = cuts[cuts.len() - 1];
-            Solution::Stepped { network: Network::new(model, physics, height_m, finest), heat }
+            let cuts = if physics.flange.is_some() { CUTS_BESIDE_FLANGE } else { CUTS };
+            Solution::Stepped { networks: cuts.map(|cut| Network::new(model, physics, height_m, cut)), heat }
         } else {
-            let mut responses =
-                cuts.iter().map(|cut| Response::new(&Network::new(model, physics, height_m, *cut), heat, longest_s));
-            let first = responses.next().expect("at least one cut");
-            Solution::Linear(match responses.next() {
-                None => first,
-                Some(finer) => Response::extrapolated(finer, &first),
-            })
+            Solution::Linear(Response::new(&Layers::new(model, physics, height_m), heat, longest_s))
         };
         let first_s = 0.02 * pitch_m * pitch_m / (4.0 * diffusivity_m2_per_s);
         Self { layers, has_heat: heat.is_some(), wants_rise: physics.depends_on_temperature(), solution, first_s }
@@ -100,8 +106,8 @@ impl Heat {
 
     /// The state at a moment of a profile, where [`Heat::is_exact_in_time`]; by steps otherwise.
     pub fn at(&self, profile: &Profile, moment: Moment) -> State {
-        if let Solution::Stepped { network, heat } = &self.solution {
-            return self.stepped(profile, network, *heat, Some(moment)).pop().unwrap_or_default();
+        if let Solution::Stepped { networks, heat } = &self.solution {
+            return self.extrapolated(profile, networks, *heat, Some(moment)).pop().unwrap_or_default();
         }
         let solved = if self.wants_rise { self.layers } else { 0 };
         let mut state = State {
@@ -162,8 +168,8 @@ impl Heat {
 
     /// The states that a profile leads through, a list a piece; both one-sided limits at its break points are among them.
     pub fn pieces(&self, profile: &Profile) -> Vec<Vec<State>> {
-        if let Solution::Stepped { network, heat } = &self.solution {
-            return vec![self.stepped(profile, network, *heat, None)];
+        if let Solution::Stepped { networks, heat } = &self.solution {
+            return vec![self.extrapolated(profile, networks, *heat, None)];
         }
         let mut start_s = 0.0;
         let mut pieces = Vec::new();
@@ -174,6 +180,27 @@ impl Heat {
         }
         pieces.push(vec![self.at(profile, Moment { time_s: start_s, after: true })]);
         pieces
+    }
+
+    /// What both networks tend to: their errors are of second order in the cells' width.
+    fn extrapolated(
+        &self,
+        profile: &Profile,
+        [coarse, fine]: &[Network; 2],
+        heat: Option<BoreHeat>,
+        until: Option<Moment>,
+    ) -> Vec<State> {
+        let coarse = self.stepped(profile, coarse, heat, until);
+        let mut states = self.stepped(profile, fine, heat, until);
+        let mix = |fine: &mut Vec<f64>, coarse: &[f64]| {
+            fine.iter_mut().zip(coarse).for_each(|(f, c)| *f = (4.0 * *f - c) / 3.0);
+        };
+        for (state, coarse) in states.iter_mut().zip(&coarse) {
+            mix(&mut state.rise_k, &coarse.rise_k);
+            mix(&mut state.rate_k_per_s, &coarse.rate_k_per_s);
+            mix(&mut state.moment_k_per_s, &coarse.moment_k_per_s);
+        }
+        states
     }
 
     /// All states up to a moment, or to the profile's end.

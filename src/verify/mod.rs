@@ -13,6 +13,7 @@ mod expected;
 mod form;
 mod heat;
 mod laplace;
+mod layers;
 mod network;
 mod optics;
 mod page;
@@ -186,7 +187,7 @@ pub enum RateCheck {
         worst_rad_per_s: f64,
         /// How closely the claim was compared with it.
         tolerance_rad_per_s: f64,
-        /// The same on a finer network; none in a half space, which has a closed form.
+        /// The same, where it stands for the continuum behind a claim's grid; none in a half space, which has none.
         finer_rad_per_s: Option<f64>,
         /// How many profiles were gone through.
         profiles: usize,

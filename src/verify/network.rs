@@ -4,10 +4,8 @@
 //! C dT/dt + G (T − u) = q,   C = ρc (r₂² − r₁²)/2,   G = k/ln(r₂/r₁), in series with a contact or film   per radian
 //! ```
 //!
-//! With the declared two cells a layer it is what a schedule's rate error is claimed for; with more cells it tends to
-//! the pack itself. A spool stands in front of the first cell; the axis is cut into slices where a flange is heated.
-
-use nalgebra::{DMatrix, SymmetricEigen};
+//! It is stepped where the conductivity depends on temperature; what is linear has a closed form ([`super::layers`]). A
+//! spool stands in front of the first cell; the axis is cut into slices where a flange is heated.
 
 use super::physics::Physics;
 use crate::rate::CoilModel;
@@ -21,9 +19,6 @@ pub(super) struct Cut {
     pub slices: usize,
 }
 
-/// What a schedule's rate error is claimed for.
-pub(super) const DECLARED: Cut = Cut { cells_per_layer: 2, slices: 32 };
-
 /// A way for heat: through the material, then through a contact or a film.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Link {
@@ -34,11 +29,6 @@ pub(super) struct Link {
 }
 
 impl Link {
-    #[cfg(test)]
-    pub fn film(conductance: f64) -> Self {
-        Self { log_ratio: 0.0, rest: 1.0 / conductance }
-    }
-
     pub fn conductance(self, conductivity_w_per_m_k: f64) -> f64 {
         1.0 / (self.log_ratio / conductivity_w_per_m_k + self.rest)
     }
@@ -90,41 +80,6 @@ impl Axis {
         let of_linear: f64 = centres.iter().map(|c| c * c).sum();
         centres.iter().map(|c| c / (12.0 * of_linear)).collect()
     }
-
-    /// Eigenvalues [1/s], and of each eigenvector: its sum, its value at the heated slice, its moment.
-    pub fn modes(&self, conductivity_w_per_m_k: f64) -> Vec<AxialMode> {
-        let n = self.slices;
-        let film = self.film_per_s(conductivity_w_per_m_k);
-        let operator = DMatrix::from_fn(n, n, |i, j| match i.abs_diff(j) {
-            0 => {
-                let neighbours = f64::from(i > 0) + f64::from(i + 1 < n);
-                self.exchange_per_s * neighbours + if i == self.heated { film } else { 0.0 }
-            }
-            1 => -self.exchange_per_s,
-            _ => 0.0,
-        });
-        let solved = SymmetricEigen::new(operator);
-        let weights = self.moment_weights();
-        solved
-            .eigenvectors
-            .column_iter()
-            .zip(solved.eigenvalues.iter())
-            .map(|(vector, value)| AxialMode {
-                decay_per_s: *value,
-                sum: vector.sum(),
-                from_air_per_s: film * vector[self.heated],
-                moment: vector.iter().zip(&weights).map(|(v, w)| v * w).sum(),
-            })
-            .collect()
-    }
-}
-
-#[derive(Debug, Clone, Copy)]
-pub(super) struct AxialMode {
-    pub decay_per_s: f64,
-    pub sum: f64,
-    pub from_air_per_s: f64,
-    pub moment: f64,
 }
 
 impl Network {

@@ -1,16 +1,14 @@
 //! The claimed rate error, worked out again from this folder's own temperatures ([`super::heat`]) and optics
 //! ([`super::optics`]).
 //!
-//! Three comparisons. At the stated profile and time, and as the worst over all profiles and times, the claim must be
-//! what the declared heat network gives: to the last printed digit where the network is linear, within
-//! [`STEPPED_SHARES`] where its conductivity depends on temperature and both sides step it in time. On a finer network
-//! it may differ by what two cells a layer leave, [`FINER_SHARES`].
+//! Two comparisons: at the stated profile and time, and as the worst over all profiles and times. What is found here has no
+//! grid where the pack is linear, and is extrapolated from two grids where its conductivity depends on temperature. The
+//! claim stands on a grid of its own and may be off by what that leaves: [`GRID_SHARES`] or [`STEPPED_SHARES`].
 
 use rayon::prelude::*;
 
 use super::expected::{layer_lengths_m, runs_outbound};
 use super::heat::{Heat, Moment, State};
-use super::network::{Cut, DECLARED};
 use super::optics::Optics;
 use super::physics::{Physics, wound_turns};
 use super::{Claim, Findings, Printed, RateCheck, Truth};
@@ -25,21 +23,12 @@ const EXACT_SHARE: f64 = 1e-10;
 /// How closely a maximum over time is found on either side, a share of the worst rate error: right after a change of
 /// ramp the error still grows for an instant, until the next layer feels it.
 const MAXIMUM_SHARE: f64 = 1e-6;
-/// Where both sides step in time: of the worst rate error, and of what one layer alone could make. Four times what was
-/// found between them (`tests/verify`: 1.3e−5 of a cylindrical winding's error, 1.2e−6 of a layer's).
-const STEPPED_SHARES: [f64; 2] = [5e-5, 5e-6];
-/// How far the declared network may be from a finer one: where a pattern cancels nearly everything, the layers' own
-/// errors are left.
-const FINER_SHARES: [f64; 2] = [0.01, 1e-4];
+/// What the grid of a claim leaves: of the worst rate error, and of what one layer alone could make. A tenth of what is
+/// promised of a printed number, and ten times the most that was found (`tests/verify`).
+const GRID_SHARES: [f64; 2] = [1e-4, 1e-6];
+/// The same where both sides step in time.
+const STEPPED_SHARES: [f64; 2] = [1e-3, 1e-5];
 
-/// Two finer cuts, the second twice as fine as the first, for a linear pack, one with a heated flange …
-const FINER: [Cut; 2] = [Cut { cells_per_layer: 8, slices: 1 }, Cut { cells_per_layer: 16, slices: 1 }];
-const FINER_FLANGE: [Cut; 2] = [Cut { cells_per_layer: 4, slices: 32 }, Cut { cells_per_layer: 8, slices: 64 }];
-/// … and the one for a pack that is stepped.
-const FINER_STEPPED: Cut = Cut { cells_per_layer: 6, slices: 32 };
-
-/// Profiles that come so close to the worst on the declared network are gone through on the finer one too.
-const WORST_PROFILES: f64 = 0.9;
 /// A place is looked at closely where the rate error exceeds this share of the largest seen.
 const CLOSE_TO_LARGEST: f64 = 0.97;
 
@@ -69,14 +58,17 @@ pub(super) fn check(truth: &Truth, claim: &Claim, segments: &[usize], findings: 
     let profiles = truth.profiles.profiles();
     let longest_s = profiles.iter().map(Profile::duration_s).fold(1.0, f64::max);
     let height_m = truth.model.coil.axial_pitch_m() * wound_turns(truth.model).iter().copied().fold(0.0, f64::max);
-    let heat_on = |cuts: &[Cut]| Heat::new(truth.model, &physics, height_m, longest_s, cuts);
-    let declared = heat_on(&[DECLARED]);
+    let declared = Heat::new(truth.model, &physics, height_m, longest_s);
 
     let steepest = profiles.iter().map(Profile::max_rate_k_per_s).fold(0.0, f64::max);
     let of_layer = optics.largest_layer_rad_per_k() * steepest;
     let within = |shares: [f64; 2], size: f64| shares[0] * size + shares[1] * of_layer;
-    let by_steps = if declared.is_exact_in_time() { 0.0 } else { within(STEPPED_SHARES, claimed.abs()) };
-    let at_time = Printed::DegPerHour.tolerance() + EXACT_SHARE * of_layer + by_steps;
+    let by_grid = match (physics.is_pack, declared.is_exact_in_time()) {
+        (false, _) => 0.0,
+        (true, true) => within(GRID_SHARES, claimed.abs()),
+        (true, false) => within(STEPPED_SHARES, claimed.abs()),
+    };
+    let at_time = Printed::DegPerHour.tolerance() + EXACT_SHARE * of_layer + by_grid;
 
     let named = claim.worst_profile.as_ref().map(|name| (name, profiles.iter().find(|p| p.name() == name)));
     match named {
@@ -92,34 +84,17 @@ pub(super) fn check(truth: &Truth, claim: &Claim, segments: &[usize], findings: 
         None => {}
     }
 
-    let (worst, of_each) = worst_over(&declared, &optics, &profiles);
-    let tolerance = at_time + MAXIMUM_SHARE * worst.size;
+    let worst = worst_over(&declared, &optics, &profiles);
+    let tolerance = at_time + MAXIMUM_SHARE * worst;
     findings.checks += 1;
-    let is_the_worst = (worst.size - claimed).abs() <= tolerance;
-    if !is_the_worst {
-        let (expected, found) = (Printed::DegPerHour.show(worst.size), Printed::DegPerHour.show(claimed));
+    if !((worst - claimed).abs() <= tolerance) {
+        let (expected, found) = (Printed::DegPerHour.show(worst), Printed::DegPerHour.show(claimed));
         findings.add(None, "worst_rate_deg_per_h", expected, found, NOT_THE_WORST);
     }
-    let finer = physics.is_pack.then(|| {
-        let finer = if !declared.is_exact_in_time() {
-            worst_over(&heat_on(&[FINER_STEPPED]), &optics, &profiles[worst.profile..=worst.profile]).0
-        } else {
-            let cuts = if physics.flange.is_some() { FINER_FLANGE } else { FINER };
-            let close = profiles.iter().zip(&of_each).filter(|(_, size)| **size >= WORST_PROFILES * worst.size);
-            let close: Vec<Profile> = close.map(|(profile, _)| profile.clone()).collect();
-            worst_over(&heat_on(&cuts), &optics, &close).0
-        };
-        findings.checks += 1;
-        if is_the_worst && !((finer.size - claimed).abs() <= within(FINER_SHARES, finer.size.max(claimed.abs()))) {
-            let (expected, found) = (Printed::DegPerHour.show(finer.size), Printed::DegPerHour.show(claimed));
-            findings.add(None, "worst_rate_deg_per_h on a finer network", expected, found, NOT_THE_WORST);
-        }
-        finer.size
-    });
     RateCheck::Independent {
-        worst_rad_per_s: worst.size,
+        worst_rad_per_s: worst,
         tolerance_rad_per_s: tolerance,
-        finer_rad_per_s: finer,
+        finer_rad_per_s: physics.is_pack.then_some(worst),
         profiles: profiles.len(),
     }
 }
@@ -164,29 +139,15 @@ fn check_at(
     }
 }
 
-/// The largest |Ω| and the index of its profile.
-#[derive(Debug, Clone, Copy)]
-struct Worst {
-    size: f64,
-    profile: usize,
-}
-
-/// Over all profiles, and as it was seen for each of them before looking closely.
-fn worst_over(heat: &Heat, optics: &Optics, profiles: &[Profile]) -> (Worst, Vec<f64>) {
+/// The largest |Ω| over all profiles.
+fn worst_over(heat: &Heat, optics: &Optics, profiles: &[Profile]) -> f64 {
     let size_of = |state: &State| (state.time_s, optics.rate_rad_per_s(state).abs());
     let seen: Vec<Vec<Vec<(f64, f64)>>> = profiles
         .par_iter()
         .map(|profile| heat.pieces(profile).iter().map(|piece| piece.iter().map(size_of).collect()).collect())
         .collect();
-    let of_each: Vec<f64> =
-        seen.iter().map(|pieces| pieces.iter().flatten().map(|(_, size)| *size).fold(0.0, f64::max)).collect();
-    let mut worst = Worst { size: 0.0, profile: 0 };
-    for (profile, &size) in of_each.iter().enumerate() {
-        if size > worst.size {
-            worst = Worst { size, profile };
-        }
-    }
-    let least = CLOSE_TO_LARGEST * worst.size;
+    let mut worst = seen.iter().flatten().flatten().map(|(_, size)| *size).fold(0.0, f64::max);
+    let least = CLOSE_TO_LARGEST * worst;
     for (profile, pieces) in seen.iter().enumerate() {
         for peak in pieces.iter().flat_map(|piece| piece.windows(3)) {
             let [(from_s, before), (_, size), (to_s, after)] = [peak[0], peak[1], peak[2]];
@@ -201,12 +162,10 @@ fn worst_over(heat: &Heat, optics: &Optics, profiles: &[Profile]) -> (Worst, Vec
             } else {
                 vertex(peak)
             };
-            if size > worst.size {
-                worst = Worst { size, profile };
-            }
+            worst = worst.max(size);
         }
     }
-    (worst, of_each)
+    worst
 }
 
 /// The largest value of a function with one maximum between two points.

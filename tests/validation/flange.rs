@@ -2,8 +2,7 @@
 //! other flange being adiabatic. The excess of temperature after a step is the product of the hollow cylinder's Bessel
 //! series and the slab's Fourier series (Carslaw and Jaeger, Conduction of Heat in Solids, 1959, sections 1.15 and 3.11);
 //! after a step of the drive's *rate* the rates are one minus that product.
-//! Tolerance: what cells and slices leave of the continuum, from the printed errors; the order of convergence must be at
-//! least 1.8.
+//! Tolerance: what the grid leaves of the continuum, from the printed errors; a finer grid must come closer.
 
 use std::f64::consts::PI;
 
@@ -99,36 +98,28 @@ fn flanged(location: Location, outer_film: Option<f64>, flange: Flange, flange_f
 }
 
 #[test]
-fn a_heated_flange_gives_the_means_and_moments_of_the_product_of_both_series_and_converges_with_second_order() {
+fn a_heated_flange_gives_the_means_and_moments_of_the_product_of_both_series_and_a_finer_grid_comes_closer() {
     for (name, location, outer_film, flange) in [
         ("imposed outer layer, first flange", Location::OuterLayer, None, Flange::First),
         ("ambient through a film, second flange", Location::Ambient, Some(40.0), Flange::Second),
     ] {
-        let refined: Vec<(f64, f64)> = [(2, 8), (4, 16), (8, 32)]
-            .into_iter()
-            .map(|(cells_per_layer, axial_slices)| {
-                let coarse = flanged(location, outer_film, flange, 200.0, 8.5e-3);
-                errors(&HeatPath { cells_per_layer, axial_slices, ..coarse })
-            })
-            .collect();
-        println!("{name}: errors of mean and moment at 2/8, 4/16, 8/32 cells a layer and slices {refined:?}");
-        for (coarse, fine) in refined.iter().zip(&refined[1..]) {
-            let orders = ((coarse.0 / fine.0).log2(), (coarse.1 / fine.1).log2());
-            println!("  orders {orders:.3?}");
-            assert!(orders.0 >= 1.8 && orders.1 >= 1.8, "{name}: {orders:?}");
-        }
-        assert!(refined[2].0 < 3e-4 && refined[2].1 < 6e-3, "{name}: {refined:?}");
+        let path = flanged(location, outer_film, flange, 200.0, 8.5e-3);
+        let coarse = errors(&path);
+        let fine = errors(&HeatPath { cells_per_layer: 2, ..path });
+        println!("{name}: errors of mean and moment with 1 and 2 cells a layer {coarse:?} {fine:?}");
+        assert!(coarse.0 < 1e-8 && coarse.1 < 1e-8, "{name}: {coarse:?}");
+        assert!(fine.0 < coarse.0 + 1e-9 && fine.1 < coarse.1 + 1e-9, "{name}: {fine:?}");
     }
 }
 
 #[test]
-fn the_default_slices_leave_little_of_the_moment() {
-    for (film, allowed) in [(20.0, 1.5e-3), (200.0, 5e-3), (2000.0, 1.5e-2)] {
+fn the_default_grid_leaves_little_of_the_moment() {
+    for film in [20.0, 200.0, 2000.0] {
         for height_m in [8.0e-3, 17.0e-3] {
             let path = flanged(Location::Ambient, Some(20.0), Flange::First, film, height_m);
-            let (mean, moment) = errors(&HeatPath { cells_per_layer: 8, ..path });
+            let (mean, moment) = errors(&path);
             println!("{height_m} m, {film} W/(m²K): mean {mean:.1e}, moment {moment:.1e} of the largest");
-            assert!(moment < allowed, "{height_m} m, {film} W/(m²K): {moment}");
+            assert!(moment < 1e-8, "{height_m} m, {film} W/(m²K): {moment}");
         }
     }
 }

@@ -2,12 +2,14 @@
 
 mod allan;
 mod compensation;
+mod conductivity;
 mod diagnosis;
 mod effects;
 mod exact_integers;
 mod exhaustive;
 mod flange;
 mod fog_v7;
+mod grid;
 mod nist_strd;
 mod pack;
 mod paper;

@@ -1,7 +1,7 @@
 //! Reference: closed solutions of the heat equation — the slab series (Carslaw and Jaeger, Conduction of Heat in Solids,
 //! 1959, section 3.3) and the Bessel series of a hollow cylinder (section 7.10 and 9.11) with an adiabatic bore — and the
-//! balance of energy. Tolerances: what the stated number of cells a layer leaves of the continuum, from the printed
-//! achieved errors; the order of convergence must be at least 1.8.
+//! balance of energy. Tolerances: what the grid leaves of the continuum, from the printed achieved errors; a finer grid must
+//! come closer.
 
 use std::f64::consts::PI;
 
@@ -150,31 +150,29 @@ fn cylinder_error(location: Location, film_w_per_m2_k: Option<f64>, cells: usize
 }
 
 #[test]
-fn a_thick_pack_has_the_rates_of_the_bessel_series_and_converges_with_second_order() {
+fn a_thick_pack_has_the_rates_of_the_bessel_series_and_a_finer_grid_comes_closer() {
     for (name, location, film) in
         [("imposed outer layer", Location::OuterLayer, None), ("ambient through a film", Location::Ambient, Some(40.0))]
     {
-        let errors: Vec<f64> = [2, 4, 8, 16].iter().map(|&cells| cylinder_error(location, film, cells)).collect();
-        let orders: Vec<f64> = errors.windows(2).map(|e| (e[0] / e[1]).log2()).collect();
-        println!("{name}: errors at 2, 4, 8, 16 cells a layer {errors:?}, orders {orders:.3?}");
-        assert!(errors[0] < 2e-3 && errors[3] < 3e-5, "{name}: {errors:?}");
-        assert!(orders.iter().all(|o| *o >= 1.8), "{name}: {orders:?}");
+        let errors: Vec<f64> = [1, 2].iter().map(|&cells| cylinder_error(location, film, cells)).collect();
+        println!("{name}: errors with 1 and 2 cells a layer {errors:?}");
+        assert!(errors[0] < 1e-8 && errors[1] < 0.3 * errors[0] + 1e-9, "{name}: {errors:?}");
     }
 }
 
 #[test]
-fn the_default_cells_put_the_layer_rates_of_a_tactical_pack_within_two_thousandths_of_the_continuum() {
+fn the_default_grid_puts_the_layer_rates_of_a_tactical_pack_within_a_hundred_thousandth_of_the_continuum() {
     let shape = shape(24, 0.04, 165e-6);
     let coarse = HeatPath::new(shape, Extent::Pack, Material::Diffusivity { m2_per_s: 2.06e-7 }, Location::OuterLayer);
-    let fine = HeatPath { cells_per_layer: 32, ..coarse.clone() };
+    let fine = HeatPath { cells_per_layer: 16, ..coarse.clone() };
     let mut worst = 0.0_f64;
-    for time_s in [1.0, 3.0, 10.0, 30.0, 60.0, 100.0] {
+    for time_s in [0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 60.0, 100.0] {
         for (a, b) in step_rates(&coarse, time_s).iter().zip(step_rates(&fine, time_s)) {
             worst = worst.max((a - b).abs());
         }
     }
-    println!("default cells against 32 a layer, from 1 s on: {worst:.2e} of the step");
-    assert!(worst < 2e-3);
+    println!("default grid against 16 cells a layer, from 10 ms on: {worst:.2e} of the step");
+    assert!(worst < 1e-5);
 }
 
 /// Heat in pack and spool per radian and height, in excess of 300 K.
@@ -215,7 +213,7 @@ fn what_flows_through_the_film_is_stored_in_the_pack() {
     let ramp = PiecewiseLinear::new(vec![0.0, 1e5], vec![300.0, 400.0]).unwrap();
     let state = solve(&path, &Drive::boundary(ramp.clone())).unwrap().at(&[Instant::before(9e4)]);
     let rate_k_per_s = 1e-3;
-    assert!(state.rates_k_per_s(0).iter().all(|r| (r - rate_k_per_s).abs() < 1e-12));
+    assert!(state.rates_k_per_s(0).iter().all(|r| (r - rate_k_per_s).abs() < 1e-11));
     let flow = stored_j_per_m(&path, &[300.0 + rate_k_per_s; 24]);
     let surface_k = ramp.value(9e4) - flow / (20.0 * outer_m);
     // From the surface inwards the steady ramp's profile is quadratic: the outermost layer's mean lies below it by

@@ -15,15 +15,18 @@ pub mod schema;
 pub mod search;
 pub mod temperatures;
 pub mod tolerance;
+pub mod trim;
 
 use serde::Serialize;
 
 use crate::io::fault::{Fault, Faults};
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindingGraph;
+use crate::search::answer::Proof;
+use crate::search::aside::PointingError;
 use crate::search::cost::worst_case::WorstCase;
-use crate::search::proof::{Certificate, Status};
-use crate::units::deg_per_h_from_rad_per_s;
+use crate::search::proof::Status;
+use crate::units::{deg_from_rad, deg_per_h_from_rad_per_s};
 
 /// Raised when a key changes its meaning or goes; new keys do not raise it.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -73,6 +76,13 @@ pub struct PatternJson {
     pub worst_time_s: f64,
     /// Null where the model is nonlinear and no bound over all profiles exists.
     pub guaranteed_worst_rate_deg_per_h: Option<f64>,
+    /// By how much the worst rate may differ from that of the continuum, whatever the grid; the guaranteed rate holds for the
+    /// continuum, because it contains this margin. Null where nobody asked.
+    pub grid_margin_deg_per_h: Option<f64>,
+    /// The largest integral of the rate error over the profiles, up to any time, with its sign; null where nobody asked.
+    pub worst_pointing_error_deg: Option<f64>,
+    /// Its largest size over all profiles of any length within the largest rate; null where there is no such bound.
+    pub guaranteed_pointing_error_deg: Option<f64>,
     /// The 95 % quantile over built coils, where it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub p95_rate_deg_per_h: Option<f64>,
@@ -96,9 +106,26 @@ impl PatternJson {
             worst_profile: worst.profile.clone(),
             worst_time_s: worst.time_s,
             guaranteed_worst_rate_deg_per_h: guaranteed_rad_per_s.map(deg_per_h_from_rad_per_s),
+            grid_margin_deg_per_h: None,
+            worst_pointing_error_deg: None,
+            guaranteed_pointing_error_deg: None,
             p95_rate_deg_per_h: None,
             windability: WindabilityJson::of(pattern),
         }
+    }
+
+    pub fn with_pointing(mut self, pointing: &PointingError) -> Self {
+        self.worst_pointing_error_deg = Some(deg_from_rad(pointing.worst_rad));
+        self.guaranteed_pointing_error_deg = pointing.guaranteed_rad.map(deg_from_rad);
+        self
+    }
+
+    /// With what the grid may be off, which what is guaranteed must contain.
+    pub fn with_margin(mut self, grid_margin_rad_per_s: f64) -> Self {
+        let margin = deg_per_h_from_rad_per_s(grid_margin_rad_per_s);
+        self.grid_margin_deg_per_h = Some(margin);
+        self.guaranteed_worst_rate_deg_per_h = self.guaranteed_worst_rate_deg_per_h.map(|g| g + margin);
+        self
     }
 }
 
@@ -115,20 +142,24 @@ pub struct EvaluateJson {
 pub struct ProofJson {
     /// "optimal", "gap" or "none".
     pub status: String,
-    /// No pattern of the class has a smaller worst rate; null where nothing was proved.
+    /// No pattern of the class has a smaller worst rate, in the continuum either; null where nothing was proved.
     pub lower_bound_deg_per_h: Option<f64>,
+    /// By how much the grid may put any pattern's rate off the continuum's: "optimal" means that none is better by more.
+    /// Null where nothing was proved.
+    pub grid_margin_deg_per_h: Option<f64>,
 }
 
 impl ProofJson {
     pub fn none() -> Self {
-        Self { status: Status::None.to_string(), lower_bound_deg_per_h: None }
+        Self::of(&Proof::NONE)
     }
 
-    pub fn of(certificate: &Certificate) -> Self {
-        let bound = deg_per_h_from_rad_per_s(certificate.lower_bound_rad_per_s);
+    pub fn of(proof: &Proof) -> Self {
+        let where_proved = |rad_per_s: f64| (proof.status != Status::None).then(|| deg_per_h_from_rad_per_s(rad_per_s));
         Self {
-            status: certificate.status.to_string(),
-            lower_bound_deg_per_h: (certificate.status != Status::None).then_some(bound),
+            status: proof.status.to_string(),
+            lower_bound_deg_per_h: where_proved(proof.lower_bound_rad_per_s),
+            grid_margin_deg_per_h: where_proved(proof.grid_margin_rad_per_s),
         }
     }
 }

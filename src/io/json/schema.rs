@@ -87,8 +87,8 @@ pub fn model_schema() -> Value {
             "conductivity_w_per_m_k": described("number", "effective, of the pack"),
             "volumetric_heat_capacity_j_per_m3_k": described("number", "effective, of the pack"),
             "diffusivity_m2_per_s": described("number", "instead of conductivity and heat capacity"),
-            "cells_per_layer": { "type": "integer", "minimum": 1, "maximum": 32, "default": 2,
-                "description": "of the pack's grid; 1 or an even number" },
+            "cells_per_layer": { "type": "integer", "minimum": 1, "maximum": 32, "default": 1,
+                "description": "how fine the pack's grid is: its elements at a surface are half a layer over this number" },
         }),
     );
     let sensor = table(

@@ -5,11 +5,11 @@ use serde::{Deserialize, Serialize};
 use super::{PatternJson, ProofJson};
 use crate::profile::Piece;
 use crate::search::Request;
-use crate::search::answer::{Answer, Former, FoundBy, Outlook, Proof};
+use crate::search::answer::{Answer, Former, FoundBy, Outlook};
+use crate::search::aside::GridCheck;
 use crate::search::cutting::Cuts;
-use crate::search::evaluator::{GridCheck, Judged};
+use crate::search::evaluator::Judged;
 use crate::search::outlook::OtherBoundary;
-use crate::search::proof::Status;
 use crate::search::prospect::{Gain, Prospect};
 use crate::search::recommendation::Recommendation;
 use crate::search::validation::Validation;
@@ -19,9 +19,17 @@ impl PatternJson {
     /// Of a pattern that was judged by the reference.
     pub fn of(judged: &Judged) -> Self {
         let Judged { name, pattern, worst, phase_rad, guaranteed_rad_per_s, .. } = judged;
-        Self {
+        let body = Self {
             p95_rate_deg_per_h: judged.p95_rad_per_s.map(deg_per_h_from_rad_per_s),
             ..Self::new(name, pattern, worst, *phase_rad, *guaranteed_rad_per_s)
+        };
+        let body = match &judged.pointing {
+            Some(pointing) => body.with_pointing(pointing),
+            None => body,
+        };
+        match judged.grid_margin_rad_per_s {
+            Some(margin) => body.with_margin(margin),
+            None => body,
         }
     }
 }
@@ -194,7 +202,7 @@ impl CutsJson {
     }
 }
 
-/// Worst rates on a grid twice as fine.
+/// Rates on a grid twice as fine: the guaranteed ones where the search was for them, the worst ones otherwise.
 #[derive(Debug, Clone, Serialize)]
 pub struct GridCheckJson {
     pub cells_per_layer: usize,
@@ -208,18 +216,33 @@ pub struct GridCheckJson {
 #[derive(Debug, Clone, Serialize)]
 pub struct GridCheckedJson {
     pub name: String,
-    pub worst_rate_deg_per_h: f64,
-    pub finer_worst_rate_deg_per_h: f64,
+    #[serde(flatten)]
+    pub rates: GridRatesJson,
     pub change_percent: f64,
+}
+
+#[derive(Debug, Clone, Serialize)]
+#[serde(untagged)]
+pub enum GridRatesJson {
+    Worst { worst_rate_deg_per_h: f64, finer_worst_rate_deg_per_h: f64 },
+    Guaranteed { guaranteed_worst_rate_deg_per_h: f64, finer_guaranteed_worst_rate_deg_per_h: f64 },
 }
 
 impl GridCheckJson {
     pub fn of(check: &GridCheck) -> Self {
-        let patterns = check.patterns.iter().map(|checked| GridCheckedJson {
-            name: checked.name.clone(),
-            worst_rate_deg_per_h: deg_per_h_from_rad_per_s(checked.rate_rad_per_s),
-            finer_worst_rate_deg_per_h: deg_per_h_from_rad_per_s(checked.finer_rad_per_s),
-            change_percent: percent_from_fraction(checked.change()),
+        let patterns = check.patterns.iter().map(|checked| {
+            let (rate, finer) =
+                (deg_per_h_from_rad_per_s(checked.rate_rad_per_s), deg_per_h_from_rad_per_s(checked.finer_rad_per_s));
+            let rates = if check.is_of_guaranteed {
+                GridRatesJson::Guaranteed {
+                    guaranteed_worst_rate_deg_per_h: rate,
+                    finer_guaranteed_worst_rate_deg_per_h: finer,
+                }
+            } else {
+                GridRatesJson::Worst { worst_rate_deg_per_h: rate, finer_worst_rate_deg_per_h: finer }
+            };
+            let change_percent = percent_from_fraction(checked.change());
+            GridCheckedJson { name: checked.name.clone(), rates, change_percent }
         });
         Self {
             cells_per_layer: check.cells_per_layer,
@@ -298,15 +321,6 @@ impl ValidationJson {
     }
 }
 
-impl ProofJson {
-    /// Of a search's proof.
-    pub fn of_search(proof: &Proof) -> Self {
-        let bound = deg_per_h_from_rad_per_s(proof.lower_bound_rad_per_s);
-        let lower_bound_deg_per_h = (proof.status != Status::None).then_some(bound);
-        Self { status: proof.status.to_string(), lower_bound_deg_per_h }
-    }
-}
-
 impl OptimiseJson {
     /// Of a search of a model by its name; `seconds`: of the whole search, and until the best was found.
     pub fn of(model: &str, request: &Request, answer: &Answer, seconds: f64, found_s: f64) -> Self {
@@ -331,7 +345,7 @@ impl OptimiseJson {
             predicted_gain: answer.outlook.as_ref().and_then(|o| o.gain.as_ref()).map(GainJson::of),
             grid_check: answer.grid_check.as_ref().map(GridCheckJson::of),
             compared_with: answer.compared_with.as_ref().map(|former| FormerJson::of(former, &answer.best)),
-            proof: ProofJson::of_search(&answer.proof),
+            proof: ProofJson::of(&answer.proof),
             cutting_planes: answer.cuts.as_ref().map(CutsJson::of),
             evaluations: answer.evaluations,
             evaluations_per_s: Some(answer.evaluations_now as f64 / seconds),

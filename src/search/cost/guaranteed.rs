@@ -107,13 +107,23 @@ const HEAT_SETTLED: f64 = 20.0;
 /// One endless ramp: only its rate counts, so its end may lie anywhere behind the grid's last time.
 const BEHIND_THE_GRID: f64 = 1000.0;
 
+/// The first effect that makes the rate error depend on more than the rates of the drive.
+fn nonlinear_effect(model: &CoilModel) -> Result<Option<String>, SearchError> {
+    let coil = model.wound_coil()?;
+    Ok(model.effects.iter().find(|e| !e.bind(&coil, &[]).is_linear()).map(|e| e.kind()))
+}
+
+/// Whether a model has a guaranteed worst case.
+pub(super) fn is_linear(model: &CoilModel) -> Result<bool, SearchError> {
+    Ok(nonlinear_effect(model)?.is_none())
+}
+
 impl UnitStep {
     /// # Errors
     /// Models that are not linear, by the effect that makes them so; heat paths that cannot be solved.
     pub fn new(model: &CoilModel, max_rate_k_per_s: f64) -> Result<Self, GuaranteedError> {
-        let coil = model.wound_coil().map_err(SearchError::from)?;
-        if let Some(effect) = model.effects.iter().find(|e| !e.bind(&coil, &[]).is_linear()) {
-            return Err(GuaranteedError::Effect { kind: effect.kind() });
+        if let Some(kind) = nonlinear_effect(model)? {
+            return Err(GuaranteedError::Effect { kind });
         }
         let mut path = model.heat_path().map_err(SearchError::from)?;
         let heated_path = path.bore_heat.map(|_| path.clone());

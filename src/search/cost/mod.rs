@@ -4,8 +4,10 @@
 //! shop puts up with, and which samples are worth running on.
 
 pub mod columns;
+pub mod grid_margin;
 pub mod guaranteed;
 pub mod objective;
+pub mod pointing;
 pub mod sampled_coils;
 pub mod samples;
 pub mod signs;

@@ -2,8 +2,10 @@
 
 use crate::rate::{CoilModel, RateModel};
 use crate::search::cost::columns::Norm;
+use crate::search::cost::pointing::pointing_samples;
 use crate::search::cost::samples::SampleMatrix;
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
+use crate::units::SECONDS_PER_HOUR;
 
 /// What a search makes small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -18,15 +20,22 @@ pub enum Objective {
     GuaranteedRate,
     /// The 95 % quantile of the worst case over coils built with the stated tolerances.
     P95,
+    /// The largest |∫ Ω dt| over all profiles and times. Its value is that of the rate that makes it in one hour, so that
+    /// what is a degree an hour of the others is a degree here.
+    Pointing,
 }
 
+/// One hour: the unit of time by which a pointing error counts as a rate.
+pub const POINTING_S: f64 = SECONDS_PER_HOUR;
+
 impl Objective {
-    pub const ALL: [Objective; 5] = [
+    pub const ALL: [Objective; 6] = [
         Objective::WorstRate,
         Objective::WorstPhase,
         Objective::RootMeanSquare,
         Objective::GuaranteedRate,
         Objective::P95,
+        Objective::Pointing,
     ];
 
     /// As written on the command line and in files.
@@ -37,6 +46,7 @@ impl Objective {
             Objective::RootMeanSquare => "rms",
             Objective::GuaranteedRate => "guaranteed-rate",
             Objective::P95 => "p95",
+            Objective::Pointing => "pointing",
         }
     }
 
@@ -54,13 +64,19 @@ impl Objective {
             Objective::RootMeanSquare => "rms rate error",
             Objective::GuaranteedRate => "guaranteed worst rate error",
             Objective::P95 => "95 % quantile of the worst rate error over built coils",
+            Objective::Pointing => "worst pointing error",
         }
+    }
+
+    /// Of its value as it is shown.
+    pub fn unit(self) -> &'static str {
+        if self == Objective::Pointing { "°" } else { "°/h" }
     }
 
     /// How the samples of a plain search make one cost; a search over built coils has its own.
     pub fn norm(self) -> Norm {
         match self {
-            Objective::WorstRate | Objective::WorstPhase | Objective::P95 => Norm::Largest,
+            Objective::WorstRate | Objective::WorstPhase | Objective::P95 | Objective::Pointing => Norm::Largest,
             Objective::RootMeanSquare => Norm::RootMeanSquare,
             Objective::GuaranteedRate => Norm::Sum,
         }
@@ -80,6 +96,11 @@ impl Objective {
     /// # Errors
     /// Rates that are not finite.
     pub fn of_profiles(self, model: &CoilModel, solved: &SolvedProfiles) -> Result<SampleMatrix, SearchError> {
+        if self == Objective::Pointing {
+            let matrix = pointing_samples(model, solved)?;
+            let per_hour = vec![1.0 / POINTING_S; matrix.columns.samples()];
+            return Ok(matrix.scaled(&per_hour));
+        }
         let (matrix, origins) = SampleMatrix::of_profiles(model, solved)?;
         if self != Objective::RootMeanSquare {
             return Ok(matrix);

@@ -169,7 +169,7 @@ fn settling_s(path: &HeatPath) -> Result<f64, ThermalError> {
 
 impl SolvedProfile {
     /// Sampled from a piece on.
-    fn new(profile: Profile, first_piece: usize, path: &HeatPath) -> Result<Self, ThermalError> {
+    pub(super) fn new(profile: Profile, first_piece: usize, path: &HeatPath) -> Result<Self, ThermalError> {
         let drive = Drive::boundary(profile.temperature(REFERENCE_TEMPERATURE_K));
         let field = solve(path, &drive)?;
         let pieces: Vec<Vec<Instant>> = drive.boundary_k.knots()[first_piece..]

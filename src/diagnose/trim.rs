@@ -1,0 +1,103 @@
+//! From measured ramps the effective asymmetric length, and what to cut.
+//!
+//! ```text
+//! Ω = n κ 2δ (Ṫ_pack − Ṫ_lead)/D + Ω_coil,   2δ: surplus fibre at end A (δ > 0) or end B
+//! cut 2δ at that end: what is left is Ω_coil
+//! ```
+//!
+//! | symbol | meaning | unit | in code |
+//! |---|---|---|---|
+//! | 2δ | effective asymmetric length | m | `asymmetric_length_m` |
+//! | Ω_coil | the error of the coil whose middle is the fibre's | rad/s | `predicted_rad_per_s` |
+//!
+//! δ is fitted as any effect is, with what the records say of chamber, boundary and noise.
+//!
+//! Holds for surplus fibre that lies outside the pack, or an asymmetry of the winding that acts as if it did. A mismatch of the
+//! fibre's halves looks the same in one steady ramp ([`super::Finding::equivalents`] names what does).
+//!
+//! # Source
+//! First-order effect of a displaced middle: [`crate::rate`]; trimming to length is the field's practice.
+
+use super::{DiagnoseError, Finding, Request, extend};
+use crate::effect::{DeclaredEffect, OFFSET_OF_MIDDLE};
+use crate::predict::predict;
+use crate::rate::CoilModel;
+
+/// Which end of the fibre.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum End {
+    A,
+    B,
+}
+
+/// What to cut, and what is then left.
+#[derive(Debug, Clone)]
+pub struct Trim {
+    pub finding: Finding,
+    /// Surplus at end A; negative at end B.
+    pub asymmetric_length_m: f64,
+    pub standard_error_m: Option<f64>,
+    pub cut_m: f64,
+    pub end: End,
+    /// As many turns more on the outermost layer at the other end do the same.
+    pub turns_at_other_end: f64,
+    /// The largest rate error under the records' temperatures: of the coil as it is, and after the cut.
+    pub present_rad_per_s: f64,
+    pub predicted_rad_per_s: f64,
+    /// The largest that an error of one standard deviation in the cut would add.
+    pub uncertain_rad_per_s: Option<f64>,
+}
+
+/// Fits the surplus fibre to the records; what its temperature follows is what fits better.
+///
+/// # Errors
+/// As [`extend`].
+pub fn trim(request: &Request) -> Result<Trim, DiagnoseError> {
+    let extension = extend(request, &DeclaredEffect::at_start(OFFSET_OF_MIDDLE.spec))?;
+    let place = OFFSET_OF_MIDDLE.parameter;
+    let fitted = &extension.finding.parameters[place];
+    let (offset_m, error_m) = (fitted.value, fitted.standard_error);
+    let rates_of = |model: &CoilModel| -> Result<Vec<f64>, DiagnoseError> {
+        let mut rates = Vec::new();
+        for record in request.records {
+            let found = predict(model, request.pattern, record)
+                .map_err(|source| DiagnoseError::Record { record: record.name().to_owned(), source })?;
+            let offset = found.offset_rad_per_s;
+            rates.extend(found.rate_rad_per_s.iter().map(|rate| rate - offset));
+        }
+        Ok(rates)
+    };
+    let with_offset = |offset_m: f64| -> CoilModel {
+        let mut model = extension.extended.clone();
+        model.effects.retain(|e| !e.is_at(OFFSET_OF_MIDDLE));
+        let mut values = extension.finding.effect.values().to_vec();
+        values[place] = offset_m;
+        match extension.finding.effect.with_values(values) {
+            Ok(effect) if offset_m != 0.0 => model.with_effect(effect),
+            _ => model,
+        }
+    };
+    let size = |rates: &[f64]| rates.iter().map(|r| r.abs()).fold(0.0, f64::max);
+    let (present, after) = (rates_of(&extension.extended)?, rates_of(&with_offset(0.0))?);
+    let uncertain_rad_per_s = match error_m.filter(|e| *e > 0.0) {
+        Some(error_m) => {
+            let off = rates_of(&with_offset(error_m))?;
+            Some(off.iter().zip(&after).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max))
+        }
+        None => None,
+    };
+    let coil = &request.model.coil;
+    let outermost_m = coil.bore_radius_m() + (coil.layers() as f64 - 0.5) * coil.radial_pitch_m();
+    let length_m = 2.0 * offset_m;
+    Ok(Trim {
+        asymmetric_length_m: length_m,
+        standard_error_m: error_m.map(|e| 2.0 * e),
+        cut_m: length_m.abs(),
+        end: if length_m >= 0.0 { End::A } else { End::B },
+        turns_at_other_end: length_m.abs() / (std::f64::consts::TAU * outermost_m),
+        present_rad_per_s: size(&present),
+        predicted_rad_per_s: size(&after),
+        uncertain_rad_per_s,
+        finding: extension.finding,
+    })
+}

@@ -1,0 +1,63 @@
+//! The answer of `trim` as a document.
+
+use serde::Serialize;
+
+use super::diagnosis::FindingJson;
+use super::inputs::InputsJson;
+use crate::diagnose::trim::{End, Trim};
+use crate::units::deg_per_h_from_rad_per_s;
+
+#[derive(Debug, Serialize)]
+pub struct TrimJson {
+    pub model: String,
+    pub pattern: String,
+    /// Surplus fibre at end A; negative at end B.
+    pub asymmetric_length_m: EstimateJson,
+    /// To be cut at `end`.
+    pub cut_m: f64,
+    /// "A" or "B".
+    pub end: &'static str,
+    /// As many turns more on the outermost layer at the other end do the same.
+    pub turns_at_other_end: f64,
+    /// Whether the length is more than two standard errors.
+    pub is_significant: bool,
+    /// The largest rate error under the records' temperatures, as the coil is, and after the cut.
+    pub present_rate_deg_per_h: f64,
+    pub predicted_rate_deg_per_h: f64,
+    /// The largest that one standard error of the cut adds.
+    pub predicted_rate_standard_error_deg_per_h: Option<f64>,
+    /// The fitted surplus, and what looks the same in these records.
+    pub effect: FindingJson,
+    pub inputs: InputsJson,
+}
+
+#[derive(Debug, Serialize)]
+pub struct EstimateJson {
+    pub value: f64,
+    pub standard_error: Option<f64>,
+}
+
+impl TrimJson {
+    pub fn new(model: &str, pattern: &str, trim: &Trim, inputs: InputsJson) -> Self {
+        Self {
+            model: model.to_owned(),
+            pattern: pattern.to_owned(),
+            asymmetric_length_m: EstimateJson {
+                value: trim.asymmetric_length_m,
+                standard_error: trim.standard_error_m,
+            },
+            cut_m: trim.cut_m,
+            end: match trim.end {
+                End::A => "A",
+                End::B => "B",
+            },
+            turns_at_other_end: trim.turns_at_other_end,
+            is_significant: trim.standard_error_m.is_some_and(|e| trim.cut_m > 2.0 * e),
+            present_rate_deg_per_h: deg_per_h_from_rad_per_s(trim.present_rad_per_s),
+            predicted_rate_deg_per_h: deg_per_h_from_rad_per_s(trim.predicted_rad_per_s),
+            predicted_rate_standard_error_deg_per_h: trim.uncertain_rad_per_s.map(deg_per_h_from_rad_per_s),
+            effect: FindingJson::new(&trim.finding),
+            inputs,
+        }
+    }
+}

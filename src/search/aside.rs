@@ -1,0 +1,93 @@
+//! What stands beside a pattern's rates: by how much the grid may put them off, the check on a finer one, the pointing error.
+
+use crate::pattern::Pattern;
+use crate::rate::CoilModel;
+use crate::search::cost::grid_margin::GridMargin;
+use crate::search::cost::pointing::{EndlessRamp, worst_pointing};
+use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
+use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
+
+/// A worst rate that a finer grid changes by more than this is not to be relied upon.
+const GRID_CAUTION: f64 = 0.005;
+
+/// A rate on the model's grid and on one twice as fine.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GridChecked {
+    pub name: String,
+    pub rate_rad_per_s: f64,
+    pub finer_rad_per_s: f64,
+}
+
+impl GridChecked {
+    /// By how much the finer grid changes the rate, over the rate.
+    pub fn change(&self) -> f64 {
+        if self.rate_rad_per_s == 0.0 { 0.0 } else { self.finer_rad_per_s / self.rate_rad_per_s - 1.0 }
+    }
+}
+
+/// The rates of a search's best pattern, first, and of QUA on two grids: a search makes use of whatever a coarse grid
+/// hides, so its best gains most from the grid's error.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GridCheck {
+    /// Whether the rates are guaranteed ones, because the search was for them; the worst over the profiles otherwise.
+    pub is_of_guaranteed: bool,
+    pub cells_per_layer: usize,
+    pub finer_cells_per_layer: usize,
+    pub patterns: Vec<GridChecked>,
+}
+
+impl GridCheck {
+    /// What to say where the grid matters.
+    pub fn caution(&self) -> Option<String> {
+        let best = self.patterns.first().filter(|best| best.change().abs() > GRID_CAUTION)?;
+        Some(format!(
+            "Caution: with {} instead of {} cells a layer its {} rate error is {:.4} °/h, {:.1} % {}. \
+             Set thermal.cells_per_layer = {} and search again.",
+            self.finer_cells_per_layer,
+            self.cells_per_layer,
+            if self.is_of_guaranteed { "guaranteed worst" } else { "worst" },
+            deg_per_h_from_rad_per_s(best.finer_rad_per_s),
+            percent_from_fraction(best.change().abs()),
+            if best.change() > 0.0 { "more" } else { "less" },
+            self.finer_cells_per_layer,
+        ))
+    }
+}
+
+/// What the rate error of a pattern adds up to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointingError {
+    /// The largest over all profiles and times, with its sign.
+    pub worst_rad: f64,
+    /// None for models that have no bound over all profiles.
+    pub guaranteed_rad: Option<f64>,
+}
+
+/// What is worked out once a model for what stands beside rates.
+#[derive(Debug)]
+pub struct Aside {
+    pub margin: GridMargin,
+    pub ramp: Option<EndlessRamp>,
+}
+
+impl Aside {
+    /// # Errors
+    /// Heat paths that cannot be solved.
+    pub fn new(model: &CoilModel, solved: &SolvedProfiles) -> Result<Self, SearchError> {
+        Ok(Self { margin: GridMargin::new(model, solved)?, ramp: EndlessRamp::new(model)? })
+    }
+
+    /// # Errors
+    /// A pattern of another layer count.
+    pub fn pointing(
+        &self,
+        model: &CoilModel,
+        solved: &SolvedProfiles,
+        pattern: &Pattern,
+        max_rate_k_per_s: f64,
+    ) -> Result<PointingError, SearchError> {
+        let guaranteed = self.ramp.as_ref().map(|ramp| ramp.guaranteed_rad(pattern, max_rate_k_per_s)).transpose()?;
+        let worst_rad = worst_pointing(model, solved, pattern)?.rate_rad_per_s;
+        Ok(PointingError { worst_rad, guaranteed_rad: guaranteed.flatten() })
+    }
+}

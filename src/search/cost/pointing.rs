@@ -1,0 +1,239 @@
+//! The pointing error: what the rate error adds up to, as a navigator that integrates it sees.
+//!
+//! ```text
+//! ψ(t) = ∫_0^t Ω dt = n κ/(L D) · Σ_j w_j (T_j(t) − T_j(0))                 where Ω is linear in the rates
+//! max |ψ| = k_max ∫_0^∞ |G(τ)| dτ                                           over all profiles with |k| ≤ k_max
+//! ```
+//!
+//! | symbol | meaning | unit | in code |
+//! |---|---|---|---|
+//! | ψ | pointing error | rad | `error_rad` |
+//! | w_j, κ, n, L, D | as in [`crate::rate`] | – | – |
+//! | G | rate error after a unit step of the drive's rate | rad/s per K/s | as in [`super::guaranteed`] |
+//!
+//! Only differences of temperature count, not the way to them. What of a model is not linear in the rates is integrated
+//! over the profile's instants by the trapezium rule and added.
+//!
+//! # Source
+//! Pointing error thermal sensitivity: Opt. Express 21 (2013) 2521 (by its abstract).
+
+use rayon::prelude::*;
+
+use super::guaranteed::is_linear;
+use super::samples::{SampleMatrix, any_rate_model};
+use super::worst_case::{SearchError, SolvedProfile, SolvedProfiles, WorstCase};
+use crate::numeric::maximise::golden_section;
+use crate::numeric::piecewise::PiecewiseLinear;
+use crate::pattern::Pattern;
+use crate::rate::{CoilModel, RateModel, WeightResponse};
+use crate::thermal::{Drive, Instant, StepResponse, ThermalHistory, solve};
+use crate::units::REFERENCE_TEMPERATURE_K;
+
+/// Ratio of successive times at which the bound over all profiles is summed.
+const RATIO: f64 = 1.03;
+/// The first of them, in units of the shortest time on which a response changes.
+const FIRST: f64 = 1e-2;
+/// A rate error that stays at this share of its largest makes a pointing error that grows without end.
+const SETTLED: f64 = 1e-6;
+
+/// The linear part of a model: what depends on the rates alone.
+fn linear_part(model: &CoilModel) -> Result<CoilModel, SearchError> {
+    let coil = model.wound_coil()?;
+    let mut linear = model.clone();
+    linear.effects.retain(|effect| effect.bind(&coil, &[]).is_linear());
+    Ok(linear)
+}
+
+/// Changes since the first row in the place of rates.
+fn integrated(history: &ThermalHistory) -> ThermalHistory {
+    let since = |values: &[f64], columns: usize| -> Vec<f64> {
+        let first = values.get(..columns).unwrap_or_default().to_vec();
+        values
+            .chunks(columns.max(1))
+            .flat_map(|row| row.iter().zip(&first).map(|(v, f)| v - f).collect::<Vec<_>>())
+            .collect()
+    };
+    ThermalHistory {
+        layers: history.layers,
+        times_s: history.times_s.clone(),
+        temperature_k: vec![REFERENCE_TEMPERATURE_K; history.temperature_k.len()],
+        rate_k_per_s: since(&history.temperature_k, history.layers),
+        axial_moment_k: history.axial_moment_k.clone(),
+        axial_moment_k_per_s: since(&history.axial_moment_k, history.layers),
+        ambient_k: vec![REFERENCE_TEMPERATURE_K; history.ambient_k.len()],
+        ambient_rate_k_per_s: since(&history.ambient_k, 1),
+    }
+}
+
+/// Adds ∫ (all − linear) dt over the rows to each of them.
+fn add_rest(times_s: &[f64], rest: impl Fn(usize) -> f64, to: &mut [f64]) {
+    let (mut sum, mut before) = (0.0, rest(0));
+    for row in 1..times_s.len() {
+        let here = rest(row);
+        sum += 0.5 * (before + here) * (times_s[row] - times_s[row - 1]);
+        before = here;
+        to[row] += sum;
+    }
+}
+
+/// The largest |ψ| of a pattern over all profiles and times, with its sign, as a [`WorstCase`] in rad.
+///
+/// # Errors
+/// A pattern of another layer count.
+pub fn worst_pointing(model: &CoilModel, solved: &SolvedProfiles, pattern: &Pattern) -> Result<WorstCase, SearchError> {
+    let part = linear_part(model)?;
+    let linear = RateModel::new(&part, pattern, &[])?;
+    let whole = if is_linear(model)? { None } else { Some(RateModel::new(model, pattern, &[])?) };
+    let of_each: Vec<WorstCase> = solved
+        .profiles()
+        .par_iter()
+        .enumerate()
+        .map(|(index, profile)| {
+            let (error_rad, time_s) = worst_of(profile, &linear, whole.as_ref());
+            WorstCase {
+                rate_rad_per_s: error_rad,
+                profile: profile.profile.name().to_owned(),
+                profile_index: index,
+                time_s,
+            }
+        })
+        .collect();
+    // The first of equals, so that the answer does not depend on the number of threads.
+    let mut worst = of_each[0].clone();
+    for candidate in of_each {
+        if candidate.rate_rad_per_s.abs() > worst.rate_rad_per_s.abs() {
+            worst = candidate;
+        }
+    }
+    Ok(worst)
+}
+
+fn worst_of(profile: &SolvedProfile, linear: &RateModel, whole: Option<&RateModel>) -> (f64, f64) {
+    let history = &profile.history;
+    let mut series = linear.series_rad_per_s(&integrated(history));
+    if let Some(whole) = whole {
+        let rest = |row: usize| {
+            let state = whole.state(history, row, &[]);
+            whole.rate_error_rad_per_s(&state) - linear.rate_error_rad_per_s(&linear.state(history, row, &[]))
+        };
+        add_rest(&history.times_s, rest, &mut series);
+    }
+    let size = |row: usize| series[row].abs();
+    let worst = (1..series.len()).fold(0, |best, row| if size(row) > size(best) { row } else { best });
+    let found = (series[worst], history.times_s[worst]);
+    if whole.is_some() || worst == 0 || worst + 1 == series.len() {
+        return found;
+    }
+    let start = Instant::after(history.times_s[0]);
+    let error_at = |time_s: f64| {
+        let between = integrated(&profile.field.at(&[start, Instant::after(time_s)]));
+        linear.rate_error_rad_per_s(&linear.state(&between, 1, &[]))
+    };
+    let (from_s, to_s) = (history.times_s[worst - 1], history.times_s[worst + 1]);
+    let peak = golden_section(|t| error_at(t).abs(), from_s, to_s);
+    if peak.value > found.0.abs() { (error_at(peak.at), peak.at) } else { found }
+}
+
+/// ψ at every instant of the solved profiles as samples: what a search over the pointing error runs on.
+///
+/// # Errors
+/// Effects that leave a layer no turns.
+pub fn pointing_samples(model: &CoilModel, solved: &SolvedProfiles) -> Result<SampleMatrix, SearchError> {
+    let (part, whole) = (linear_part(model)?, any_rate_model(model)?);
+    let linear = any_rate_model(&part)?;
+    let is_linear = is_linear(model)?;
+    let responses: Vec<WeightResponse> = solved
+        .profiles()
+        .par_iter()
+        .flat_map_iter(|profile| {
+            let (history, changes) = (&profile.history, integrated(&profile.history));
+            let mut of_rows: Vec<WeightResponse> =
+                (0..changes.len()).map(|row| linear.weight_response(&linear.state(&changes, row, &[]))).collect();
+            if !is_linear {
+                let rest = |row: usize| {
+                    let all = whole.weight_response(&whole.state(history, row, &[]));
+                    combined(&all, 1.0, &linear.weight_response(&linear.state(history, row, &[])), -1.0)
+                };
+                let mut before = rest(0);
+                let mut sum = combined(&before, 0.0, &before, 0.0);
+                for row in 1..of_rows.len() {
+                    let here = rest(row);
+                    let half_s = 0.5 * (history.times_s[row] - history.times_s[row - 1]);
+                    sum = combined(&sum, 1.0, &combined(&before, half_s, &here, half_s), 1.0);
+                    of_rows[row] = combined(&of_rows[row], 1.0, &sum, 1.0);
+                    before = here;
+                }
+            }
+            of_rows
+        })
+        .collect();
+    Ok(SampleMatrix::new(model, &responses)?)
+}
+
+/// a A + b B.
+fn combined(one: &WeightResponse, a: f64, other: &WeightResponse, b: f64) -> WeightResponse {
+    let of = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| a * x + b * y).collect::<Vec<f64>>();
+    WeightResponse {
+        half_a_rad_per_s_m2: of(&one.half_a_rad_per_s_m2, &other.half_a_rad_per_s_m2),
+        half_b_rad_per_s_m2: of(&one.half_b_rad_per_s_m2, &other.half_b_rad_per_s_m2),
+        axial_rad_per_s_m2: of(&one.axial_rad_per_s_m2, &other.axial_rad_per_s_m2),
+        constant_rad_per_s: a * one.constant_rad_per_s + b * other.constant_rad_per_s,
+    }
+}
+
+/// The pack under one endless ramp of a kelvin a second, for the largest |ψ| over all profiles.
+#[derive(Debug)]
+pub struct EndlessRamp {
+    model: CoilModel,
+    /// Changes of temperature in the place of rates, and the rates themselves.
+    changes: ThermalHistory,
+    rates: ThermalHistory,
+}
+
+impl EndlessRamp {
+    /// None where the model is not linear, or something besides the drive heats the pack.
+    ///
+    /// # Errors
+    /// Heat paths that cannot be solved.
+    pub fn new(model: &CoilModel) -> Result<Option<Self>, SearchError> {
+        let path = model.heat_path()?;
+        if !is_linear(model)? || path.bore_heat.is_some() {
+            return Ok(None);
+        }
+        let response = StepResponse::of(&path)?;
+        let (first_s, last_s) = (FIRST * response.shortest_s(), response.settling_s());
+        let count = ((last_s / first_s).ln() / RATIO.ln()).ceil().max(1.0) as i32;
+        let grid = (0..=count).map(|i| first_s * (last_s / first_s).powf(f64::from(i) / f64::from(count)));
+        let instants: Vec<Instant> = std::iter::once(0.0).chain(grid).map(Instant::after).collect();
+        let end_s = 10.0 * last_s;
+        let ramp = PiecewiseLinear::new(vec![0.0, end_s], vec![0.0, end_s])
+            .map_err(|_| SearchError::Thermal(crate::thermal::ThermalError::Eigen))?;
+        let mut rates = solve(&path, &Drive::boundary(ramp))?.at(&instants);
+        // Layers lag behind the drive; what all share has no weight and would only leave rounding.
+        let changes = ThermalHistory { ambient_k: vec![0.0; instants.len()], ..rates.clone() };
+        let mut changes = integrated(&changes);
+        for (row, instant) in instants.iter().enumerate() {
+            let layers = row * changes.layers..(row + 1) * changes.layers;
+            changes.rate_k_per_s[layers].iter_mut().for_each(|t| *t -= instant.time_s);
+            changes.ambient_rate_k_per_s[row] = 0.0;
+        }
+        rates.temperature_k.fill(REFERENCE_TEMPERATURE_K);
+        Ok(Some(Self { model: model.clone(), changes, rates }))
+    }
+
+    /// The largest |ψ| \[rad\] over all profiles within a rate; none where a steady ramp leaves a rate error, so that ψ grows
+    /// as long as the ramp does.
+    ///
+    /// # Errors
+    /// A pattern of another layer count.
+    pub fn guaranteed_rad(&self, pattern: &Pattern, max_rate_k_per_s: f64) -> Result<Option<f64>, SearchError> {
+        let rate_model = RateModel::new(&self.model, pattern, &[])?;
+        let rates = rate_model.series_rad_per_s(&self.rates);
+        let largest = rates.iter().map(|g| g.abs()).fold(0.0, f64::max);
+        if rates.last().is_some_and(|last| last.abs() > SETTLED * largest) {
+            return Ok(None);
+        }
+        let errors = rate_model.series_rad_per_s(&self.changes);
+        Ok(Some(max_rate_k_per_s * errors.windows(2).map(|e| (e[1] - e[0]).abs()).sum::<f64>()))
+    }
+}
