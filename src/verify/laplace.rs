@@ -125,16 +125,45 @@ impl Response {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coil::LayerLength;
-    use crate::search::cost::samples::tests::model;
-    use crate::thermal::Location;
+    use crate::coil::{Coil, CoilSpec, Fibre, LayerLength};
+    use crate::rate::CoilModel;
+    use crate::thermal::{Extent, Location, Material};
     use crate::verify::physics::Physics;
+
+    fn model() -> CoilModel {
+        let fibre = Fibre {
+            refractive_index: 1.45,
+            thermo_optic_per_k: 1e-5,
+            thermal_expansion_per_k: 0.0,
+            wavelength_m: 1.55e-6,
+            outer_diameter_m: 165e-6,
+        };
+        let spec = CoilSpec {
+            fibre,
+            layers: 4,
+            turns_per_layer: Some(50.0),
+            bore_radius_m: 0.04,
+            radial_pitch_m: 165e-6,
+            axial_pitch_m: 170e-6,
+            layer_length: LayerLength::Actual,
+            length_m: None,
+        };
+        CoilModel {
+            name: "four".into(),
+            coil: Coil::new(spec).unwrap(),
+            extent: Extent::Pack,
+            material: Material::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 },
+            location: Location::Ambient,
+            rate_mean_s: 0.0,
+            cells_per_layer: 1,
+            effects: vec![],
+        }
+    }
 
     /// A pack that conducts so well that it is one capacity behind its film: θ' = 1 − e^{−t/T}.
     #[test]
     fn a_well_conducting_pack_follows_its_exponential_over_ten_decades() {
-        let mut model = model(4, LayerLength::Actual, &[]);
-        model.location = Location::Ambient;
+        let model = model();
         let mut physics = Physics::read(&model).unwrap();
         (physics.conductivity_w_per_m_k, physics.film_w_per_m2_k) = (1e9, Some(20.0));
         let (inner_m, outer_m) =

@@ -293,7 +293,7 @@ pub fn any_rate_model(model: &CoilModel) -> Result<RateModel, SearchError> {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+pub(in crate::search) mod tests {
     use super::*;
     use crate::coil::{Coil, CoilSpec, Fibre, LayerLength};
     use crate::effect::{self, DeclaredEffect};
