@@ -23,6 +23,10 @@ from ._results import (
 )
 
 
+_FAR = 30.0
+"""Rates that differ by more than this factor are shown on a logarithmic axis."""
+
+
 def _axes(ax: Any) -> Any:
     if ax is not None:
         return ax
@@ -34,17 +38,21 @@ def _axes(ax: Any) -> Any:
 
 
 def plot_patterns(result: EvaluateResult | OptimiseResult, ax: Any = None) -> Any:
-    """Worst rate errors of the patterns as bars; a mark shows the guaranteed one."""
+    """Worst rate errors of the patterns; a mark shows the guaranteed one. Bars, or points where a few are far above the others."""
     ax = _axes(ax)
     patterns = [*result.baselines, result.best] if isinstance(result, OptimiseResult) else result.patterns
     names = [p["name"] for p in patterns]
-    ax.barh(names, [p["worst_rate_deg_per_h"] for p in patterns], color="#4c78a8", label="over the profiles")
+    rates = [p["worst_rate_deg_per_h"] for p in patterns]
+    if min(rates, default=1.0) * _FAR < max(rates, default=1.0):
+        ax.plot(rates, names, "o", color="#4c78a8", label="over the profiles")
+        ax.set_xscale("log")
+    else:
+        ax.barh(names, rates, color="#4c78a8", label="over the profiles")
     bounds = [p.get("guaranteed_worst_rate_deg_per_h") for p in patterns]
     if any(bound is not None for bound in bounds):
         shown = [(n, b) for n, b in zip(names, bounds) if b is not None]
         ax.plot([b for _, b in shown], [n for n, _ in shown], "k|", markersize=14, label="guaranteed")
     ax.invert_yaxis()
-    ax.set_xscale("log")
     ax.set_xlabel("worst rate error [°/h]")
     ax.legend()
     return ax

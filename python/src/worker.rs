@@ -11,7 +11,7 @@ use coilwright::task::{Observer, TaskError};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
-use crate::error::raised;
+use crate::error::{raised, wrong};
 
 /// Signals are looked for this often.
 const LOOK: Duration = Duration::from_millis(50);
@@ -173,7 +173,7 @@ fn finished<T>(py: Python, done: Result<T, Failure>, notes: Vec<String>) -> PyRe
     match done {
         Ok(answer) => Ok(Worked { answer, notes }),
         Err(Failure::Task(error)) => Err(raised(py, &error)),
-        Err(Failure::Stopped) => Err(broken("the work stopped although nobody asked for it")),
+        Err(Failure::Stopped) => Err(wrong(py, "the work ended before anything was found: give it more time")),
         Err(Failure::Panic(text)) => Err(broken(&text)),
     }
 }
