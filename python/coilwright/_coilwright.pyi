@@ -182,6 +182,8 @@ def optimise(
     compare_with: PatternArgument | None = None,
     prove_s: float | None = None,
     output: str | None = None,
+    cutting_planes: bool = False,
+    diagnosis: str | None = None,
     progress: Progress = None,
 ) -> Answered: ...
 def exact(

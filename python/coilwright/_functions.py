@@ -60,6 +60,15 @@ def _optional_path(path: PathLike | None) -> str | None:
     return None if path is None else os.fspath(path)
 
 
+def _diagnosis_text(diagnosis: DiagnoseResult | PathLike | None) -> str | None:
+    if diagnosis is None:
+        return None
+    if isinstance(diagnosis, DiagnoseResult):
+        return diagnosis.to_json()
+    with open(diagnosis, encoding="utf-8") as file:
+        return file.read()
+
+
 def evaluate(
     model: ModelLike,
     patterns: PatternLike | Sequence[PatternLike] | None = None,
@@ -114,6 +123,8 @@ def optimise(
     init: PatternLike | None = None,
     compare_with: PatternLike | None = None,
     prove_s: float | None = None,
+    cutting_planes: bool = False,
+    diagnosis: DiagnoseResult | PathLike | None = None,
     output: PathLike | None = None,
     progress: bool | Progress | None = None,
 ) -> OptimiseResult:
@@ -129,6 +140,8 @@ def optimise(
         init: a pattern to begin with.
         compare_with: a former pattern, or the folder of a search.
         prove_s: tries for so long to prove that the best pattern is the best of its class.
+        cutting_planes: lets the worst admissible profiles of what is found join the searched ones.
+        diagnosis: the diagnosis that the model comes from, or its file: every set of explanations counts by its probability.
         output: a folder for the run's results, as ``optimise -o`` leaves it.
         progress: True for a bar, or a callable that takes the share done and words.
 
@@ -156,6 +169,8 @@ def optimise(
             _optional_pattern(compare_with),
             prove_s,
             _optional_path(output),
+            cutting_planes,
+            _diagnosis_text(diagnosis),
             at,
         )
     return result_of(OptimiseResult, answered)

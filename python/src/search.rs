@@ -6,8 +6,10 @@ use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use coilwright::io::files::WriteError;
+use coilwright::io::json::diagnosis::DiagnosisJson;
 use coilwright::io::json::search::OptimiseJson;
 use coilwright::io::read::pattern_file::resolve_pattern;
+use coilwright::io::read::posterior::drawn_models;
 use coilwright::io::write::checkpoint::write_checkpoint;
 use coilwright::io::write::run_directory::{Request as Run, write_request};
 use coilwright::pattern::windability::WindabilityClass;
@@ -16,7 +18,7 @@ use coilwright::search::anneal::rounds::Rounds;
 use coilwright::search::cost::objective::Objective;
 use coilwright::search::proof;
 use coilwright::search::run::Halt;
-use coilwright::task::optimise::Wishes;
+use coilwright::task::optimise::{DRAWN_MODELS, Wishes};
 use coilwright::task::{self, Observer, TaskError};
 use coilwright::units::deg_per_h_from_rad_per_s;
 use pyo3::prelude::*;
@@ -196,7 +198,7 @@ impl SearchOptions {
 }
 
 #[pyfunction]
-#[pyo3(signature = (model, options, init=None, compare_with=None, prove_s=None, output=None, progress=None))]
+#[pyo3(signature = (model, options, init=None, compare_with=None, prove_s=None, output=None, cutting_planes=false, diagnosis=None, progress=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn optimise(
     py: Python,
@@ -206,9 +208,15 @@ pub fn optimise(
     compare_with: Option<PatternArgument>,
     prove_s: Option<f64>,
     output: Option<PathBuf>,
+    cutting_planes: bool,
+    diagnosis: Option<String>,
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Answered> {
     let file = Arc::clone(&model.file);
+    let diagnosis = diagnosis.map(|text| serde_json::from_str::<DiagnosisJson>(&text)).transpose().map_err(|error| {
+        let message = format!("line {}: cannot be understood: {error}; give what diagnose answers", error.line());
+        raise(py, option("diagnosis", message))
+    })?;
     let start = one_pattern(py, init.as_ref(), &file)?;
     let former = match &compare_with {
         // The folder of a search stands for its best pattern.
@@ -219,18 +227,22 @@ pub fn optimise(
         other => one_pattern(py, other.as_ref(), &file)?.or_else(|| start.clone()),
     };
     let (budget, prove) = (duration_of(py, "budget_s", options.budget_s)?, duration_of(py, "prove_s", prove_s)?);
-    let wishes = Wishes { start, ..options.wishes(py)? };
+    let wishes = Wishes { start, cutting_planes, ..options.wishes(py)? };
     let worked = work(py, progress, move |watcher| {
         for advice in &file.advice {
             watcher.note(&format!("note: {advice}"));
         }
         let _held = held(output.as_ref(), "optimise")?;
-        let request = wishes.request(&file, prove.is_some(), former)?;
+        let mut request = wishes.request(&file, prove.is_some(), former)?;
         let plan = request.plan.clone();
+        let uncertain = diagnosis.as_ref().map_or_else(Vec::new, |found| {
+            drawn_models(&file.model, &found.posterior, &found.refitted, DRAWN_MODELS, plan.seed)
+        });
+        request.uncertain = &uncertain;
         let (class, objective) = (request.class, request.objective);
         let stated = budget.map(|budget| format!("{}s", budget.as_secs_f64()));
         let budget_stated = stated.as_deref();
-        let run = Run { file: &file, class, objective, plan: &plan, budget: budget_stated, cutting_planes: false };
+        let run = Run { file: &file, class, objective, plan: &plan, budget: budget_stated, cutting_planes };
         let mut watch = SearchWatch {
             prove,
             kept: output.clone().map(|folder| (folder, run)),
