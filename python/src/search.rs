@@ -213,10 +213,11 @@ pub fn optimise(
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Answered> {
     let file = Arc::clone(&model.file);
-    let diagnosis = diagnosis.map(|text| serde_json::from_str::<DiagnosisJson>(&text)).transpose().map_err(|error| {
-        let message = format!("line {}: cannot be understood: {error}; give what diagnose answers", error.line());
-        raise(py, option("diagnosis", message))
-    })?;
+    let diagnosis =
+        diagnosis.map(|text| serde_json::from_str::<DiagnosisJson>(&text)).transpose().map_err(|error| {
+            let message = format!("line {}: cannot be understood: {error}; give what diagnose answers", error.line());
+            raise(py, option("diagnosis", message))
+        })?;
     let start = one_pattern(py, init.as_ref(), &file)?;
     let former = match &compare_with {
         // The folder of a search stands for its best pattern.
