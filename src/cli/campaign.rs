@@ -4,9 +4,10 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use super::progress::StopFlag;
-use super::screen::{Screen, table};
+use super::screen::{Screen, held, table};
 use super::{CliError, Ending};
 use crate::io::files::write_atomically;
+use crate::io::folder::{Replacement, remove_numbered};
 use crate::io::read::campaign_file::{
     CampaignFile, CampaignJson, Cell, CellJson, cell_path, read_campaign, read_cell, summary_csv,
 };
@@ -59,6 +60,8 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let campaign = read_campaign(&arguments.campaign)?;
     let cells = campaign.cells()?;
     let folder = &arguments.output;
+    // Shards of one campaign may work in one folder at once; they write different files.
+    let _held = if arguments.shard.is_none() { Some(held(folder, "campaign")?) } else { None };
     let shard = arguments.shard.unwrap_or(Shard { index: 1, count: 1 });
     let progress = screen.progress("campaign", Some(cells.len() as u64));
     let mut searched = 0;
@@ -87,8 +90,11 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     };
     if answer.missing == 0 {
         let csv = summary_csv(&answer.results);
-        write_atomically(&folder.join("summary.csv"), &csv)?;
-        write_atomically(&folder.join("summary.svg"), chart(&answer).as_bytes())?;
+        let mut files = Replacement::of(folder);
+        files.add("summary.csv", &csv)?;
+        files.add("summary.svg", chart(&answer).as_bytes())?;
+        files.commit(&["summary.csv", "summary.svg"])?;
+        remove_numbered(&folder.join("cells"), answer.cells)?;
         screen.note(&format!("wrote {}", folder.join("summary.csv").display()));
     } else {
         screen.note(&format!("{} of {} cells are missing: no table yet", answer.missing, answer.cells));

@@ -1,6 +1,7 @@
 //! `metrics`: what a gyro's data sheet says, from records.
 
 use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::records::{GrossErrors, RecordArguments};
@@ -12,6 +13,7 @@ use crate::io::json::inputs::RecordInputJson;
 use crate::io::json::metrics::{MetricsJson, NoiseJson, RecordMetricsJson};
 use crate::io::read::record_columns::RecordFormat;
 use crate::io::write::measurement_folder::check_free;
+use crate::task::Observer;
 use crate::task::metrics::{self, DEFAULT_AVERAGE_S, Measured, Settings, measure_stream};
 use crate::task::page::REPORT_FILE;
 
@@ -44,9 +46,10 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     }
     let format = arguments.reading.format(None)?;
     let settings = Settings { average_s: arguments.average, gross_errors: arguments.gross_errors.into() };
-    let watching = Watching::quiet(screen);
+    let watching = Watching::new(screen, "metrics");
     let measured = arguments.records.iter().map(|path| measure(path, &format, &settings, &watching));
     let body = metrics::document(measured.collect::<Result<_, _>>()?)?;
+    watching.finish();
     if let Some(folder) = &arguments.output {
         metrics::write(&body, folder)?;
         screen.note(&format!("wrote {}", folder.join(REPORT_FILE).display()));
@@ -54,6 +57,28 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     screen.answer(body, text)?;
     Ok(Ending::Done)
 }
+
+/// Says how much of a file has been read.
+struct Watched<'w, R> {
+    inner: R,
+    read: u64,
+    size: u64,
+    watching: &'w Watching<'w>,
+}
+
+impl<R: Read> Read for Watched<'_, R> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let count = self.inner.read(buffer)?;
+        let before = self.read;
+        self.read += count as u64;
+        if before / SAID_EVERY_BYTES != self.read / SAID_EVERY_BYTES && self.size > 0 {
+            self.watching.at((self.read as f64 / self.size as f64).min(1.0), "");
+        }
+        Ok(count)
+    }
+}
+
+const SAID_EVERY_BYTES: u64 = 1 << 22;
 
 /// Measures a record as it passes by, without holding it.
 fn measure(path: &Path, format: &RecordFormat, settings: &Settings, watching: &Watching) -> Result<Measured, CliError> {
@@ -67,6 +92,8 @@ fn measure(path: &Path, format: &RecordFormat, settings: &Settings, watching: &W
     }
     let unreadable = |e| Faults::of_file(&name, format!("cannot be read: {e}"));
     let source = File::open(path).map_err(unreadable)?;
+    let size = source.metadata().map_or(0, |found| found.len());
+    let source = Watched { inner: source, read: 0, size, watching };
     Ok(measure_stream(RecordInputJson::new(path, "measured")?, &name, source, format, settings, watching)?)
 }
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::pattern_asked::pattern_asked;
 use super::screen::{Screen, held, table};
 use super::{CliError, Ending};
-use crate::io::files::write_atomically;
+use crate::io::folder::Replacement;
 use crate::io::json::schedule::{ScheduleJson, crossover_words};
 use crate::io::read::model_file::read_model;
 use crate::schedule::Schedule;
@@ -34,11 +34,9 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let answer = plan(&Request { model: &file, pattern: pattern.as_ref() })?;
     if let Some(folder) = &arguments.output {
         let _held = held(folder, "schedule")?;
-        for (name, text) in answer.files(&file)? {
-            let path = folder.join(name);
-            write_atomically(&path, text.as_bytes())?;
-            screen.note(&format!("wrote {}", path.display()));
-        }
+        let files = answer.files(&file)?;
+        Replacement::all(folder, &files)?;
+        files.iter().for_each(|(name, _)| screen.note(&format!("wrote {}", folder.join(name).display())));
     }
     screen.document(&answer.document, |document| text(&answer.schedule, document))?;
     Ok(Ending::Done)

@@ -6,7 +6,7 @@ use super::records::RecordArguments;
 use super::screen::{Screen, held};
 use super::watching::Watching;
 use super::{CliError, Ending};
-use crate::io::files::write_atomically;
+use crate::io::folder::Replacement;
 use crate::io::json::temperatures::TemperaturesJson;
 use crate::io::read::model_file::read_model;
 use crate::io::read::profile_file::read_profile_file;
@@ -53,13 +53,11 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let body = solve(&Request { model: &file, driver }, &Watching::quiet(screen))?.document();
     if let Some(folder) = &arguments.output {
         let _held = held(folder, "temperatures")?;
-        for (file, content) in [
-            ("temperatures.csv", body.csv()),
-            ("temperatures.svg", temperature_chart(&body).svg()),
-            ("rates.svg", rate_chart(&body).svg()),
-        ] {
-            write_atomically(&folder.join(file), content.as_bytes())?;
-        }
+        let mut files = Replacement::of(folder);
+        let names = ["temperatures.csv", "temperatures.svg", "rates.svg"];
+        let contents = [body.csv(), temperature_chart(&body).svg(), rate_chart(&body).svg()];
+        names.iter().zip(&contents).try_for_each(|(name, content)| files.add(name, content.as_bytes()))?;
+        files.commit(&names)?;
         screen.note(&format!("wrote temperatures.csv, temperatures.svg and rates.svg into {}", folder.display()));
         if !screen.is_json() {
             return Ok(Ending::Done);

@@ -120,6 +120,14 @@ impl NewFile {
         Err(fail(std::io::Error::other("too many runs write this file at once")))
     }
 
+    /// What was written so far is on the disk from here on.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn sync(&self) -> Result<(), WriteError> {
+        self.file.sync_all().map_err(|source| WriteError::File { path: self.path.clone(), source })
+    }
+
     /// Readers see the old file until here, and the new one from here on.
     ///
     /// # Errors
@@ -142,6 +150,14 @@ impl Drop for NewFile {
             let _ = std::fs::remove_file(&self.temporary);
         }
     }
+}
+
+/// Whether a name is one that a file has while it is written: `.NAME.0.coilwright`.
+pub(super) fn is_temporary(name: &str) -> bool {
+    name.strip_prefix('.')
+        .and_then(|rest| rest.strip_suffix(".coilwright"))
+        .and_then(|rest| rest.rsplit_once('.'))
+        .is_some_and(|(own, slot)| !own.is_empty() && slot.parse::<usize>().is_ok_and(|slot| slot < MOST_WRITERS))
 }
 
 /// An empty file of that name, locked; none where another run has it.

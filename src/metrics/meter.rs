@@ -22,6 +22,8 @@ const REGULAR: f64 = 0.01;
 const GAP: f64 = 2.0;
 /// Fewer regular rows have no Allan deviation worth the name.
 const MIN_ALLAN_ROWS: usize = 16;
+/// To each side of room temperature; readings beyond them are a thermometer's errors and share the last one.
+const MOST_BANDS: f64 = 400.0;
 /// Columns of temperature are taken once in so long a time: nothing in a coil is faster.
 const THERMAL_STEP_S: f64 = 1.0;
 /// A rate is set beside what its temperature did until so many rows later: a thermometer's noise can then be smoothed from both
@@ -195,7 +197,9 @@ impl Running {
             (self.mean_rows, self.mean_sum) = (0, 0.0);
         }
         // Room temperature is the middle of a band.
-        let band = ((row.temperature_k - REFERENCE_TEMPERATURE_K) / POINT_WIDTH_K).round() as i64;
+        let band = ((row.temperature_k - REFERENCE_TEMPERATURE_K) / POINT_WIDTH_K)
+            .round()
+            .clamp(-MOST_BANDS, MOST_BANDS) as i64;
         let sums = self.bands.entry(band).or_default();
         *sums = (sums.0 + row.temperature_k, sums.1 + from_level, sums.2 + 1);
         self.allan.push(row.rate_rad_per_s);

@@ -80,9 +80,8 @@ mod folder {
     use std::path::Path;
 
     use super::{Answer, ModelFile, TaskError};
-    use crate::io::files::write_atomically;
     use crate::io::write::comparison_rows::comparison_rows;
-    use crate::io::write::measurement_folder::{COMPARISON_FILE, MODEL_FILE, table_name, write_document, write_table};
+    use crate::io::write::measurement_folder::{COMPARISON_FILE, MeasurementFiles, table_name};
     use crate::report::comparison::pictures;
     use crate::task::page::{REPORT_FILE, write_report};
 
@@ -92,16 +91,17 @@ mod folder {
         /// # Errors
         /// Files that cannot be written.
         pub fn write(&self, folder: &Path, model: &ModelFile) -> Result<(), TaskError> {
+            let mut files = MeasurementFiles::new(folder, Some(model))?;
             let parts = self.records.iter().zip(&self.comparisons).zip(&self.document.records);
             for (index, ((record, found), shown)) in parts.enumerate() {
                 let rows = comparison_rows(record, found);
-                write_table(folder, &table_name(index + 1), &rows)?;
+                files.table(&table_name(index + 1), &rows)?;
                 for picture in pictures(index + 1, shown, &rows) {
-                    write_atomically(&folder.join(&picture.file), picture.svg.as_bytes())?;
+                    files.add(&picture.file, picture.svg.as_bytes())?;
                 }
             }
-            write_atomically(&folder.join(MODEL_FILE), model.source.as_bytes())?;
-            write_document(folder, COMPARISON_FILE, &self.document)?;
+            files.document(COMPARISON_FILE, &self.document)?;
+            files.commit(COMPARISON_FILE)?;
             write_report(folder, &folder.join(REPORT_FILE))?;
             Ok(())
         }

@@ -6,15 +6,12 @@ use crate::compare::suspicion;
 use crate::diagnose::experiment::{Chamber, Experiment, design};
 use crate::diagnose::{self, Diagnosis, Verdict};
 use crate::effect;
-use crate::io::files::write_atomically;
 use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow, FindingJson};
 use crate::io::json::inputs::InputsJson;
 use crate::io::json::schedule::{RATE_DECIMALS, rounded};
 use crate::io::model::{ModelFile, NamedPattern};
 use crate::io::read::profile_file::print_profile;
-use crate::io::write::measurement_folder::{
-    DIAGNOSIS_FILE, MODEL_FILE, before_and_after_name, write_document, write_table,
-};
+use crate::io::write::measurement_folder::{DIAGNOSIS_FILE, MeasurementFiles, before_and_after_name};
 use crate::io::write::model_edit::{Remark, with_effect};
 use crate::pattern::Pattern;
 use crate::predict::{noise_floor_rad_per_s, predict};
@@ -146,20 +143,21 @@ impl Answer {
     /// # Errors
     /// Files that cannot be written.
     pub fn write(&self, folder: &Path, model: &ModelFile) -> Result<(), TaskError> {
-        write_atomically(&folder.join("ladder.svg"), ladder_chart(&self.document).svg().as_bytes())?;
-        write_atomically(&folder.join("noise.svg"), noise_chart(&self.document).svg().as_bytes())?;
-        write_atomically(&folder.join(MODEL_FILE), model.source.as_bytes())?;
+        let mut files = MeasurementFiles::new(folder, Some(model))?;
+        files.add("ladder.svg", ladder_chart(&self.document).svg().as_bytes())?;
+        files.add("noise.svg", noise_chart(&self.document).svg().as_bytes())?;
         if let Some(source) = self.extended_source(model)? {
-            write_atomically(&folder.join("extended.toml"), source.as_bytes())?;
+            files.add("extended.toml", source.as_bytes())?;
             for (index, record) in self.records.iter().chain(&self.holdout).enumerate() {
                 let rows = self.before_and_after(model, record)?;
                 let noise = deg_per_h_from_rad_per_s(noise_floor_rad_per_s(record));
                 let chart = before_and_after_chart(&format!("Residual of {}", record.name()), &rows, noise);
-                write_table(folder, &before_and_after_name(index + 1), &rows)?;
-                write_atomically(&folder.join(picture_name(index + 1)), chart.svg().as_bytes())?;
+                files.table(&before_and_after_name(index + 1), &rows)?;
+                files.add(&picture_name(index + 1), chart.svg().as_bytes())?;
             }
         }
-        write_document(folder, DIAGNOSIS_FILE, &self.document)?;
+        files.document(DIAGNOSIS_FILE, &self.document)?;
+        files.commit(DIAGNOSIS_FILE)?;
         write_report(folder, &folder.join(REPORT_FILE))?;
         Ok(())
     }

@@ -83,7 +83,7 @@ impl Measurement {
             .iter()
             .map(|e| GrossErrorJson { time_s: times_s[e.row], column: e.column.to_owned(), dropped })
             .collect();
-        say_gross(&self.file, &gross_errors, dropped, observer);
+        say_gross(&self.file, gross_errors.len(), gross_errors.first(), dropped, observer);
         let rows: Vec<usize> = found.iter().map(|e| e.row).collect();
         let record = if dropped && !rows.is_empty() { self.record.without_rows(&rows)? } else { self.record.clone() };
         let gaps = record.gaps().len();
@@ -117,13 +117,11 @@ pub fn say_read<'r>(
 }
 
 /// Says how many gross errors there are and what becomes of them.
-pub fn say_gross(file: &str, found: &[GrossErrorJson], dropped: bool, observer: &dyn Observer) {
-    let Some(first) = found.first() else { return };
+pub fn say_gross(file: &str, count: usize, first: Option<&GrossErrorJson>, dropped: bool, observer: &dyn Observer) {
+    let Some(first) = first else { return };
     let fate = if dropped { "left out" } else { "used all the same: --gross-errors drop leaves them out" };
     observer.note(&format!(
-        "note: {file}: {} gross errors, the first in {} at {} s; {fate}",
-        found.len(),
-        first.column,
-        first.time_s
+        "note: {file}: {count} gross errors, the first in {} at {} s; {fate}",
+        first.column, first.time_s
     ));
 }

@@ -3,7 +3,7 @@
 use std::io::Read;
 
 use crate::io::json::inputs::{InputsJson, RecordInputJson};
-use crate::io::json::metrics::{GrossErrorJson, MetricsJson, RecordMetricsJson};
+use crate::io::json::metrics::{GrossErrorJson, GrossErrors as Found, MetricsJson, RecordMetricsJson};
 use crate::io::read::record_columns::RecordFormat;
 use crate::io::read::record_rows::{CHUNK, stream_rows};
 use crate::metrics::{Meter, Metrics, repeatability_rad_per_s};
@@ -40,13 +40,13 @@ pub struct Measured {
 struct Metering {
     meter: Meter,
     dropped: bool,
-    found: Vec<GrossErrorJson>,
+    found: Found,
 }
 
 impl Metering {
     fn new(settings: &Settings) -> Result<Self, TaskError> {
         let meter = Meter::new(settings.average_s)?;
-        Ok(Self { meter, dropped: settings.gross_errors == GrossErrors::Drop, found: Vec::new() })
+        Ok(Self { meter, dropped: settings.gross_errors == GrossErrors::Drop, found: Found::default() })
     }
 
     fn take(&mut self, rows: &[Row]) {
@@ -58,7 +58,7 @@ impl Metering {
             while let Some(error) = gross.next_if(|e| e.row == i) {
                 alone = true;
                 let (time_s, dropped) = (row.time_s, self.dropped);
-                self.found.push(GrossErrorJson { time_s, column: error.column.to_owned(), dropped });
+                self.found.push(|| GrossErrorJson { time_s, column: error.column.to_owned(), dropped });
             }
             if !(alone && self.dropped) {
                 self.meter.push(*row);
@@ -90,7 +90,7 @@ pub fn measure_stream(
     let mut metering = Metering::new(settings)?;
     let noticed = stream_rows(shown_as, source, &format, |rows: &[Row]| metering.take(rows))?;
     say_read(&input.file, noticed.skipped_rows, &noticed.remarks, observer);
-    say_gross(&input.file, &metering.found, metering.dropped, observer);
+    say_gross(&input.file, metering.found.count, metering.found.first.first(), metering.dropped, observer);
     metering.finish(input)
 }
 
@@ -105,7 +105,7 @@ pub fn measure(measurement: &Measurement, settings: &Settings, observer: &dyn Ob
         metering.take(rows);
     }
     measurement.say(None, observer);
-    say_gross(&measurement.file, &metering.found, metering.dropped, observer);
+    say_gross(&measurement.file, metering.found.count, metering.found.first.first(), metering.dropped, observer);
     metering.finish(measurement.input("measured"))
 }
 
@@ -125,8 +125,7 @@ mod folder {
     use std::path::Path;
 
     use super::{MetricsJson, TaskError};
-    use crate::io::files::write_atomically;
-    use crate::io::write::measurement_folder::{METRICS_FILE, write_document};
+    use crate::io::write::measurement_folder::{METRICS_FILE, MeasurementFiles};
     use crate::report::allan::allan_chart;
     use crate::task::page::{REPORT_FILE, write_report};
 
@@ -135,11 +134,12 @@ mod folder {
     /// # Errors
     /// Files that cannot be written.
     pub fn write(document: &MetricsJson, folder: &Path) -> Result<(), TaskError> {
+        let mut files = MeasurementFiles::new(folder, None)?;
         for (index, record) in document.records.iter().enumerate() {
-            let name = format!("allan-{}.svg", index + 1);
-            write_atomically(&folder.join(name), allan_chart(record).svg().as_bytes())?;
+            files.add(&format!("allan-{}.svg", index + 1), allan_chart(record).svg().as_bytes())?;
         }
-        write_document(folder, METRICS_FILE, document)?;
+        files.document(METRICS_FILE, document)?;
+        files.commit(METRICS_FILE)?;
         write_report(folder, &folder.join(REPORT_FILE))?;
         Ok(())
     }

@@ -119,6 +119,9 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Option<Answer>,
         );
         observer.at((number + 1) as f64 / parts.len() as f64, &words);
     }
+    if let Some(front) = &kept {
+        front.keep_parts(parts.len())?;
+    }
     let mut points = front(&with_spreads(file, judged)?);
     // Knees first; stable, so that each part keeps its order by error.
     let all = points.clone();
@@ -266,12 +269,12 @@ fn named<'n>(names: impl Iterator<Item = &'n str>) -> Vec<String> {
 #[cfg(feature = "report")]
 mod folder {
     use super::*;
-    use crate::io::files::write_atomically;
+    use crate::io::folder::Replacement;
     use crate::io::json::PatternJson;
     use crate::io::json::pareto::front_csv;
     use crate::io::model::NamedPattern;
     use crate::io::read::pattern_file::print_pattern;
-    use crate::io::write::pareto_parts::remove_front;
+    use crate::io::write::pareto_parts::files_of_front;
     use crate::pattern::classic::Classic;
     use crate::report::plot::{Axis, Chart, Series};
     use crate::text::sink::TomlComment;
@@ -282,7 +285,7 @@ mod folder {
         /// # Errors
         /// Files that cannot be written.
         pub fn write(&self, folder: &Path, file: &ModelFile) -> Result<ParetoJson, TaskError> {
-            remove_front(folder)?;
+            let mut replacement = Replacement::of(folder);
             let mut files = Vec::with_capacity(self.points.len());
             for point in &self.points {
                 let name = point.judged.name.clone();
@@ -290,18 +293,20 @@ mod folder {
                 let comment = format!("coil: {}; a point of the front of error against windability", file.model.name);
                 let pattern = NamedPattern { name, pattern: point.judged.pattern.clone() };
                 let text = print_pattern(&pattern, &[TomlComment::of(comment)]);
-                write_atomically(&folder.join(&file_name), text.as_bytes())?;
+                replacement.add(&file_name, text.as_bytes())?;
                 files.push(file_name);
             }
             let document = self.document(Some(&files));
             let shown = &document.points;
-            write_atomically(&folder.join("pareto.csv"), &front_csv(shown))?;
+            replacement.add_list("pareto.csv", &front_csv(shown))?;
             let worst = chart(file, shown, "worst rate error", |p| Some(p.worst_rate_deg_per_h));
-            write_atomically(&folder.join("pareto.svg"), worst.as_bytes())?;
+            replacement.add("pareto.svg", worst.as_bytes())?;
             if file.tolerance.is_some() {
                 let p95 = chart(file, shown, "P95 over built coils", |p| p.p95_rate_deg_per_h);
-                write_atomically(&folder.join("pareto-p95.svg"), p95.as_bytes())?;
+                replacement.add("pareto-p95.svg", p95.as_bytes())?;
             }
+            let former = files_of_front(folder);
+            replacement.commit(&former.iter().map(String::as_str).collect::<Vec<_>>())?;
             Ok(document)
         }
     }

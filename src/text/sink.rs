@@ -134,7 +134,11 @@ impl CComment {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Cell(String);
 
-const FORMULA_SIGNS: [char; 6] = ['=', '+', '-', '@', '\t', '\r'];
+/// With the full-width forms, which spreadsheets of East Asian languages take for the same.
+///
+/// # Source
+/// OWASP, CSV Injection: characters that begin a formula.
+const FORMULA_SIGNS: [char; 11] = ['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－', '＠'];
 
 fn begins_formula(text: &str) -> bool {
     text.trim_start_matches('\'').starts_with(FORMULA_SIGNS)
@@ -151,6 +155,13 @@ impl Cell {
         let is_number = text.trim().parse::<f64>().is_ok_and(f64::is_finite);
         let seen = visible(text, &['\n', '\t']);
         if begins_formula(&seen) && !is_number { Self(format!("'{seen}")) } else { Self(seen) }
+    }
+
+    /// Whether [`Cell::text`] leaves a text as it is.
+    pub fn leaves(text: &str) -> bool {
+        let seen = |c: char| c.is_ascii_graphic() || c == ' ' || c == '\n' || c == '\t' || !is_unseen(c);
+        let is_number = || text.trim().parse::<f64>().is_ok_and(f64::is_finite);
+        text.chars().all(seen) && (!begins_formula(text) || is_number())
     }
 
     /// The text that [`Cell::text`] made a cell of.
@@ -197,6 +208,7 @@ mod tests {
         "/*/",
         "??/",
         "=1+1",
+        "＝1+1",
         "'=1",
         "''-x",
         "-1.5",
@@ -282,10 +294,12 @@ mod tests {
         for text in HOSTILE.iter().filter(|t| !t.contains(|c| is_unseen(c) && c != '\n')) {
             let cell = Cell::text(text);
             assert_eq!(Cell::read(cell.as_str()), *text);
+            assert_eq!(Cell::leaves(text), cell.as_str() == *text);
             let is_number = text.parse::<f64>().is_ok();
             assert!(is_number || !cell.as_str().starts_with(FORMULA_SIGNS), "{cell}");
         }
         assert_eq!(Cell::text("-1.5").as_str(), "-1.5");
+        assert_eq!(Cell::text("\n=x").as_str(), "'\n=x");
         assert_eq!(Cell::text("\tx").as_str(), "'\tx");
         assert_eq!(Cell::read("'tis"), "'tis");
     }

@@ -6,6 +6,7 @@ mod campaign;
 mod commands;
 mod compare;
 mod compensate;
+mod damage;
 mod diagnose;
 mod exact;
 mod examples;
@@ -20,7 +21,9 @@ mod readme;
 mod reproduce;
 mod resume;
 mod schemas;
+mod sinks;
 mod terminal;
+mod ways;
 
 use std::path::{Path, PathBuf};
 use std::process::Output;

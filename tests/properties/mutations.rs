@@ -4,11 +4,18 @@
 
 use std::path::{Path, PathBuf};
 
+use coilwright::compensate::{Compensator, Method};
+use coilwright::io::read::campaign_file::parse_campaign;
 use coilwright::io::read::model_file::parse_model;
 use coilwright::io::read::pattern_file::parse_pattern;
-use coilwright::io::read::record_file::parse_record;
+use coilwright::io::read::profile_file::parse_profiles;
+use coilwright::io::read::record_columns::{Division, RecordFormat};
+use coilwright::io::read::record_file::{parse_record, parse_record_as};
+use coilwright::io::read::record_rows::stream_rows;
 use coilwright::io::read::schedule_reader::parse_claim;
+use coilwright::io::write::compensation_file::compensate_lines;
 use coilwright::numeric::expression::Expression;
+use coilwright::pattern::classic::Classic;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -138,6 +145,68 @@ fn a_damaged_pattern_file_is_refused_or_understood() {
 #[test]
 fn a_damaged_record_is_refused_or_understood() {
     survives("record", 3000, |text| shown(parse_record("record.csv", text)));
+}
+
+#[test]
+fn a_damaged_record_with_a_mapping_is_the_same_as_a_whole_and_as_a_stream() {
+    survives("mapping", 3000, |text| {
+        let Some((mapping, record)) = text.split_once('\n') else { return false };
+        let mut format = RecordFormat::default();
+        if !shown(format.map_all(mapping)) {
+            return false;
+        }
+        let mut rows = 0;
+        let streamed = stream_rows("record.csv", record.as_bytes(), &format, |chunk| rows += chunk.len());
+        let whole = parse_record_as("record.csv", record, &format);
+        if let Ok(read) = &whole {
+            assert_eq!(read.record.rows(), rows);
+            assert_eq!(read.skipped_rows, streamed.as_ref().unwrap().skipped_rows);
+        }
+        shown(streamed);
+        shown(whole)
+    });
+}
+
+#[test]
+fn a_damaged_campaign_or_experiment_is_refused_or_understood() {
+    survives("campaign", 2000, |text| shown(parse_campaign(Path::new("c.toml"), text)));
+    survives("experiment", 2000, |text| shown(parse_profiles("next.toml", text)));
+}
+
+#[test]
+fn a_damaged_stream_is_compensated_to_a_table_or_its_header_is_refused() {
+    let file = parse_model(
+        Path::new("examples/paper-200m.toml"),
+        &std::fs::read_to_string("examples/paper-200m.toml").unwrap(),
+    );
+    let model = file.unwrap().model;
+    let pattern = Classic::Qua.pattern(model.coil.layers()).unwrap();
+    let compensator = Compensator::declared(Method::Physical, &model, &pattern).unwrap();
+    let mut random = ChaCha8Rng::seed_from_u64(13);
+    let mut rows = 0;
+    for (_, seed) in corpus("compensation") {
+        for change in 0..1000 {
+            let text = if change == 0 { seed.clone() } else { mutate(&seed, &mut random) };
+            let mut out = Vec::new();
+            let format = RecordFormat::default();
+            if !shown(compensate_lines(&compensator, &format, "record", text.as_bytes(), &mut out)) {
+                assert!(change > 0);
+                continue;
+            }
+            let out = String::from_utf8(out).unwrap();
+            let table: Vec<&str> = out.lines().skip_while(|line| line.starts_with('#') || line.is_empty()).collect();
+            let separator = Division::of_header(table[0]).separator;
+            let mut reader = csv::ReaderBuilder::new();
+            let mut reader = reader.delimiter(separator).comment(Some(b'#')).from_reader(out.as_bytes());
+            for row in reader.records() {
+                let row = row.unwrap_or_else(|e| panic!("{e}\n{text:?}\n{out:?}"));
+                let bias = &row[row.len() - 2];
+                assert!(bias.is_empty() || bias.parse::<f64>().is_ok_and(f64::is_finite), "{bias} {out}");
+                rows += 1;
+            }
+        }
+    }
+    assert!(rows > 5000, "{rows}");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 //! Source is read as Rust tokens, so that comments and strings can neither break a rule nor hide a breach.
 
 mod conversions;
+mod materials;
 mod source;
 
 use std::collections::BTreeSet;
@@ -303,6 +304,72 @@ fn the_rules_of_this_file_catch_what_they_are_for() {
         Source::new("src/rate.rs".into(), "use crate::{io::table, units}; fn f() { crate::cli::run() }".into());
     let found: Vec<String> = source.imported_modules().into_iter().map(|(module, _)| module).collect();
     assert_eq!(found, ["io", "units", "cli"]);
+}
+
+/// What opens a connection, or has another program do so.
+const REACHES_OUT: &[&str] = &[
+    "net",
+    "TcpStream",
+    "UdpSocket",
+    "ToSocketAddrs",
+    "ureq",
+    "reqwest",
+    "hyper",
+    "curl",
+    "attohttpc",
+    "minreq",
+    "isahc",
+    "git2",
+    "\"curl\"",
+    "\"wget\"",
+    "\"git\"",
+    "\"ssh\"",
+    "\"nc\"",
+    "\"pip\"",
+    "\"npm\"",
+];
+
+#[test]
+fn no_build_script_of_what_the_program_is_built_upon_reaches_out() {
+    let mut faults = Vec::new();
+    let mut read = 0;
+    for material in materials::materials() {
+        let Some(script) = &material.build_script else { continue };
+        // What other platforms need may not be there.
+        let Ok(text) = std::fs::read_to_string(script) else { continue };
+        read += 1;
+        let tokens = flatten(&text);
+        let found = tokens.iter().filter(|t| REACHES_OUT.contains(&t.text.as_str()));
+        faults.extend(
+            found.map(|t| {
+                format!("{} {}: {}:{}: {}", material.name, material.version, script.display(), t.line, t.text)
+            }),
+        );
+        let fetchers = material.upon.iter().filter(|name| REACHES_OUT.contains(&name.as_str()));
+        faults.extend(fetchers.map(|name| format!("{} {} is built upon {name}", material.name, material.version)));
+    }
+    println!("{read} build scripts read");
+    assert!(read > 5);
+    assert_no(faults);
+}
+
+#[test]
+fn the_bill_of_materials_names_everything_with_version_licence_and_checksum() {
+    let materials = materials::materials();
+    let mut faults = Vec::new();
+    for material in materials.iter().filter(|m| m.name != "coilwright") {
+        let of_registry = material.source.as_deref() == Some("registry+https://github.com/rust-lang/crates.io-index");
+        if !of_registry || material.checksum.is_none() || material.licence.is_empty() {
+            faults.push(format!("{} {}: {:?}", material.name, material.version, material.source));
+        }
+    }
+    let bill = materials::bill(&materials);
+    let components = bill["components"].as_array().map_or(0, Vec::len);
+    println!("{components} packages");
+    assert_eq!(components, materials.len() - 1);
+    assert!(bill["dependencies"][0]["dependsOn"].is_array() && materials.iter().any(|m| m.name == "nalgebra"));
+    assert!(materials.iter().all(|m| m.name != "proptest"), "what only tests use is no part of the program");
+    assert_no(faults);
 }
 
 fn assert_no(faults: Vec<String>) {

@@ -67,8 +67,31 @@ pub struct RecordMetricsJson {
     pub allan: Vec<AllanPointJson>,
     /// The fitted noises that show, the steepest fall first.
     pub allan_noises: Vec<AllanNoiseJson>,
+    /// The first ten thousand of them.
     pub gross_errors: Vec<GrossErrorJson>,
+    /// How many there are.
+    #[serde(default)]
+    pub gross_errors_count: usize,
     pub gaps: usize,
+}
+
+/// Values that stand alone, as a record passes by: counted all, listed as far as a document has use for them.
+#[derive(Debug, Clone, Default)]
+pub struct GrossErrors {
+    pub first: Vec<GrossErrorJson>,
+    pub count: usize,
+}
+
+/// More than this many are counted, not listed: a document and its page stay small however long the record is.
+const MOST_LISTED: usize = 10_000;
+
+impl GrossErrors {
+    pub fn push(&mut self, error: impl FnOnce() -> GrossErrorJson) {
+        self.count += 1;
+        if self.first.len() < MOST_LISTED {
+            self.first.push(error());
+        }
+    }
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -117,7 +140,7 @@ pub struct GrossErrorJson {
 }
 
 impl RecordMetricsJson {
-    pub fn new(file: &str, metrics: &Metrics, gross_errors: Vec<GrossErrorJson>, gaps: usize) -> Self {
+    pub fn new(file: &str, metrics: &Metrics, gross_errors: GrossErrors, gaps: usize) -> Self {
         let allan = metrics.allan.as_ref();
         let noises = metrics.noises.as_ref();
         let of_noise = |show: fn(&NoiseStrengths) -> f64| noises.map(show);
@@ -148,7 +171,7 @@ impl RecordMetricsJson {
             noise: noises.map_or_else(Vec::new, strengths),
             temperature_range_c: metrics.temperature_range_k,
             thermal_deg_per_h: of_noise(|n| deg_per_h_from_rad_per_s(n.explained)),
-            cautions: cautions(metrics, gross_errors.len()),
+            cautions: cautions(metrics, gross_errors.count),
             temperature_points: metrics
                 .temperature_points
                 .iter()
@@ -170,7 +193,8 @@ impl RecordMetricsJson {
                     .collect()
             }),
             allan_noises: noises.map_or_else(Vec::new, lines),
-            gross_errors,
+            gross_errors_count: gross_errors.count,
+            gross_errors: gross_errors.first,
             gaps,
         }
     }

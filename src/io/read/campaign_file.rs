@@ -12,6 +12,7 @@ use crate::pattern::windability::WindabilityClass;
 use crate::search::cost::objective::Objective;
 
 use super::model_file::parse_model;
+use super::pattern_file::states_any;
 use super::toml_reader::{TomlReader, parse};
 use crate::io::table::Table;
 use crate::text::sink;
@@ -77,10 +78,17 @@ pub struct CampaignJson {
 /// # Errors
 /// All faults of the file at once.
 pub fn read_campaign(path: &Path) -> Result<CampaignFile, Faults> {
-    let source = read_text(path)?;
+    parse_campaign(path, &read_text(path)?)
+}
+
+/// As [`read_campaign`], of a text that was read already.
+///
+/// # Errors
+/// All faults of the text at once.
+pub fn parse_campaign(path: &Path, source: &str) -> Result<CampaignFile, Faults> {
     let shown = path.display().to_string();
-    let document = parse(&shown, &source)?;
-    let mut reader = TomlReader::new(&shown, &source);
+    let document = parse(&shown, source)?;
+    let mut reader = TomlReader::new(&shown, source);
     let r = &mut reader;
     let mut root = r.root(&document);
     let name = root.needed_name(r, "name").map(str::to_owned);
@@ -200,9 +208,9 @@ impl CampaignFile {
     }
 }
 
-/// Whether a text is TOML that says at least one of the things that only a model file says.
+/// Whether a text says at least one of the things that only a model file says.
 fn looks_like_a_model(source: &str) -> bool {
-    parse("", source).is_ok_and(|document| ["fibre", "winding", "thermal"].iter().any(|key| document.contains_key(key)))
+    states_any(source, &["fibre", "winding", "thermal"])
 }
 
 /// The model with another layer count; its own pattern would no longer fit.

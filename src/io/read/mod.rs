@@ -4,6 +4,7 @@
 //! reader, so that what is printed can be read.
 
 pub mod campaign_file;
+pub mod csv_rows;
 pub mod effect_tables;
 pub mod model_file;
 pub mod pattern_file;

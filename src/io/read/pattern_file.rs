@@ -53,9 +53,18 @@ pub fn resolve_pattern(stated: &str, layers: usize, base: Option<&Path>) -> Resu
     Ok(named)
 }
 
-/// Whether a text is TOML that says at least one of the things that a pattern file says.
+/// Whether a text says at least one of the things that a pattern file says, on a line of its own.
 fn looks_like_a_pattern(source: &str) -> bool {
-    parse("", source).is_ok_and(|document| ["layers", "segments"].iter().any(|key| document.contains_key(key)))
+    states_any(source, &["layers", "segments"])
+}
+
+/// Whether a line of a text begins with one of such keys, be it a table's or a value's, and whatever else is wrong with it.
+pub(super) fn states_any(source: &str, keys: &[&str]) -> bool {
+    let states = |line: &str, key: &str| {
+        let rest = line.trim_start().trim_start_matches('[').trim_start().strip_prefix(key);
+        rest.is_some_and(|rest| rest.trim_start().starts_with(['=', ']', '.']))
+    };
+    source.lines().any(|line| keys.iter().any(|key| states(line, key)))
 }
 
 /// Reads and checks a pattern file.

@@ -6,16 +6,15 @@
 use std::ops::Range;
 use std::path::Path;
 
-use csv::{ReaderBuilder, StringRecord, Trim};
-
 use crate::io::fault::{Fault, Faults};
 use crate::io::files::read_text_up_to;
 use crate::numeric::statistics::median;
 use crate::record::{Channel, MIN_ROWS, Record, RecordError};
 use crate::units::celsius_from_kelvin;
 
-use super::record_columns::{Column, Division, FLAGS, Quantity, RecordFormat, read_header};
-use super::record_rows::{Cells, CellsRead, PLAUSIBLE_C, assumptions, average, implausible, suspicions};
+use super::csv_rows::{CsvRows, Piece};
+use super::record_columns::{Column, FLAGS, Quantity, RecordFormat, read_header};
+use super::record_rows::{Cells, CellsRead, NO_HEADER, PLAUSIBLE_C, assumptions, average, implausible, suspicions};
 
 /// Ten million rows of three columns or so.
 const LARGEST_RECORD_BYTES: u64 = 512 * 1024 * 1024;
@@ -68,7 +67,6 @@ struct Reading<'s> {
     file: &'s str,
     source: &'s str,
     format: &'s RecordFormat,
-    separator: char,
     faults: Vec<Fault>,
     uncounted: usize,
     skipped: usize,
@@ -76,7 +74,7 @@ struct Reading<'s> {
 
 impl<'s> Reading<'s> {
     fn new(file: &'s str, source: &'s str, format: &'s RecordFormat) -> Self {
-        Self { file, source, format, separator: ',', faults: Vec::new(), uncounted: 0, skipped: 0 }
+        Self { file, source, format, faults: Vec::new(), uncounted: 0, skipped: 0 }
     }
 
     fn fault(&mut self, fault: Fault) {
@@ -88,28 +86,17 @@ impl<'s> Reading<'s> {
     }
 
     fn record(mut self) -> Result<ReadRecord, Faults> {
-        // A byte-order mark belongs to no column's name.
-        let start = if self.source.starts_with('\u{feff}') { '\u{feff}'.len_utf8() } else { 0 };
-        let is_content = |line: &&str| !line.trim().is_empty() && !line.starts_with('#');
-        let header = self.source[start..].lines().find(is_content).unwrap_or("");
-        let division = Division::of_header(header);
-        self.separator = char::from(division.separator);
-        let mut reader = ReaderBuilder::new()
-            .has_headers(false)
-            .delimiter(division.separator)
-            .flexible(true)
-            .comment(Some(b'#'))
-            .trim(Trim::All)
-            .from_reader(&self.source.as_bytes()[start..]);
-        let mut row = StringRecord::new();
-        if !self.next(&mut reader, &mut row) {
-            return self.end(
-                None,
-                "the file holds comments only: expected a header such as time_s,temperature_c,rate_deg_per_h",
-            );
+        let mut rows = CsvRows::new(self.source.as_bytes());
+        // A text in memory does not fail.
+        let Ok(Some((piece, division))) = rows.header(|_| {}) else {
+            return self.end(None, NO_HEADER);
+        };
+        let header_span = rows.span();
+        if let Piece::Broken(why) = piece {
+            self.fault(Fault::new(format!("line {}: {why}", rows.line()), Some(header_span)));
+            return self.end(None, "");
         }
-        let header_span = self.line_span(start, &row);
-        let fields: Vec<&str> = row.iter().collect();
+        let fields: Vec<&str> = rows.cells().collect();
         let columns = match read_header(&fields, self.format, division) {
             Ok(columns) => columns,
             Err(faults) => {
@@ -121,15 +108,18 @@ impl<'s> Reading<'s> {
         };
         let mut values: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
         let mut cells = Cells::new(&columns, self.format);
-        while self.next(&mut reader, &mut row) {
-            match cells.read(&row) {
+        while let Ok(Some(piece)) = rows.next() {
+            if piece == Piece::Aside {
+                continue;
+            }
+            match cells.read(piece, &rows) {
                 CellsRead::Row => values.iter_mut().zip(cells.numbers()).for_each(|(column, v)| column.push(*v)),
                 CellsRead::Skipped => self.skipped += 1,
                 CellsRead::Faults(faults) => {
                     for fault in faults {
                         let span = match fault.place {
-                            Some(place) => self.field_span(start, &row, place),
-                            None => self.line_span(start, &row),
+                            Some(place) => rows.span_of_cell(place),
+                            None => rows.span(),
                         };
                         self.fault(Fault {
                             message: fault.message,
@@ -165,17 +155,6 @@ impl<'s> Reading<'s> {
                 Ok(ReadRecord { record, skipped_rows, remarks })
             }
             Err(error) => self.end(Some(error), ""),
-        }
-    }
-
-    /// Reads on; a row that is no CSV at all is a fault and ends the reading.
-    fn next(&mut self, reader: &mut csv::Reader<&[u8]>, row: &mut StringRecord) -> bool {
-        match reader.read_record(row) {
-            Ok(more) => more,
-            Err(error) => {
-                self.fault(Fault::new(format!("no CSV: {error}"), None));
-                false
-            }
         }
     }
 
@@ -223,27 +202,6 @@ impl<'s> Reading<'s> {
             self.faults.push(Fault::new(format!("{} further faults of the same kinds", self.uncounted), None));
         }
         Err(Faults { file: self.file.to_owned(), source: self.source.to_owned(), faults: self.faults })
-    }
-
-    /// The source line that a row came from.
-    fn line_span(&self, start: usize, row: &StringRecord) -> Range<usize> {
-        let from = start + row.position().map_or(0, |p| p.byte() as usize);
-        let skipped = self.source[from..].len() - self.source[from..].trim_start_matches(['\n', '\r']).len();
-        let from = from + skipped;
-        let line = self.source[from..].lines().next().unwrap_or("");
-        from..from + line.len()
-    }
-
-    /// The field of a row in the source; the whole line where quotes hide the commas.
-    fn field_span(&self, start: usize, row: &StringRecord, place: usize) -> Range<usize> {
-        let line = self.line_span(start, row);
-        let text = &self.source[line.clone()];
-        if text.contains('"') {
-            return line;
-        }
-        let before: usize = text.split(self.separator).take(place).map(|f| f.len() + 1).sum();
-        let length = text.split(self.separator).nth(place).map_or(0, str::len);
-        line.start + before..line.start + before + length
     }
 }
 

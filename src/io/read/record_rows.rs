@@ -3,13 +3,12 @@
 use std::io::{BufRead, BufReader, Read};
 use std::ops::Range;
 
-use csv::{ReaderBuilder, StringRecord, Trim};
-
 use crate::io::fault::{Fault, Faults};
 use crate::numeric::statistics::median;
 use crate::record::{MIN_ROWS, Row};
 use crate::units::celsius_from_kelvin;
 
+use super::csv_rows::{CsvRows, Piece};
 use super::record_columns::{Column, Division, FLAGS, Quantity, RecordFormat, read_header};
 
 /// A coil that is mostly outside of this is in other units than its header says.
@@ -52,7 +51,6 @@ pub(super) struct Cells<'c> {
     numbers: Vec<f64>,
     last_s: Option<f64>,
     origin_s: Option<f64>,
-    line_offset: u64,
 }
 
 impl<'c> Cells<'c> {
@@ -65,7 +63,6 @@ impl<'c> Cells<'c> {
             numbers: Vec::with_capacity(columns.len()),
             last_s: None,
             origin_s: None,
-            line_offset: 0,
         }
     }
 
@@ -74,9 +71,17 @@ impl<'c> Cells<'c> {
         &self.numbers
     }
 
-    pub(super) fn read(&mut self, row: &StringRecord) -> CellsRead {
+    /// What was read last of a text.
+    pub(super) fn read(&mut self, piece: Piece, row: &CsvRows<impl BufRead>) -> CellsRead {
         self.numbers.clear();
-        let line = row.position().map_or(0, csv::Position::line) + self.line_offset;
+        let line = row.line();
+        if let Piece::Broken(why) = piece {
+            if self.skips {
+                return CellsRead::Skipped;
+            }
+            let fault = CellFault { message: format!("line {line}: {why}"), place: None, note: None };
+            return CellsRead::Faults(vec![fault]);
+        }
         if row.len() != self.columns.len() {
             if self.skips {
                 return CellsRead::Skipped;
@@ -86,7 +91,7 @@ impl<'c> Cells<'c> {
             return CellsRead::Faults(vec![CellFault { message, place: None, note: None }]);
         }
         let mut faults = Vec::new();
-        for (place, (column, field)) in self.columns.iter().zip(row.iter()).enumerate() {
+        for (place, (column, field)) in self.columns.iter().zip(row.cells()).enumerate() {
             let number = match column.value(field) {
                 Ok(value) if column.quantity == Quantity::Time => match self.time(value) {
                     Ok(value) => value,
@@ -225,50 +230,25 @@ pub fn stream_rows(
     format: &RecordFormat,
     mut sink: impl FnMut(&[Row]),
 ) -> Result<StreamNoticed, Faults> {
-    let mut input = BufReader::with_capacity(1 << 18, input);
-    let (header, lines) = header_line(name, &mut input)?;
-    let division = Division::of_header(&header);
-    let mut reader = ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .delimiter(division.separator)
-        .comment(Some(b'#'))
-        .trim(Trim::All)
-        .from_reader(input);
-    let mut head = ReaderBuilder::new()
-        .has_headers(false)
-        .delimiter(division.separator)
-        .trim(Trim::All)
-        .from_reader(header.as_bytes());
-    let mut row = StringRecord::new();
-    let _ = head.read_record(&mut row);
-    let fields: Vec<&str> = row.iter().collect();
-    let as_faults = |faults: Vec<(String, Option<String>)>| Faults {
-        file: name.to_owned(),
-        source: header.clone(),
-        faults: faults
-            .into_iter()
-            .map(|(message, note)| Fault { message, span: Some(0..header.len()), note })
-            .collect(),
+    let mut rows = CsvRows::new(BufReader::with_capacity(1 << 18, input));
+    let unreadable = |e: std::io::Error| Faults::of_file(name, format!("cannot be read: {e}"));
+    let Some((piece, division)) = rows.header(|_| {}).map_err(unreadable)? else {
+        return Err(Faults::of_file(name, NO_HEADER));
     };
-    let columns = read_header(&fields, format, division).map_err(as_faults)?;
+    let columns = header_columns(name, piece, &rows, format, division)?;
     let place = |quantity: Quantity| columns.iter().position(|c| c.quantity == quantity).unwrap_or(0);
     let (time, temperature, rate) = (place(Quantity::Time), place(Quantity::Temperature), place(Quantity::Rate));
     let mut cells = Cells::new(&columns, format);
-    cells.line_offset = lines;
     let mut noticed = StreamNoticed { remarks: assumptions(&columns, division), ..StreamNoticed::default() };
     let (mut faults, mut uncounted) = (Vec::new(), 0);
     let mut chunk: Vec<Row> = Vec::with_capacity(CHUNK);
     loop {
-        match reader.read_record(&mut row) {
-            Ok(true) => {}
-            Ok(false) => break,
-            Err(error) => {
-                faults.push(Fault::new(format!("no CSV: {error}"), None));
-                break;
-            }
-        }
-        match cells.read(&row) {
+        let piece = match rows.next().map_err(unreadable)? {
+            Some(Piece::Aside) => continue,
+            Some(piece) => piece,
+            None => break,
+        };
+        match cells.read(piece, &rows) {
             CellsRead::Row if faults.is_empty() => {
                 let numbers = cells.numbers();
                 chunk.push(Row {
@@ -341,24 +321,29 @@ pub(super) fn implausible(column: &Column, middle_c: f64, span: Option<Range<usi
     Fault::new(message, span).with_note("a name that ends in _c holds degrees Celsius, one that ends in _k kelvin")
 }
 
-/// The first line that is no comment, and how many lines came before the next.
-fn header_line(name: &str, input: &mut impl BufRead) -> Result<(String, u64), Faults> {
-    let mut lines = 0;
-    loop {
-        let mut bytes = Vec::new();
-        let read = input.by_ref().take(1 << 20).read_until(b'\n', &mut bytes);
-        if read.map_err(|e| Faults::of_file(name, format!("cannot be read: {e}")))? == 0 {
-            let message = "the file holds comments only: expected a header such as time_s,temperature_c,rate_deg_per_h";
-            return Err(Faults::of_file(name, message));
-        }
-        lines += 1;
-        let text = String::from_utf8(bytes)
-            .map_err(|_| Faults::of_file(name, "expected text in UTF-8, found other bytes: is it the right file?"))?;
-        let line = text.trim_start_matches('\u{feff}').trim_end();
-        if !line.is_empty() && !line.starts_with('#') {
-            return Ok((line.to_owned(), lines));
-        }
+/// What is said of a text without a header.
+pub(in crate::io) const NO_HEADER: &str =
+    "the file holds comments only: expected a header such as time_s,temperature_c,rate_deg_per_h";
+
+/// The columns that a header says, which was read last.
+///
+/// # Errors
+/// All faults of the header at once.
+pub(in crate::io) fn header_columns(
+    name: &str,
+    piece: Piece,
+    header: &CsvRows<impl BufRead>,
+    format: &RecordFormat,
+    division: Division,
+) -> Result<Vec<Column>, Faults> {
+    let source = header.text();
+    let fault = |(message, note)| Fault { message, span: Some(0..source.len()), note };
+    let all = |faults: Vec<Fault>| Faults { file: name.to_owned(), source: source.to_owned(), faults };
+    if let Piece::Broken(why) = piece {
+        return Err(all(vec![fault((format!("line {}: {why}", header.line()), None))]));
     }
+    let fields: Vec<&str> = header.cells().collect();
+    read_header(&fields, format, division).map_err(|faults| all(faults.into_iter().map(fault).collect()))
 }
 
 #[cfg(test)]

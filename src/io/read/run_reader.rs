@@ -7,6 +7,7 @@ use serde::Deserialize;
 use crate::io::fault::{Fault, Faults};
 use crate::io::files::read_text;
 use crate::io::model::ModelFile;
+use crate::io::table::rows_of_csv;
 
 use super::model_file::parse_model;
 use super::toml_reader::parse;
@@ -133,8 +134,5 @@ pub fn read_run(folder: &Path) -> Result<Run, Faults> {
 
 fn read_rows<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Vec<T>, Faults> {
     let text = read_text(path)?;
-    csv::Reader::from_reader(text.as_bytes())
-        .deserialize()
-        .collect::<Result<_, _>>()
-        .map_err(|error| Faults::of_file(path.display().to_string(), error.to_string()))
+    rows_of_csv(&text).map_err(|error| Faults::of_file(path.display().to_string(), error.to_string()))
 }

@@ -127,12 +127,19 @@ pub fn read_checkpoint(folder: &Path, fingerprint: &str) -> Result<Option<State>
     if !path.exists() {
         return Ok(None);
     }
-    let shown = path.display().to_string();
-    let fault = |message: String| Faults::of_file(&shown, message);
     let text = crate::io::files::read_text(&path)?;
+    parse_checkpoint(&path.display().to_string(), &text, fingerprint).map(Some)
+}
+
+/// As [`read_checkpoint`], of a text that was read already.
+///
+/// # Errors
+/// A text that is no checkpoint, or one of another request.
+pub fn parse_checkpoint(file: &str, text: &str, fingerprint: &str) -> Result<State, Faults> {
+    let fault = |message: String| Faults::of_file(file, message);
     let remedy = "begin again with --fresh, which keeps this one as checkpoint.broken.json";
     let document: CheckpointJson =
-        serde_json::from_str(&text).map_err(|e| fault(format!("is no checkpoint of this program ({e}): {remedy}")))?;
+        serde_json::from_str(text).map_err(|e| fault(format!("is no checkpoint of this program ({e}): {remedy}")))?;
     if document.schema_version != SCHEMA_VERSION {
         return Err(fault(format!(
             "expected a checkpoint of version {SCHEMA_VERSION}, found version {}: {remedy}",
@@ -149,7 +156,7 @@ pub fn read_checkpoint(folder: &Path, fingerprint: &str) -> Result<Option<State>
                 .to_owned(),
         ));
     }
-    state_of(document).map(Some).ok_or_else(|| fault(format!("holds a number that no search has: {remedy}")))
+    state_of(document).ok_or_else(|| fault(format!("holds a number that no search has: {remedy}")))
 }
 
 /// Where a checkpoint goes that cannot be gone on from.

@@ -1,23 +1,21 @@
 //! Compensation as text: CSV lines in, CSV lines out.
 
 use std::fmt::Write as _;
-use std::io::{BufRead, Read, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 
 use serde::Serialize;
 
 use crate::compensate::Compensator;
 use crate::compensate::stream::{Compensated, Flag, Reading, Stream};
-use crate::io::fault::{Fault, Faults};
-use crate::io::json::metrics::RecordMetricsJson;
-use crate::io::read::record_columns::{Column, Division, Quantity, RecordFormat, read_header};
+use crate::io::fault::Faults;
+use crate::io::json::metrics::{GrossErrors, RecordMetricsJson};
+use crate::io::read::csv_rows::{CsvRows, Piece};
+use crate::io::read::record_columns::{COMPENSATED, Column, Division, FLAGS, Quantity, RecordFormat};
+use crate::io::read::record_rows::{NO_HEADER, header_columns};
+use crate::io::table::PassedRow;
 use crate::metrics::Metrics;
 use crate::numeric::statistics::RunningDeviation;
 use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s};
-
-/// The column that is added, and the one that says what happened to a row.
-pub const ADDED_COLUMNS: &str = "rate_compensated_deg_per_h,flags";
-/// A longer line is no row of a record; it is cut here and flagged.
-const LONGEST_LINE_BYTES: u64 = 64 * 1024;
 
 /// What a stream did.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -62,22 +60,24 @@ pub enum StreamError {
     Write(std::io::Error),
 }
 
-/// One line on its way through.
-struct Line {
+/// What is passed on of a place of the input.
+struct Passed {
     text: String,
+    is_aside: bool,
     rate_rad_per_s: Option<f64>,
 }
 
-/// Which fields of a line are needed.
+/// Which cells of a row are needed.
 struct Places {
     count: usize,
-    separator: char,
     columns: Vec<(usize, Column)>,
     /// Of each further column that the compensator reads, its place among `columns`.
     channels: Vec<usize>,
 }
 
-/// Compensates line by line; every line comes out, in order, delayed by the compensator's delay.
+/// Compensates row by row; every one comes out, in order, delayed by the compensator's delay.
+///
+/// What is passed on is what came in, but for what a spreadsheet or a terminal would take for a command.
 ///
 /// # Errors
 /// A header that lacks what is needed; an input or output that fails.
@@ -88,41 +88,40 @@ pub fn compensate_lines(
     input: impl Read,
     output: impl Write,
 ) -> Result<StreamSummary, StreamError> {
-    let mut input = std::io::BufReader::with_capacity(1 << 16, input);
+    let mut rows = CsvRows::new(BufReader::with_capacity(1 << 16, input));
     let mut sink = Sink::new(std::io::BufWriter::with_capacity(1 << 16, output));
-    let mut bytes = Vec::new();
-    let places = loop {
-        if !next_line(&mut input, &mut bytes)? {
-            let message = "expected a header such as time_s,temperature_c,rate_deg_per_h, found nothing";
-            return Err(Faults::of_file(name, message).into());
-        }
-        let line = String::from_utf8_lossy(&bytes);
-        let line = line.trim_start_matches('\u{feff}');
-        if is_comment(line) {
-            sink.plain(line);
-            continue;
-        }
-        let places = places(name, line, format, compensator)?;
-        let separator = places.separator;
-        sink.separator = separator;
-        sink.plain(&format!("{line}{separator}{}", ADDED_COLUMNS.replace(',', &separator.to_string())));
-        break places;
+    let mut asides = Vec::new();
+    let Some((piece, division)) = rows.header(|line| asides.push(line.to_owned())).map_err(StreamError::Read)? else {
+        return Err(Faults::of_file(name, NO_HEADER).into());
     };
+    let places = places(name, piece, &rows, format, division, compensator)?;
+    let passed_row = PassedRow { separator: division.separator, decimal_comma: division.decimal_comma };
+    sink.separator = char::from(division.separator);
+    asides.iter().for_each(|line| sink.plain(&passed_row.aside(line)));
+    let header = passed_row.cells(rows.text(), rows.cells());
+    let separator = sink.separator;
+    sink.plain(&format!("{header}{separator}{COMPENSATED}{separator}{FLAGS}"));
     let mut channels = vec![None; places.columns.len()];
-    let mut stream: Stream<Line> = Stream::new(compensator);
-    while next_line(&mut input, &mut bytes)? {
-        let text = String::from_utf8_lossy(&bytes).into_owned();
-        let reading = if is_comment(&text) { None } else { reading(&text, &places, compensator, &mut channels) };
-        let line = Line { rate_rad_per_s: reading.and_then(|r| r.rate_rad_per_s), text };
-        stream.push(line, reading, |row| sink.row(row, places.count));
-        if input.buffer().is_empty() {
+    let mut stream: Stream<Passed> = Stream::new(compensator);
+    while let Some(piece) = rows.next().map_err(StreamError::Read)? {
+        let is_aside = piece == Piece::Aside;
+        let reading = if is_aside { None } else { reading(rows.cells(), &places, compensator, &mut channels) };
+        let text = match piece {
+            Piece::Aside => passed_row.aside(rows.text()),
+            Piece::Row if rows.len() == places.count => passed_row.cells(rows.text(), rows.cells()),
+            // As one quoted cell, so that the output stays a table and nothing is lost.
+            Piece::Row | Piece::Broken(_) => passed_row.one_cell(rows.text(), places.count),
+        };
+        let passed = Passed { text, is_aside, rate_rad_per_s: reading.and_then(|r| r.rate_rad_per_s) };
+        stream.push(passed, reading, |row| sink.row(row));
+        if rows.waits() {
             // Whoever feeds line by line waits for what is ready.
             sink.flush();
         }
         sink.check()?;
     }
     sink.summary.delay_rows = stream.delay_rows();
-    stream.finish(|row| sink.row(row, places.count));
+    stream.finish(|row| sink.row(row));
     sink.flush();
     sink.check()?;
     let mut summary = sink.summary;
@@ -131,31 +130,22 @@ pub fn compensate_lines(
     Ok(summary)
 }
 
-fn is_comment(line: &str) -> bool {
-    line.is_empty() || line.starts_with('#')
-}
-
-fn next_line(input: &mut impl BufRead, bytes: &mut Vec<u8>) -> Result<bool, StreamError> {
-    bytes.clear();
-    let read = input.take(LONGEST_LINE_BYTES).read_until(b'\n', bytes).map_err(StreamError::Read)?;
-    while matches!(bytes.last(), Some(b'\n' | b'\r')) {
-        bytes.pop();
+fn places(
+    name: &str,
+    piece: Piece,
+    header: &CsvRows<impl BufRead>,
+    format: &RecordFormat,
+    division: Division,
+    compensator: &Compensator,
+) -> Result<Places, Faults> {
+    let columns = header_columns(name, piece, header, format, division)?;
+    if let Some(own) = columns.iter().find(|c| [COMPENSATED, FLAGS].contains(&c.name.as_str())) {
+        let message = format!(
+            "column {} is what compensating adds: expected a record that has not been compensated yet; leave the column out",
+            own.name
+        );
+        return Err(Faults::of_file(name, message));
     }
-    Ok(read > 0)
-}
-
-fn places(name: &str, header: &str, format: &RecordFormat, compensator: &Compensator) -> Result<Places, Faults> {
-    let division = Division::of_header(header);
-    let separator = char::from(division.separator);
-    let fields: Vec<&str> = header.split(separator).map(|f| f.trim().trim_matches('"')).collect();
-    let columns = read_header(&fields, format, division).map_err(|faults| Faults {
-        file: name.to_owned(),
-        source: header.to_owned(),
-        faults: faults
-            .into_iter()
-            .map(|(message, note)| Fault { message, span: Some(0..header.len()), note })
-            .collect(),
-    })?;
     let count = columns.len();
     let names = compensator.channel_names();
     let needed = |c: &Column| match c.quantity {
@@ -169,11 +159,16 @@ fn places(name: &str, header: &str, format: &RecordFormat, compensator: &Compens
         found.ok_or_else(|| Faults::of_file(name, format!("the model reads the column {wanted}, which is not there")))
     };
     let channels = names.iter().map(place).collect::<Result<_, _>>()?;
-    Ok(Places { count, separator, columns, channels })
+    Ok(Places { count, columns, channels })
 }
 
-/// None where the fields are not as many as the header's or the time is no number; `channels` is room for the further columns.
-fn reading(line: &str, places: &Places, compensator: &Compensator, channels: &mut [Option<f64>]) -> Option<Reading> {
+/// None where the cells are not as many as the header's or the time is no number; `channels` is room for the further columns.
+fn reading<'r>(
+    cells: impl Iterator<Item = &'r str>,
+    places: &Places,
+    compensator: &Compensator,
+    channels: &mut [Option<f64>],
+) -> Option<Reading> {
     let mut found = Reading {
         time_s: f64::NAN,
         temperature_k: None,
@@ -183,11 +178,11 @@ fn reading(line: &str, places: &Places, compensator: &Compensator, channels: &mu
     };
     let mut count = 0;
     let mut next = 0;
-    for field in line.split(places.separator) {
+    for cell in cells {
         if let Some((place, column)) = places.columns.get(next)
             && *place == count
         {
-            let value = column.value(field.trim().trim_matches('"')).ok();
+            let value = column.value(cell).ok();
             match column.quantity {
                 Quantity::Time => found.time_s = value?,
                 Quantity::Temperature => found.temperature_k = value,
@@ -249,25 +244,14 @@ impl<W: Write> Sink<W> {
         self.failed.take().map_or(Ok(()), |error| Err(StreamError::Write(error)))
     }
 
-    fn row(&mut self, row: Compensated<Line>, columns: usize) {
-        if is_comment(&row.tag.text) {
-            let text = row.tag.text;
-            self.plain(&text);
+    fn row(&mut self, row: Compensated<Passed>) {
+        if row.tag.is_aside {
+            self.plain(&row.tag.text);
             return;
         }
         self.summary.rows += 1;
         self.text.clear();
-        if row.flags.contains(&Flag::Malformed) && row.tag.text.split(self.separator).count() != columns {
-            // As one quoted field, so that the output stays a table and nothing is lost.
-            let _ = write!(
-                self.text,
-                "\"{}\"{}",
-                row.tag.text.replace('"', "\"\""),
-                self.separator.to_string().repeat(columns - 1)
-            );
-        } else {
-            self.text.push_str(&row.tag.text);
-        }
+        self.text.push_str(&row.tag.text);
         self.text.push(self.separator);
         if let Some(rate) = row.rate_rad_per_s {
             let _ = write!(self.text, "{:.8}", deg_per_h_from_rad_per_s(rate));
@@ -317,7 +301,7 @@ pub struct MeasuresJson {
 
 impl MeasuresJson {
     pub fn new(metrics: &Metrics) -> Self {
-        let all = RecordMetricsJson::new("", metrics, Vec::new(), 0);
+        let all = RecordMetricsJson::new("", metrics, GrossErrors::default(), 0);
         Self {
             bias_deg_per_h: all.bias_deg_per_h,
             bias_stability_deg_per_h: all.bias_stability_deg_per_h,

@@ -4,18 +4,20 @@
 
 use std::path::Path;
 
+use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
 
 use crate::io::fault::{Fault, Faults};
 use crate::io::files::{WriteError, read_text, read_text_up_to, write_atomically};
+use crate::io::folder::Replacement;
 use crate::io::json::Document;
 use crate::io::json::comparison::CompareJson;
 use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow};
 use crate::io::json::metrics::MetricsJson;
+use crate::io::model::ModelFile;
 
 use super::comparison_rows::ComparisonRow;
-use crate::io::table::rows_as_csv;
+use crate::io::table::{rows_as_csv, rows_of_csv};
 
 pub const COMPARISON_FILE: &str = "comparison.json";
 pub const DIAGNOSIS_FILE: &str = "diagnosis.json";
@@ -95,14 +97,79 @@ pub fn before_and_after_name(number: usize) -> String {
     format!("before-after-{number}.csv")
 }
 
-/// Writes a document under its name.
-///
-/// # Errors
-/// A folder that cannot be written.
-pub fn write_document<T: Serialize>(folder: &Path, name: &str, document: &T) -> Result<(), WriteError> {
-    // A number that is not finite becomes null, which is no error.
-    let json = serde_json::to_string_pretty(&Document::new(document)).expect("keys are texts");
-    write_atomically(&folder.join(name), (json + "\n").as_bytes())
+/// What each command may leave in such a folder; `#` stands for a number.
+const KINDS: [&[&str]; 3] = [
+    &[
+        COMPARISON_FILE,
+        "record-#.csv",
+        "record-#-prediction.svg",
+        "record-#-residual.svg",
+        "record-#-temperature.svg",
+        "record-#-shares.svg",
+        "record-#-states.svg",
+        "record-#-autocorrelation.svg",
+    ],
+    &[DIAGNOSIS_FILE, "ladder.svg", "noise.svg", "extended.toml", "before-after-#.csv", "before-after-#.svg"],
+    &[METRICS_FILE, "allan-#.svg"],
+];
+const OF_ALL: [&str; 2] = [MODEL_FILE, "report.html"];
+
+/// The files of one command on their way into a folder that it may share with the others about the same model.
+#[derive(Debug)]
+pub struct MeasurementFiles<'a> {
+    folder: &'a Path,
+    files: Replacement<'a>,
+    model_source: Option<&'a str>,
+}
+
+impl<'a> MeasurementFiles<'a> {
+    /// `model` is none for documents that no model was asked about.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn new(folder: &'a Path, model: Option<&'a ModelFile>) -> Result<Self, WriteError> {
+        let mut files = Replacement::of(folder);
+        let model_source = model.map(|m| m.source.as_str());
+        if let Some(source) = model_source {
+            files.add(MODEL_FILE, source.as_bytes())?;
+        }
+        Ok(Self { folder, files, model_source })
+    }
+
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn add(&mut self, name: &str, contents: &[u8]) -> Result<(), WriteError> {
+        self.files.add(name, contents)
+    }
+
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn document<T: Serialize>(&mut self, name: &str, document: &T) -> Result<(), WriteError> {
+        // A number that is not finite becomes null, which is no error.
+        let json = serde_json::to_string_pretty(&Document::new(document)).expect("keys are texts");
+        self.add(name, (json + "\n").as_bytes())
+    }
+
+    /// Rows as CSV.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn table<T: Serialize>(&mut self, name: &str, rows: &[T]) -> Result<(), WriteError> {
+        self.add(name, &rows_as_csv(rows).expect("rows are flat and a buffer in memory takes every one"))
+    }
+
+    /// Takes the place of what the command that writes `document` left there, and of everything about another model.
+    ///
+    /// # Errors
+    /// A file that cannot be written, removed or renamed.
+    pub fn commit(self, document: &str) -> Result<(), WriteError> {
+        let former = std::fs::read_to_string(self.folder.join(MODEL_FILE)).ok();
+        let is_other = self.model_source.zip(former.as_deref()).is_some_and(|(new, old)| new != old);
+        let replaced = KINDS.iter().filter(|kinds| is_other || kinds[0] == document).copied().flatten();
+        let of_all = OF_ALL.iter().filter(|name| self.model_source.is_some() || **name != MODEL_FILE);
+        let kinds: Vec<&str> = replaced.chain(of_all).copied().collect();
+        self.files.commit(&kinds)
+    }
 }
 
 /// Writes rows as CSV under a name.
@@ -127,10 +194,7 @@ fn read_document<T: DeserializeOwned>(folder: &Path, name: &str, what: &str) -> 
     Ok(Some(document))
 }
 
-fn read_table<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<Vec<T>, Faults> {
+fn read_table<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, Faults> {
     let text = read_text_up_to(path, LARGEST_TABLE_BYTES)?;
-    csv::Reader::from_reader(text.as_bytes())
-        .deserialize()
-        .collect::<Result<_, _>>()
-        .map_err(|error| Faults::of_file(path.display().to_string(), error.to_string()))
+    rows_of_csv(&text).map_err(|error| Faults::of_file(path.display().to_string(), error.to_string()))
 }

@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::io::files::{WriteError, sha256_hex, write_atomically};
+use crate::io::folder::remove_numbered;
 use crate::io::model::ModelFile;
 use crate::pattern::Pattern;
+use crate::text::sink::Cell;
 
 /// What all parts of one front have in common and what a part must agree with to be kept.
 #[derive(Debug, Clone)]
@@ -27,30 +29,18 @@ struct PartJson {
     found: Vec<Vec<usize>>,
 }
 
-/// Takes away what an earlier front left in the folder: its table, its pictures and the pattern files that the table lists,
-/// so that a folder holds one front only.
-///
-/// # Errors
-/// A file that cannot be removed.
-pub fn remove_front(folder: &Path) -> Result<(), WriteError> {
-    let table = folder.join("pareto.csv");
-    let mut names = vec!["pareto.svg".to_owned(), "pareto-p95.svg".to_owned()];
-    if let Ok(mut reader) = csv::Reader::from_path(&table) {
+/// What an earlier front left in the folder: its pictures, the pattern files that its table lists, and the table, last: it must
+/// not go before what it lists.
+pub fn files_of_front(folder: &Path) -> Vec<String> {
+    let mut names = ["pareto.svg", "pareto-p95.svg"].map(str::to_owned).to_vec();
+    if let Ok(mut reader) = csv::Reader::from_path(folder.join("pareto.csv")) {
         let column = reader.headers().ok().and_then(|header| header.iter().position(|name| name == "file"));
-        let listed = reader.records().filter_map(|row| row.ok()?.get(column?).map(str::to_owned));
+        let listed = reader.records().filter_map(|row| row.ok()?.get(column?).map(|cell| Cell::read(cell).to_owned()));
         // Only what stands in the folder itself and is a pattern file by its name.
-        names.extend(listed.filter(|name| name.ends_with(".toml") && !name.contains(['/', '\\'])));
+        names.extend(listed.filter(|name| name.ends_with(".toml") && !name.contains(['/', '\\', '#'])));
     }
-    for name in names.into_iter().chain(["pareto.csv".to_owned()]) {
-        let path = folder.join(name);
-        match std::fs::remove_file(&path) {
-            Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
-                return Err(WriteError::File { path, source });
-            }
-            _ => {}
-        }
-    }
-    Ok(())
+    names.push("pareto.csv".to_owned());
+    names
 }
 
 impl Front<'_> {
@@ -72,6 +62,14 @@ impl Front<'_> {
         let document = PartJson { fingerprint: self.fingerprint(part), part: part.to_owned(), found };
         let json = serde_json::to_string(&document).expect("numbers, strings and lists can always be written as JSON");
         write_atomically(&self.path(number), (json + "\n").as_bytes())
+    }
+
+    /// Takes away the parts of a front that had more of them.
+    ///
+    /// # Errors
+    /// A file that cannot be removed.
+    pub fn keep_parts(&self, count: usize) -> Result<(), WriteError> {
+        remove_numbered(&self.folder.join("parts"), count)
     }
 
     fn path(&self, number: usize) -> PathBuf {

@@ -6,6 +6,7 @@
 use std::path::Path;
 
 use crate::io::files::{WriteError, sha256_hex, write_atomically};
+use crate::io::folder::Replacement;
 use crate::io::json::search::{BestFoundJson, OptimiseJson};
 use crate::io::json::{Document, PatternJson};
 use crate::io::model::{ModelFile, NamedPattern};
@@ -17,6 +18,8 @@ use crate::search::cost::objective::Objective;
 use crate::search::evaluator::Judged;
 use crate::text::sink::{Cell, TomlComment};
 use crate::units::deg_per_h_from_rad_per_s;
+
+use super::checkpoint::CHECKPOINT_FILE;
 
 /// A request, as far as the search's course depends on it.
 #[derive(Debug, Clone)]
@@ -86,21 +89,25 @@ impl Request<'_> {
 /// # Errors
 /// Files that cannot be written.
 pub fn write_request(folder: &Path, request: &Request) -> Result<(), WriteError> {
-    // The summary first: while it is there, the rest is of its run.
-    for name in
-        ["summary.json", "best.toml", "baselines.csv", "history.csv", "schedule.csv", "schedule.json", "report.html"]
-    {
-        let path = folder.join(name);
-        match std::fs::remove_file(&path) {
-            Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
-                return Err(WriteError::File { path, source });
-            }
-            _ => {}
-        }
-    }
-    write_atomically(&folder.join("run.toml"), request.run_toml().as_bytes())?;
-    write_atomically(&folder.join("model.toml"), request.file.source.as_bytes())
+    let mut files = Replacement::of(folder);
+    files.add("run.toml", request.run_toml().as_bytes())?;
+    files.add("model.toml", request.file.source.as_bytes())?;
+    files.commit(&KINDS)
 }
+
+/// What a search may leave; the summary first: while it is there, the rest is of its run.
+const KINDS: [&str; 10] = [
+    "summary.json",
+    "best.toml",
+    "baselines.csv",
+    "history.csv",
+    "schedule.csv",
+    "schedule.json",
+    "report.html",
+    CHECKPOINT_FILE,
+    "run.toml",
+    "model.toml",
+];
 
 /// Writes what a run has found; the summary last, so that where it is, the rest is.
 ///
