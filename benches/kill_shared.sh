@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Two runs at once in one folder, of different models, killed with SIGKILL: at a random moment, or before or after a rename that is
 # drawn. After each kill every finished file must be of one run only; at the end the folder must hold what an unbroken run leaves.
-# Usage: benches/kill_shared.sh COILWRIGHT [KILLS]; needs a C compiler (the rename is caught by a preloaded library).
+# Usage: benches/kill_shared.sh COILWRIGHT [KILLS]; needs a C compiler (the rename is caught by a preloaded library). COMMANDS names
+# those to be tried.
 set -euo pipefail
 program=$(realpath "$1") wanted=${2:-200}
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -38,7 +39,7 @@ END
   awk -v rows=$rows -v a=$index 'BEGIN { srand(1); print "time_s,temperature_c,rate_deg_per_h"
     for (i = 0; i < rows; i++) printf "%d,%.3f,%.4f\n", 10 * i, 20 + 0.004 * i, a * sin(i / 20) + 0.05 * rand() }' > $name.csv
 done
-commands=(schedule optimise pareto compare metrics temperatures)
+read -ra commands <<< "${COMMANDS:-schedule optimise pareto compare metrics temperatures}"
 # command model folder
 request() {
   case $1 in
