@@ -329,6 +329,12 @@ const REACHES_OUT: &[&str] = &[
     "\"npm\"",
 ];
 
+/// Looked at, and harmless.
+const READ: &[(&str, &str)] = &[
+    // Asks a repository on this machine which commit it is at.
+    ("wasm-bindgen-shared", "\"git\""),
+];
+
 #[test]
 fn no_build_script_of_what_the_program_is_built_upon_reaches_out() {
     let mut faults = Vec::new();
@@ -339,7 +345,8 @@ fn no_build_script_of_what_the_program_is_built_upon_reaches_out() {
         let Ok(text) = std::fs::read_to_string(script) else { continue };
         read += 1;
         let tokens = flatten(&text);
-        let found = tokens.iter().filter(|t| REACHES_OUT.contains(&t.text.as_str()));
+        let is_read = |text: &str| READ.contains(&(material.name.as_str(), text));
+        let found = tokens.iter().filter(|t| REACHES_OUT.contains(&t.text.as_str()) && !is_read(&t.text));
         faults.extend(
             found.map(|t| {
                 format!("{} {}: {}:{}: {}", material.name, material.version, script.display(), t.line, t.text)
