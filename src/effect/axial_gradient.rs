@@ -6,7 +6,7 @@ use crate::units::Unit;
 
 pub(super) const SPEC: EffectSpec = EffectSpec {
     kind: "axial_gradient",
-    summary: "One flange exchanges heat with the ambient, so temperature varies along the axis",
+    summary: "A flange exchanges heat with the ambient, so temperature varies along the axis; declared twice, both flanges do",
     equation: "k dT/dz = ±h (T − T_air) at one flange; the optics see the layer's first axial moment ∫ Ṫ ζ dζ, signed by its direction",
     acts: Acts::HeatPath,
     nature: Nature::Physical,
@@ -40,6 +40,9 @@ struct AxialGradient(FlangeFilm);
 
 impl Effect for AxialGradient {
     fn change_heat_path(&self, path: &mut HeatPath) {
-        path.flange = Some(self.0);
+        match path.flange {
+            Some(first) if first.flange != self.0.flange => path.opposite_flange = Some(self.0),
+            _ => path.flange = Some(self.0),
+        }
     }
 }

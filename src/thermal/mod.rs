@@ -142,6 +142,8 @@ pub struct HeatPath {
     pub spool: Option<Spool>,
     pub bore_heat: Option<BoreHeat>,
     pub flange: Option<FlangeFilm>,
+    /// Of the other flange, where that exchanges heat too.
+    pub opposite_flange: Option<FlangeFilm>,
     /// a in k = k0 (1 + a (T − 20 °C)).
     pub conductivity_slope_per_k: f64,
     /// Places where layers touch less well than the pack conducts.
@@ -172,6 +174,7 @@ impl HeatPath {
             spool: None,
             bore_heat: None,
             flange: None,
+            opposite_flange: None,
             conductivity_slope_per_k: 0.0,
             gaps: Vec::new(),
             cells_per_layer: DEFAULT_CELLS_PER_LAYER,

@@ -15,7 +15,7 @@
 use nalgebra::DMatrix;
 
 use super::elements::{Elements, Grading};
-use super::{Flange, HeatPath, Location, Material};
+use super::{Flange, FlangeFilm, HeatPath, Location, Material};
 
 /// The narrowest element, at a surface, in layers …
 const NARROWEST_LAYERS: f64 = 0.5;
@@ -217,21 +217,24 @@ pub(super) struct Axis {
 impl Axis {
     /// None where no flange is heated.
     pub fn new(path: &HeatPath) -> Option<Self> {
-        let flange = path.flange?;
+        let flanges: Vec<FlangeFilm> = path.flange.into_iter().chain(path.opposite_flange).collect();
+        if flanges.is_empty() {
+            return None;
+        }
         let height_m = path.shape.height_m;
         let narrowest = NARROWEST_AT_FLANGE * path.shape.radial_pitch_m / path.cells_per_layer as f64 / height_m;
-        let at = |which: Flange| (flange.flange == which).then_some(narrowest.min(0.5));
+        let at = |which: Flange| flanges.iter().any(|f| f.flange == which).then_some(narrowest.min(0.5));
         let grading = Grading { at_start: at(Flange::First), at_end: at(Flange::Second), widest: 0.5 };
         let elements = Elements::new(order(ORDER_ALONG, path.cells_per_layer), grading.breaks(1.0), &[]);
-        let node = match flange.flange {
-            Flange::First => 0,
-            Flange::Second => elements.nodes() - 1,
+        let heated = |flange: &FlangeFilm| {
+            let node = if flange.flange == Flange::First { 0 } else { elements.nodes() - 1 };
+            (node, flange.film_w_per_m2_k / height_m)
         };
         Some(Self {
             masses: elements.masses(|_| 1.0),
             stiffness_per_m2: elements.stiffness(|_| 1.0) / (height_m * height_m),
             moment: elements.integral(0.0, 1.0, |zeta| zeta - 0.5),
-            flanges: vec![(node, flange.film_w_per_m2_k / height_m)],
+            flanges: flanges.iter().map(heated).collect(),
         })
     }
 

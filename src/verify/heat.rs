@@ -90,7 +90,7 @@ impl Heat {
             let depths_m = (0..layers).map(|j| (layers - 1 - j) as f64 * pitch_m).collect();
             Solution::HalfSpace { depths_m, diffusivity_m2_per_s }
         } else if physics.conductivity_slope_per_k != 0.0 {
-            let cuts = if physics.flange.is_some() { CUTS_BESIDE_FLANGE } else { CUTS };
+            let cuts = if !physics.flanges.is_empty() { CUTS_BESIDE_FLANGE } else { CUTS };
             Solution::Stepped { networks: cuts.map(|cut| Network::new(model, physics, height_m, cut)), heat }
         } else {
             Solution::Linear(Response::new(&Layers::new(model, physics, height_m), heat, longest_s))

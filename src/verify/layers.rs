@@ -6,8 +6,9 @@
 //! ```
 //!
 //! The power series gives what flows into a layer from the temperatures of its two faces, and its mean. Faces, spool and
-//! film make a tridiagonal system in s. Where one flange exchanges heat, the axis has the cosines of a slab with
-//! b tan b = h H/k; each carries such a system with K μ = K b²/H² added to s.
+//! film make a tridiagonal system in s. Where flanges exchange heat, the axis has the waves of a slab,
+//! cos bζ + (β₁/b) sin bζ with (b² − β₁ β₂) tan b = b (β₁ + β₂) and β = h H/k of either flange; each carries such a system
+//! with K μ = K b²/H² added to s.
 //!
 //! # Source
 //! Carslaw and Jaeger, Conduction of Heat in Solids (1959), sections 3.4 (matrices of layers), 3.11 and 13.4.
@@ -75,22 +76,30 @@ impl Layers {
             faces_m[layers] -= 0.5 * pitch_m;
         }
         let film = physics.film_w_per_m2_k.filter(|_| !outermost_is_drive);
-        let cosines = physics.flange.map(|flange| {
-            let biot = flange.film_w_per_m2_k * height_m / physics.conductivity_w_per_m_k;
+        let cosines = (!physics.flanges.is_empty()).then(|| {
+            let biot = |first: bool| -> f64 {
+                let films = physics.flanges.iter().filter(|flange| flange.is_first == first);
+                films.map(|flange| flange.film_w_per_m2_k * height_m / physics.conductivity_w_per_m_k).sum()
+            };
+            let (at_first, at_second) = (biot(true), biot(false));
             let per_s = physics.diffusivity_m2_per_s() / (height_m * height_m);
-            let away = if flange.is_first { -1.0 } else { 1.0 };
-            let count = (COSINES + (COSINES_PER_BIOT * biot) as usize).min(MOST_COSINES);
+            let count = (COSINES + (COSINES_PER_BIOT * (at_first + at_second)) as usize).min(MOST_COSINES);
             (0..count)
                 .map(|n| {
-                    let b = root(n, biot);
-                    let norm = 0.5 * (1.0 + (2.0 * b).sin() / (2.0 * b));
-                    let mean = b.sin() / b;
+                    let b = root(n, at_first, at_second);
+                    let (sine, cosine, tilt) = (b.sin(), b.cos(), at_first / b);
+                    let twice = (2.0 * b).sin() / (2.0 * b);
+                    let norm = 0.5 * (1.0 + twice)
+                        + 0.5 * tilt * tilt * (1.0 - twice)
+                        + tilt * (1.0 - (2.0 * b).cos()) / (2.0 * b);
+                    let mean = sine / b + tilt * (1.0 - cosine) / b;
+                    let first_moment = sine / b + (cosine - 1.0) / (b * b) + tilt * (sine / (b * b) - cosine / b);
                     Cosine {
                         decay_per_s: per_s * b * b,
                         uniform: mean / norm,
-                        from_air_per_s: per_s * biot * b.cos() / norm,
+                        from_air_per_s: per_s * (at_first + at_second * (cosine + tilt * sine)) / norm,
                         mean,
-                        moment: away * (0.5 * mean + (b.cos() - 1.0) / (b * b)),
+                        moment: first_moment - 0.5 * mean,
                     }
                 })
                 .collect()
@@ -256,13 +265,15 @@ impl Layers {
     }
 }
 
-/// The n-th root of b tan b = β, in (nπ, nπ + π/2).
-fn root(n: usize, biot: f64) -> f64 {
+/// The n-th root of (b² − β₁ β₂) tan b = b (β₁ + β₂), in (nπ, (n + 1)π).
+fn root(n: usize, at_first: f64, at_second: f64) -> f64 {
     let start = n as f64 * std::f64::consts::PI;
-    let (mut low, mut high) = (0.0, std::f64::consts::FRAC_PI_2);
+    // The tangent's period takes the sign of sine and cosine along.
+    let (mut low, mut high) = (0.0, std::f64::consts::PI);
     for _ in 0..100 {
-        let middle = 0.5 * (low + high);
-        if (start + middle) * middle.sin() < biot * middle.cos() {
+        let middle: f64 = 0.5 * (low + high);
+        let b = start + middle;
+        if (b * b - at_first * at_second) * middle.sin() < b * (at_first + at_second) * middle.cos() {
             low = middle;
         } else {
             high = middle;

@@ -58,19 +58,21 @@ pub(super) struct Axis {
     pub slices: usize,
     /// k/(ρc Δz²) [1/s].
     pub exchange_per_s: f64,
-    /// Δz ρc [J/(m² K)], Δz/2 [m] and the film [W/(m² K)] of the heated flange.
+    /// Δz ρc [J/(m² K)] and Δz/2 [m].
     pub slice_capacity_j_per_m2_k: f64,
     pub half_slice_m: f64,
-    pub film_w_per_m2_k: f64,
-    /// Index of the slice that touches the heated flange.
-    pub heated: usize,
+    /// Slices that touch a heated flange, with its film [W/(m² K)].
+    pub heated: Vec<(usize, f64)>,
 }
 
 impl Axis {
-    /// From the heated flange's slice to the air [1/s].
-    pub fn film_per_s(&self, conductivity_w_per_m_k: f64) -> f64 {
-        let resistance = self.half_slice_m / conductivity_w_per_m_k + 1.0 / self.film_w_per_m2_k;
-        1.0 / (resistance * self.slice_capacity_j_per_m2_k)
+    /// From a slice to the air behind its flange, if it has one [1/s].
+    pub fn film_per_s(&self, slice: usize, conductivity_w_per_m_k: f64) -> f64 {
+        let of = |film: f64| {
+            let resistance = self.half_slice_m / conductivity_w_per_m_k + 1.0 / film;
+            1.0 / (resistance * self.slice_capacity_j_per_m2_k)
+        };
+        self.heated.iter().filter(|(at, _)| *at == slice).map(|(_, film)| of(*film)).sum()
     }
 
     /// First moment over ζ = −½ … ½ of what the slices hold, exact for what is linear in ζ.
@@ -109,15 +111,18 @@ impl Network {
                 Link { rest, ..between(i as f64 + 0.5, count as f64) }
             });
         }
-        let axis = physics.flange.map(|flange| {
+        let axis = (!physics.flanges.is_empty()).then(|| {
             let slice_m = height_m / cut.slices as f64;
             Axis {
                 slices: cut.slices,
                 exchange_per_s: physics.diffusivity_m2_per_s() / (slice_m * slice_m),
                 slice_capacity_j_per_m2_k: slice_m * physics.heat_capacity_j_per_m3_k,
                 half_slice_m: 0.5 * slice_m,
-                film_w_per_m2_k: flange.film_w_per_m2_k,
-                heated: if flange.is_first { 0 } else { cut.slices - 1 },
+                heated: physics
+                    .flanges
+                    .iter()
+                    .map(|flange| (if flange.is_first { 0 } else { cut.slices - 1 }, flange.film_w_per_m2_k))
+                    .collect(),
             }
         });
         Self {
@@ -164,8 +169,7 @@ mod tests {
             exchange_per_s: 1.0,
             slice_capacity_j_per_m2_k: 1.0,
             half_slice_m: 1.0,
-            film_w_per_m2_k: 1.0,
-            heated: 0,
+            heated: vec![(0, 1.0)],
         };
         let weights = axis.moment_weights();
         let of = |f: &dyn Fn(f64) -> f64| -> f64 {

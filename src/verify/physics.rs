@@ -20,7 +20,8 @@ pub(super) struct Physics {
     pub film_w_per_m2_k: Option<f64>,
     pub spool: Option<SpoolMass>,
     pub bore_heat: Option<BoreHeat>,
-    pub flange: Option<HeatedFlange>,
+    /// One, or one at either end.
+    pub flanges: Vec<HeatedFlange>,
     pub conductivity_slope_per_k: f64,
     /// Missing on every second layer, the innermost being the first.
     pub missing_turns: f64,
@@ -94,7 +95,7 @@ impl Physics {
             film_w_per_m2_k: None,
             spool: None,
             bore_heat: None,
-            flange: None,
+            flanges: Vec::new(),
             conductivity_slope_per_k: 0.0,
             missing_turns: 0.0,
             path_factor: 1.0,
@@ -131,7 +132,7 @@ impl Physics {
                     p.bore_heat = Some(BoreHeat { power_w_per_m2, time_constant_s });
                 }
                 (_, "axial_gradient", &[film_w_per_m2_k]) => {
-                    p.flange = Some(HeatedFlange { is_first: choices == [0], film_w_per_m2_k });
+                    p.flanges.push(HeatedFlange { is_first: choices == [0], film_w_per_m2_k });
                 }
                 (_, "conductivity_temperature", &[slope]) => p.conductivity_slope_per_k = slope,
                 (_, "stress_gradient", &[strength]) => p.stress_strengths.push(strength),

@@ -66,7 +66,7 @@ impl Network {
     /// Exchange of a node with the air behind a heated flange [1/s].
     fn film_at(&self, slice: usize, node: usize, rise_k: f64) -> f64 {
         match &self.axis {
-            Some(axis) if axis.heated == slice && node >= self.spool => axis.film_per_s(self.conductivity(rise_k)),
+            Some(axis) if node >= self.spool => axis.film_per_s(slice, self.conductivity(rise_k)),
             _ => 0.0,
         }
     }

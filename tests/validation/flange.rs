@@ -123,3 +123,41 @@ fn the_default_grid_leaves_little_of_the_moment() {
         }
     }
 }
+
+#[test]
+fn two_flanges_of_one_film_are_two_half_coils_and_unequal_ones_turn_the_moment_with_them() {
+    let (film, height_m) = (200.0, 8.5e-3);
+    let both = |first: f64, second: f64| HeatPath {
+        opposite_flange: Some(FlangeFilm { flange: Flange::Second, film_w_per_m2_k: second }),
+        ..flanged(Location::Ambient, Some(40.0), Flange::First, first, height_m)
+    };
+    let ramp = PiecewiseLinear::new(vec![0.0, 1e4], vec![300.0, 300.0 + 1e4]).unwrap();
+    let instants = TIMES_S.map(Instant::after);
+    let solved = |path: &HeatPath| solve(path, &Drive::boundary(ramp.clone())).unwrap().at(&instants);
+    let path = both(film, film);
+    let PackShape { layers, bore_radius_m, radial_pitch_m, .. } = path.shape;
+    let cylinder = Cylinder::new(
+        bore_radius_m,
+        bore_radius_m + radial_pitch_m * layers as f64,
+        Some(40.0 / CONDUCTIVITY_W_PER_M_K),
+    );
+    let half = Slab::new(0.5 * height_m, film / CONDUCTIVITY_W_PER_M_K);
+    let history = solved(&path);
+    let (mut mean_error, mut moment) = (0.0_f64, 0.0_f64);
+    for (row, time_s) in TIMES_S.into_iter().enumerate() {
+        let mean = half.mean_and_moment(time_s).0;
+        for j in 0..layers {
+            let edge_m = |j: usize| bore_radius_m + j as f64 * radial_pitch_m;
+            let radial = 1.0 - cylinder.ring_rate(edge_m(j), edge_m(j + 1), time_s);
+            mean_error = mean_error.max((history.rates_k_per_s(row)[j] - (1.0 - radial * mean)).abs());
+            moment = moment.max(history.axial_moments_k_per_s(row)[j].abs());
+        }
+    }
+    println!("means within {mean_error:.1e}, moments below {moment:.1e}");
+    assert!(mean_error < 1e-8 && moment < 1e-8);
+    let (one, other) = (solved(&both(50.0, 400.0)), solved(&both(400.0, 50.0)));
+    for (a, b) in one.axial_moment_k_per_s.iter().zip(&other.axial_moment_k_per_s) {
+        assert!((a + b).abs() < 1e-8, "{a} {b}");
+    }
+    assert!(one.axial_moment_k_per_s.iter().any(|m| m.abs() > 1e-3));
+}

@@ -17,7 +17,7 @@ pub(super) fn read_effects(r: &mut TomlReader, tables: Vec<TableReader>) -> Opti
         let effect = read_effect(r, &mut table);
         let kind_span = table.span_of("kind");
         match effect {
-            Some(effect) if effects.iter().any(|e| e.kind() == effect.kind() && e.spec().kind != CUSTOM.kind) => {
+            Some(effect) if effects.iter().any(|e| is_the_same(e, &effect)) => {
                 let message = format!("the effect {} is declared twice: keep one of them", effect.kind());
                 r.fault(Fault::new(message, kind_span));
                 clean = false;
@@ -30,6 +30,11 @@ pub(super) fn read_effects(r: &mut TomlReader, tables: Vec<TableReader>) -> Opti
         }
     }
     clean.then_some(effects)
+}
+
+/// Formulas may stand side by side, and effects that act at a place of their choice, each at its own.
+fn is_the_same(one: &DeclaredEffect, other: &DeclaredEffect) -> bool {
+    one.kind() == other.kind() && one.spec().kind != CUSTOM.kind && one.choices() == other.choices()
 }
 
 fn read_effect(r: &mut TomlReader, table: &mut TableReader) -> Option<DeclaredEffect> {
