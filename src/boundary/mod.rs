@@ -186,13 +186,7 @@ impl Boundary {
         let mut found = self;
         for _ in 0..BENT_ROUNDS {
             let film_w_per_m2_k = found.air.film_w_per_m2_k;
-            let in_air = HeatPath {
-                location: Location::Ambient,
-                film_w_per_m2_k,
-                flange: None,
-                opposite_flange: None,
-                ..path.clone()
-            };
+            let in_air = HeatPath { location: Location::Ambient, film_w_per_m2_k, ..path.without_flanges() };
             let drive = Drive::boundary(found.air_k.clone());
             let times_s = found.air_k.knots();
             let terms = thermal::slope_series(&in_air, &drive, times_s, 0.0)?;

@@ -50,8 +50,7 @@ pub fn expose(
     let field = thermal::solve(&linear, &by_air)?.at(&instants);
     let mut outer: Vec<f64> = (0..fine_s.len()).map(|row| field.temperatures_k(row)[layers - 1]).collect();
     if slope_per_k != 0.0 && path.extent == Extent::Pack {
-        let terms =
-            thermal::slope_series(&HeatPath { flange: None, opposite_flange: None, ..linear }, &by_air, &fine_s, 0.0)?;
+        let terms = thermal::slope_series(&linear.without_flanges(), &by_air, &fine_s, 0.0)?;
         for (row, value) in outer.iter_mut().enumerate() {
             let powers = thermal::slope_powers(slope_per_k);
             *value += terms.iter().zip(powers).map(|(t, p)| p * t.temperature_k[(row + 1) * layers - 1]).sum::<f64>();

@@ -20,7 +20,7 @@ pub(super) struct SlopeResponse {
 impl SlopeResponse {
     /// None where the path cannot be solved with such a slope. A flange is left out.
     pub fn new(path: &HeatPath, drive: &Drive, times_s: &[f64], rate_mean_s: f64) -> Option<Self> {
-        let path = HeatPath { flange: None, opposite_flange: None, ..path.clone() };
+        let path = path.without_flanges();
         Some(Self { terms: thermal::slope_series(&path, drive, times_s, rate_mean_s).ok()? })
     }
 

@@ -181,6 +181,10 @@ impl HeatPath {
         }
     }
 
+    pub fn without_flanges(&self) -> Self {
+        Self { flange: None, opposite_flange: None, ..self.clone() }
+    }
+
     /// What lies between the drive and the first layer that does not touch it.
     pub fn untouched_m(&self) -> f64 {
         self.shape.radial_pitch_m * if self.location == Location::OuterLayer { 0.5 } else { 1.0 }
