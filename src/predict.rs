@@ -17,7 +17,7 @@ use crate::coil::CoilError;
 use crate::numeric::noise::{WhiteNoise, white_noise};
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::pattern::Pattern;
-use crate::rate::{CoilModel, RateError, RateModel};
+use crate::rate::{CoilModel, Past, RateError, RateModel};
 use crate::record::Record;
 use crate::thermal::{self, HeatPath, ThermalError, ThermalHistory};
 use crate::units::percent_from_fraction;
@@ -164,7 +164,7 @@ pub fn predict_from(
 /// The model's rates over a history, without any offset, the record's channels included.
 ///
 /// # Errors
-/// A pattern of another layer count; effects that leave a layer no turns.
+/// A pattern of another layer count; effects that leave a layer no turns; a formula that has no value somewhere.
 pub fn rates_rad_per_s(
     model: &CoilModel,
     pattern: &Pattern,
@@ -174,14 +174,15 @@ pub fn rates_rad_per_s(
     let names: Vec<String> = record.channels().iter().map(|c| c.name.clone()).collect();
     let rate = RateModel::new(model, pattern, &names)?;
     let mut channels = vec![0.0; names.len()];
-    Ok((0..history.len())
+    let mut past = Past::default();
+    (0..history.len())
         .map(|row| {
             for (value, channel) in channels.iter_mut().zip(record.channels()) {
                 *value = channel.values[row];
             }
-            rate.rate_error_rad_per_s(&rate.state(history, row, &channels))
+            rate.checked_after(&rate.state(history, row, &channels), &mut past)
         })
-        .collect())
+        .collect()
 }
 
 /// dΩ/dṪ_j of the coil [rad/s per K/s], innermost layer first.

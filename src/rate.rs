@@ -22,16 +22,19 @@
 //! 654 (1980). The sign is the paper's: positive Ω for a positive phase as written.
 
 mod builder;
+mod past;
 
 use thiserror::Error;
 
 use crate::coil::{Coil, CoilError};
 use crate::effect::{DeclaredEffect, Effect, FibrePlace, Lead, PackState, SurplusFibre};
+use crate::numeric::expression::EvaluationError;
 use crate::pattern::{Half, Pattern};
 use crate::thermal::{Extent, HeatPath, Location, Material, PackShape, ThermalHistory};
 use crate::units::{LIGHT_SPEED_M_PER_S, REFERENCE_TEMPERATURE_K};
 
 pub use builder::CoilModelBuilder;
+pub use past::Past;
 
 /// A coil, how it is heated, and which physics is taken into account; everything but the pattern.
 #[derive(Debug, Clone)]
@@ -56,6 +59,12 @@ pub enum RateError {
     Layers { pattern: usize, coil: usize },
     #[error(transparent)]
     Coil(#[from] CoilError),
+    #[error("the formula \"{formula}\" has no value at {time_s} s: {fault}")]
+    Formula { formula: String, time_s: f64, fault: EvaluationError },
+    #[error(
+        "the formula \"{formula}\" is not linear in thermal_rate, which depends on the pattern: patterns can be evaluated with it, not searched"
+    )]
+    NotSearchable { formula: String },
 }
 
 impl CoilModel {
@@ -191,6 +200,8 @@ pub struct RateModel {
     coil: Coil,
     weights: LayerWeights,
     effects: Vec<Box<dyn Effect>>,
+    /// Of each effect its formula, for what is said about it; empty where it has none.
+    formulas: Vec<String>,
     surplus: Vec<SurplusFibre>,
     /// Empty where κ depends on temperature.
     steady: Vec<SteadyLayer>,
@@ -215,7 +226,8 @@ impl RateModel {
         let weights = LayerWeights::new(&coil, pattern)?;
         let effects = model.bind_all(&coil, channels);
         let surplus = effects.iter().filter_map(|e| e.surplus_fibre()).collect();
-        let mut rate = Self { coil, weights, effects, surplus, steady: Vec::new() };
+        let formulas = model.effects.iter().map(past::formula_of).collect();
+        let mut rate = Self { coil, weights, effects, formulas, surplus, steady: Vec::new() };
         if rate.effects.iter().all(|e| !e.path_depends_on_temperature()) {
             rate.steady = (0..rate.coil.layers()).map(|layer| rate.layer_at(layer, REFERENCE_TEMPERATURE_K)).collect();
         }
@@ -255,8 +267,19 @@ impl RateModel {
         self.coil.fibre().path_per_k() * self.effects.iter().map(|e| e.path_factor(&place)).product::<f64>()
     }
 
-    /// Ω, with everything that the model declares.
+    /// Ω, with everything that the model declares; what remembers is at rest.
     pub fn rate_error_rad_per_s(&self, state: &PackState) -> f64 {
+        self.rate_error_after(state, &mut Past::default())
+    }
+
+    /// The same after the states that the past holds, in the order of time.
+    pub fn rate_error_after(&self, state: &PackState, past: &mut Past) -> f64 {
+        let coil = self.thermal_rate_rad_per_s(state);
+        coil + self.outside_rad_per_s(&PackState { thermal_rate_rad_per_s: coil, ..*state }, past)
+    }
+
+    /// The coil's own part of Ω, lead included.
+    fn thermal_rate_rad_per_s(&self, state: &PackState) -> f64 {
         let scale = self.scale_per_m2();
         let mut coil_sum = 0.0;
         for (layer, (&rate, &temperature_k)) in state.rates_k_per_s.iter().zip(state.temperatures_k).enumerate() {
@@ -268,27 +291,39 @@ impl RateModel {
         }
         let gain: f64 = self.effects.iter().map(|e| e.coil_gain(state)).product();
         let lead: f64 = self.surplus.iter().map(|s| self.surplus_rad_per_s(s, state)).sum();
-        let outside: f64 = self.effects.iter().map(|e| e.outside_rate_rad_per_s(state)).sum();
-        scale * coil_sum * gain + lead + outside
+        scale * coil_sum * gain + lead
     }
 
     /// The coefficients of the layer weights in Ω at a state; the fast paths of the search are compiled from them.
     pub fn weight_response(&self, state: &PackState) -> WeightResponse {
+        self.weight_response_after(state, &mut Past::default())
+    }
+
+    /// The same after the states that the past holds; what is not linear in the coil's own rate is refused by
+    /// [`RateModel::check_searchable`].
+    pub fn weight_response_after(&self, state: &PackState, past: &mut Past) -> WeightResponse {
         let gain: f64 = self.effects.iter().map(|e| e.coil_gain(state)).product();
-        let scale = self.scale_per_m2() * gain;
+        let lead: f64 = self.surplus.iter().map(|s| self.surplus_rad_per_s(s, state)).sum();
+        // What is outside the coil may follow the coil's own rate: c + s Ω.
+        let outside_at = |rate: f64, past: &mut Past| {
+            self.outside_rad_per_s(&PackState { thermal_rate_rad_per_s: rate, ..*state }, past)
+        };
+        let follows = self.follows_thermal_rate();
+        let followed = if follows { outside_at(1.0, &mut past.clone()) } else { 0.0 };
+        let outside = outside_at(0.0, past);
+        let own = if follows { 1.0 + followed - outside } else { 1.0 };
+        let scale = self.scale_per_m2() * gain * own;
         let layers = state.rates_k_per_s.len();
         let kappa = |layer: usize, half| self.path_per_k(layer, half, state.temperatures_k[layer]);
         let of_half = |half| (0..layers).map(|j| scale * kappa(j, half) * state.rates_k_per_s[j]).collect::<Vec<f64>>();
         let axial = state.axial_moments_k_per_s.iter().enumerate();
-        let lead: f64 = self.surplus.iter().map(|s| self.surplus_rad_per_s(s, state)).sum();
-        let outside: f64 = self.effects.iter().map(|e| e.outside_rate_rad_per_s(state)).sum();
         WeightResponse {
             half_a_rad_per_s_m2: of_half(Half::A),
             half_b_rad_per_s_m2: of_half(Half::B),
             axial_rad_per_s_m2: axial
                 .map(|(j, moment)| scale * 0.5 * (kappa(j, Half::A) + kappa(j, Half::B)) * moment)
                 .collect(),
-            constant_rad_per_s: lead + outside,
+            constant_rad_per_s: own * lead + outside,
         }
     }
 
@@ -339,12 +374,18 @@ impl RateModel {
             ambient_k: history.ambient_k[row],
             ambient_rate_k_per_s: history.ambient_rate_k_per_s[row],
             channels,
+            thermal_rate_rad_per_s: 0.0,
         }
     }
 
-    /// Ω over a whole history, for models without further channels.
+    /// Ω over a whole history that begins at rest, for models without further channels.
     pub fn series_rad_per_s(&self, history: &ThermalHistory) -> Vec<f64> {
-        (0..history.len()).map(|row| self.rate_error_rad_per_s(&self.state(history, row, &[]))).collect()
+        self.series_after(history, &mut Past::default())
+    }
+
+    /// The same after what the past holds.
+    pub fn series_after(&self, history: &ThermalHistory, past: &mut Past) -> Vec<f64> {
+        (0..history.len()).map(|row| self.rate_error_after(&self.state(history, row, &[]), past)).collect()
     }
 
     fn length_mean(&self, layers: &[f64]) -> f64 {

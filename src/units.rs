@@ -178,6 +178,8 @@ pub fn fraction_from_percent(percent: f64) -> f64 {
 pub enum Unit {
     /// A ratio or a count.
     One,
+    /// The number of a layer, counted from 1 innermost.
+    Layer,
     PerKelvin,
     Second,
     Metre,
@@ -197,7 +199,7 @@ impl Unit {
     /// As shown behind a number.
     pub fn symbol(self) -> &'static str {
         match self {
-            Unit::One => "1",
+            Unit::One | Unit::Layer => "1",
             Unit::PerKelvin => "1/K",
             Unit::Second => "s",
             Unit::Metre => "m",

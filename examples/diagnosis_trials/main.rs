@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use statrs::distribution::{Beta, ContinuousCDF};
 
 use chamber::{declared, simulate};
-use coilwright::diagnose::{Request, Verdict, diagnose};
+use coilwright::diagnose::{Request, Terms, Verdict, diagnose};
 use coilwright::effect::{CATALOGUE, DeclaredEffect};
 use coilwright::io::files::write_atomically;
 use coilwright::rate::CoilModel;
@@ -201,7 +201,8 @@ fn try_one(plan: &Plan) -> Result<Outcome, Box<dyn Error>> {
     };
     let (calibration, size_in_noises) = record("calibration", ROWS[0])?;
     let (holdout, _) = record("hold-out", ROWS[1])?;
-    let request = Request { model: &model, pattern: &pattern, records: &[calibration], holdout: &[holdout] };
+    let terms = Terms::default();
+    let request = Request { model: &model, pattern: &pattern, records: &[calibration], holdout: &[holdout], terms };
     let found = diagnose(&request, &|_| ())?;
     let mut answer: Vec<String> = Vec::new();
     for finding in &found.effects {

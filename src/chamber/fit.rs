@@ -131,7 +131,8 @@ impl Chamber<'_> {
             }
         }
         all.extend(free.iter().map(|f| Parameter::of_effect(&assumed.model.effects[f.effect], f)));
-        all.extend(assumed.inputs.iter().enumerate().map(|(i, input)| Parameter::of_input(i, input.deviation)));
+        let unknown = assumed.inputs.iter().enumerate().filter(|(_, input)| input.deviation > 0.0);
+        all.extend(unknown.map(|(i, input)| Parameter::of_input(i, input.deviation)));
         Ok(all)
     }
 

@@ -17,7 +17,7 @@ use super::filter::{MEASURED, RATE, Values};
 use super::series::Series;
 use super::system::{Gains, driven_by_air};
 use crate::effect::PackState;
-use crate::rate::RateModel;
+use crate::rate::{Past, RateModel};
 use crate::record::Record;
 use crate::thermal::reduced::Reduced;
 use crate::thermal::{HeatPath, ThermalError};
@@ -61,7 +61,7 @@ impl Reference {
     }
 
     /// At the beginning of a row's window, between the rows where it lies there.
-    fn at_window_start(&self, series: &Series, row: usize, out: &mut Vec<f64>) -> f64 {
+    pub(super) fn at_window_start(&self, series: &Series, row: usize, out: &mut Vec<f64>) -> f64 {
         let shape = &series.shapes[series.shape_of(row)];
         let start_s = series.times_s[row] - shape.window_s;
         let before = series.times_s[..row].partition_point(|&t| t <= start_s + 1e-6).max(1) - 1;
@@ -227,10 +227,18 @@ pub(super) fn beyond_linear(asked: &Asked, record: &Record, series: &Series, ref
     let mean = |values: &[f64]| values.iter().zip(lengths_m).map(|(v, l)| v * l).sum::<f64>() / length_m;
     let mut channels = vec![0.0; record.channels().len()];
     let mut start = Vec::new();
-    for (k, rate) in rates.iter_mut().enumerate().skip(1) {
+    let mut past = Past::default();
+    for (k, rate) in rates.iter_mut().enumerate() {
         for (value, channel) in channels.iter_mut().zip(record.channels()) {
             let (from, to) = series.spans[k];
             *value = channel.values[from..=to].iter().sum::<f64>() / (to + 1 - from) as f64;
+        }
+        if k == 0 {
+            // What remembers begins at rest.
+            if asked.rate.remembers() {
+                begin(asked, series, reference, &channels, &mut past);
+            }
+            continue;
         }
         let air_before = reference.at_window_start(series, k, &mut start);
         let window_s = series.shapes[series.shape_of(k)].window_s;
@@ -250,11 +258,36 @@ pub(super) fn beyond_linear(asked: &Asked, record: &Record, series: &Series, ref
             ambient_k: series.reference_k + 0.5 * (reference.air_k[k] + air_before),
             ambient_rate_k_per_s: air_rate,
             channels: &channels,
+            thermal_rate_rad_per_s: 0.0,
         };
         let linear: f64 =
             change.iter().zip(&asked.gains.outputs).map(|(c, g)| c * g).sum::<f64>() + asked.gains.air * air_rate;
-        *rate += asked.rate.rate_error_rad_per_s(&state) - linear;
+        *rate += asked.rate.rate_error_after(&state, &mut past) - linear;
     }
+}
+
+/// The first row's state, standing still.
+fn begin(asked: &Asked, series: &Series, reference: &Reference, channels: &[f64], past: &mut Past) {
+    let layers = reference.layers;
+    let temperatures: Vec<f64> = reference.row(0)[..layers].iter().map(|t| series.reference_k + t).collect();
+    let still = vec![0.0; reference.outputs];
+    let lengths_m = asked.rate.coil().layer_lengths_m();
+    let mean: f64 = temperatures.iter().zip(lengths_m).map(|(t, l)| t * l).sum();
+    asked.rate.rate_error_after(
+        &PackState {
+            time_s: series.times_s[0],
+            temperatures_k: &temperatures,
+            rates_k_per_s: &still[..layers],
+            axial_moments_k_per_s: &still[layers..],
+            mean_temperature_k: mean / asked.rate.coil().length_m(),
+            mean_rate_k_per_s: 0.0,
+            ambient_k: series.reference_k + reference.air_k[0],
+            ambient_rate_k_per_s: 0.0,
+            channels,
+            thermal_rate_rad_per_s: 0.0,
+        },
+        past,
+    );
 }
 
 /// Takes known inputs off a record's values.

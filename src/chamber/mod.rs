@@ -19,7 +19,8 @@
 //! 4. [`Chamber::held_out`] scores records that were not fitted with everything frozen; [`Chamber::noise`] tells white
 //!    noise, wander and unresolved air apart; [`Chamber::prediction`] is the rate that readings alone, or all, imply.
 //! 5. [`Chamber::score`] says what any further output of the rate would gain, cleared of all that was fitted, without a
-//!    fit: one filter pass a column. To keep one, give it to an assumption as an [`Input`] and fit again.
+//!    fit: one filter pass a column; [`Chamber::scorer`] keeps the gains for many of them, and [`Chamber::states`] has the
+//!    courses that they may be made of. To keep one, give it to an assumption as an [`Input`] and fit again.
 //!
 //! Rows of the chamber are not always rows of the record ([`Chamber::times_s`], [`Chamber::span`]): several may be averaged.
 //!
@@ -41,9 +42,11 @@ mod parameter;
 mod point;
 pub mod prior;
 mod score;
+mod scorer;
 mod series;
 mod settle;
 mod sparse;
+mod states;
 mod system;
 
 use thiserror::Error;
@@ -66,6 +69,8 @@ pub use noise::{Noise, Remedy};
 pub use parameter::{Free, Parameter, Place, Scale};
 pub use prior::{PRIORS, Prior, Quantity};
 pub use score::{Column, Direction, Scores};
+pub use scorer::{Scored, Scorer};
+pub use states::RowStates;
 
 /// What is assumed of coil, sensor and gyro; the numbers of chamber and noise are fitted with it.
 #[derive(Debug, Clone)]
@@ -94,7 +99,7 @@ pub struct Input {
     pub name: String,
     pub rate_rad_per_s: Vec<Vec<f64>>,
     pub amplitude: f64,
-    /// Prior standard deviation of the amplitude about zero.
+    /// Prior standard deviation of the amplitude about zero; 0: the amplitude is known, and no fit moves it.
     pub deviation: f64,
 }
 

@@ -114,8 +114,12 @@ impl Parameter {
             };
         }
         let Some(spec) = effect.spec().parameters.get(free.parameter) else {
-            // A formula's own: nothing is known of it but the value it was given.
-            return linear(0.0, STARTS * value.abs().max(1e-6));
+            // A formula's own: nothing is known of it but the value it was given, and of a size that it is one.
+            return if declared.lower > 0.0 {
+                logarithm(value.ln(), ORDER_DEVIATION)
+            } else {
+                linear(0.0, STARTS * value.abs().max(1e-6))
+            };
         };
         let start = spec.unit.to_si(spec.start);
         if is_factor(spec) {

@@ -7,7 +7,7 @@ use super::series::Series;
 use super::system::{Gains, Layout, Numbers, Parts, driven_by_air, system};
 use super::{Assumption, ChamberError};
 use crate::effect::PackState;
-use crate::rate::RateModel;
+use crate::rate::{Past, RateModel};
 use crate::record::Record;
 use crate::thermal::reduced::Reduced;
 use crate::thermal::{HeatPath, Location, check};
@@ -181,8 +181,8 @@ fn gains(rate: &RateModel, reduced: &Reduced, observed: &Observed) -> Gains {
     let lengths_m = rate.coil().layer_lengths_m();
     let length_m = rate.coil().length_m();
     let channels = vec![0.0; observed.channels.len()];
-    let of = |rates: &[f64], air: f64| {
-        rate.rate_error_rad_per_s(&PackState {
+    let after = |rates: &[f64], air: f64, past: &mut Past| {
+        let state = PackState {
             time_s: 0.0,
             temperatures_k: &temperatures,
             rates_k_per_s: &rates[..reduced.layers],
@@ -192,8 +192,14 @@ fn gains(rate: &RateModel, reduced: &Reduced, observed: &Observed) -> Gains {
             ambient_k: observed.mean_k,
             ambient_rate_k_per_s: air,
             channels: &channels,
-        })
+            thermal_rate_rad_per_s: 0.0,
+        };
+        rate.rate_error_after(&state, past)
     };
+    // What remembers does not follow at once: it stays as it is while the pack stands still.
+    let mut still = Past::default();
+    after(&vec![0.0; reduced.outputs], 0.0, &mut still);
+    let of = |rates: &[f64], air: f64| after(rates, air, &mut still.clone());
     // Both signs: what depends on the sign of a rate has no linear part in this.
     let mut unit = vec![0.0; reduced.outputs];
     let mut outputs = Vec::with_capacity(reduced.outputs);

@@ -7,6 +7,7 @@ use super::records::RecordArguments;
 use super::screen::{Screen, held, table};
 use super::watching::Watching;
 use super::{CliError, Ending};
+use crate::diagnose::Terms;
 use crate::io::files::write_atomically;
 use crate::io::json::diagnosis::{DiagnosisJson, FindingJson};
 use crate::io::read::model_file::read_model;
@@ -15,6 +16,7 @@ use crate::report::diagnosis::{
     explanations, posterior_in_words, refitted_in_words, rest_in_words, value_in_words, verdict_in_words,
 };
 use crate::report::noise::noise_in_words;
+use crate::report::proposal::proposal_in_words;
 use crate::task::diagnose::{Request, run as diagnose};
 use crate::task::page::REPORT_FILE;
 
@@ -48,6 +50,12 @@ pub struct Arguments {
     /// Seed of the profiles that the experiment is chosen from
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// Seeks no formula for what the listed effects leave
+    #[arg(long, conflicts_with = "terms")]
+    no_discovery: bool,
+    /// Forms and variables that a formula may be made of, such as relaxation, hysteresis, T_mean or a column's name
+    #[arg(long, value_name = "WORD,…", value_delimiter = ',')]
+    terms: Vec<String>,
     #[command(flatten)]
     reading: RecordArguments,
 }
@@ -66,6 +74,11 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         pattern: pattern.as_ref(),
         holdout: &holdout,
         experiment_seed: wants_experiment.then_some(arguments.seed),
+        terms: match arguments.terms.as_slice() {
+            _ if arguments.no_discovery => Terms::None,
+            [] => Terms::All,
+            words => Terms::Among(words),
+        },
         ..Request::new(&file, &measurements)
     };
     let watching = Watching::new(screen, "diagnose");
@@ -99,6 +112,9 @@ fn text(body: &DiagnosisJson) -> String {
     }
     for line in refitted_in_words(body) {
         text += &format!("\n{line}\n");
+    }
+    for proposal in &body.proposals {
+        text += &format!("\n{}\n", proposal_in_words(proposal).join("\n"));
     }
     let rest = rest_in_words(body);
     if !rest.is_empty() {

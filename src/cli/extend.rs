@@ -9,22 +9,28 @@ use super::watching::Watching;
 use super::{CliError, Ending};
 use crate::io::json::comparison::{PartJson, RecordComparisonJson};
 use crate::io::json::diagnosis::ExtendJson;
+use crate::io::json::proposals::ProposalExtendJson;
 use crate::io::read::model_file::read_model;
 use crate::report::diagnosis::value_in_words;
 use crate::task::extend::{Request, effect_of, run as extend};
+use crate::task::proposal;
 use crate::text::sink::Line;
 
 /// Adds an effect to a model file, fitted to records; comments and layout of the file are kept
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  coilwright extend coil.toml --effect spool_mass --fit calibration.csv -o coil-2.toml\n  coilwright extend coil.toml --effect custom --formula \"a * dT_dt^2\" --parameter a=0.1 --fit calibration.csv -o coil-2.toml"
+    after_help = "Examples:\n  coilwright extend coil.toml --effect spool_mass --fit calibration.csv -o coil-2.toml\n  coilwright extend coil.toml --effect custom --formula \"a * dT_dt^2\" --parameter a=0.1 --fit calibration.csv -o coil-2.toml\n  coilwright extend coil.toml --proposal results/coil/diagnosis.json -o coil-2.toml"
 )]
 pub struct Arguments {
     /// The model file
     model: PathBuf,
     /// The effect's name in files, such as strain_mismatch or channel:supply_v; `custom` takes --formula
-    #[arg(long, value_name = "KIND")]
-    effect: String,
+    #[arg(long, value_name = "KIND", required_unless_present = "proposal")]
+    effect: Option<String>,
+    /// A diagnosis (JSON) whose listed effects and proposed terms are added, the latter as custom effects; with --fit they
+    /// are fitted anew
+    #[arg(long, value_name = "DIAGNOSIS", conflicts_with_all = ["effect", "formula", "parameter"])]
+    proposal: Option<PathBuf>,
     /// A record to fit the effect to; may be repeated. Without it, the effect gets its start values
     #[arg(long, value_name = "RECORD")]
     fit: Vec<PathBuf>,
@@ -56,14 +62,43 @@ fn named_value(stated: &str) -> Result<(String, f64), String> {
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
     let pattern = pattern_asked(&file, arguments.pattern.as_deref())?;
-    let effect = effect_of(&arguments.effect, arguments.formula.as_deref(), &arguments.parameter, &file)?;
     let fit = arguments.reading.read(&arguments.fit, Some(&file))?;
     let holdout = arguments.reading.read(&arguments.holdout, Some(&file))?;
+    if let Some(path) = &arguments.proposal {
+        let proposed = proposal::read_proposal(path, &file)?;
+        let (pattern, proposed) = (pattern.as_ref(), proposed.as_slice());
+        let request = proposal::Request { model: &file, pattern, proposed, fit: &fit, holdout: &holdout };
+        let answer = proposal::run(&request, &Watching::quiet(screen))?;
+        answer.write(&arguments.output)?;
+        screen.answer(answer.document(&arguments.output), text_of_proposal)?;
+        return Ok(Ending::Done);
+    }
+    let kind = arguments.effect.as_deref().unwrap_or_default();
+    let effect = effect_of(kind, arguments.formula.as_deref(), &arguments.parameter, &file)?;
     let request = Request { model: &file, pattern: pattern.as_ref(), effect, fit: &fit, holdout: &holdout };
     let answer = extend(&request, &Watching::quiet(screen))?;
     answer.write(&arguments.output)?;
     screen.answer(answer.document(&arguments.output), text)?;
     Ok(Ending::Done)
+}
+
+fn text_of_proposal(body: &ProposalExtendJson) -> String {
+    let mut text = format!("wrote {}\n", Line::of(&body.written));
+    for effect in &body.effects {
+        text += &format!("{}\n", effect.kind);
+        for (key, parameter) in &effect.parameters {
+            text += &format!("  {key} = {}\n", value_in_words(parameter));
+        }
+    }
+    let compared = body.before.records.iter().zip(&body.after.records);
+    let rows = body.before.inputs.records.iter().zip(compared).map(|(input, (before, after))| {
+        let mut row = vec![Line::of(&before.file).to_string(), input.role.clone()];
+        row.extend(
+            [before.rmse_deg_per_h, after.rmse_deg_per_h, after.noise_floor_deg_per_h].map(|v| format!("{v:.4}")),
+        );
+        row
+    });
+    text + &table(&["record", "role", "before °/h", "after °/h", "noise °/h"], rows)
 }
 
 fn text(body: &ExtendJson) -> String {

@@ -262,6 +262,14 @@ impl Filter {
         self.hypotheses.iter().map(|h| h.weight * h.values[self.n + lag]).sum()
     }
 
+    /// The states, given all readings until now; empty before the first.
+    pub fn state(&self) -> Vec<f64> {
+        if self.hypotheses.is_empty() {
+            return Vec::new();
+        }
+        (0..self.n).map(|i| self.hypotheses.iter().map(|h| h.weight * h.values[i]).sum()).collect()
+    }
+
     fn start(&mut self, temperature_k: f64) {
         let mut values = vec![0.0; self.gains[0].gain.len()];
         for &level in &self.level_states {

@@ -8,6 +8,7 @@
 
 pub mod empirical;
 pub mod filter;
+pub mod formulas;
 mod heating;
 pub mod learned;
 pub mod physical;
@@ -23,6 +24,7 @@ use crate::rate::{CoilModel, RateError};
 use crate::record::Record;
 use crate::thermal::ThermalError;
 use empirical::{PiecewiseBias, Regression};
+use formulas::Columns;
 use learned::Learned;
 use physical::{MOST_DELAY_ROWS, Physical};
 use stream::{Compensated, Reading, Stream};
@@ -102,7 +104,11 @@ impl Compensator {
             Method::Physical => {
                 let boundary = predict::estimate_boundary(model, pattern, record)?;
                 let mut physical = Physical::with_boundary(model, pattern, &boundary, record)?;
-                if let Some(name) = physical.channel_names().find(|n| record.channels().iter().all(|c| c.name != *n)) {
+                if let Some(name) = physical
+                    .channel_names()
+                    .chain(physical.formula_columns())
+                    .find(|n| record.channels().iter().all(|c| c.name != *n))
+                {
                     return Err(CompensateError::MissingChannel { name: name.to_owned() });
                 }
                 physical.tune(record);
@@ -147,7 +153,7 @@ impl Compensator {
     /// Further columns that are needed.
     pub fn channel_names(&self) -> Vec<&str> {
         match self {
-            Compensator::Physical(physical) => physical.channel_names().collect(),
+            Compensator::Physical(physical) => physical.channel_names().chain(physical.formula_columns()).collect(),
             Compensator::Piecewise(_) | Compensator::Regression(_) | Compensator::Learned(_) => Vec::new(),
         }
     }
@@ -159,6 +165,13 @@ impl Compensator {
         }
     }
 
+    fn columns_of(&self, record: &Record, row: usize) -> Columns {
+        match self {
+            Compensator::Physical(physical) => physical.columns_of(record, row),
+            Compensator::Piecewise(_) | Compensator::Regression(_) | Compensator::Learned(_) => Columns::default(),
+        }
+    }
+
     /// What a row of a record holds for a stream.
     pub fn reading(&self, record: &Record, row: usize) -> Reading {
         Reading {
@@ -166,6 +179,7 @@ impl Compensator {
             temperature_k: Some(record.temperature_k()[row]),
             inner_k: record.inner_k().map(|k| k[row]),
             channel_rad_per_s: self.channel_bias_of(record, row),
+            columns: self.columns_of(record, row),
             rate_rad_per_s: Some(record.rate_rad_per_s()[row]),
         }
     }

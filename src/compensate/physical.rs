@@ -23,10 +23,13 @@
 //! # Source
 //! As [`super::filter`]; the pack's modes as in [`crate::thermal::pack`].
 
+mod beside;
+
 use nalgebra::DMatrix;
 
 use super::CompensateError;
 use super::filter::{Dynamics, Filter, Tuning};
+use super::formulas::Formulas;
 use super::heating::Heating;
 use crate::boundary::Boundary;
 use crate::effect::DeclaredEffect;
@@ -84,6 +87,7 @@ pub struct Physical {
     heating: Option<Heating>,
     /// Further columns and what each adds [rad/s per unit].
     channels: Vec<(String, f64)>,
+    formulas: Option<Formulas>,
     /// Where the conductivity depends on temperature.
     linearised: Option<Linearised>,
     /// At least 1; with 1 it is one difference equation without breaks.
@@ -136,6 +140,7 @@ impl Physical {
         noise_k: f64,
         range_k: Option<(f64, f64)>,
     ) -> Result<Self, CompensateError> {
+        let (model, formulas) = &Formulas::split(model);
         let mut path = model.heat_path()?;
         let real_layers = path.shape.layers;
         let mut buried = 0;
@@ -177,7 +182,10 @@ impl Physical {
         let functional = |mode: usize| -> f64 {
             gains.iter().enumerate().map(|(layer, gain)| gain * pack.amplitude(buried + layer, mode)).sum()
         };
+        let amplitude =
+            DMatrix::from_fn(real_layers, order.len(), |layer, mode| pack.amplitude(buried + layer, order[mode]));
         Ok(Self {
+            formulas: Formulas::new(&model.coil, formulas.clone(), amplitude),
             decay_per_s: order.iter().map(|&i| pack.decays_per_s()[i]).collect(),
             outer: order.iter().map(|&i| pack.amplitude(path.shape.layers - 1, i)).collect(),
             functional: order.iter().map(|&i| functional(i)).collect(),
@@ -202,11 +210,12 @@ impl Physical {
     pub fn tune(&mut self, record: &Record) {
         let interval_s = record.interval_s();
         let dynamics = self.dynamics(interval_s);
+        let beside = self.formulas_over(record);
         let trials: Vec<(f64, Vec<f64>, Vec<f64>)> = (-24..=-12)
             .map(|exponent| {
                 let mut trial = self.clone();
                 trial.slope_noise_k2_per_s3 = 10f64.powf(0.5 * f64::from(exponent));
-                let (squares, means) = trial.misfit(&dynamics, record);
+                let (squares, means) = trial.misfit(&dynamics, record, &beside);
                 (trial.slope_noise_k2_per_s3, squares, means)
             })
             .collect();
@@ -223,7 +232,7 @@ impl Physical {
     }
 
     /// Variance and mean of the compensated rate at each lag.
-    fn misfit(&self, dynamics: &Dynamics, record: &Record) -> (Vec<f64>, Vec<f64>) {
+    fn misfit(&self, dynamics: &Dynamics, record: &Record, beside: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let interval_s = record.interval_s();
         let mut filter = Filter::new(dynamics, &self.tuning(interval_s, TRIAL_DELAY_ROWS));
         let mut sums = vec![(0.0, 0.0, 0.0); TRIAL_DELAY_ROWS + 1];
@@ -246,7 +255,7 @@ impl Physical {
             for (lag, sum) in sums.iter_mut().enumerate() {
                 let Some(step) = rows_of_step.len().checked_sub(lag + 1) else { continue };
                 if let Some(then) = rows_of_step[step] {
-                    let left = rates[then] - error(then, filter.rate_error_rad_per_s(lag));
+                    let left = rates[then] - beside[then] - error(then, filter.rate_error_rad_per_s(lag));
                     *sum = (sum.0 + 1.0, sum.1 + left, sum.2 + left * left);
                 }
             }
@@ -254,8 +263,13 @@ impl Physical {
         sums.iter().map(|(n, sum, square)| ((square - sum * sum / n) / n, sum / n)).unzip()
     }
 
+    /// Modes that are states: the others follow within a row.
+    fn slow_modes(&self, interval_s: f64) -> usize {
+        self.decay_per_s.iter().take_while(|l| **l * interval_s < FAST).count()
+    }
+
     fn dynamics(&self, interval_s: f64) -> Dynamics {
-        let slow = self.decay_per_s.iter().take_while(|l| **l * interval_s < FAST).count();
+        let slow = self.slow_modes(interval_s);
         let has_lag = self.lag_s > 0.0;
         let n = slow + 2 + usize::from(has_lag);
         let (air, slope) = (slow, slow + 1);
@@ -350,7 +364,7 @@ impl Physical {
         coil * at(&self.factor, 1.0) + at(&self.bias, 0.0) + channel_rad_per_s
     }
 
-    /// Whether the difference equation is all there is.
+    /// Whether the difference equation, and formulas beside it, are all there is.
     pub fn is_linear(&self) -> bool {
         self.bias.is_none() && self.factor.is_none() && self.heating.is_none() && self.channels.is_empty()
     }

@@ -9,6 +9,7 @@ use std::collections::VecDeque;
 use super::Compensator;
 use super::empirical::Window;
 use super::filter::Filter;
+use super::formulas::{AtWork, Columns};
 use super::learned::Follower;
 use crate::numeric::statistics::median;
 
@@ -20,6 +21,8 @@ pub struct Reading {
     pub inner_k: Option<f64>,
     /// What the model's further columns add to the rate error; 0 where it reads none.
     pub channel_rad_per_s: Option<f64>,
+    /// What formulas read of the further columns.
+    pub columns: Columns,
     pub rate_rad_per_s: Option<f64>,
 }
 
@@ -91,6 +94,7 @@ struct Pending<T> {
     time_s: f64,
     temperature_k: Option<f64>,
     channel_rad_per_s: f64,
+    columns: Columns,
     rate_rad_per_s: Option<f64>,
     flags: Vec<Flag>,
     bias_rad_per_s: Option<f64>,
@@ -111,6 +115,7 @@ pub struct Stream<'c, T> {
     interval_s: f64,
     delay: usize,
     predictor: Option<Predictor>,
+    formulas: Option<AtWork>,
     first: Vec<(T, Option<Reading>)>,
     pending: VecDeque<Pending<T>>,
     step: u64,
@@ -132,6 +137,7 @@ impl<'c, T> Stream<'c, T> {
             interval_s: 0.0,
             delay: 1,
             predictor: None,
+            formulas: None,
             first: Vec::new(),
             pending: VecDeque::new(),
             step: 0,
@@ -185,6 +191,9 @@ impl<'c, T> Stream<'c, T> {
         self.interval_s = if found_s > 0.0 { found_s } else { 1.0 };
         self.delay = self.compensator.delay_rows(self.interval_s);
         self.predictor = Some(self.new_predictor());
+        if let Compensator::Physical(physical) = self.compensator {
+            self.formulas = physical.formulas_at_work(self.interval_s);
+        }
         for (tag, reading) in std::mem::take(&mut self.first) {
             self.take(tag, reading, out);
         }
@@ -202,6 +211,9 @@ impl<'c, T> Stream<'c, T> {
     }
 
     fn restart(&mut self) {
+        if let Some(formulas) = &mut self.formulas {
+            formulas.restart();
+        }
         match self.predictor.as_mut() {
             Some(Predictor::Physical(filter)) => filter.restart(),
             Some(Predictor::Regression(window)) => *window = Window::new(self.delay),
@@ -217,6 +229,7 @@ impl<'c, T> Stream<'c, T> {
             time_s: f64::NAN,
             temperature_k: None,
             channel_rad_per_s: 0.0,
+            columns: Columns::default(),
             rate_rad_per_s: None,
             flags: Vec::new(),
             bias_rad_per_s: None,
@@ -235,6 +248,7 @@ impl<'c, T> Stream<'c, T> {
                 None => pending.flags.push(Flag::ChannelHeld),
             }
             pending.channel_rad_per_s = self.last_channel_rad_per_s;
+            pending.columns = reading.columns;
             let of_the_air_k = match self.compensator {
                 Compensator::Physical(physical) => temperature_k.map(|t| physical.of_the_air_k(reading.time_s, t)),
                 Compensator::Piecewise(_) | Compensator::Regression(_) | Compensator::Learned(_) => temperature_k,
@@ -317,7 +331,12 @@ impl<'c, T> Stream<'c, T> {
             }
         }
         match self.predictor.as_mut() {
-            Some(Predictor::Physical(filter)) => filter.step(temperature_k),
+            Some(Predictor::Physical(filter)) => {
+                filter.step(temperature_k);
+                if let Some(formulas) = &mut self.formulas {
+                    formulas.see(&filter.state(), self.delay + 1);
+                }
+            }
             Some(Predictor::Regression(window)) => window.push(temperature_k, inner_k),
             Some(Predictor::Learned(follower)) => {
                 if let Compensator::Learned(learned) = self.compensator {
@@ -332,14 +351,19 @@ impl<'c, T> Stream<'c, T> {
 
     /// The bias of a pending row as it is known now.
     fn settle(&mut self, row: usize) {
-        let Some(pending) = self.pending.get_mut(row) else { return };
+        let Some(pending) = self.pending.get(row) else { return };
         let (Some(step), None) = (pending.step, pending.bias_rad_per_s) else { return };
         let lag = (self.step - step) as usize;
         let (time_s, temperature_k, channel) = (pending.time_s, pending.temperature_k, pending.channel_rad_per_s);
-        pending.bias_rad_per_s = match (&self.predictor, self.compensator) {
+        let columns = pending.columns;
+        let bias_rad_per_s = match (&self.predictor, self.compensator) {
             (Some(Predictor::Physical(filter)), Compensator::Physical(physical)) => (lag <= self.delay).then(|| {
                 let air = filter.rate_error_rad_per_s(lag);
-                physical.error_rad_per_s(air, time_s, temperature_k, channel) + physical.offset_rad_per_s
+                let known = physical.error_rad_per_s(air, time_s, temperature_k, channel);
+                let thermal = physical.thermal_rate_rad_per_s(air, time_s, temperature_k);
+                let formulas = self.formulas.as_mut();
+                let beside = formulas.map_or(0.0, |f| f.rate_rad_per_s(lag, time_s, thermal, &columns));
+                known + beside + physical.offset_rad_per_s
             }),
             (Some(Predictor::Regression(window)), Compensator::Regression(regression)) => {
                 Some(regression.bias_rad_per_s(&window.regressors(lag, self.interval_s)))
@@ -348,6 +372,9 @@ impl<'c, T> Stream<'c, T> {
             (_, Compensator::Piecewise(piecewise)) => temperature_k.map(|t| piecewise.bias_rad_per_s(t)),
             _ => None,
         };
+        if let Some(pending) = self.pending.get_mut(row) {
+            pending.bias_rad_per_s = bias_rad_per_s;
+        }
     }
 
     /// Sends the oldest row on its way.

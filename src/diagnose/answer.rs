@@ -91,6 +91,7 @@ pub(super) fn answer(question: &Question, found: &Found, records: &[&Record]) ->
         hypothesis,
         noise,
         effects,
+        proposals: Vec::new(),
     })
 }
 
@@ -202,7 +203,7 @@ fn hypothesis(question: &Question, found: &Found, named: &Explanation) -> Option
     (said != Hypothesis::default()).then_some(said)
 }
 
-fn noises(question: &Question, explanation: &Explanation) -> Result<Vec<RecordNoise>, DiagnoseError> {
+pub(super) fn noises(question: &Question, explanation: &Explanation) -> Result<Vec<RecordNoise>, DiagnoseError> {
     let chamber = question.chamber;
     let mut all = Vec::new();
     for &record in &question.fitted {

@@ -22,6 +22,25 @@ impl Candidate {
     pub fn kind(&self) -> String {
         self.effect.kind()
     }
+
+    /// Whether it is about one of the coil's layers, and so has a sister for every other one.
+    pub fn is_of_layer(&self) -> bool {
+        self.effect.layer().is_some()
+    }
+
+    /// Whether it is another with more of its parameters free.
+    pub fn is_fuller_than(&self, other: &Self) -> bool {
+        self.free.len() > other.free.len()
+            && self.kind() == other.kind()
+            && self.effect.choices() == other.effect.choices()
+            && self.effect.layer() == other.effect.layer()
+    }
+
+    /// Whether it says the same of a neighbouring layer.
+    pub fn is_next_to(&self, other: &Self) -> bool {
+        let apart = self.effect.layer().zip(other.effect.layer()).map(|(a, b)| a.abs_diff(b));
+        self.kind() == other.kind() && apart == Some(1)
+    }
 }
 
 pub fn is_empirical(effect: &DeclaredEffect) -> bool {
@@ -41,7 +60,13 @@ pub fn candidates(model: &CoilModel, records: &[&Record]) -> Vec<Candidate> {
     for spec in CATALOGUE.iter().filter(|s| !present.iter().any(|p| p == s.kind)) {
         let count: usize = spec.choices.iter().map(|c| c.options.len()).product();
         for index in 0..count.max(1) {
-            all.extend(of_spec(spec, choices_of(spec, index), &temperatures));
+            for candidate in of_spec(spec, choices_of(spec, index), &temperatures) {
+                if candidate.is_of_layer() {
+                    all.extend(of_each_layer(&candidate, model.coil.layers()));
+                } else {
+                    all.push(candidate);
+                }
+            }
         }
     }
     if let Some((first, others)) = records.split_first() {
@@ -86,7 +111,8 @@ fn choices_of(spec: &EffectSpec, mut index: usize) -> Vec<usize> {
 
 /// The effect with its needed parameters alone, and with the optional ones too.
 fn of_spec(spec: &'static EffectSpec, choices: Vec<usize>, temperatures_k: &[f64]) -> Vec<Candidate> {
-    let all: Vec<usize> = (0..spec.parameters.len()).collect();
+    // Which layer is nothing to fit: every layer is a candidate of its own.
+    let all: Vec<usize> = (0..spec.parameters.len()).filter(|&i| spec.parameters[i].unit != Unit::Layer).collect();
     let mut needed: Vec<usize> = all.iter().copied().filter(|&i| spec.parameters[i].default.is_none()).collect();
     if needed.is_empty() && !all.is_empty() {
         needed.push(0);
@@ -125,11 +151,32 @@ fn of_spec(spec: &'static EffectSpec, choices: Vec<usize>, temperatures_k: &[f64
         .collect()
 }
 
+/// The same of every layer that it can be about.
+fn of_each_layer(candidate: &Candidate, layers: usize) -> Vec<Candidate> {
+    let of_layer = candidate.effect.spec().parameters.iter().position(|p| p.unit == Unit::Layer);
+    let Some(place) = of_layer else { return vec![candidate.clone()] };
+    (1..=layers)
+        .filter_map(|layer| {
+            let there = |values: &[f64]| {
+                let mut values = values.to_vec();
+                values[place] = layer as f64;
+                values
+            };
+            let effect = candidate.effect.with_values(there(candidate.effect.values())).ok()?;
+            effect.check_layers(layers).ok()?;
+            let starts = candidate.starts.iter().map(|s| there(s)).collect();
+            Some(Candidate { effect, free: candidate.free.clone(), starts })
+        })
+        .collect()
+}
+
 /// Where to start a parameter: once if the response is linear in it, else at several points.
 fn starts_of(spec: &EffectSpec, parameter: usize, temperatures_k: &[f64]) -> Vec<f64> {
     let p = spec.parameters[parameter];
     let stated: Vec<f64> = match p.unit {
         Unit::Celsius => return temperatures_k.to_vec(),
+        // One start says which layer: the size is fitted then.
+        _ if spec.parameters.iter().any(|p| p.unit == Unit::Layer) => vec![p.start],
         _ if p.lower > 0.0 && p.upper / p.lower >= 100.0 => vec![p.start, 0.2 * p.start, 5.0 * p.start],
         Unit::Second => vec![p.start, 4.0 * p.start],
         _ => vec![p.start],

@@ -59,7 +59,7 @@ pub(super) fn alone(question: &Question, best: &Explanation, base: &Fit) -> Find
     }
 }
 
-fn parameters(fit: &Fit, place: usize, effect: &DeclaredEffect) -> Vec<FittedParameter> {
+pub(super) fn parameters(fit: &Fit, place: usize, effect: &DeclaredEffect) -> Vec<FittedParameter> {
     let declared = effect.parameters().into_iter().enumerate();
     declared
         .map(|(parameter, own)| {

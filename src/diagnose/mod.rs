@@ -18,12 +18,16 @@ mod answer;
 mod candidate;
 mod conductivity;
 mod describe;
+pub mod discover;
 mod evidence;
 pub mod experiment;
 mod field;
 mod joint;
 pub mod plain;
 mod standing;
+#[cfg(test)]
+mod tests;
+mod together;
 pub mod trim;
 
 use thiserror::Error;
@@ -44,6 +48,7 @@ use joint::Question;
 pub use candidate::{is_declared_number, is_empirical};
 pub use plain::{Plain, Shape};
 pub use standing::{Standing, is_adequate, standing};
+pub use together::{Together, declared_with, extend_together};
 
 /// What is asked.
 #[derive(Debug, Clone, Copy)]
@@ -54,6 +59,18 @@ pub struct Request<'a> {
     pub records: &'a [Record],
     /// Only judged by.
     pub holdout: &'a [Record],
+    /// Whether formulas are sought for what no listed effect explains, and among which.
+    pub terms: Terms<'a>,
+}
+
+/// Whether and among which terms an unlisted effect is sought.
+#[derive(Debug, Clone, Copy, Default)]
+pub enum Terms<'a> {
+    #[default]
+    All,
+    /// Of these forms and variables only.
+    Among(&'a [String]),
+    None,
 }
 
 /// The answer in one word.
@@ -219,6 +236,8 @@ pub struct Diagnosis {
     pub hypothesis: Option<Hypothesis>,
     /// Fitted records first, then those held out.
     pub noise: Vec<RecordNoise>,
+    /// Formulas that explain what no listed effect does, best first.
+    pub proposals: Vec<discover::Proposal>,
 }
 
 /// What one set of explanations holds of the posterior mass.
@@ -394,8 +413,9 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
         held_out: (given..records.len()).collect(),
         depth: MOST_MEMBERS,
     };
-    let found = joint::search(&question, null, &|share| progress(0.8 * share))?;
+    let found = joint::search(&question, null, &|share| progress(0.6 * share))?;
     let mut diagnosis = answer::answer(&question, &found, &records)?;
+    beyond(request, &question, &found, &mut diagnosis, &|share| progress(0.6 + 0.2 * share))?;
     // Where what is to be fitted shows nothing, the other records may; the former then confirm it.
     if let (Verdict::Adequate, Some(declared), false) =
         (diagnosis.verdict, found.declared(), request.holdout.is_empty())
@@ -404,7 +424,8 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
         let day = chamber.fit(&declared.fit.assumed, &[], &other.fitted, Some(&declared.fit), Effort::FULL)?;
         if joint::promise(&other, &day)? > PROMISING {
             let found = joint::search(&other, day, &|share| progress(0.8 + 0.2 * share))?;
-            let elsewhere = answer::answer(&other, &found, &records)?;
+            let mut elsewhere = answer::answer(&other, &found, &records)?;
+            beyond(request, &other, &found, &mut elsewhere, &|_| ())?;
             if elsewhere.verdict != Verdict::Adequate {
                 diagnosis = elsewhere;
                 diagnosis.cautions.insert(0, Caution::FittedToHoldout);
@@ -413,6 +434,25 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
     }
     progress(1.0);
     Ok(diagnosis)
+}
+
+/// Formulas for what no listed effect explains.
+fn beyond(
+    request: &Request,
+    question: &Question,
+    found: &joint::Found,
+    diagnosis: &mut Diagnosis,
+    progress: &(dyn Fn(f64) + Sync),
+) -> Result<(), DiagnoseError> {
+    let allowed = match request.terms {
+        Terms::All => discover::Allowed::default(),
+        Terms::Among(words) => discover::Allowed { words: words.to_vec() },
+        Terms::None => return Ok(()),
+    };
+    if let Some(discovered) = discover::discover(question, found, &allowed, progress)? {
+        discover::amend(question, found, &discovered, diagnosis)?;
+    }
+    Ok(())
 }
 
 /// What a diagnosis leaves to be told apart by an experiment.
@@ -439,62 +479,5 @@ impl From<ChamberError> for DiagnoseError {
             ChamberError::Unsolvable => Self::Unsolvable,
             other => Self::Chamber(other),
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
-    use statrs::distribution::{ContinuousCDF, Normal};
-
-    use super::experiment::fixtures::{effect, model, pattern};
-    use super::*;
-    use crate::boundary::expose;
-    use crate::numeric::piecewise::PiecewiseLinear;
-    use crate::rate::RateModel;
-    use crate::thermal::solve;
-    use crate::units::REFERENCE_TEMPERATURE_K;
-
-    /// A day in a chamber that goes up and down by `swing_k`.
-    fn day(model: &CoilModel, swing_k: f64, seed: u64) -> Record {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let normal = Normal::new(0.0, 1.0).unwrap();
-        let mut noise = |deviation: f64| deviation * normal.inverse_cdf(random.random::<f64>());
-        let times_s: Vec<f64> = (1..=600).map(|i| 10.0 * f64::from(i)).collect();
-        let knots_s = vec![0.0, 905.0, 1703.0, 2412.0, 4011.0, 6000.0];
-        let air_k = [0.0, 0.0, 1.0, 1.0, -1.0, -1.0].map(|t| REFERENCE_TEMPERATURE_K + swing_k * t).to_vec();
-        let air = PiecewiseLinear::new(knots_s, air_k).unwrap();
-        let exposed = expose(&model.heat_path().unwrap(), Some(25.0), 0.0, &air, &times_s).unwrap();
-        let history = solve(&exposed.path, &exposed.drive).unwrap().means(&times_s, model.rate_mean_s);
-        let rates = RateModel::new(model, &pattern(), &[]).unwrap().series_rad_per_s(&history);
-        let rates = rates.into_iter().map(|r| r + noise(1e-7)).collect();
-        let temperature_k = exposed.shown_k.into_iter().map(|t| t + noise(0.002)).collect();
-        Record::new("day", times_s, temperature_k, rates).unwrap()
-    }
-
-    #[test]
-    fn what_only_the_hold_out_shows_is_found() {
-        let complete = model(vec![effect("strain_mismatch", &[0.004])]);
-        let (gentle, wild) = ([day(&complete, 0.6, 1)], [day(&complete, 20.0, 2)]);
-        let (declared, pattern) = (model(Vec::new()), pattern());
-        let asked = |records, holdout| {
-            let request = Request { model: &declared, pattern: &pattern, records, holdout };
-            diagnose(&request, &|_| ()).unwrap()
-        };
-        let says = |d: &Diagnosis| d.cautions.contains(&Caution::FittedToHoldout);
-        let found = asked(&gentle, &wild);
-        println!("{:?}: {:?}", found.verdict, found.ladder);
-        assert!(found.verdict != Verdict::Adequate);
-        let kinds = found
-            .effects
-            .iter()
-            .flat_map(|f| std::iter::once(f.effect.kind()).chain(f.equivalents.iter().map(|e| e.effect.kind())));
-        assert!(kinds.collect::<Vec<_>>().contains(&"strain_mismatch".to_owned()));
-        // The ladder's columns stay those of the records as they were given.
-        let (first, last) = (&found.ladder[0], &found.ladder[1]);
-        assert!(first.holdout_rmse_rad_per_s.unwrap() > 1.2 * last.holdout_rmse_rad_per_s.unwrap());
-        assert!(first.rmse_rad_per_s < 1.1 * last.rmse_rad_per_s);
-        assert!(!says(&asked(&wild, &gentle)));
     }
 }

@@ -1,7 +1,12 @@
 //! Formulas that a user types: parsed once, evaluated often, unable to do anything but arithmetic.
 //!
 //! `+ - * / ^`, parentheses, numbers, the constant `pi`, the functions of [`FUNCTIONS`], and variables by name.
-//! `^` binds most tightly and to the right, so −x^2 is −(x²).
+//! `^` binds most tightly and to the right, so −x^2 is −(x²). `lag` and `play` remember what their argument was before:
+//! [`Expression::evaluate_after`] takes instants in order; [`Expression::evaluate`] is an instant that nothing came before.
+
+mod analysis;
+mod memory;
+mod printed;
 
 use std::ops::Range;
 
@@ -17,6 +22,10 @@ mod grammar {
 }
 use grammar::{FormulaParser, Rule};
 
+pub use analysis::{Degree, EvaluationError, Interval};
+pub use memory::Memory;
+use memory::{AtRest, Keeper, Recall};
+
 /// A formula that was understood.
 ///
 /// # Shapes
@@ -26,6 +35,8 @@ pub struct Expression {
     source: String,
     root: Node,
     variables: Vec<Variable>,
+    /// Calls that remember.
+    memories: usize,
 }
 
 /// A name in a formula, and where it first stands (bytes).
@@ -54,7 +65,7 @@ const LONGEST: usize = 2000;
 const DEEPEST: usize = 64;
 
 /// Name and arity of every function.
-pub const FUNCTIONS: [(&str, usize); 14] = [
+pub const FUNCTIONS: [(&str, usize); 17] = [
     ("abs", 1),
     ("sign", 1),
     ("sqrt", 1),
@@ -69,6 +80,9 @@ pub const FUNCTIONS: [(&str, usize); 14] = [
     ("min", 2),
     ("max", 2),
     ("pow", 2),
+    ("softplus", 1),
+    ("lag", 2),
+    ("play", 2),
 ];
 
 #[derive(Debug, Clone, PartialEq)]
@@ -76,8 +90,20 @@ enum Node {
     Number(f64),
     Variable(usize),
     Negate(Box<Node>),
-    Binary(Operator, Box<Node>, Box<Node>),
-    Call(&'static str, Vec<Node>),
+    Binary(Operator, Range<usize>, Box<Node>, Box<Node>),
+    Call(&'static str, Range<usize>, Vec<Node>),
+    /// What it is, its place among those that remember, what it follows, and its time constant or half width.
+    Remember(Keeper, usize, Range<usize>, Box<Node>, Box<Node>),
+}
+
+/// A node and where it stands.
+type Built = (Node, Range<usize>);
+
+/// What a formula is made of, as far as it was read.
+#[derive(Default)]
+struct Parts {
+    variables: Vec<Variable>,
+    memories: usize,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -111,12 +137,12 @@ impl Expression {
         }
         check_depth(source)?;
         let mut pairs = FormulaParser::parse(Rule::formula, source).map_err(|e| syntax_error(source, &e))?;
-        let mut variables = Vec::new();
+        let mut parts = Parts::default();
         let root = match pairs.next() {
-            Some(expression) => build(expression.into_inner(), &mut variables)?,
+            Some(expression) => build(expression.into_inner(), &mut parts)?.0,
             None => Node::Number(0.0),
         };
-        Ok(Self { source: source.to_owned(), root, variables })
+        Ok(Self { source: source.to_owned(), root, variables: parts.variables, memories: parts.memories })
     }
 
     pub fn source(&self) -> &str {
@@ -128,8 +154,19 @@ impl Expression {
         &self.variables
     }
 
+    /// At an instant that nothing came before: what remembers is at rest.
     pub fn evaluate(&self, values: &[f64]) -> f64 {
-        evaluate(&self.root, values)
+        evaluate(&self.root, values, &mut AtRest)
+    }
+
+    /// At an instant after those that the memory has seen; an empty memory begins at rest.
+    pub fn evaluate_after(&self, values: &[f64], time_s: f64, memory: &mut Memory) -> f64 {
+        evaluate(&self.root, values, &mut memory.at(time_s, self.memories))
+    }
+
+    /// Whether its value depends on earlier ones.
+    pub fn remembers(&self) -> bool {
+        self.memories > 0
     }
 }
 
@@ -177,16 +214,19 @@ fn syntax_error(source: &str, error: &pest::error::Error<Rule>) -> ExpressionErr
     }
 }
 
-fn build(pairs: Pairs<Rule>, variables: &mut Vec<Variable>) -> Result<Node, ExpressionError> {
+fn build(pairs: Pairs<Rule>, parts: &mut Parts) -> Result<Built, ExpressionError> {
     let binding = PrattParser::new()
         .op(Op::infix(Rule::add, Assoc::Left) | Op::infix(Rule::subtract, Assoc::Left))
         .op(Op::infix(Rule::multiply, Assoc::Left) | Op::infix(Rule::divide, Assoc::Left))
         .op(Op::prefix(Rule::negate))
         .op(Op::infix(Rule::power, Assoc::Right));
-    let variables = std::cell::RefCell::new(variables);
+    let parts = std::cell::RefCell::new(parts);
     binding
-        .map_primary(|pair| primary(pair, &mut variables.borrow_mut()))
-        .map_prefix(|_, operand| Ok(Node::Negate(Box::new(operand?))))
+        .map_primary(|pair| primary(pair, &mut parts.borrow_mut()))
+        .map_prefix(|sign, operand| {
+            let (operand, at) = operand?;
+            Ok((Node::Negate(Box::new(operand)), sign.as_span().start()..at.end))
+        })
         .map_infix(|left, operator, right| {
             let operator = match operator.as_rule() {
                 Rule::add => Operator::Add,
@@ -195,27 +235,30 @@ fn build(pairs: Pairs<Rule>, variables: &mut Vec<Variable>) -> Result<Node, Expr
                 Rule::divide => Operator::Divide,
                 _ => Operator::Power,
             };
-            Ok(Node::Binary(operator, Box::new(left?), Box::new(right?)))
+            let ((left, from), (right, to)) = (left?, right?);
+            let at = from.start..to.end;
+            Ok((Node::Binary(operator, at.clone(), Box::new(left), Box::new(right)), at))
         })
         .parse(pairs)
 }
 
-fn primary(pair: Pair<Rule>, variables: &mut Vec<Variable>) -> Result<Node, ExpressionError> {
+fn primary(pair: Pair<Rule>, parts: &mut Parts) -> Result<Built, ExpressionError> {
     let span = pair.as_span();
     let at = span.start()..span.end();
     match pair.as_rule() {
         // The grammar admits only what `f64` can read.
-        Rule::number => Ok(Node::Number(pair.as_str().parse().unwrap_or(f64::NAN))),
+        Rule::number => Ok((Node::Number(pair.as_str().parse().unwrap_or(f64::NAN)), at)),
         Rule::variable => {
             let name = pair.as_str();
             if name == "pi" {
-                return Ok(Node::Number(std::f64::consts::PI));
+                return Ok((Node::Number(std::f64::consts::PI), at));
             }
-            let index = variables.iter().position(|v| v.name == name).unwrap_or_else(|| {
-                variables.push(Variable { name: name.to_owned(), at });
-                variables.len() - 1
+            let known = parts.variables.iter().position(|v| v.name == name);
+            let index = known.unwrap_or_else(|| {
+                parts.variables.push(Variable { name: name.to_owned(), at: at.clone() });
+                parts.variables.len() - 1
             });
-            Ok(Node::Variable(index))
+            Ok((Node::Variable(index), at))
         }
         Rule::call => {
             let mut inner = pair.into_inner();
@@ -228,56 +271,88 @@ fn primary(pair: Pair<Rule>, variables: &mut Vec<Variable>) -> Result<Node, Expr
                     known,
                 });
             };
-            let arguments = inner.map(|a| build(a.into_inner(), variables)).collect::<Result<Vec<_>, _>>()?;
+            let arguments = inner.map(|a| Ok(build(a.into_inner(), parts)?.0)).collect::<Result<Vec<_>, _>>()?;
             if arguments.len() != arity {
                 return Err(ExpressionError::Arguments { at, function, expected: arity, found: arguments.len() });
             }
-            Ok(Node::Call(function, arguments))
+            let Some(keeper) = Keeper::named(function) else {
+                return Ok((Node::Call(function, at.clone(), arguments), at));
+            };
+            let mut arguments = arguments.into_iter();
+            let (Some(input), Some(size)) = (arguments.next(), arguments.next()) else {
+                return Err(ExpressionError::Arguments { at, function, expected: arity, found: 0 });
+            };
+            let slot = parts.memories;
+            parts.memories += 1;
+            Ok((Node::Remember(keeper, slot, at.clone(), Box::new(input), Box::new(size)), at))
         }
-        _ => build(pair.into_inner(), variables),
+        _ => {
+            let (inner, _) = build(pair.into_inner(), parts)?;
+            Ok((inner, at))
+        }
     }
 }
 
-fn evaluate(node: &Node, values: &[f64]) -> f64 {
+fn evaluate(node: &Node, values: &[f64], recall: &mut impl Recall) -> f64 {
     match node {
         Node::Number(number) => *number,
         Node::Variable(index) => values[*index],
-        Node::Negate(operand) => -evaluate(operand, values),
-        Node::Binary(operator, left, right) => {
-            let (left, right) = (evaluate(left, values), evaluate(right, values));
-            match operator {
-                Operator::Add => left + right,
-                Operator::Subtract => left - right,
-                Operator::Multiply => left * right,
-                Operator::Divide => left / right,
-                Operator::Power => left.powf(right),
+        Node::Negate(operand) => -evaluate(operand, values, recall),
+        Node::Binary(operator, _, left, right) => {
+            let left = evaluate(left, values, recall);
+            operator.of(left, evaluate(right, values, recall))
+        }
+        Node::Call(function, _, arguments) => {
+            let x = evaluate(&arguments[0], values, recall);
+            let y = arguments.get(1).map_or(0.0, |y| evaluate(y, values, recall));
+            call(function, x, y)
+        }
+        Node::Remember(keeper, slot, _, input, size) => {
+            let x = evaluate(input, values, recall);
+            let size = evaluate(size, values, recall);
+            recall.remember(*keeper, *slot, x, size)
+        }
+    }
+}
+
+impl Operator {
+    fn of(self, left: f64, right: f64) -> f64 {
+        match self {
+            Operator::Add => left + right,
+            Operator::Subtract => left - right,
+            Operator::Multiply => left * right,
+            Operator::Divide => left / right,
+            Operator::Power => left.powf(right),
+        }
+    }
+}
+
+/// A function of [`FUNCTIONS`] that remembers nothing; `y` counts only where it takes two arguments.
+fn call(function: &str, x: f64, y: f64) -> f64 {
+    match function {
+        "abs" => x.abs(),
+        "sign" => {
+            if x == 0.0 {
+                0.0
+            } else {
+                x.signum()
             }
         }
-        Node::Call(function, arguments) => {
-            let x = evaluate(&arguments[0], values);
-            match *function {
-                "abs" => x.abs(),
-                "sign" => {
-                    if x == 0.0 {
-                        0.0
-                    } else {
-                        x.signum()
-                    }
-                }
-                "sqrt" => x.sqrt(),
-                "exp" => x.exp(),
-                "ln" => x.ln(),
-                "log10" => x.log10(),
-                "sin" => x.sin(),
-                "cos" => x.cos(),
-                "tan" => x.tan(),
-                "atan" => x.atan(),
-                "tanh" => x.tanh(),
-                "min" => x.min(evaluate(&arguments[1], values)),
-                "max" => x.max(evaluate(&arguments[1], values)),
-                _ => x.powf(evaluate(&arguments[1], values)),
-            }
-        }
+        "sqrt" => x.sqrt(),
+        "exp" => x.exp(),
+        "ln" => x.ln(),
+        "log10" => x.log10(),
+        "sin" => x.sin(),
+        "cos" => x.cos(),
+        "tan" => x.tan(),
+        "atan" => x.atan(),
+        "tanh" => x.tanh(),
+        // Where x is no number, neither is what is larger.
+        "min" if !x.is_nan() => x.min(y),
+        "max" if !x.is_nan() => x.max(y),
+        "min" | "max" => x,
+        "softplus" => x.max(0.0) + (-x.abs()).exp().ln_1p(),
+        _ => x.powf(y),
     }
 }
 
@@ -317,6 +392,16 @@ mod tests {
         assert_eq!(at("max(1)"), 0..6);
         assert_eq!(at("a $ b"), 2..3);
         assert_eq!(at(""), 0..0);
+    }
+
+    #[test]
+    fn what_remembers_is_its_argument_at_an_instant_that_nothing_came_before() {
+        let e = Expression::parse("lag(x, 900) - play(x, 2) + softplus(0)").unwrap();
+        assert!(e.remembers());
+        assert_eq!(e.evaluate(&[7.0]), 2f64.ln());
+        assert_eq!(value("softplus(800) - softplus(-800)"), 800.0);
+        let missing = Expression::parse("lag(x)").unwrap_err();
+        assert_eq!(missing.at(), Some(0..6));
     }
 
     #[test]

@@ -25,6 +25,11 @@ pub fn verdict_in_words(body: &DiagnosisJson) -> String {
         "missing" => format!("missing — the model lacks {}", kinds()),
         "indistinguishable" => format!("indistinguishable — {} or an equivalent is missing", kinds()),
         _ if body.hypothesis.is_some() => format!("unexplained — {}", hypothesis_in_words(body).join("; ")),
+        _ if !body.proposals.is_empty() => {
+            let beside = if body.effects.is_empty() { String::new() } else { format!("{} and ", kinds()) };
+            let formula = &body.proposals[0].formula;
+            format!("unexplained by listed effects alone — {beside}{formula} °/h explain the records")
+        }
         _ if body.effects.is_empty() => {
             "unexplained — something is there that no combination of known effects explains".to_owned()
         }
@@ -160,11 +165,12 @@ pub(super) fn section(body: &DiagnosisJson, tables: &[Vec<DiagnosisRow>]) -> Mar
         ul { @for step in &body.ladder_in_words { li { (step) } } }
         (ladder_table(body))
         @if !body.effects.is_empty() { h2 { "What is missing" } (effects(&body.effects)) }
+        (super::proposal::section(body))
         @if body.unexplained.is_some() {
             h2 { "What is left over" }
             @for line in rest_in_words(body) { p { (line) } }
         }
-        @if !body.effects.is_empty() {
+        @if !body.effects.is_empty() || !body.proposals.is_empty() {
             @for (record, rows) in body.inputs.records.iter().zip(tables) {
                 @let noise = if record.role == "held out" { body.holdout_noise_floor_deg_per_h } else { None };
                 (figure(&before_and_after_chart(&format!("Residual of {}", record.file), rows, noise.unwrap_or(body.noise_floor_deg_per_h)).svg(),

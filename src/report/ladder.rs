@@ -60,6 +60,7 @@ fn headline(body: &DiagnosisJson) -> String {
         "adequate" => format!("Nothing is missing: the error is {after:.2} times the noise"),
         "missing" => format!("{kinds} {are} missing: {fall}"),
         "indistinguishable" => format!("{kinds}, or an equivalent, {are} missing: {fall}"),
+        _ if !body.proposals.is_empty() => format!("With {kinds} {fall}"),
         _ if last.effects.is_empty() => {
             format!("No known effect explains the error of {after:.2} times the noise")
         }

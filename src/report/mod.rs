@@ -11,6 +11,7 @@ pub mod measurement;
 pub mod noise;
 pub mod page;
 pub mod plot;
+pub mod proposal;
 pub mod search_run;
 pub mod temperatures;
 pub mod thesis2021;

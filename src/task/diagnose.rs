@@ -3,15 +3,16 @@
 use std::path::Path;
 
 use crate::compare::suspicion;
+use crate::diagnose::discover::Allowed;
 use crate::diagnose::experiment::{Chamber, Experiment, design};
-use crate::diagnose::{self, Diagnosis, Verdict};
+use crate::diagnose::{self, Diagnosis, Terms, Verdict};
 use crate::effect;
 use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow, FindingJson};
 use crate::io::json::inputs::InputsJson;
 use crate::io::json::schedule::{RATE_DECIMALS, rounded};
 use crate::io::model::{ModelFile, NamedPattern};
 use crate::io::read::profile_file::print_profile;
-use crate::io::write::measurement_folder::{DIAGNOSIS_FILE, MeasurementFiles, before_and_after_name};
+use crate::io::write::measurement_folder::{DIAGNOSIS_FILE, MeasurementFiles, PROPOSED_FILE, before_and_after_name};
 use crate::io::write::model_edit::{Remark, with_effect};
 use crate::pattern::Pattern;
 use crate::predict::{noise_floor_rad_per_s, predict};
@@ -25,6 +26,7 @@ use crate::units::deg_per_h_from_rad_per_s;
 
 use super::measurement::Measurement;
 use super::page::{REPORT_FILE, write_report};
+use super::proposal::term_remarks;
 use super::{Observer, TaskError, pattern_or_own};
 
 /// What is to be diagnosed.
@@ -38,12 +40,14 @@ pub struct Request<'a> {
     pub holdout: &'a [Measurement],
     /// Whether to plan the experiment that would tell the candidates apart, and the seed it is drawn by.
     pub experiment_seed: Option<u64>,
+    /// Whether formulas are sought for what no listed effect explains, and among which.
+    pub terms: Terms<'a>,
 }
 
 impl<'a> Request<'a> {
     /// With the model's own pattern; no hold-out and no experiment.
     pub fn new(model: &'a ModelFile, measurements: &'a [Measurement]) -> Self {
-        Self { model, pattern: None, measurements, holdout: &[], experiment_seed: None }
+        Self { model, pattern: None, measurements, holdout: &[], experiment_seed: None, terms: Terms::All }
     }
 }
 
@@ -71,7 +75,16 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
         said.map(|m| m.record.clone()).collect()
     };
     let (records, holdout) = (taken(request.measurements), taken(request.holdout));
-    let asked = diagnose::Request { model: &file.model, pattern: &pattern, records: &records, holdout: &holdout };
+    if let Terms::Among(words) = request.terms {
+        check_terms(words, &records)?;
+    }
+    let asked = diagnose::Request {
+        model: &file.model,
+        pattern: &pattern,
+        records: &records,
+        holdout: &holdout,
+        terms: request.terms,
+    };
     let diagnosis = diagnose::diagnose(&asked, &|share| observer.at(share, ""))?;
     let all: Vec<&Record> = records.iter().chain(&holdout).collect();
     let seed = request.experiment_seed.filter(|_| !diagnosis.effects.is_empty());
@@ -86,6 +99,19 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
     let mut document = DiagnosisJson::new(&file.model.name, &diagnosis, holdout_noise, experiment.as_ref(), inputs);
     document.cautions.extend(suspicions(&file.model, &all, &diagnosis));
     Ok(Answer { document, diagnosis, experiment, pattern, records, holdout })
+}
+
+/// Words that are neither a form nor a variable of these records.
+fn check_terms(words: &[String], records: &[Record]) -> Result<(), TaskError> {
+    let names: Vec<String> = records.iter().flat_map(|r| r.channels().iter().map(|c| c.name.clone())).collect();
+    let known = Allowed::known(&names);
+    match words.iter().find(|word| !known.contains(word)) {
+        Some(word) => {
+            let message = format!("expected forms or variables among {}, found \"{word}\"", known.join(", "));
+            Err(TaskError::Option { option: "--terms", message })
+        }
+        None => Ok(()),
+    }
 }
 
 /// What the records and the fitted factors make one suspect.
@@ -130,6 +156,22 @@ impl Answer {
         Ok(Some(source))
     }
 
+    /// The model file with the listed effects and the proposed terms; none where nothing is proposed.
+    ///
+    /// # Errors
+    /// A text that is no model file.
+    pub fn proposed_source(&self, model: &ModelFile) -> Result<Option<String>, TaskError> {
+        let Some((proposal, shown)) = self.diagnosis.proposals.first().zip(self.document.proposals.first()) else {
+            return Ok(None);
+        };
+        let mut source = self.extended_source(model)?.unwrap_or_else(|| model.source.clone());
+        let name = model.path.display().to_string();
+        for (term, shown) in proposal.terms.iter().zip(&shown.terms) {
+            source = with_effect(&name, &source, &term.effect, &term_remarks(shown))?;
+        }
+        Ok(Some(source))
+    }
+
     /// The experiment as a file of profiles; none where there is none.
     pub fn experiment_source(&self, model: &ModelFile) -> Option<String> {
         let (found, shown) = self.experiment.as_ref().zip(self.document.experiment.as_ref())?;
@@ -148,8 +190,13 @@ impl Answer {
         files.add("noise.svg", noise_chart(&self.document).svg().as_bytes())?;
         if let Some(source) = self.extended_source(model)? {
             files.add("extended.toml", source.as_bytes())?;
+        }
+        if let Some(source) = self.proposed_source(model)? {
+            files.add(PROPOSED_FILE, source.as_bytes())?;
+        }
+        if let Some(after) = self.after() {
             for (index, record) in self.records.iter().chain(&self.holdout).enumerate() {
-                let rows = self.before_and_after(model, record)?;
+                let rows = self.before_and_after(model, after, record)?;
                 let noise = deg_per_h_from_rad_per_s(noise_floor_rad_per_s(record));
                 let chart = before_and_after_chart(&format!("Residual of {}", record.name()), &rows, noise);
                 files.table(&before_and_after_name(index + 1), &rows)?;
@@ -162,14 +209,25 @@ impl Answer {
         Ok(())
     }
 
-    /// What the declared and the extended model leave of a record.
-    fn before_and_after(&self, model: &ModelFile, record: &Record) -> Result<Vec<DiagnosisRow>, TaskError> {
+    /// The model with everything that was found; none where nothing was.
+    fn after(&self) -> Option<&CoilModel> {
+        let extended = Some(&self.diagnosis.extended).filter(|_| !self.document.effects.is_empty());
+        self.diagnosis.proposals.first().map(|p| &p.proposed).or(extended)
+    }
+
+    /// What the declared model and the one with everything that was found leave of a record.
+    fn before_and_after(
+        &self,
+        model: &ModelFile,
+        after: &CoilModel,
+        record: &Record,
+    ) -> Result<Vec<DiagnosisRow>, TaskError> {
         let left = |model: &CoilModel| -> Result<Vec<f64>, TaskError> {
             let predicted = predict(model, &self.pattern, record)?.rate_rad_per_s;
             let residuals = record.rate_rad_per_s().iter().zip(predicted);
             Ok(residuals.map(|(m, p)| rounded(deg_per_h_from_rad_per_s(m - p), RATE_DECIMALS)).collect())
         };
-        let (declared, extended) = (left(&model.model)?, left(&self.diagnosis.extended)?);
+        let (declared, extended) = (left(&model.model)?, left(after)?);
         let rows = record.times_s().iter().zip(declared).zip(extended);
         Ok(rows
             .map(|((&time_s, residual_declared_deg_per_h), residual_extended_deg_per_h)| DiagnosisRow {

@@ -2,7 +2,7 @@
 
 use crate::effect::FILM;
 use crate::io::json::search::OtherBoundaryJson;
-use crate::io::json::{EvaluateJson, PatternJson};
+use crate::io::json::{EvaluateJson, GuaranteedBesideJson, PatternJson};
 use crate::io::model::{Advice, ModelFile, NamedPattern};
 use crate::pattern::Pattern;
 use crate::profile::Profile;
@@ -40,7 +40,12 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
     advise(file, observer);
     let all = if request.patterns.is_empty() { own_and_classics(file) } else { request.patterns.to_vec() };
     let solved = SolvedProfiles::new(&file.model, &file.profiles.profiles())?;
-    let step = UnitStep::new(&file.model, file.profiles.max_rate_k_per_s);
+    let (guaranteed_model, left_out) = file.model.without_unguaranteed(file.profiles.max_rate_k_per_s);
+    let guaranteed_beside = GuaranteedBesideJson::all(&left_out);
+    for formula in &guaranteed_beside {
+        observer.note(&format!("note: {}", formula.in_words()));
+    }
+    let step = UnitStep::new(&guaranteed_model, file.profiles.max_rate_k_per_s);
     if let Err(reason @ GuaranteedError::Effect { .. }) = &step {
         observer.note(&format!("note: {reason}"));
     }
@@ -58,7 +63,7 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
         }
         let phase_rad = RateModel::new(&file.model, pattern, &[])?.phase_rad(worst.rate_rad_per_s);
         let bound = match &step {
-            Ok(step) => Some(step.guaranteed(&file.model, pattern)?),
+            Ok(step) => Some(step.guaranteed(&guaranteed_model, pattern)?),
             Err(_) => None,
         };
         let bound_rad_per_s = bound.as_ref().map(|b| b.rate_rad_per_s);
@@ -77,7 +82,7 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
         observer.note(&format!("note: {sentence}"));
     }
     let other_boundary = other.as_ref().map(OtherBoundaryJson::of);
-    let document = EvaluateJson { model: file.model.name.clone(), patterns, other_boundary };
+    let document = EvaluateJson { model: file.model.name.clone(), patterns, other_boundary, guaranteed_beside };
     Ok(Answer { document, extremes: step.map(|_| extremes) })
 }
 

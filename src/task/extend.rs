@@ -83,7 +83,9 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
         model.effects.push(wanted.clone());
         (Finding::unfitted(wanted.clone()), model)
     } else {
-        let asked = diagnose::Request { model: &file.model, pattern: &named.pattern, records: &records, holdout: &[] };
+        let terms = diagnose::Terms::None;
+        let asked =
+            diagnose::Request { model: &file.model, pattern: &named.pattern, records: &records, holdout: &[], terms };
         let extension = diagnose::extend(&asked, wanted)?;
         (extension.finding, extension.extended)
     };
@@ -116,11 +118,10 @@ pub fn effect_of(
     if kind == CUSTOM.kind {
         let Some(formula) = formula else { return Err(TaskError::FormulaMissing) };
         let names = parameters.iter().map(|(name, _)| name.clone()).collect();
-        let formula = Formula::new(formula, names).map_err(|error| {
-            let at = match &error {
-                FormulaError::Expression(error) => error.at(),
-                _ => None,
-            };
+        let layers = file.model.coil.layers();
+        let read = Formula::new(formula, names).and_then(|read| read.check_layers(layers).map(|()| read));
+        let formula = read.map_err(|error: FormulaError| {
+            let at = error.at();
             // At the end of the text there is no character to mark: the last one is.
             let at = at.map(|at| at.start.min(formula.len().saturating_sub(1))..at.end.min(formula.len()));
             Faults::one("--formula", formula, Fault::new(error.to_string(), at))

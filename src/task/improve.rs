@@ -226,6 +226,7 @@ impl Way<'_> {
             measurements: self.request.measurements,
             holdout: self.request.holdout,
             experiment_seed: Some(EXPERIMENT_SEED),
+            terms: crate::diagnose::Terms::All,
         };
         let found = diagnose::run(&request, &Quietly(self.observer))?;
         if let Some(experiment) = found.experiment_source(file) {

@@ -12,6 +12,7 @@ pub mod measurement;
 pub mod metrics;
 pub mod optimise;
 pub mod pareto;
+pub mod proposal;
 pub mod schedule;
 pub mod temperatures;
 pub mod tolerance;

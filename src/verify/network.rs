@@ -111,6 +111,12 @@ impl Network {
                 Link { rest, ..between(i as f64 + 0.5, count as f64) }
             });
         }
+        for &(above, conductance_w_per_m2_k) in &physics.gaps {
+            // The way that crosses the face between the layers.
+            let face = above * cells;
+            let crossing = physics.spool.iter().count() + face - 1;
+            links[crossing].rest += 1.0 / (conductance_w_per_m2_k * radius_m(face as f64));
+        }
         let axis = (!physics.flanges.is_empty()).then(|| {
             let slice_m = height_m / cut.slices as f64;
             Axis {

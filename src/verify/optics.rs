@@ -11,8 +11,7 @@
 use super::heat::State;
 use super::physics::{Bias, Physics};
 use crate::coil::Coil;
-use crate::effect::custom::VARIABLES;
-use crate::units::{REFERENCE_TEMPERATURE_K, celsius_from_kelvin, rad_per_s_from_deg_per_h};
+use crate::units::{REFERENCE_TEMPERATURE_K, celsius_from_kelvin, deg_per_h_from_rad_per_s, rad_per_s_from_deg_per_h};
 
 /// Layers with more turns are summed in so many pieces.
 const MOST_PIECES: f64 = 100_000.0;
@@ -96,6 +95,9 @@ impl Optics {
         for strength in &p.stress_strengths {
             kappa *= 1.0 + strength * self.stress[layer];
         }
+        for (_, change) in p.layer_changes.iter().filter(|(number, _)| *number == layer + 1) {
+            kappa += kappa * change;
+        }
         for slope in &p.path_slopes_per_k {
             kappa *= 1.0 + slope * rise_k;
         }
@@ -136,11 +138,12 @@ impl Optics {
         });
         let coil_rate = self.scale_per_m2 * (coil * gain + surplus.sum::<f64>());
         let mean_rise = mean(&state.rise_k);
-        coil_rate + self.physics.biases.iter().map(|b| bias_rad_per_s(b, state, mean_rise, mean_rate)).sum::<f64>()
+        let bias = |b: &Bias| bias_rad_per_s(b, state, mean_rise, mean_rate, coil_rate);
+        coil_rate + self.physics.biases.iter().map(bias).sum::<f64>()
     }
 }
 
-fn bias_rad_per_s(bias: &Bias, state: &State, mean_rise_k: f64, mean_rate_k_per_s: f64) -> f64 {
+fn bias_rad_per_s(bias: &Bias, state: &State, mean_rise_k: f64, mean_rate_k_per_s: f64, coil_rate: f64) -> f64 {
     let outer = state.rise_k.len() - 1;
     match bias {
         Bias::Temperature { linear_rad_per_s_k, quadratic_rad_per_s_k2 } => {
@@ -162,7 +165,9 @@ fn bias_rad_per_s(bias: &Bias, state: &State, mean_rise_k: f64, mean_rate_k_per_
                 "T_mean" => celsius(mean_rise_k),
                 "mean_rate" => mean_rate_k_per_s,
                 "T_ambient" => celsius(state.ambient_rise_k),
-                _ => state.ambient_rate_k_per_s,
+                "dT_ambient_dt" => state.ambient_rate_k_per_s,
+                "thermal_rate" => deg_per_h_from_rad_per_s(coil_rate),
+                of_layer => layer_value(of_layer, state, &celsius),
             };
             let arguments: Vec<f64> = formula
                 .expression()
@@ -170,13 +175,18 @@ fn bias_rad_per_s(bias: &Bias, state: &State, mean_rise_k: f64, mean_rate_k_per_
                 .iter()
                 .map(|v| match formula.parameters().iter().position(|p| *p == v.name) {
                     Some(i) => values[i],
-                    None => {
-                        debug_assert!(VARIABLES.contains(&v.name.as_str()));
-                        known(&v.name)
-                    }
+                    None => known(&v.name),
                 })
                 .collect();
             rad_per_s_from_deg_per_h(formula.expression().evaluate(&arguments))
         }
     }
+}
+
+/// `T_layer_K` or `dT_layer_K_dt`, the innermost layer being the first.
+fn layer_value(name: &str, state: &State, celsius: &dyn Fn(f64) -> f64) -> f64 {
+    let digits: String = name.chars().filter(char::is_ascii_digit).collect();
+    let layer = digits.parse::<usize>().unwrap_or(0).wrapping_sub(1);
+    let of = |values: &[f64]| values.get(layer).copied().unwrap_or(f64::NAN);
+    if name.starts_with('d') { of(&state.rate_k_per_s) } else { celsius(of(&state.rise_k)) }
 }

@@ -22,6 +22,10 @@ pub(super) struct Physics {
     pub bore_heat: Option<BoreHeat>,
     /// One, or one at either end.
     pub flanges: Vec<HeatedFlange>,
+    /// Layer below a gap, counted from 1 innermost, and conductance per area [W/(m²K)].
+    pub gaps: Vec<(usize, f64)>,
+    /// Layer, counted from 1 innermost, and relative change of its κ.
+    pub layer_changes: Vec<(usize, f64)>,
     pub conductivity_slope_per_k: f64,
     /// Missing on every second layer, the innermost being the first.
     pub missing_turns: f64,
@@ -96,6 +100,8 @@ impl Physics {
             spool: None,
             bore_heat: None,
             flanges: Vec::new(),
+            gaps: Vec::new(),
+            layer_changes: Vec::new(),
             conductivity_slope_per_k: 0.0,
             missing_turns: 0.0,
             path_factor: 1.0,
@@ -135,6 +141,8 @@ impl Physics {
                     p.flanges.push(HeatedFlange { is_first: choices == [0], film_w_per_m2_k });
                 }
                 (_, "conductivity_temperature", &[slope]) => p.conductivity_slope_per_k = slope,
+                (_, "layer_gap", &[above, conductance]) => p.gaps.push((above as usize, conductance)),
+                (_, "layer_gain", &[layer, change]) => p.layer_changes.push((layer as usize, change)),
                 (_, "stress_gradient", &[strength]) => p.stress_strengths.push(strength),
                 (_, "strain_mismatch", &[relative]) => p.mismatches.push(Mismatch { relative, below: None }),
                 (_, "glass_transition", &[relative, middle_k, width_k]) => {

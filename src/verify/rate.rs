@@ -38,6 +38,10 @@ const TIME_PARTS: i32 = 5;
 
 pub(super) fn check(truth: &Truth, claim: &Claim, segments: &[usize], findings: &mut Findings) -> RateCheck {
     let Some(claimed) = claim.worst_rate_rad_per_s else { return RateCheck::None };
+    // What a formula remembers is not worked out a second time: the rate error then stands as it is given.
+    if truth.model.remembers() {
+        return RateCheck::None;
+    }
     let physics = match Physics::read(truth.model) {
         Ok(physics) => physics,
         Err(kind) => {

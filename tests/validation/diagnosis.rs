@@ -3,7 +3,7 @@
 //! Tolerance: the effects themselves or a set of at most three that holds them, hold-out error within 10 % of the noise
 //! floor, parameters within three of their standard errors.
 
-use coilwright::diagnose::{Caution, Diagnosis, Request, Verdict, diagnose};
+use coilwright::diagnose::{Caution, Diagnosis, Request, Terms, Verdict, diagnose};
 use coilwright::pattern::classic::Classic;
 
 use crate::records::{model, record};
@@ -12,7 +12,8 @@ fn diagnosed(name: &str) -> Diagnosis {
     let file = model(name);
     let pattern = file.pattern.unwrap().pattern;
     let (fitted, holdout) = ([record(name, "calibration.csv")], [record(name, "validation.csv")]);
-    let request = Request { model: &file.model, pattern: &pattern, records: &fitted, holdout: &holdout };
+    let terms = Terms::default();
+    let request = Request { model: &file.model, pattern: &pattern, records: &fitted, holdout: &holdout, terms };
     diagnose(&request, &|_| ()).unwrap()
 }
 
@@ -58,7 +59,8 @@ fn a_model_file_that_declares_another_winding_is_told_which_one_explains_the_rec
     let file = model("a-control");
     let declared = Classic::Qua.pattern(file.model.coil.layers()).unwrap();
     let fitted = [record("a-control", "calibration.csv")];
-    let request = Request { model: &file.model, pattern: &declared, records: &fitted, holdout: &[] };
+    let terms = Terms::default();
+    let request = Request { model: &file.model, pattern: &declared, records: &fitted, holdout: &[], terms };
     let found = diagnose(&request, &|_| ()).unwrap();
     println!("{:?} {:?}", found.verdict, found.cautions);
     assert!(found.cautions.contains(&Caution::OtherWinding { winding: "dip" }));

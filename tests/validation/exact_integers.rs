@@ -110,5 +110,6 @@ fn state_of<'a>(temperatures_k: &'a [f64], rates_k_per_s: &'a [f64]) -> PackStat
         ambient_k: 293.15,
         ambient_rate_k_per_s: 0.0,
         channels: &[],
+        thermal_rate_rad_per_s: 0.0,
     }
 }

@@ -106,7 +106,7 @@ impl Explanation {
 }
 
 /// What an explanation with one more member assumes, its values as given for an effect.
-pub(super) fn with(
+pub(in crate::diagnose) fn with(
     question: &Question,
     windings: &[Winding],
     from: &Fit,
@@ -146,7 +146,7 @@ pub(super) fn with(
 }
 
 /// The assumption of an explanation without one of its members.
-pub(super) fn without(question: &Question, from: &Explanation, place: usize) -> (Assumption, Vec<Free>) {
+pub(in crate::diagnose) fn without(question: &Question, from: &Explanation, place: usize) -> (Assumption, Vec<Free>) {
     let (mut assumed, mut free) = (from.fit.assumed.clone(), from.fit.free.clone());
     let declared = question.model.effects.len();
     match from.members[place] {
@@ -188,7 +188,7 @@ fn step(question: &Question, record: usize, row: usize) -> Input {
 }
 
 /// Fits a set.
-pub(super) fn fitted(
+pub(in crate::diagnose) fn fitted(
     question: &Question,
     windings: &[Winding],
     members: Vec<Member>,

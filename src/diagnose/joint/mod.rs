@@ -19,6 +19,9 @@ use crate::diagnose::candidate::Candidate;
 use crate::pattern::Pattern;
 
 pub use explanation::{Explanation, Member};
+pub(in crate::diagnose) use explanation::{fitted, with, without};
+pub(in crate::diagnose) use odds::EFFECT;
+pub(in crate::diagnose) use search::{Proposal, proposals};
 pub use search::{promise, refit_without, search, settle_one};
 pub use winding::Winding;
 
@@ -53,9 +56,9 @@ impl Found {
     }
 }
 
-pub(super) type Outcome<T> = Result<T, ChamberError>;
+pub(in crate::diagnose) type Outcome<T> = Result<T, ChamberError>;
 
 /// Rates that a fit has seen.
-pub(super) fn rates(chamber: &Chamber, fit: &Fit) -> usize {
+pub(in crate::diagnose) fn rates(chamber: &Chamber, fit: &Fit) -> usize {
     fit.records.iter().map(|&r| chamber.times_s(r).len()).sum::<usize>().max(2)
 }

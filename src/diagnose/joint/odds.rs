@@ -4,7 +4,7 @@
 
 /// A natural logarithm of prior odds, with its reason.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Odds {
+pub(in crate::diagnose) struct Odds {
     pub name: &'static str,
     pub log: f64,
     pub reason: &'static str,
@@ -14,7 +14,8 @@ const fn odds(name: &'static str, log: f64, reason: &'static str) -> Odds {
     Odds { name, log, reason }
 }
 
-pub(super) const EFFECT: Odds = odds("effect", -3.0, "one effect of the catalogue is missing in one coil of twenty");
+pub(in crate::diagnose) const EFFECT: Odds =
+    odds("effect", -3.0, "one effect of the catalogue is missing in one coil of twenty");
 pub(super) const REFITTED: Odds = odds("refitted", -2.3, "a number of a model file is wrong in one of ten");
 pub(super) const WINDING: Odds =
     odds("winding", -3.9, "one coil in fifty is wound, or connected, as another classic or the other way round");

@@ -97,14 +97,14 @@ fn keep(cache: &mut Cache, explanation: Explanation) {
 
 /// One more member, where its fit begins, and what the score test promises.
 #[derive(Debug, Clone)]
-struct Proposal {
-    member: Member,
-    values: Option<Vec<f64>>,
-    gain: f64,
+pub(in crate::diagnose) struct Proposal {
+    pub member: Member,
+    pub values: Option<Vec<f64>>,
+    pub gain: f64,
 }
 
 /// The score test of every candidate from each of its starts.
-fn proposals(question: &Question, best: &Explanation) -> Outcome<Vec<Proposal>> {
+pub(in crate::diagnose) fn proposals(question: &Question, best: &Explanation) -> Outcome<Vec<Proposal>> {
     let mut asked: Vec<(usize, Vec<f64>)> = Vec::new();
     for (place, candidate) in question.candidates.iter().enumerate() {
         let there = best.members.iter().any(|m| match m {
@@ -112,9 +112,7 @@ fn proposals(question: &Question, best: &Explanation) -> Outcome<Vec<Proposal>> 
             _ => false,
         });
         // With a default a parameter joins only once the effect is there.
-        let fuller = question.candidates[..place]
-            .iter()
-            .any(|c| c.kind() == candidate.kind() && c.effect.choices() == candidate.effect.choices());
+        let fuller = question.candidates[..place].iter().any(|c| candidate.is_fuller_than(c));
         if !there && !fuller {
             asked.extend(candidate.starts.iter().map(|start| (place, start.clone())));
         }
@@ -136,7 +134,22 @@ fn proposals(question: &Question, best: &Explanation) -> Outcome<Vec<Proposal>> 
         let values = scaled(effect, &question.candidates[*place].free, start, amplitude);
         all.push(Proposal { member: Member::Effect(*place), values: Some(values), gain });
     }
-    Ok(all)
+    Ok(best_layers(question, all))
+}
+
+/// Of what every layer has a candidate for, only the layer that promises most: its neighbours look alike.
+fn best_layers(question: &Question, proposals: Vec<Proposal>) -> Vec<Proposal> {
+    let candidate = |p: &Proposal| match p.member {
+        Member::Effect(place) => Some(&question.candidates[place]).filter(|c| c.is_of_layer()),
+        _ => None,
+    };
+    let outdone = |p: &Proposal| {
+        candidate(p).is_some_and(|own| {
+            proposals.iter().any(|o| candidate(o).is_some_and(|c| c.kind() == own.kind()) && o.gain > p.gain)
+        })
+    };
+    let kept: Vec<bool> = proposals.iter().map(|p| !outdone(p)).collect();
+    proposals.into_iter().zip(kept).filter_map(|(p, keep)| keep.then_some(p)).collect()
 }
 
 /// Multiples of a start that a score test may look for: either sign where the parameter has both.
@@ -362,11 +375,13 @@ fn complete(question: &Question, windings: &[Winding], best: &Explanation, cache
         let mut rest_fit = best.fit.clone();
         (rest_fit.assumed, rest_fit.free) = (rest.0.clone(), rest.1.clone());
         for (other, candidate) in question.candidates.iter().enumerate() {
-            let fuller = other != *own
-                && candidate.kind() == question.candidates[*own].kind()
-                && candidate.effect.choices() == question.candidates[*own].effect.choices();
-            if fuller {
-                let values = best.effects(question).iter().find(|e| e.0 == *own).map(|e| e.1.values().to_vec());
+            let own_candidate = &question.candidates[*own];
+            if candidate.is_fuller_than(own_candidate) || candidate.is_next_to(own_candidate) {
+                let values = if candidate.is_of_layer() {
+                    None
+                } else {
+                    best.effects(question).iter().find(|e| e.0 == *own).map(|e| e.1.values().to_vec())
+                };
                 let mut members = best.members.clone();
                 members.remove(place);
                 members.push(Member::Effect(other));

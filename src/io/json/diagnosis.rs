@@ -17,6 +17,7 @@ use super::comparison::CompareJson;
 use super::experiment::ExperimentJson;
 use super::inputs::InputsJson;
 pub use super::noise::{NoiseJson, RemedyJson};
+use super::proposals::ProposalJson;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DiagnosisJson {
@@ -48,6 +49,9 @@ pub struct DiagnosisJson {
     /// White noise, wander and unresolved air of each record, fitted ones first.
     #[serde(default)]
     pub noise: Vec<NoiseJson>,
+    /// Formulas for what no listed effect explains, best first.
+    #[serde(default)]
+    pub proposals: Vec<ProposalJson>,
     pub inputs: InputsJson,
 }
 
@@ -243,6 +247,7 @@ impl DiagnosisJson {
             refitted: diagnosis.refitted.iter().map(RefittedJson::new).collect(),
             hypothesis: diagnosis.hypothesis.as_ref().map(HypothesisJson::new),
             noise: diagnosis.noise.iter().map(NoiseJson::new).collect(),
+            proposals: diagnosis.proposals.iter().map(ProposalJson::new).collect(),
             inputs,
         };
         document.ladder_in_words = document.steps_in_words();

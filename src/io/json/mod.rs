@@ -10,6 +10,7 @@ pub mod inputs;
 pub mod metrics;
 pub mod noise;
 pub mod pareto;
+pub mod proposals;
 pub mod schedule;
 pub mod schema;
 pub mod search;
@@ -135,6 +136,41 @@ pub struct EvaluateJson {
     pub patterns: Vec<PatternJson>,
     /// Null for a half space.
     pub other_boundary: Option<search::OtherBoundaryJson>,
+    /// Formulas that the guaranteed rates leave out, which no pattern changes.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub guaranteed_beside: Vec<GuaranteedBesideJson>,
+}
+
+/// A formula that no guaranteed worst case holds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GuaranteedBesideJson {
+    pub formula: String,
+    /// By how much it can change the rate beside the guaranteed one; null where nothing bounds it.
+    pub at_most_deg_per_h: Option<f64>,
+}
+
+impl GuaranteedBesideJson {
+    /// Formulas with their largest sizes [rad/s].
+    pub fn all(left_out: &[(String, f64)]) -> Vec<Self> {
+        let one = |(formula, bound): &(String, f64)| Self {
+            formula: formula.clone(),
+            at_most_deg_per_h: bound.is_finite().then(|| deg_per_h_from_rad_per_s(*bound)),
+        };
+        left_out.iter().map(one).collect()
+    }
+
+    pub fn in_words(&self) -> String {
+        match self.at_most_deg_per_h {
+            Some(bound) => format!(
+                "the guaranteed rates leave out the formula \"{}\", which adds at most {bound:.4} °/h whatever the winding",
+                self.formula
+            ),
+            None => format!(
+                "the guaranteed rates leave out the formula \"{}\": nothing bounds it over all profiles",
+                self.formula
+            ),
+        }
+    }
 }
 
 /// What was proved about the best pattern.

@@ -8,6 +8,7 @@ use crate::effect::{CATALOGUE, CHANNEL, CUSTOM, EffectSpec};
 use crate::pattern::classic::Classic;
 use crate::search::cost::objective::Objective;
 use crate::text::{MOST_NAME_CHARACTERS, NAME_PATTERN, NAME_RULE};
+use crate::units::Unit;
 
 use super::SCHEMA_VERSION;
 use super::schedule::STEP_COLUMNS;
@@ -214,7 +215,8 @@ fn effect_schema(spec: &EffectSpec) -> Value {
     let mut needed = vec!["kind"];
     for p in spec.parameters {
         let description = format!("{} [{}]", p.meaning, p.unit.symbol());
-        let number = json!({ "type": "number", "minimum": p.lower, "maximum": p.upper, "description": description });
+        let number = if p.unit == Unit::Layer { "integer" } else { "number" };
+        let number = json!({ "type": number, "minimum": p.lower, "maximum": p.upper, "description": description });
         properties.insert(p.key.to_owned(), number);
         if p.default.is_none() {
             needed.push(p.key);

@@ -151,8 +151,7 @@ fn read_custom(r: &mut TomlReader, table: &mut TableReader) -> Option<DeclaredEf
 /// The character of the source at which a formula goes wrong: its place in the string, behind the opening quote.
 fn formula_place(error: &FormulaError, string: Option<Range<usize>>) -> Option<Range<usize>> {
     let string = string?;
-    let FormulaError::Expression(error) = error else { return Some(string) };
-    let at = error.at()?;
+    let Some(at) = error.at() else { return Some(string) };
     let start = (string.start + 1 + at.start).min(string.end.saturating_sub(1));
     Some(start..(string.start + 1 + at.end).clamp(start, string.end))
 }

@@ -13,6 +13,7 @@ pub mod posterior;
 mod production_table;
 pub mod profile_file;
 mod profile_tables;
+pub mod proposal_file;
 pub mod record_columns;
 pub mod record_file;
 pub mod record_rows;

@@ -6,7 +6,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use crate::coil::{Coil, CoilError, CoilSpec, Fibre, LayerLength};
-use crate::effect::{self, DeclaredEffect};
+use crate::effect::{self, DeclaredEffect, Subject};
 use crate::io::fault::{Fault, Faults};
 use crate::io::files::read_text;
 use crate::io::model::{Advice, ModelFile, NamedPattern, SearchSettings};
@@ -107,6 +107,7 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
     })();
     if let Some(model) = &whole {
         check_whole(r, model, thermal_span);
+        check_layers(r, model, source);
         if let Some(message) = too_many_ramps(&profiles, model.coil.layers()) {
             r.fault(Fault::new(message, span_in(source, "count").or_else(|| span_in(source, "segments"))));
         }
@@ -370,6 +371,22 @@ fn check_whole(r: &mut TomlReader, model: &CoilModel, thermal_span: Option<Range
             if let Err(error) = thermal::check(&path) {
                 r.fault(Fault::new(error.to_string(), thermal_span));
             }
+        }
+    }
+}
+
+/// Effects and formulas that name a layer which the coil lacks.
+fn check_layers(r: &mut TomlReader, model: &CoilModel, source: &str) {
+    let layers = model.coil.layers();
+    for effect in &model.effects {
+        if let Err(error) = effect.check_layers(layers) {
+            let key = effect.spec().parameters.first().map_or("kind", |p| p.key);
+            r.fault(Fault::new(error.to_string(), span_in(source, key)));
+        }
+        if let Subject::Formula(formula) = effect.subject()
+            && let Err(error) = formula.check_layers(layers)
+        {
+            r.fault(Fault::new(format!("effect.formula: {error}"), span_in(source, "formula")));
         }
     }
 }

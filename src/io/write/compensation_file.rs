@@ -6,6 +6,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use serde::Serialize;
 
 use crate::compensate::Compensator;
+use crate::compensate::formulas::Columns;
 use crate::compensate::stream::{Compensated, Flag, Reading, Stream};
 use crate::io::fault::Faults;
 use crate::io::json::metrics::{GrossErrors, RecordMetricsJson};
@@ -174,6 +175,7 @@ fn reading<'r>(
         temperature_k: None,
         inner_k: None,
         channel_rad_per_s: Some(0.0),
+        columns: Columns::default(),
         rate_rad_per_s: None,
     };
     let mut count = 0;
@@ -197,6 +199,9 @@ fn reading<'r>(
     }
     if let Compensator::Physical(physical) = compensator {
         found.channel_rad_per_s = physical.channel_bias_rad_per_s(places.channels.iter().map(|c| channels[*c]));
+        // The columns of formulas stand behind those of the channels' own effects.
+        let of_formulas = places.channels.iter().skip(physical.channel_names().count());
+        found.columns.iter_mut().zip(of_formulas).for_each(|(value, c)| *value = channels[*c]);
     }
     (count == places.count).then_some(found)
 }

@@ -1,5 +1,6 @@
 //! The physical compensator for an embedded target: coefficients as JSON and as a C header that needs nothing else.
 
+use super::formulas_in_c::FormulasInC;
 use serde::Serialize;
 
 use crate::compensate::filter::{BREAK_PROBABILITY, FORGOTTEN_ROWS, Filter, Gains, LEAST_LOG_WEIGHT};
@@ -32,6 +33,11 @@ pub struct DifferenceEquation {
     pub forgotten_rows: usize,
     /// By rows since the last break; the last ones are for long ago.
     pub gains: Vec<GainsJson>,
+    /// What is added to the rate error by the model's formulas [°/h], with the values of their parameters in their place.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub formulas: Vec<String>,
+    #[serde(skip)]
+    formulas_in_c: Option<FormulasInC>,
 }
 
 /// Gains of one age.
@@ -82,7 +88,10 @@ impl DifferenceEquation {
         if most_hypotheses > 1 {
             equations.extend(BRANCHES);
         }
+        let formulas_in_c = physical.formulas(interval_s).map(|(formulas, work)| FormulasInC::new(formulas, &work));
         Some(Self {
+            formulas: formulas_in_c.as_ref().map_or_else(Vec::new, |f| f.stated.clone()),
+            formulas_in_c,
             model: model.to_owned(),
             equations,
             interval_s,
@@ -110,7 +119,7 @@ impl DifferenceEquation {
         let factors: Vec<f64> = variances.iter().map(|v| -0.5 * v.ln()).collect();
         let starts: Vec<String> =
             self.level_states.iter().map(|i| format!("    s->h[0].v[{i}] = temperature_c;")).collect();
-        filled(
+        let header = filled(
             HEADER,
             &[
                 ("name", CComment::of(&self.model).into_string()),
@@ -132,12 +141,16 @@ impl DifferenceEquation {
                 ("least", format!("{:.17e}", self.least_log_weight)),
                 ("starts", starts.join("\n")),
             ],
-        )
+        );
+        match &self.formulas_in_c {
+            Some(formulas) => formulas.added_to(&header),
+            None => header,
+        }
     }
 }
 
 /// The template with every `@key@` replaced, in one pass: what a value holds is not looked at again.
-fn filled(template: &str, values: &[(&str, String)]) -> String {
+pub(super) fn filled(template: &str, values: &[(&str, String)]) -> String {
     let mut out = String::with_capacity(2 * template.len());
     let mut parts = template.split('@');
     out.push_str(parts.next().unwrap_or_default());

@@ -22,6 +22,8 @@ use crate::io::table::{rows_as_csv, rows_of_csv};
 pub const COMPARISON_FILE: &str = "comparison.json";
 pub const DIAGNOSIS_FILE: &str = "diagnosis.json";
 pub const METRICS_FILE: &str = "metrics.json";
+/// The model with the listed effects and the proposed terms.
+pub const PROPOSED_FILE: &str = "proposed.toml";
 /// A copy of the model file that was asked about.
 pub const MODEL_FILE: &str = "model.toml";
 
@@ -71,7 +73,8 @@ pub fn read_measurements(folder: &Path) -> Result<Measurements, Faults> {
     let diagnosis = match read_document::<DiagnosisJson>(folder, DIAGNOSIS_FILE, "diagnosis")? {
         None => None,
         Some(document) => {
-            let count = if document.effects.is_empty() { 0 } else { document.inputs.records.len() };
+            let without = document.effects.is_empty() && document.proposals.is_empty();
+            let count = if without { 0 } else { document.inputs.records.len() };
             let tables = (1..=count)
                 .map(|number| read_table(&folder.join(before_and_after_name(number))))
                 .collect::<Result<_, _>>()?;
@@ -109,7 +112,15 @@ const KINDS: [&[&str]; 3] = [
         "record-#-states.svg",
         "record-#-autocorrelation.svg",
     ],
-    &[DIAGNOSIS_FILE, "ladder.svg", "noise.svg", "extended.toml", "before-after-#.csv", "before-after-#.svg"],
+    &[
+        DIAGNOSIS_FILE,
+        "ladder.svg",
+        "noise.svg",
+        "extended.toml",
+        "proposed.toml",
+        "before-after-#.csv",
+        "before-after-#.svg",
+    ],
     &[METRICS_FILE, "allan-#.svg"],
 ];
 const OF_ALL: [&str; 2] = [MODEL_FILE, "report.html"];

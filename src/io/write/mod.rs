@@ -6,6 +6,7 @@ pub mod checkpoint;
 pub mod comparison_rows;
 pub mod compensation_file;
 pub mod difference_equation;
+mod formulas_in_c;
 pub mod machine_program;
 pub mod measurement_folder;
 pub mod model_edit;

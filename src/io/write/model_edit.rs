@@ -122,7 +122,10 @@ fn declare(table: &mut Table, effect: &DeclaredEffect, remarks: &[Remark]) {
         return;
     }
     for (key, number) in &stated {
-        table[key] = value(*number);
+        // A layer is a number to count by.
+        let whole =
+            effect.layer().is_some_and(|layer| *number == layer as f64 && effect.spec().parameters[0].key == key);
+        table[key] = if whole { value(*number as i64) } else { value(*number) };
         remark(table, key, remarks);
     }
     for (choice, &index) in effect.spec().choices.iter().zip(effect.choices()) {

@@ -217,7 +217,8 @@ impl Compared {
             .filter(|(_, worst)| **worst >= CONTENDER * largest)
             .map(|(index, worst)| {
                 let again = self.solved[index].get_or_init(|| {
-                    SolvedProfile::new(self.profiles[index].clone(), 0, &path).map_err(SearchError::from)
+                    SolvedProfile::new(self.profiles[index].clone(), 0, &path, rate_model.remembers())
+                        .map_err(SearchError::from)
                 });
                 let again = again.as_ref().map_err(Clone::clone)?;
                 Ok((again.worst(&rate_model).0.abs() - worst).abs())

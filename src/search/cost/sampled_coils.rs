@@ -355,7 +355,10 @@ impl SampledCoil {
         let path = model.heat_path()?;
         let mut responses = Vec::new();
         for (profile, instants) in profiles.profiles().iter().zip(instants) {
-            if !instants.is_empty() {
+            if model.remembers() && !instants.is_empty() {
+                let solved = SolvedProfiles::new(model, std::slice::from_ref(profile))?;
+                responses.extend(instants.iter().map(|&i| solved.profiles()[0].response_at(&rate_model, i)));
+            } else if !instants.is_empty() {
                 let history =
                     solve(&path, &Drive::boundary(profile.temperature(REFERENCE_TEMPERATURE_K)))?.at(instants);
                 let rows = 0..history.len();

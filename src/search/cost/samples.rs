@@ -96,14 +96,8 @@ impl SampleMatrix {
     /// Effects that leave a layer no turns.
     pub fn of_profiles(model: &CoilModel, solved: &SolvedProfiles) -> Result<(Self, Vec<Origin>), SearchError> {
         let rate_model = any_rate_model(model)?;
-        let responses: Vec<WeightResponse> = solved
-            .profiles()
-            .par_iter()
-            .flat_map_iter(|profile| {
-                (0..profile.history.len())
-                    .map(|row| rate_model.weight_response(&rate_model.state(&profile.history, row, &[])))
-            })
-            .collect();
+        let responses: Vec<WeightResponse> =
+            solved.profiles().par_iter().flat_map_iter(|profile| profile.responses(&rate_model)).collect();
         let origins = solved
             .profiles()
             .iter()
@@ -113,6 +107,9 @@ impl SampleMatrix {
             })
             .collect::<Vec<Origin>>();
         if let Some((_, origin)) = responses.iter().zip(&origins).find(|(response, _)| !is_finite(response)) {
+            if let Some(fault) = solved.profiles()[origin.profile].fault(&rate_model) {
+                return Err(fault.into());
+            }
             let profile = solved.profiles()[origin.profile].profile.name().to_owned();
             return Err(SearchError::NotFinite { profile, time_s: origin.instant.time_s });
         }
@@ -289,7 +286,9 @@ fn is_finite(response: &WeightResponse) -> bool {
 /// A rate model with a pattern that does not matter, to ask for responses.
 pub fn any_rate_model(model: &CoilModel) -> Result<RateModel, SearchError> {
     let pattern = Classic::Zyl.pattern(model.coil.layers()).expect("every even layer count has a cylindrical winding");
-    Ok(RateModel::new(model, &pattern, &[])?)
+    let rate_model = RateModel::new(model, &pattern, &[])?;
+    rate_model.check_searchable()?;
+    Ok(rate_model)
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ use crate::numeric::maximise::golden_section;
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::profile::{Piece, Profile};
-use crate::rate::{CoilModel, RateError, RateModel};
+use crate::rate::{CoilModel, Past, RateError, RateModel, WeightResponse};
 use crate::thermal::{Drive, Field, HeatPath, Instant, StepResponse, ThermalError, ThermalHistory, solve};
 use crate::units::{REFERENCE_TEMPERATURE_K, RotationRate};
 
@@ -54,6 +54,8 @@ pub struct SolvedProfile {
     pub pieces: Vec<Vec<Instant>>,
     /// The field at all of them, in order.
     pub history: ThermalHistory,
+    /// What came before the first of them, where something remembers it; empty elsewhere.
+    lead: ThermalHistory,
 }
 
 /// Where and how large the rate error of a pattern is largest.
@@ -76,9 +78,13 @@ impl std::fmt::Display for WorstCase {
 /// Points a piece: close to its start, where layers respond one after the other, and then wider apart.
 const POINTS_PER_PIECE: usize = 96;
 
+/// Where an effect remembers, instants are no wider apart than this share of a piece: between them what it follows counts as
+/// straight.
+const REMEMBERED_SHARE: f64 = 1.0 / 400.0;
+
 /// From just after a piece's start to just before its end; the spacing grows geometrically from a tenth of the
 /// fastest response so that every layer's onset is seen.
-fn instants_of_piece(start_s: f64, end_s: f64, path: &HeatPath) -> Vec<Instant> {
+fn instants_of_piece(start_s: f64, end_s: f64, path: &HeatPath, remembers: bool) -> Vec<Instant> {
     let duration_s = end_s - start_s;
     let first_s =
         (0.1 * path.shape.radial_pitch_m.powi(2) / (4.0 * path.material.diffusivity_m2_per_s())).min(0.01 * duration_s);
@@ -86,6 +92,17 @@ fn instants_of_piece(start_s: f64, end_s: f64, path: &HeatPath) -> Vec<Instant> 
     let mut instants = vec![Instant::after(start_s)];
     instants.extend((0..POINTS_PER_PIECE - 1).map(|i| Instant::after(start_s + first_s * ratio.powi(i as i32))));
     instants.push(Instant::before(end_s));
+    if remembers {
+        let widest_s = REMEMBERED_SHARE * duration_s;
+        let mut filled = vec![instants[0]];
+        for pair in instants.windows(2) {
+            let parts = ((pair[1].time_s - pair[0].time_s) / widest_s).ceil().max(1.0);
+            let within = |i: usize| pair[0].time_s + (pair[1].time_s - pair[0].time_s) * i as f64 / parts;
+            filled.extend((1..parts as usize).map(|i| Instant::after(within(i))));
+            filled.push(pair[1]);
+        }
+        return filled;
+    }
     instants
 }
 
@@ -96,8 +113,8 @@ impl SolvedProfiles {
         if profiles.is_empty() {
             return Err(SearchError::NoProfiles);
         }
-        let path = model.heat_path()?;
-        let profiles = profiles.par_iter().map(|p| SolvedProfile::new(p.clone(), 0, &path));
+        let (path, remembers) = (model.heat_path()?, model.remembers());
+        let profiles = profiles.par_iter().map(|p| SolvedProfile::new(p.clone(), 0, &path, remembers));
         Ok(Self { profiles: profiles.collect::<Result<_, ThermalError>>()? })
     }
 
@@ -107,7 +124,7 @@ impl SolvedProfiles {
     /// # Errors
     /// A heat path that cannot be solved.
     pub fn after_the_ends(model: &CoilModel, profiles: &[Profile]) -> Result<Option<Self>, SearchError> {
-        let path = model.heat_path()?;
+        let (path, remembers) = (model.heat_path()?, model.remembers());
         let settling_s = settling_s(&path)?;
         let soaked: Vec<SolvedProfile> = profiles
             .par_iter()
@@ -118,7 +135,7 @@ impl SolvedProfiles {
                 let pieces = profile.pieces().iter().copied().chain([soak]).collect();
                 (!settles).then(|| {
                     let longer = Profile::new(profile.name(), pieces).expect("a soak of a positive duration");
-                    SolvedProfile::new(longer, profile.pieces().len(), &path)
+                    SolvedProfile::new(longer, profile.pieces().len(), &path, remembers)
                 })
             })
             .collect::<Result<_, ThermalError>>()?;
@@ -135,6 +152,11 @@ impl SolvedProfiles {
     /// A pattern of another layer count.
     pub fn worst_case(&self, model: &CoilModel, pattern: &Pattern) -> Result<WorstCase, SearchError> {
         let rate_model = RateModel::new(model, pattern, &[])?;
+        if rate_model.has_formulas()
+            && let Some(fault) = self.profiles.iter().find_map(|p| p.fault(&rate_model))
+        {
+            return Err(fault.into());
+        }
         let candidates: Vec<WorstCase> = self
             .profiles
             .par_iter()
@@ -168,22 +190,78 @@ fn settling_s(path: &HeatPath) -> Result<f64, ThermalError> {
 }
 
 impl SolvedProfile {
-    /// Sampled from a piece on.
-    pub(super) fn new(profile: Profile, first_piece: usize, path: &HeatPath) -> Result<Self, ThermalError> {
+    /// Sampled from a piece on; with what came before it, where that is remembered.
+    pub(super) fn new(
+        profile: Profile,
+        first_piece: usize,
+        path: &HeatPath,
+        remembers: bool,
+    ) -> Result<Self, ThermalError> {
         let drive = Drive::boundary(profile.temperature(REFERENCE_TEMPERATURE_K));
         let field = solve(path, &drive)?;
-        let pieces: Vec<Vec<Instant>> = drive.boundary_k.knots()[first_piece..]
+        let knots = drive.boundary_k.knots();
+        let of = |knots: &[f64]| instants_of_piece(knots[0], knots[1], path, remembers);
+        let pieces: Vec<Vec<Instant>> = knots[first_piece..]
             .windows(2)
-            .map(|knots| instants_of_piece(knots[0], knots[1], path))
+            .map(of)
             .chain(std::iter::once(vec![Instant::after(profile.duration_s())]))
             .collect();
         let history = field.at(&pieces.concat());
-        Ok(Self { profile, field, pieces, history })
+        let before: Vec<Instant> =
+            if remembers { knots[..=first_piece].windows(2).flat_map(of).collect() } else { Vec::new() };
+        let lead = field.at(&before);
+        Ok(Self { profile, field, pieces, history, lead })
+    }
+
+    /// What is remembered where the samples begin.
+    pub(in crate::search) fn past(&self, rate_model: &RateModel) -> Past {
+        let mut past = Past::default();
+        if rate_model.remembers() {
+            rate_model.series_after(&self.lead, &mut past);
+        }
+        past
+    }
+
+    /// The coefficients of the layer weights at any instant, with all that was before it.
+    pub(in crate::search) fn response_at(&self, rate_model: &RateModel, instant: Instant) -> WeightResponse {
+        let mut past = self.past(rate_model);
+        if rate_model.remembers() {
+            let before = self.history.times_s.partition_point(|t| *t < instant.time_s);
+            for row in 0..before {
+                rate_model.rate_error_after(&rate_model.state(&self.history, row, &[]), &mut past);
+            }
+        }
+        let history = self.field.at(&[instant]);
+        rate_model.weight_response_after(&rate_model.state(&history, 0, &[]), &mut past)
+    }
+
+    /// The coefficients at every sample.
+    pub(in crate::search) fn responses(&self, rate_model: &RateModel) -> Vec<WeightResponse> {
+        let mut past = self.past(rate_model);
+        let state = |row: usize| rate_model.state(&self.history, row, &[]);
+        (0..self.history.len()).map(|row| rate_model.weight_response_after(&state(row), &mut past)).collect()
+    }
+
+    /// Why there is no rate at some sample, if a formula is why.
+    pub(in crate::search) fn fault(&self, rate_model: &RateModel) -> Option<RateError> {
+        let mut past = self.past(rate_model);
+        (0..self.history.len())
+            .find_map(|row| rate_model.checked_after(&rate_model.state(&self.history, row, &[]), &mut past).err())
     }
 
     /// The rate error with its sign and the time at which its size is largest.
     pub(in crate::search) fn worst(&self, rate_model: &RateModel) -> (f64, f64) {
-        let series = rate_model.series_rad_per_s(&self.history);
+        let mut past = self.past(rate_model);
+        let mut pasts = Vec::new();
+        let series: Vec<f64> = (0..self.history.len())
+            .map(|row| {
+                let rate = rate_model.rate_error_after(&rate_model.state(&self.history, row, &[]), &mut past);
+                if rate_model.remembers() {
+                    pasts.push(past.clone());
+                }
+                rate
+            })
+            .collect();
         let largest = series.iter().map(|r| r.abs()).fold(0.0, f64::max);
         let (mut best_rate, mut best_time_s) = (0.0_f64, 0.0);
         let mut offset = 0;
@@ -198,7 +276,8 @@ impl SolvedProfile {
                 if is_peak && size(i) > 0.9 * largest {
                     let rate_at = |time_s: f64| {
                         let history = self.field.at(&[Instant::after(time_s)]);
-                        rate_model.rate_error_rad_per_s(&rate_model.state(&history, 0, &[]))
+                        let mut past = pasts.get(offset + i - 1).cloned().unwrap_or_default();
+                        rate_model.rate_error_after(&rate_model.state(&history, 0, &[]), &mut past)
                     };
                     let peak = golden_section(|t| rate_at(t).abs(), piece[i - 1].time_s, piece[i + 1].time_s);
                     if peak.value > best_rate.abs() {

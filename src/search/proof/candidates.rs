@@ -165,8 +165,8 @@ impl<'a> Judge<'a> {
             self.witnesses.push(witness.clone());
             match witness {
                 Witness::Instant { profile, time_s } => {
-                    let history = self.task.solved.profiles()[*profile].field.at(&[Instant::after(*time_s)]);
-                    responses.push(any.weight_response(&any.state(&history, 0, &[])));
+                    let solved = &self.task.solved.profiles()[*profile];
+                    responses.push(solved.response_at(&any, Instant::after(*time_s)));
                 }
                 Witness::Pattern(segments) => attaining.push(self.coefficients_of(segments)),
             }

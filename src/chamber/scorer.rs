@@ -1,0 +1,192 @@
+//! A fit made ready to score any number of further outputs of the rate, block by block: the filter's gains are shared.
+//!
+//! What [`Chamber::score`] says of columns together, this says of each alone and of any two, without a matrix over all.
+//!
+//! ```text
+//! r̃ = V/√S cleared:  g̃ = r·v + w·s,  J̃_ab = r_a·r_b − c_a I⁻¹ c_b,   c = r·v'/√S,  w = I⁻¹ cᵀ
+//! ```
+//!
+//! A regression clears a column of the coil's numbers alone, with the gyro as quiet as its white noise: where much is
+//! unexplained, it ranks columns by what they explain, not by what the fitted wander has left of them.
+//!
+//! # Source
+//! As [`super::score`].
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use rayon::prelude::*;
+
+use super::derivative::Derivatives;
+use super::filter::{RATE, System, Trace, Values, respond};
+use super::fit::Fit;
+use super::parameter::{Parameter, Place};
+use super::point::run_kept;
+use super::prior::Quantity;
+use super::{Chamber, ChamberError, Column};
+
+/// A fit with its filter's gains and derivatives, of each record that it was fitted to.
+pub struct Scorer<'c, 'a> {
+    chamber: &'c Chamber<'a>,
+    records: Vec<Prepared>,
+    factor: Cholesky<f64, Dyn>,
+    /// s of the fitted posterior.
+    slope: DVector<f64>,
+}
+
+struct Prepared {
+    record: usize,
+    system: System,
+    trace: Trace,
+    /// v/√S.
+    innovations: DVector<f64>,
+    /// v'/√S, innovations × fitted coordinates.
+    derivatives: DMatrix<f64>,
+}
+
+/// A column as the filter sees it, cleared of what was fitted.
+#[derive(Debug, Clone)]
+pub struct Scored {
+    /// In units of the innovations' deviations, record after record.
+    response: Vec<f64>,
+    cross: DVector<f64>,
+    weights: DVector<f64>,
+    /// g̃ and J̃.
+    pub score: f64,
+    pub information: f64,
+}
+
+/// A column that what was fitted explains to this share says nothing of its own.
+const OWN_SHARE: f64 = 1e-6;
+
+impl Scored {
+    /// By how much the log likelihood would rise at the best amplitude, and that amplitude.
+    pub fn gain(&self) -> (f64, f64) {
+        let all: f64 = self.response.iter().map(|r| r * r).sum();
+        if !(self.information > OWN_SHARE * all) || !self.score.is_finite() {
+            return (0.0, 0.0);
+        }
+        let amplitude = self.score / self.information;
+        (0.5 * self.score * amplitude, amplitude)
+    }
+
+    /// J̃ between two columns.
+    pub fn information_with(&self, other: &Self) -> f64 {
+        self.response.iter().zip(&other.response).map(|(a, b)| a * b).sum::<f64>() - self.cross.dot(&other.weights)
+    }
+
+    /// Cosine of the angle between two columns, as far as the records tell them apart.
+    pub fn likeness(&self, other: &Self) -> f64 {
+        self.information_with(other) / (self.information * other.information).sqrt()
+    }
+}
+
+impl<'a> Chamber<'a> {
+    /// # Errors
+    /// A fit whose model cannot be solved, or whose information is not positive.
+    pub fn scorer(&self, fit: &Fit) -> Result<Scorer<'_, 'a>, ChamberError> {
+        self.scorer_of(fit, |_| true)
+    }
+
+    /// The fit as a regression with a quiet gyro.
+    ///
+    /// # Errors
+    /// As [`Chamber::scorer`].
+    pub fn regression(&self, fit: &Fit) -> Result<Scorer<'_, 'a>, ChamberError> {
+        let mut quiet = fit.clone();
+        self.quieten(&mut quiet);
+        let of_noise =
+            |p: &Parameter| matches!(p.place, Place::Quantity { quantity, .. } if quantity != Quantity::Film);
+        self.scorer_of(&quiet, |p| !of_noise(p))
+    }
+
+    /// A gyro of the record's own white noise, with the wander that is usual beside it.
+    pub fn quieten(&self, fit: &mut Fit) {
+        fit.calm(&fit.records.clone());
+        for &r in &fit.records {
+            let floor = self.noise_floor_rad_per_s(r);
+            let own = fit.numbers[r].get(Quantity::RateNoise);
+            fit.numbers[r].set(Quantity::RateNoise, own.min(floor));
+        }
+    }
+
+    fn scorer_of(&self, fit: &Fit, cleared: impl Fn(&Parameter) -> bool) -> Result<Scorer<'_, 'a>, ChamberError> {
+        let kept: Vec<usize> = (0..fit.parameters.len()).filter(|&i| cleared(&fit.parameters[i])).collect();
+        let whole = kept.len() == fit.parameters.len();
+        let parameters: Vec<Parameter> = kept.iter().map(|&i| fit.parameters[i]).collect();
+        let coordinates: Vec<f64> = kept.iter().map(|&i| fit.coordinates[i]).collect();
+        let place = self.place(fit.assumed.clone(), fit.numbers.clone(), &fit.records, &fit.courses)?;
+        let fitted = parameters.len();
+        let mut slope = DVector::zeros(fitted);
+        let mut information = DMatrix::zeros(fitted, fitted);
+        let mut records = Vec::with_capacity(fit.records.len());
+        for &record in &fit.records {
+            let (Some(side), Some(values)) = (&place.sides[record], &place.values[record]) else {
+                return Err(ChamberError::Unsolvable);
+            };
+            let (system, trace) =
+                run_kept(side, &place.assumed, &place.numbers[record], &self.observed[record], values);
+            let base = vec![trace.innovations.clone()];
+            let derivatives = self.derivatives(&place, &parameters, &coordinates, &[record], &base)?;
+            let own = &derivatives[0];
+            let deviations: Vec<f64> = trace.innovations.iter().map(|i| i.variance.sqrt()).collect();
+            let innovations = trace.innovations.iter().zip(&deviations).map(|(i, d)| i.value / d);
+            let innovations = DVector::from_iterator(deviations.len(), innovations);
+            let derivatives = scaled(own, &deviations, fitted);
+            if whole {
+                own.add_to(&trace.innovations, &mut slope, &mut DMatrix::zeros(fitted, fitted));
+            } else {
+                slope -= derivatives.tr_mul(&innovations);
+                information += derivatives.tr_mul(&derivatives);
+            }
+            records.push(Prepared { record, innovations, derivatives, system, trace });
+        }
+        for (i, p) in parameters.iter().enumerate() {
+            let precision = p.deviation.powi(-2);
+            slope[i] -= (coordinates[i] - p.mean) * precision;
+            information[(i, i)] += precision;
+        }
+        let information = if whole { fit.information.clone() } else { information };
+        let factor = information.cholesky().ok_or(ChamberError::Unsolvable)?;
+        Ok(Scorer { chamber: self, records, factor, slope })
+    }
+}
+
+fn scaled(own: &Derivatives, deviations: &[f64], fitted: usize) -> DMatrix<f64> {
+    let mut all = DMatrix::zeros(deviations.len(), fitted);
+    for (place, &p) in own.parameters.iter().enumerate() {
+        let mut column = all.column_mut(p);
+        for (row, d) in deviations.iter().enumerate() {
+            column[row] = own.columns[place].value[row] / d;
+        }
+    }
+    all
+}
+
+impl Scorer<'_, '_> {
+    /// One column; the amplitude's unit is that of the column.
+    pub fn score(&self, column: &Column) -> Scored {
+        let mut response = Vec::new();
+        let mut cross = DVector::zeros(self.slope.len());
+        let mut score = 0.0;
+        for prepared in &self.records {
+            let mut inputs = Values { of: std::array::from_fn(|_| Vec::new()) };
+            inputs.of[RATE] = column.rate_rad_per_s.get(prepared.record).cloned().unwrap_or_default();
+            let rows = &self.chamber.observed[prepared.record].series.rows;
+            let mut own = respond(&prepared.system, rows, &prepared.trace, &inputs);
+            own.iter_mut().zip(&prepared.trace.innovations).for_each(|(o, i)| *o /= i.variance.sqrt());
+            let own = DVector::from_vec(own);
+            score += own.dot(&prepared.innovations);
+            cross += prepared.derivatives.tr_mul(&own);
+            response.extend(own.iter().copied());
+        }
+        let weights = self.factor.solve(&cross);
+        // The innovations fall by V per unit of amplitude: their derivative is −V.
+        let score = score + weights.dot(&self.slope);
+        let information = response.iter().map(|r| r * r).sum::<f64>() - cross.dot(&weights);
+        Scored { response, cross, weights, score, information }
+    }
+
+    /// Many columns, in their order.
+    pub fn score_all(&self, columns: &[Column]) -> Vec<Scored> {
+        columns.par_iter().map(|column| self.score(column)).collect()
+    }
+}

@@ -1,0 +1,281 @@
+//! Effects that stand in no list: which formula explains what the listed effects leave.
+//!
+//! Each candidate is a term of the joint model ([`grammar`]), scored at a fit with one filter pass; listed effects and
+//! unlisted terms are in one competition ([`search`]), judged on records that were not fitted. A listed effect wins ties: an
+//! unlisted term pays for having been chosen among many.
+//!
+//! # Source
+//! The score test as in [`crate::chamber`]; forms and prices as in the book's chapter on what is missing.
+
+mod courses;
+mod forms;
+mod grammar;
+mod proposal;
+mod search;
+
+use crate::chamber::{ChamberError, Effort, Fit};
+use crate::diagnose::joint::{Explanation, Found, Member, Question};
+
+pub use forms::FORMS;
+pub use grammar::Allowed;
+pub(in crate::diagnose) use proposal::amend;
+pub use proposal::{Alternative, NO_WINDING, Proposal, ProposedTerm, Shown, TermParameter};
+
+use courses::Courses;
+use search::{Set, Tools};
+
+/// What won against everything that is listed.
+#[derive(Debug)]
+pub(in crate::diagnose) struct Discovered {
+    pub best: Set,
+    /// The best set, refitted to all records.
+    pub settled: Set,
+    /// Standard errors of inner numbers, a list a term.
+    pub inner_errors: Vec<Vec<f64>>,
+    /// Of the best set, and of the sets that do nearly as well.
+    pub probability: f64,
+    pub alternatives: Vec<(Set, f64)>,
+    /// What all records that are not fitted have in common with the best set, frozen.
+    pub days: Vec<Fit>,
+    pub courses: Courses,
+}
+
+/// A set with terms must be better than everything listed by so much (natural logarithm).
+const BEATS: f64 = 3.0;
+/// Sets within so much of the best stay beside it.
+const NEAR: f64 = 6.0;
+/// Looks for terms beside what the search over listed effects found; None where nothing beats it.
+///
+/// # Errors
+/// A declared model that cannot be solved for these records.
+pub(in crate::diagnose) fn discover(
+    question: &Question,
+    found: &Found,
+    allowed: &Allowed,
+    progress: &(dyn Fn(f64) + Sync),
+) -> Result<Option<Discovered>, ChamberError> {
+    let Some(declared) = found.declared() else { return Ok(None) };
+    let Some(tools) = tools(question, found, declared, allowed)? else { return Ok(None) };
+    let is_listed = |e: &&Explanation| {
+        !e.members.is_empty() && e.members.iter().all(|m| matches!(m, Member::Effect(_) | Member::Refitted(_)))
+    };
+    let best_listed = found.explanations.iter().map(Explanation::total).fold(f64::NEG_INFINITY, f64::max);
+    let listed = found.explanations.iter().find(is_listed);
+    let mut sets: Vec<Set> = Vec::new();
+    // Where a listed set is the answer and leaves nothing, a formula in its place would have to do the same for more.
+    let is_answer = |e: &Explanation| !e.is_outside() && e.total() > best_listed - NEAR;
+    if let Some(listed) = listed.filter(|e| is_answer(e)) {
+        sets = tools.search(tools.plain(listed), &|share| progress(0.4 * share));
+        if sets.len() < 2 {
+            return Ok(None);
+        }
+    }
+    let from_listed = !sets.is_empty();
+    sets.extend(tools.search(umbrella(&tools, found, declared), &|share| progress(0.4 + 0.4 * share)));
+    let best_yet = sets.iter().map(Set::total).fold(f64::NEG_INFINITY, f64::max);
+    if let Some(listed) = listed.filter(|e| !from_listed && e.total() + BEATS > best_yet) {
+        sets.extend(tools.search(tools.plain(listed), &|_| ()));
+    }
+    sets.retain(|s| !s.terms.is_empty() && s.total().is_finite());
+    sets.sort_by(|a, b| b.total().total_cmp(&a.total()));
+    let Some(best) = sets.first().cloned() else { return Ok(None) };
+    let confirmed = question.held_out.is_empty() || best.held_out_gain.is_none_or(|gain| gain > 0.0);
+    if best.total() < best_listed + BEATS || !confirmed {
+        return Ok(None);
+    }
+    let mut near: Vec<Set> = Vec::new();
+    for set in sets.into_iter().filter(|s| s.total() > best.total() - NEAR) {
+        let same = |o: &Set| {
+            o.explanation.key() == set.explanation.key()
+                && o.terms.len() == set.terms.len()
+                && o.terms.iter().all(|t| set.terms.iter().any(|u| u.is_sister_of(t)))
+        };
+        if !near.iter().any(same) {
+            near.push(set);
+        }
+    }
+    let listed: f64 = found.explanations.iter().map(|e| (e.total() - best.total()).exp()).sum();
+    let sum: f64 = near.iter().map(|s| (s.total() - best.total()).exp()).sum::<f64>() + listed;
+    let probability = 1.0 / sum;
+    let alternatives =
+        near.into_iter().skip(1).map(|s| ((s.total() - best.total()).exp() / sum, s)).map(|(p, s)| (s, p)).collect();
+    let (settled, inner_errors) = settled(&tools, &best);
+    let mut frozen = best.explanation.fit.clone();
+    frozen.assumed.inputs.iter_mut().for_each(|i| i.deviation = 0.0);
+    let days: Result<Vec<Fit>, ChamberError> =
+        question.held_out.iter().map(|&r| question.chamber.held_out(&frozen, r)).collect();
+    progress(1.0);
+    Ok(Some(Discovered { best, settled, inner_errors, probability, alternatives, days: days?, courses: tools.courses }))
+}
+
+/// None where no term can be made of these records.
+fn tools<'q, 'a>(
+    question: &'q Question<'a>,
+    found: &'q Found,
+    declared: &Explanation,
+    allowed: &Allowed,
+) -> Result<Option<Tools<'q, 'a>>, ChamberError> {
+    let best = found.explanations.first().unwrap_or(declared);
+    let day = |&r: &usize| question.chamber.held_out(&best.fit, r);
+    let days: Result<Vec<Fit>, ChamberError> = question.held_out.iter().map(day).collect();
+    let coil = best.fit.assumed.model.wound_coil()?;
+    let courses = Courses::new(question.chamber, &best.fit, &days?, coil.layer_lengths_m())?;
+    let families = grammar::families(&grammar::variables(&courses), allowed);
+    let longest_s = courses.longest_s();
+    let candidates = families.iter().map(|f| f.grid(longest_s).len()).sum();
+    let tools = Tools { question, windings: &found.windings, courses, families, candidates };
+    Ok((candidates > 0).then_some(tools))
+}
+
+/// The declared model with whatever takes up what it leaves: its wander, or one of the sets that say so.
+fn umbrella(tools: &Tools, found: &Found, declared: &Explanation) -> Set {
+    let outside = found.explanations.iter().find(|e| {
+        !e.members.is_empty() && e.members.iter().all(|m| matches!(m, Member::Drift)) && e.merit > declared.merit
+    });
+    let mut set = tools.plain(declared);
+    if let Some(outside) = outside {
+        // Compared with the declared model, scored beneath the umbrella.
+        set.explanation.fit = outside.fit.clone();
+        set.explanation.members = outside.members.clone();
+        set.merit = outside.merit;
+        set.held_out = outside.held_out;
+    }
+    set
+}
+
+/// The set fitted to all records, and the errors of its inner numbers there.
+fn settled(tools: &Tools, best: &Set) -> (Set, Vec<Vec<f64>>) {
+    let everything = Question {
+        fitted: tools.question.fitted.iter().chain(&tools.question.held_out).copied().collect(),
+        held_out: Vec::new(),
+        ..*tools.question
+    };
+    let all = Tools {
+        question: &everything,
+        windings: tools.windings,
+        courses: tools.courses.clone(),
+        families: Vec::new(),
+        candidates: tools.candidates,
+    };
+    let fit = &best.explanation.fit;
+    let again = everything.chamber.fit(&fit.assumed, &fit.free, &everything.fitted, Some(fit), Effort::QUICK).ok();
+    let set = match again {
+        Some(fit) => {
+            let explanation = Explanation::new(&everything, tools.windings, best.explanation.members.clone(), fit);
+            all.followed(all.set(explanation, best.terms.clone()))
+        }
+        None => best.clone(),
+    };
+    let errors = all.inner_errors(&set);
+    (set, errors)
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use statrs::distribution::{ContinuousCDF, Normal};
+
+    use super::*;
+    use crate::boundary::expose;
+    use crate::chamber::{Assumption, Chamber, Input};
+    use crate::diagnose::experiment::fixtures::{model, pattern};
+    use crate::diagnose::{Request, Terms, Verdict, diagnose};
+    use crate::numeric::piecewise::PiecewiseLinear;
+    use crate::numeric::statistics::correlation;
+    use crate::rate::RateModel;
+    use crate::record::{Channel, Record};
+    use crate::thermal::solve;
+    use crate::units::{REFERENCE_TEMPERATURE_K, rad_per_s_from_deg_per_h};
+
+    /// A day in a chamber with a fan whose current wanders, and what the fan adds [°/h] by its lagged size.
+    fn day(gain: f64, tau_s: f64, seed: u64) -> Record {
+        let model = model(Vec::new());
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let normal = Normal::new(0.0, 1.0).unwrap();
+        let mut noise = |deviation: f64| deviation * normal.inverse_cdf(random.random::<f64>());
+        let times_s: Vec<f64> = (1..=700).map(|i| 10.0 * f64::from(i)).collect();
+        let knots_s = vec![0.0, 905.0, 1703.0, 2412.0, 4011.0, 7000.0];
+        let air_k = [0.0, 0.0, 1.0, 1.0, -1.0, -1.0].map(|t| REFERENCE_TEMPERATURE_K + 15.0 * t).to_vec();
+        let air = PiecewiseLinear::new(knots_s, air_k).unwrap();
+        let exposed = expose(&model.heat_path().unwrap(), Some(25.0), 0.0, &air, &times_s).unwrap();
+        let history = solve(&exposed.path, &exposed.drive).unwrap().means(&times_s, model.rate_mean_s);
+        let rates = RateModel::new(&model, &pattern(), &[]).unwrap().series_rad_per_s(&history);
+        let (mut fan, mut lagged) = (0.0, None);
+        let (mut fans, mut all) = (Vec::new(), Vec::new());
+        for rate in rates {
+            fan += -0.02 * fan + noise(0.2);
+            let size: f64 = f64::abs(fan);
+            let before: f64 = lagged.unwrap_or(size);
+            let now = before + (size - before) * (1.0 - (-10.0 / tau_s).exp());
+            lagged = Some(now);
+            fans.push(fan);
+            all.push(rate + rad_per_s_from_deg_per_h(gain * now) + noise(2e-7));
+        }
+        let temperature_k = exposed.shown_k.into_iter().map(|t| t + noise(0.002)).collect();
+        let record = Record::new(format!("day {seed}"), times_s, temperature_k, all).unwrap();
+        record.with_channel(Channel { name: "fan_a".to_owned(), values: fans }).unwrap()
+    }
+
+    #[test]
+    fn the_lagged_size_of_a_current_is_found_with_its_numbers_and_a_record_without_it_shows_nothing() {
+        let (declared, pattern) = (model(Vec::new()), pattern());
+        let asked = |gain: f64, terms: Terms| {
+            let (records, holdout) = ([day(gain, 300.0, 1)], [day(gain, 300.0, 2)]);
+            let request = Request { model: &declared, pattern: &pattern, records: &records, holdout: &holdout, terms };
+            diagnose(&request, &|_| ()).unwrap()
+        };
+        let found = asked(0.4, Terms::All);
+        let best = &found.proposals[0];
+        println!("{} {:?}", best.formula, best.terms[0].parameters);
+        assert_eq!(found.verdict, Verdict::Unexplained);
+        assert_eq!((best.terms.len(), best.terms[0].form), (1, "lagged_size"));
+        let value = |key: &str| best.terms[0].parameters.iter().find(|p| p.key == key).unwrap().value;
+        assert!((value("a") / 0.4 - 1.0).abs() < 0.1, "{}", value("a"));
+        assert!((value("tau_s") / 300.0 - 1.0).abs() < 0.1, "{}", value("tau_s"));
+        assert!(best.predicts);
+        // With a restriction that leaves it out, and without the search, there is nothing of it.
+        assert!(asked(0.4, Terms::None).proposals.is_empty());
+        let words = ["hysteresis".to_owned()];
+        let among = asked(0.4, Terms::Among(&words));
+        assert!(among.proposals.iter().flat_map(|p| &p.terms).all(|t| t.form == "hysteresis"));
+        let nothing = asked(0.0, Terms::All);
+        assert!(nothing.proposals.is_empty(), "{:?}", nothing.proposals[0].formula);
+        assert_eq!(nothing.verdict, Verdict::Adequate);
+    }
+
+    #[test]
+    fn the_score_tests_order_is_that_of_full_fits() {
+        let (declared, pattern) = (model(Vec::new()), pattern());
+        let record = day(0.03, 300.0, 3);
+        let chamber = Chamber::new(&declared, &[&record]).unwrap();
+        let assumed = Assumption::new(declared.clone(), pattern);
+        let fit = chamber.fit_anew(&assumed, &[], &[0]).unwrap();
+        let coil = declared.wound_coil().unwrap();
+        let courses = Courses::new(&chamber, &fit, &[], coil.layer_lengths_m()).unwrap();
+        let families = grammar::families(&grammar::variables(&courses), &Allowed::default());
+        let scorer = chamber.scorer(&fit).unwrap();
+        let (mut promised, mut gained) = (Vec::new(), Vec::new());
+        for family in families.iter().step_by(families.len() / 12) {
+            let inner = family.grid(courses.longest_s()).swap_remove(0);
+            let term = grammar::Term { family: family.clone(), inner };
+            let column = courses.column(&term);
+            let (gain, amplitude) = scorer.score(&column).gain();
+            let mut with = fit.assumed.clone();
+            with.inputs.push(Input {
+                name: family.text.clone(),
+                rate_rad_per_s: column.rate_rad_per_s,
+                amplitude: 0.0,
+                deviation: 1e3 * amplitude.abs(),
+            });
+            let full = chamber.fit(&with, &[], &[0], Some(&fit), Effort::FULL).unwrap();
+            println!("{:40} {gain:8.2} {:8.2}", family.text, full.log_likelihood - fit.log_likelihood);
+            promised.push(gain);
+            gained.push((full.log_likelihood - fit.log_likelihood).max(0.0));
+        }
+        assert!(promised.len() >= 12);
+        assert!(correlation(&promised, &gained).unwrap() > 0.9);
+        let best = |of: &[f64]| (0..of.len()).max_by(|a, b| of[*a].total_cmp(&of[*b])).unwrap();
+        assert_eq!(best(&promised), best(&gained));
+    }
+}

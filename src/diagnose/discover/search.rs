@@ -1,0 +1,475 @@
+//! Listed effects and unlisted terms in one competition: score test of all, refinement, fits of the best, forward and back.
+//!
+//! ```text
+//! merit(set) = ln E(fitted) + Σ ln p(listed) + Σ_terms { ln p(term) − ln(candidates) − ½ ln n a inner number }
+//! total = merit + ln E(held-out | effects and amplitudes as fitted)
+//! ```
+//!
+//! A gain is in units of what the base fit leaves unexplained: its wander is fitted with it, and a term that explains the
+//! wander gains by that once it is fitted.
+//!
+//! # Source
+//! As [`super`]; variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973) 413.
+
+use rayon::prelude::*;
+
+use super::courses::Courses;
+use super::grammar::{Family, Term};
+use crate::chamber::{Column, Effort, Fit, Input, Scored, Scorer};
+use crate::diagnose::joint::{
+    EFFECT, Explanation, Member, Outcome, Proposal, Question, Winding, fitted, proposals, rates, with, without,
+};
+
+/// A set of listed effects and unlisted terms, fitted.
+#[derive(Debug, Clone)]
+pub struct Set {
+    /// Its members are the listed ones; the terms are the last inputs of its fit.
+    pub explanation: Explanation,
+    pub terms: Vec<Term>,
+    /// Prices of the terms included.
+    pub merit: f64,
+    pub held_out: Option<f64>,
+    /// By how much the held-out records gained with the last member.
+    pub held_out_gain: Option<f64>,
+}
+
+impl Set {
+    pub fn total(&self) -> f64 {
+        self.merit + self.held_out.unwrap_or(0.0)
+    }
+
+    /// °/h per unit of the term's form.
+    pub fn amplitude(&self, term: usize) -> f64 {
+        self.explanation.fit.assumed.inputs[self.first_input() + term].amplitude
+    }
+
+    pub fn first_input(&self) -> usize {
+        self.explanation.fit.assumed.inputs.len() - self.terms.len()
+    }
+
+    pub fn len(&self) -> usize {
+        self.explanation.members.len() + self.terms.len()
+    }
+}
+
+/// What a search over terms works with.
+pub struct Tools<'q, 'a> {
+    pub question: &'q Question<'a>,
+    pub windings: &'q [Winding],
+    pub courses: Courses,
+    pub families: Vec<Family>,
+    /// All points of all grids.
+    pub candidates: usize,
+}
+
+/// Terms in a set at most.
+pub const MOST_TERMS: usize = 4;
+/// Families that are refined after each score test, and fitted as far as they promise enough.
+const REFINED: usize = 12;
+const TRIED: usize = 4;
+/// Listed effects that are fitted beside them.
+const LISTED_TRIED: usize = 2;
+/// … if they promise so much; terms, if they promise this share of what the first does.
+const WORTH_LISTED: f64 = 8.0;
+const WORTH_BESIDE: f64 = 0.25;
+/// Sets whose held-out records are looked at after each stage.
+const HELD_OUT_TRIED: usize = 2;
+/// A step must gain so much more than it costs, and the held-out records anything at all.
+const WORTH_A_STEP: f64 = 2.0;
+/// An amplitude is likely to make a term of so many of the record's noises.
+const LIKELY_NOISES: f64 = 10.0;
+/// Rounds in which inner numbers follow the fitted amplitude; a step below this share of its error ends them.
+const POLISHED: usize = 2;
+const SETTLED_SHARE: f64 = 0.15;
+/// Relative step of a derivative by an inner number.
+const STEP_SHARE: f64 = 0.02;
+
+/// A term that promises something at a fit.
+#[derive(Debug, Clone)]
+pub struct Promise {
+    pub term: Term,
+    /// Rise of the log likelihood at the best amplitude, and that amplitude.
+    pub gain: f64,
+    pub amplitude: f64,
+    /// The gain less what the term costs.
+    pub worth: f64,
+}
+
+impl Tools<'_, '_> {
+    fn rows(&self, fit: &Fit) -> f64 {
+        rates(self.question.chamber, fit) as f64
+    }
+
+    /// What a term costs beside its amplitude, which the merit of its fit pays for.
+    fn price(&self, term: &Term, rows: f64) -> f64 {
+        -EFFECT.log + (self.candidates.max(1) as f64).ln() + 0.5 * rows.ln() * term.inner.len() as f64
+    }
+
+    fn promise(&self, term: Term, scored: &Scored, rows: f64) -> Promise {
+        let (gain, amplitude) = scored.gain();
+        let worth = gain - self.price(&term, rows) - 0.5 * rows.ln();
+        Promise { term, gain, amplitude, worth }
+    }
+
+    /// The most that any point of any grid is worth at a fit.
+    fn most_worth(&self, scorer: &Scorer, fit: &Fit) -> f64 {
+        let rows = self.rows(fit);
+        let longest_s = self.courses.longest_s();
+        let of = |family: &Family| {
+            let points = family.grid(longest_s).into_iter().map(|inner| Term { family: family.clone(), inner });
+            points
+                .map(|term| {
+                    let scored = scorer.score(&self.courses.column(&term));
+                    self.promise(term, &scored, rows).worth
+                })
+                .fold(f64::NEG_INFINITY, f64::max)
+        };
+        self.families.par_iter().map(of).reduce(|| f64::NEG_INFINITY, f64::max)
+    }
+
+    /// The best of each family at a fit, refined; most worth first.
+    pub fn promises(&self, scorer: &Scorer, fit: &Fit) -> Vec<Promise> {
+        let rows = self.rows(fit);
+        let longest_s = self.courses.longest_s();
+        let mut best: Vec<Promise> = self
+            .families
+            .par_iter()
+            .filter_map(|family| {
+                let points = family.grid(longest_s).into_iter().map(|inner| Term { family: family.clone(), inner });
+                let scored = points.map(|term| {
+                    let scored = scorer.score(&self.courses.column(&term));
+                    self.promise(term, &scored, rows)
+                });
+                scored.max_by(|a, b| a.gain.total_cmp(&b.gain))
+            })
+            .collect();
+        let order = |all: &mut Vec<Promise>| {
+            all.sort_by(|a, b| b.worth.total_cmp(&a.worth).then_with(|| a.term.family.text.cmp(&b.term.family.text)))
+        };
+        order(&mut best);
+        best.truncate(REFINED);
+        let mut refined: Vec<Promise> =
+            best.into_par_iter().map(|promise| self.refined(scorer, promise, rows, longest_s)).collect();
+        order(&mut refined);
+        refined
+    }
+
+    /// Inner numbers where the gain is largest, one after the other.
+    fn refined(&self, scorer: &Scorer, promise: Promise, rows: f64, longest_s: f64) -> Promise {
+        let count = promise.term.inner.len();
+        let mut best = promise;
+        for _ in 0..if count > 1 { 2 } else { count } {
+            for place in 0..count {
+                let inner = best.term.family.form.inner[place];
+                let (low, high) = best.term.family.bounds(place, longest_s);
+                let to = |v: f64| if inner.is_size() { v.ln() } else { v };
+                let back = |v: f64| if inner.is_size() { v.exp() } else { v };
+                // A step of the grid to each side.
+                let width = if inner.is_size() { 0.6 } else { 0.15 * (high - low) };
+                let here = to(best.term.inner[place]);
+                let moved = |v: f64| {
+                    let mut term = best.term.clone();
+                    term.inner[place] = back(v);
+                    term
+                };
+                let gain = |v: f64| scorer.score(&self.courses.column(&moved(v))).gain().0;
+                let at = near_largest(gain, (here - width).max(to(low)), (here + width).min(to(high)));
+                let term = moved(at);
+                let scored = scorer.score(&self.courses.column(&term));
+                let there = self.promise(term, &scored, rows);
+                if there.gain > best.gain {
+                    best = there;
+                }
+            }
+        }
+        best
+    }
+
+    /// A column as an input of unknown amplitude.
+    fn input(&self, term: &Term, amplitude: f64) -> Input {
+        let column = self.courses.column(term);
+        let (mut squares, mut count) = (0.0, 0usize);
+        for &r in &self.question.fitted {
+            let own = &column.rate_rad_per_s[r];
+            let mean = own.iter().sum::<f64>() / own.len().max(1) as f64;
+            squares += own.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+            count += own.len();
+        }
+        let size = (squares / count.max(1) as f64).sqrt().max(f64::MIN_POSITIVE);
+        let noises = self.question.fitted.iter().map(|&r| self.question.chamber.noise_floor_rad_per_s(r));
+        let deviation = LIKELY_NOISES * noises.fold(0.0, f64::max) / size;
+        Input { name: term.family.text.clone(), rate_rad_per_s: column.rate_rad_per_s, amplitude, deviation }
+    }
+
+    /// The prices of terms taken off what their fit is worth.
+    pub fn set(&self, explanation: Explanation, terms: Vec<Term>) -> Set {
+        let rows = self.rows(&explanation.fit);
+        let merit = explanation.merit - terms.iter().map(|t| self.price(t, rows)).sum::<f64>();
+        Set { explanation, terms, merit, held_out: None, held_out_gain: None }
+    }
+
+    /// A set without any term.
+    pub fn plain(&self, explanation: &Explanation) -> Set {
+        Set { merit: explanation.merit, held_out: explanation.held_out, ..self.set(explanation.clone(), Vec::new()) }
+    }
+
+    /// A set with one more term, fitted from the set's own chamber.
+    fn with_term(&self, set: &Set, promise: &Promise) -> Option<Set> {
+        let mut assumed = set.explanation.fit.assumed.clone();
+        assumed.drift = false;
+        assumed.cycle = false;
+        assumed.inputs.push(self.input(&promise.term, promise.amplitude));
+        let mut terms = set.terms.clone();
+        terms.push(promise.term.clone());
+        let members: Vec<Member> = set.explanation.members.iter().copied().filter(|m| !m.is_outside()).collect();
+        let begin = (assumed, set.explanation.fit.free.clone());
+        // From a quiet gyro: what the term does not explain shows as wander again.
+        let mut start = set.explanation.fit.clone();
+        self.question.chamber.quieten(&mut start);
+        let found = fitted(self.question, self.windings, members, &begin, &start, Effort::QUICK)?;
+        Some(self.set(found, terms))
+    }
+
+    fn with_listed(&self, set: &Set, proposal: &Proposal) -> Option<Set> {
+        let begin = with(self.question, self.windings, &set.explanation.fit, proposal.member, proposal.values.clone())?;
+        let mut members = set.explanation.members.clone();
+        members.push(proposal.member);
+        let fit = &set.explanation.fit;
+        let found = fitted(self.question, self.windings, members, &begin, fit, Effort::QUICK)?;
+        Some(self.set(found, set.terms.clone()))
+    }
+
+    /// With inner numbers that follow the fit.
+    pub fn followed(&self, mut best: Set) -> Set {
+        for _ in 0..POLISHED {
+            let Some((next, share)) = self.polished(&best) else { break };
+            if next.merit > best.merit {
+                best = next;
+            } else {
+                break;
+            }
+            if share < SETTLED_SHARE {
+                break;
+            }
+        }
+        best
+    }
+
+    /// Derivatives of the terms' columns by their inner numbers, as columns: of the term, and the place of the number.
+    fn inner_columns(&self, set: &Set) -> Vec<(usize, usize, Column)> {
+        let mut all = Vec::new();
+        for (place, term) in set.terms.iter().enumerate() {
+            let amplitude = set.amplitude(place);
+            for inner in 0..term.inner.len() {
+                let step = self.step(term, inner);
+                let at = |sign: f64| {
+                    let mut moved = term.clone();
+                    moved.inner[inner] += sign * step;
+                    self.courses.column(&moved)
+                };
+                let (up, down) = (at(1.0), at(-1.0));
+                let slope = |r: usize| {
+                    let pairs = up.rate_rad_per_s[r].iter().zip(&down.rate_rad_per_s[r]);
+                    pairs.map(|(u, d)| amplitude * (u - d) / (2.0 * step)).collect()
+                };
+                let rate_rad_per_s = (0..up.rate_rad_per_s.len()).map(slope).collect();
+                all.push((place, inner, Column { rate_rad_per_s }));
+            }
+        }
+        all
+    }
+
+    fn step(&self, term: &Term, inner: usize) -> f64 {
+        if term.family.form.inner[inner].is_size() {
+            STEP_SHARE * term.inner[inner]
+        } else {
+            0.5 * STEP_SHARE * (term.family.x.high - term.family.x.low)
+        }
+    }
+
+    /// Standard errors of the inner numbers, a list a term, cleared of everything that was fitted.
+    pub fn inner_errors(&self, set: &Set) -> Vec<Vec<f64>> {
+        let mut errors: Vec<Vec<f64>> = set.terms.iter().map(|t| vec![f64::NAN; t.inner.len()]).collect();
+        let Ok(scorer) = self.question.chamber.scorer(&set.explanation.fit) else { return errors };
+        let columns = self.inner_columns(set);
+        let scored: Vec<Scored> = columns.iter().map(|(_, _, c)| scorer.score(c)).collect();
+        let count = scored.len();
+        let information = nalgebra::DMatrix::from_fn(count, count, |i, k| scored[i].information_with(&scored[k]));
+        if let Some(factor) = information.cholesky() {
+            let covariance = factor.inverse();
+            for (i, (term, inner, _)) in columns.iter().enumerate() {
+                errors[*term][*inner] = covariance[(i, i)].sqrt();
+            }
+        }
+        errors
+    }
+
+    /// Inner numbers one Newton step further, fitted again; and the longest step in units of its error.
+    fn polished(&self, set: &Set) -> Option<(Set, f64)> {
+        if set.terms.iter().all(|t| t.inner.is_empty()) {
+            return None;
+        }
+        let scorer = self.question.chamber.scorer(&set.explanation.fit).ok()?;
+        let columns = self.inner_columns(set);
+        let scored: Vec<Scored> = columns.iter().map(|(_, _, c)| scorer.score(c)).collect();
+        let count = scored.len();
+        let information = nalgebra::DMatrix::from_fn(count, count, |i, k| scored[i].information_with(&scored[k]));
+        let score = nalgebra::DVector::from_iterator(count, scored.iter().map(|s| s.score));
+        let factor = information.cholesky()?;
+        let change = factor.solve(&score);
+        let covariance = factor.inverse();
+        let mut terms = set.terms.clone();
+        let mut longest: f64 = 0.0;
+        for (i, (term, inner, _)) in columns.iter().enumerate() {
+            let family = &terms[*term].family;
+            let (low, high) = family.bounds(*inner, self.courses.longest_s());
+            let here = terms[*term].inner[*inner];
+            let reach = if family.form.inner[*inner].is_size() { 0.4 * here } else { 0.1 * (high - low) };
+            let moved = (here + change[i].clamp(-reach, reach)).clamp(low, high);
+            longest = longest.max((moved - here).abs() / covariance[(i, i)].sqrt());
+            terms[*term].inner[*inner] = moved;
+        }
+        let mut assumed = set.explanation.fit.assumed.clone();
+        let first = set.first_input();
+        for (place, term) in terms.iter().enumerate() {
+            assumed.inputs[first + place] = self.input(term, set.amplitude(place));
+        }
+        let begin = (assumed, set.explanation.fit.free.clone());
+        let members = set.explanation.members.clone();
+        let fit = &set.explanation.fit;
+        let found = fitted(self.question, self.windings, members, &begin, fit, Effort::QUICK)?;
+        Some((self.set(found, terms), longest))
+    }
+
+    /// With the held-out records looked at, amplitudes and effects as they were fitted.
+    pub fn judged(&self, mut set: Set) -> Set {
+        if self.question.held_out.is_empty() || set.held_out.is_some() {
+            return set;
+        }
+        let mut frozen = set.explanation.fit.clone();
+        frozen.assumed.inputs.iter_mut().for_each(|input| input.deviation = 0.0);
+        let scores: Outcome<Vec<f64>> = self
+            .question
+            .held_out
+            .iter()
+            .map(|&r| self.question.chamber.held_out(&frozen, r).map(|fit| fit.evidence))
+            .collect();
+        set.held_out = Some(scores.map_or(f64::NEG_INFINITY, |s| s.iter().sum()));
+        set
+    }
+
+    /// The next sets from one, best first; all of them were fitted. None beyond the set itself is worth more: empty.
+    fn onwards(&self, set: &Set) -> Vec<Set> {
+        let fit = &set.explanation.fit;
+        let chamber = self.question.chamber;
+        let (Ok(scorer), Ok(regression)) = (chamber.scorer(fit), chamber.regression(fit)) else { return Vec::new() };
+        // Whether there is anything is asked beneath the wander that was fitted, what it is without it.
+        if self.most_worth(&scorer, fit) < 0.0 {
+            return Vec::new();
+        }
+        let promises = self.promises(&regression, fit);
+        let first = promises.first().map_or(0.0, |p| p.gain);
+        let listed: Vec<Proposal> = match proposals(self.question, &set.explanation) {
+            Ok(mut all) => {
+                all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+                all.retain(|p| p.gain > WORTH_LISTED);
+                all.truncate(LISTED_TRIED);
+                all
+            }
+            Err(_) => Vec::new(),
+        };
+        let tried: Vec<&Promise> =
+            promises.iter().filter(|p| p.worth > 0.0 && p.gain > WORTH_BESIDE * first).take(TRIED).collect();
+        let mut next: Vec<Set> = tried.par_iter().filter_map(|promise| self.with_term(set, promise)).collect();
+        next.extend(listed.par_iter().filter_map(|p| self.with_listed(set, p)).collect::<Vec<_>>());
+        next.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+        next.truncate(HELD_OUT_TRIED);
+        let mut next: Vec<Set> = next.into_par_iter().map(|s| self.judged(self.followed(s))).collect();
+        next.sort_by(|a, b| b.total().total_cmp(&a.total()));
+        next
+    }
+
+    /// Forward and back from a set; every set that was fitted and judged, best first.
+    pub fn search(&self, from: Set, progress: &(dyn Fn(f64) + Sync)) -> Vec<Set> {
+        let mut best = self.judged(from);
+        let mut all = vec![best.clone()];
+        for stage in 0..MOST_TERMS {
+            if best.terms.len() >= MOST_TERMS {
+                break;
+            }
+            progress(stage as f64 / MOST_TERMS as f64);
+            let mut next = self.onwards(&best);
+            for set in &mut next {
+                set.held_out_gain = set.held_out.zip(best.held_out).map(|(a, b)| a - b);
+            }
+            let gains =
+                |s: &Set| s.total() > best.total() + WORTH_A_STEP && s.held_out_gain.is_none_or(|gain| gain > 0.0);
+            let chosen = next.iter().find(|s| gains(s)).cloned();
+            all.extend(next);
+            let Some(chosen) = chosen else { break };
+            best = self.look_back(chosen, &mut all);
+        }
+        all.sort_by(|a, b| b.total().total_cmp(&a.total()));
+        all
+    }
+
+    /// Leaves out what the rest does not need.
+    fn look_back(&self, mut best: Set, all: &mut Vec<Set>) -> Set {
+        while best.len() > 1 {
+            let places: Vec<usize> = (0..best.len()).collect();
+            let smaller: Vec<Set> = places.par_iter().filter_map(|&place| self.without(&best, place)).collect();
+            let smaller: Vec<Set> = smaller.into_iter().filter(|s| s.merit > best.merit - WORTH_A_STEP).collect();
+            let judged: Vec<Set> = smaller.into_par_iter().map(|s| self.judged(s)).collect();
+            let Some(least) = judged.iter().max_by(|a, b| a.total().total_cmp(&b.total())).cloned() else { break };
+            all.extend(judged);
+            if least.total() < best.total() {
+                break;
+            }
+            best = Set { held_out_gain: best.held_out_gain, ..least };
+        }
+        best
+    }
+
+    /// The set without one of its members: listed ones first, then terms.
+    fn without(&self, set: &Set, place: usize) -> Option<Set> {
+        let listed = set.explanation.members.len();
+        let fit = &set.explanation.fit;
+        let (begin, members, terms) = if place < listed {
+            let mut members = set.explanation.members.clone();
+            members.remove(place);
+            (without(self.question, &set.explanation, place), members, set.terms.clone())
+        } else {
+            let mut assumed = fit.assumed.clone();
+            assumed.inputs.remove(set.first_input() + place - listed);
+            let mut terms = set.terms.clone();
+            terms.remove(place - listed);
+            ((assumed, fit.free.clone()), set.explanation.members.clone(), terms)
+        };
+        let found = fitted(self.question, self.windings, members, &begin, fit, Effort::QUICK)?;
+        Some(self.set(found, terms))
+    }
+}
+
+/// Halvings, by the golden ratio, of the bracket in which a gain's largest value is looked for: what is left of it is less than
+/// the numbers' errors, and fits follow it further.
+const GOLDEN_STEPS: usize = 8;
+
+/// About where a function with one maximum is largest.
+fn near_largest(f: impl Fn(f64) -> f64, low: f64, high: f64) -> f64 {
+    let ratio = 0.5 * (5f64.sqrt() - 1.0);
+    let (mut a, mut b) = (low, high);
+    let (mut x, mut y) = (b - ratio * (b - a), a + ratio * (b - a));
+    let (mut at_x, mut at_y) = (f(x), f(y));
+    for _ in 0..GOLDEN_STEPS {
+        if at_x >= at_y {
+            (b, y, at_y) = (y, x, at_x);
+            x = b - ratio * (b - a);
+            at_x = f(x);
+        } else {
+            (a, x, at_x) = (x, y, at_y);
+            y = a + ratio * (b - a);
+            at_y = f(y);
+        }
+    }
+    if at_x >= at_y { x } else { y }
+}
