@@ -36,7 +36,9 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<TrimJson, TaskE
         records.push(record);
         inputs.push(measurement.input("fitted"));
     }
-    let asked = diagnose::Request { model: &file.model, pattern: &named.pattern, records: &records, holdout: &[] };
+    let terms = diagnose::Terms::None;
+    let asked =
+        diagnose::Request { model: &file.model, pattern: &named.pattern, records: &records, holdout: &[], terms };
     let found = trim(&asked)?;
     Ok(TrimJson::new(&file.model.name, &named.name, &found, InputsJson::new(Some(file), inputs)))
 }
