@@ -71,7 +71,7 @@ def _diagnosis_text(diagnosis: DiagnoseResult | PathLike | None) -> str | None:
 
 def evaluate(
     model: ModelLike,
-    patterns: PatternLike | Sequence[PatternLike] | None = None,
+    patterns: PatternLike | Sequence[Any] | None = None,
     *,
     profiles: PathLike | None = None,
     field: Field | None = None,
@@ -185,7 +185,7 @@ def exact(
     windability: str | None = None,
     objective: str | None = None,
     budget_s: float = 60.0,
-    patterns: PatternLike | Sequence[PatternLike] | None = None,
+    patterns: PatternLike | Sequence[Any] | None = None,
     seed: int | None = None,
     progress: bool | Progress | None = None,
 ) -> ExactResult:
@@ -227,7 +227,7 @@ def pareto(
 
 def tolerance(
     model: ModelLike,
-    patterns: PatternLike | Sequence[PatternLike] | None = None,
+    patterns: PatternLike | Sequence[Any] | None = None,
     *,
     samples: int | None = None,
     seed: int | None = None,

@@ -275,7 +275,7 @@ def pattern_argument(stated: PatternLike) -> str | tuple[str, list[int]]:
     return (pattern.name, pattern.segments.tolist())
 
 
-def pattern_arguments(stated: PatternLike | Sequence[PatternLike] | None) -> list[str | tuple[str, list[int]]]:
+def pattern_arguments(stated: PatternLike | Sequence[Any] | None) -> list[str | tuple[str, list[int]]]:
     """One pattern or several."""
     if stated is None:
         return []

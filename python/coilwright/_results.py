@@ -490,7 +490,7 @@ class CompareResult(Result):
     )
 
     def _state(self) -> dict[str, Any]:
-        return {**super()._state(), "curves": self.curves}
+        return {**super()._state(), "curves": getattr(self, "curves", [])}
 
     def _headline(self) -> str:
         return f"{self._data['model']} with {self._data['pattern']}: {self._data['verdict']}"
@@ -575,7 +575,7 @@ class ExtendResult(Result):
     after: CompareResult
     extended: Model
 
-    _parts = {"effect": Finding}
+    _parts = {"effect": Finding, "before": CompareResult, "after": CompareResult}
 
     def _state(self) -> dict[str, Any]:
         return {**super()._state(), "extended": self.extended}

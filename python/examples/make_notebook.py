@@ -22,7 +22,7 @@ def notebook() -> Any:
     for part in SCRIPT.read_text(encoding="utf-8").split("# %%")[1:]:
         head, _, body = part.partition("\n")
         if "[markdown]" in head:
-            text = "\n".join(line.removeprefix("# ").removeprefix("#") for line in body.strip().splitlines())
+            text = "\n".join(line[2:] for line in body.strip().splitlines())
             cells.append(nbformat.v4.new_markdown_cell(text))
         else:
             cells.append(nbformat.v4.new_code_cell(body.strip()))
