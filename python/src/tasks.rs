@@ -4,8 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use coilwright::io::fault::Faults;
-use coilwright::io::files::write_atomically;
-use coilwright::io::folder::HeldFolder;
+use coilwright::io::folder::{HeldFolder, Replacement};
 use coilwright::io::json::Document;
 use coilwright::io::json::inputs::RecordInputJson;
 use coilwright::io::model::{ModelFile, NamedPattern};
@@ -110,10 +109,9 @@ pub fn schedule(
         let answer = task::schedule::run(&task::schedule::Request { model: &file, pattern: pattern.as_ref() })?;
         let _held = held(output.as_ref(), "schedule")?;
         if let Some(folder) = &output {
-            for (name, text) in answer.files(&file)? {
-                write_atomically(&folder.join(name), text.as_bytes())?;
-                watcher.note(&format!("wrote {}", folder.join(name).display()));
-            }
+            let files = answer.files(&file)?;
+            Replacement::all(folder, &files)?;
+            files.iter().for_each(|(name, _)| watcher.note(&format!("wrote {}", folder.join(name).display())));
         }
         // A schedule's document holds its schema version itself, because it is also a file.
         Ok(text_of(&answer.document)?)
