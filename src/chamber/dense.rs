@@ -266,14 +266,16 @@ mod tests {
         let mut noise = |size: f64| size * (0..12).map(|_| random.random::<f64>() - 0.5).sum::<f64>();
         let times_s: Vec<f64> = (0..400).map(|i| 10.0 * f64::from(i)).collect();
         let steep = |t: f64| (t / 90.0).sin();
-        let temperature_k = times_s.iter().map(|t| 293.0 + 3.0 * steep(*t) + noise(0.004)).collect();
+        let temperature_k = times_s.iter().map(|t| 293.0 + 0.05 * steep(*t) + noise(0.004)).collect();
         let mut rate: Vec<f64> = times_s.iter().map(|t| 4e-6 * steep(*t) + noise(1e-7)).collect();
         let spikes = [61, 140, 233, 322];
         spikes.iter().for_each(|&k| rate[k] += 1.5e-6);
         let record = Record::new("steep", times_s, temperature_k, rate).unwrap();
         assert!(record.gross_errors().is_empty(), "what neighbours say is not enough here");
         let model = model(Vec::new());
-        let assumed = Assumption::new(model.clone(), dip());
+        let course = record.times_s().iter().map(|t| steep(*t)).collect();
+        let input = Input { name: "sine".into(), rate_rad_per_s: vec![course], amplitude: 3e-6, deviation: 1e-5 };
+        let assumed = Assumption { inputs: vec![input], ..Assumption::new(model.clone(), dip()) };
         let (chamber, _) = Chamber::new(&model, &[&record]).unwrap().settled(&assumed, &[0]).unwrap();
         let left_out = |k: &usize| chamber.observed[0].series.values[filter::RATE][*k].is_nan();
         assert!(spikes.iter().all(left_out));
