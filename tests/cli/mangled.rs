@@ -54,6 +54,8 @@ const WAYS: &[(&str, &[&str])] = &[
     ("model.toml", &["diagnose", "model.toml", "record.csv", "--format", "json", "-o", "out"]),
     ("model.toml", &["extend", "model.toml", "--effect", "spool_mass", "-o", "out/extended.toml"]),
     ("model.toml", &["report", "run"]),
+    ("model.toml", &["trim", "model.toml", "record.csv", "--format", "json"]),
+    ("record.csv", &["trim", "model.toml", "record.csv"]),
     ("pattern.toml", &["evaluate", "model.toml", "--pattern", "pattern.toml"]),
     ("pattern.toml", &["schedule", "model.toml", "--pattern", "pattern.toml", "-o", "out"]),
     ("profiles.toml", &["temperatures", "model.toml", "--profiles", "profiles.toml", "-o", "out"]),

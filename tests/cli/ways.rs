@@ -38,6 +38,7 @@ pub const COMMANDS: &[(&str, Way)] = &[
     ("compare", Way::Slow(compare)),
     ("diagnose", Way::Slow(diagnose)),
     ("improve", Way::Slow(improve)),
+    ("trim", Way::Slow(|b| drop(b.run(&["trim", "model.toml", "record.csv", "--format", "json"])))),
     ("effects", Way::None),
     ("patterns", Way::None),
     ("reproduce", Way::None),
