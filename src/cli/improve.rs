@@ -19,8 +19,8 @@ use crate::task::measurement::Measurement;
 #[command(
     after_help = "The folder then holds before/ and after/ (comparisons), diagnosis/, design.toml (the model that was searched), search/,\n\
     recommended.toml, schedule/, predicted-record.csv (what the first record should look like with the new coil),\n\
-    next-experiment.toml and index.html. The same command goes on where it was interrupted: a step is taken again only\n\
-    where something that it is made of has changed.\n\n\
+    next-experiment.toml and index.html. The same command goes on where it was interrupted: a step is\n\
+    taken again only where something that it is made of has changed.\n\n\
     Example:\n  coilwright improve coil.toml monday.csv tuesday.csv --holdout friday.csv -o results/next-coil"
 )]
 pub struct Arguments {

@@ -37,6 +37,7 @@ use crate::task::optimise::{self, DRAWN_MODELS, Wishes};
     Examples:\n  coilwright optimise examples/paper-200m.toml -o results/paper-200m\n  \
     coilwright optimise examples/paper-200m.toml --windability any --seed 7 --budget 30s\n  \
     coilwright optimise my-coil.toml --objective p95       the winding that is best when it is built imperfectly\n  \
+    coilwright optimise my-coil.toml --cutting-planes      the worst admissible profiles join the searched ones\n  \
     coilwright optimise examples/paper-200m.toml -o results/paper-200m --resume\n  \
     coilwright optimise extended.toml --compare-with results/paper-200m"
 )]

@@ -7,7 +7,7 @@ use crate::pattern::classic::Classic;
 use crate::pattern::windability::WindabilityClass;
 use crate::profile::{Profile, ProfileSpec};
 use crate::rate::{CoilModel, RateModel};
-use crate::search::anneal::rounds::{Found, MOST_FOUND};
+use crate::search::anneal::rounds::Found;
 use crate::search::aside::{Aside, GridCheck, GridChecked, PointingError};
 use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
 use crate::search::cost::objective::{Objective, POINTING_S};
@@ -327,9 +327,10 @@ impl Evaluator<'_> {
         Ok(best)
     }
 
-    /// Built coils are worth being solved for several patterns at once.
+    /// Built coils are worth being solved for several patterns at once; the best are seldom far down the list.
     fn judged_at_once(&self) -> usize {
-        if self.objective == Objective::P95 { MOST_FOUND } else { 1 }
+        const OF_BUILT_COILS: usize = 6;
+        if self.objective == Objective::P95 { OF_BUILT_COILS } else { 1 }
     }
 
     /// In words: how much better than QUA, under which class, boundary and objective.

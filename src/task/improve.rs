@@ -90,7 +90,7 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Option<ImproveJ
     let found = read_json(&diagnosed)?;
 
     let extended_path = folder.join("extended.toml");
-    let stated = diagnosis.join("extended.toml");
+    let stated = diagnosis.join(EXTENDED);
     let source = if stated.is_file() { read_text(&stated)? } else { file.source.clone() };
     let source = with_sensor_and_pattern(&shown(&file.path), &source, None, "measured-pattern.toml")?;
     write_atomically(&extended_path, source.as_bytes())?;
@@ -220,6 +220,15 @@ impl Way<'_> {
             return Ok(());
         }
         check_free(folder)?;
+        // What an earlier diagnosis left is not this one's.
+        for stale in [folder.join(EXTENDED), self.request.folder.join(EXPERIMENT)] {
+            match std::fs::remove_file(&stale) {
+                Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+                    return Err(WriteError::File { path: stale, source }.into());
+                }
+                _ => {}
+            }
+        }
         let request = diagnose::Request {
             model: file,
             pattern: Some(self.old),
@@ -274,6 +283,7 @@ impl Way<'_> {
 const COMPARISON: &str = "comparison.json";
 const DIAGNOSIS: &str = "diagnosis.json";
 const SUMMARY: &str = "summary.json";
+const EXTENDED: &str = "extended.toml";
 const EXPERIMENT: &str = "next-experiment.toml";
 
 fn read_json(path: &Path) -> Result<Value, TaskError> {
