@@ -1,5 +1,5 @@
-//! Reference: the same models on a grid of sixteen cells a layer (elements of the twelfth order, a thirty-second of a layer at the
-//! surface), which agrees with closed forms to 1e-10 (`pack`, `flange`). Tolerances: a printed number may be off by its own margin
+//! Reference: the same models on elements of the twelfth order, an eighth of a layer at the surface, which is finer by far than
+//! sixteen finite volumes a layer and agrees with closed forms to 1e-10 (`pack`, `flange`). Tolerances: a printed number may be off by its own margin
 //! and by no more than a thousandth. And an outside number for the pointing error: an independent solver's 0.3243° for ZYL and
 //! −0.00355° for QUA on a coil of 24 × 50 turns behind a film of 20 W/(m²K) under a ramp of 50 K at one kelvin a minute.
 
@@ -18,6 +18,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const MAX_RATE_K_PER_S: f64 = 1.0 / 60.0;
+/// Elements of the twelfth order, an eighth of a layer at the surface.
+const FINEST: usize = 4;
 
 fn coil(layers: usize, pitch_m: f64, bore_m: f64) -> Coil {
     let fibre = Fibre {
@@ -59,8 +61,9 @@ fn declared(kind: &str, stated: &[f64], choices: &[usize]) -> DeclaredEffect {
     DeclaredEffect::new(spec, values, choices.to_vec()).unwrap()
 }
 
-/// Effects on the heat and on the light, each present in about a third of all models.
-fn drawn(random: &mut ChaCha8Rng, location: Location) -> Vec<DeclaredEffect> {
+/// Effects on the heat and on the light, each present in about a third of all models (a heated flange of small ones: its modes
+/// are many).
+fn drawn(random: &mut ChaCha8Rng, location: Location, layers: usize) -> Vec<DeclaredEffect> {
     let mut effects = Vec::new();
     let one_in_three = |random: &mut ChaCha8Rng| random.random_range(0..3) == 0;
     if location == Location::Ambient && random.random_range(0..4) > 0 {
@@ -74,7 +77,7 @@ fn drawn(random: &mut ChaCha8Rng, location: Location) -> Vec<DeclaredEffect> {
     if one_in_three(random) {
         effects.push(declared("self_heating", &[20.0, random.random_range(5.0..900.0)], &[]));
     }
-    if one_in_three(random) {
+    if layers <= 8 && one_in_three(random) {
         let film = 10f64.powf(random.random_range(0.5..3.0));
         effects.push(declared("axial_gradient", &[film], &[random.random_range(0..2)]));
     }
@@ -125,13 +128,13 @@ fn every_printed_rate_of_forty_random_models_is_within_its_margin_and_a_thousand
     let (mut largest, mut closest) = (0.0_f64, 0.0_f64);
     for case in 0..40 {
         // Most of moderate size: the finest grid of two hundred layers takes long without optimisation.
-        let layers = if case == 0 { 200 } else { 4 * random.random_range(1..13) };
+        let layers = if case == 0 { 200 } else { 4 * random.random_range(1..9) };
         let location = if random.random_range(0..2) == 0 { Location::OuterLayer } else { Location::Ambient };
         let coil = coil(layers, random.random_range(1.2e-4..3e-4), random.random_range(0.01..0.08));
-        let effects = drawn(&mut random, location);
+        let effects = drawn(&mut random, location, layers);
         let kinds: Vec<String> = effects.iter().map(DeclaredEffect::kind).collect();
         let coarse = model(coil, location, 1, effects);
-        let fine = CoilModel { cells_per_layer: 16, ..coarse.clone() };
+        let fine = CoilModel { cells_per_layer: FINEST, ..coarse.clone() };
         let profiles = profiles(&mut random);
         let [solved, finer] = [&coarse, &fine].map(|m| SolvedProfiles::new(m, &profiles).unwrap());
         let steps = [&coarse, &fine].map(|m| UnitStep::new(m, MAX_RATE_K_PER_S).ok());

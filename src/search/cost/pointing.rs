@@ -12,7 +12,7 @@
 //! | G | rate error after a unit step of the drive's rate | rad/s per K/s | as in [`super::guaranteed`] |
 //!
 //! Only differences of temperature count, not the way to them. What of a model is not linear in the rates is integrated
-//! over the profile's instants by the trapezium rule and added.
+//! between the profile's instants and added (where a search samples it, by the trapezium rule).
 //!
 //! # Source
 //! Pointing error thermal sensitivity: Opt. Express 21 (2013) 2521 (by its abstract).
@@ -22,6 +22,7 @@ use rayon::prelude::*;
 use super::guaranteed::is_linear;
 use super::samples::{SampleMatrix, any_rate_model};
 use super::worst_case::{SearchError, SolvedProfile, SolvedProfiles, WorstCase};
+use crate::numeric::lobatto::gauss;
 use crate::numeric::maximise::golden_section;
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::pattern::Pattern;
@@ -33,6 +34,8 @@ use crate::units::REFERENCE_TEMPERATURE_K;
 const RATIO: f64 = 1.03;
 /// The first of them, in units of the shortest time on which a response changes.
 const FIRST: f64 = 1e-2;
+/// Of Gauss's rule between two instants.
+const POINTS: usize = 4;
 /// A rate error that stays at this share of its largest makes a pointing error that grows without end.
 const SETTLED: f64 = 1e-6;
 
@@ -65,14 +68,24 @@ fn integrated(history: &ThermalHistory) -> ThermalHistory {
     }
 }
 
-/// Adds ∫ (all − linear) dt over the rows to each of them.
-fn add_rest(times_s: &[f64], rest: impl Fn(usize) -> f64, to: &mut [f64]) {
-    let (mut sum, mut before) = (0.0, rest(0));
-    for row in 1..times_s.len() {
-        let here = rest(row);
-        sum += 0.5 * (before + here) * (times_s[row] - times_s[row - 1]);
-        before = here;
-        to[row] += sum;
+/// Adds ∫ (all − linear) dt over the rows to each of them, by Gauss's rule between each two of them.
+fn add_rest(profile: &SolvedProfile, whole: &RateModel, linear: &RateModel, to: &mut [f64]) {
+    let times_s = &profile.history.times_s;
+    let rule = gauss(POINTS);
+    let inside = times_s.windows(2).flat_map(|pair| {
+        let (middle_s, half_s) = (0.5 * (pair[0] + pair[1]), 0.5 * (pair[1] - pair[0]));
+        rule.iter().map(move |(x, _)| Instant::after(middle_s + half_s * x)).collect::<Vec<_>>()
+    });
+    let between = profile.field.at(&inside.collect::<Vec<_>>());
+    let rest = |row: usize| {
+        whole.rate_error_rad_per_s(&whole.state(&between, row, &[]))
+            - linear.rate_error_rad_per_s(&linear.state(&between, row, &[]))
+    };
+    let mut sum = 0.0;
+    for (row, pair) in times_s.windows(2).enumerate() {
+        let half_s = 0.5 * (pair[1] - pair[0]);
+        sum += rule.iter().enumerate().map(|(p, (_, w))| half_s * w * rest(row * POINTS + p)).sum::<f64>();
+        to[row + 1] += sum;
     }
 }
 
@@ -112,11 +125,7 @@ fn worst_of(profile: &SolvedProfile, linear: &RateModel, whole: Option<&RateMode
     let history = &profile.history;
     let mut series = linear.series_rad_per_s(&integrated(history));
     if let Some(whole) = whole {
-        let rest = |row: usize| {
-            let state = whole.state(history, row, &[]);
-            whole.rate_error_rad_per_s(&state) - linear.rate_error_rad_per_s(&linear.state(history, row, &[]))
-        };
-        add_rest(&history.times_s, rest, &mut series);
+        add_rest(profile, whole, linear, &mut series);
     }
     let size = |row: usize| series[row].abs();
     let worst = (1..series.len()).fold(0, |best, row| if size(row) > size(best) { row } else { best });
