@@ -45,6 +45,8 @@ pub(super) struct Layers {
     bore_radius_m: f64,
     film: Option<f64>,
     cosines: Option<Vec<Cosine>>,
+    /// Layers inside a contact, and its conductance per area [W/(m² K)].
+    gaps: Vec<(usize, f64)>,
 }
 
 /// One cosine along the axis.
@@ -116,6 +118,7 @@ impl Layers {
                 .map(|s| [s.heat_capacity_j_per_m2_k, s.contact_w_per_m2_k, s.mount_w_per_m2_k].map(|v| v * bore_m)),
             bore_radius_m: bore_m,
             cosines,
+            gaps: physics.gaps.clone(),
         }
     }
 
@@ -169,15 +172,32 @@ impl Layers {
         let pieces: Vec<Piece> = cut.iter().map(|&(_, from_m, to_m)| self.piece(q, per_s, from_m, to_m)).collect();
         let zero = C::new(0.0, 0.0);
         let spool = usize::from(self.spool.is_some());
-        let last = spool + pieces.len();
+        // Pieces share a face, but where a contact lies between them each has its own.
+        let (mut contacts, mut inner_of) = (Vec::new(), Vec::with_capacity(cut.len()));
+        let mut face = spool;
+        for (i, &(layer, from_m, _)) in cut.iter().enumerate() {
+            let is_first = i > 0 && cut[i - 1].0 != layer;
+            if let Some((_, conductance)) = self.gaps.iter().find(|gap| is_first && gap.0 == layer) {
+                contacts.push((face, conductance * from_m));
+                face += 1;
+            }
+            inner_of.push(face);
+            face += 1;
+        }
+        let last = face;
         // What the flange's air makes of the pack by itself stands apart: it is the same everywhere in it.
         let by_air = C::new(cosine.from_air_per_s, 0.0) / per_s;
         let (mut diagonal, mut off) = (vec![zero; last + 1], vec![zero; last]);
         let (mut driven, mut warmed) = (vec![zero; last + 1], vec![zero; last + 1]);
         for (i, piece) in pieces.iter().enumerate() {
-            diagonal[spool + i] += piece.inner;
-            diagonal[spool + i + 1] += piece.outer;
-            off[spool + i] = piece.between;
+            diagonal[inner_of[i]] += piece.inner;
+            diagonal[inner_of[i] + 1] += piece.outer;
+            off[inner_of[i]] = piece.between;
+        }
+        for (inner, conductance) in contacts {
+            diagonal[inner] += conductance;
+            diagonal[inner + 1] += conductance;
+            off[inner] = (-conductance).into();
         }
         warmed[0] = (self.bore_radius_m * cosine.uniform).into();
         if let Some([heat, contact, mount]) = self.spool {
@@ -222,7 +242,7 @@ impl Layers {
         for (i, (piece, &(layer, from_m, to_m))) in pieces.iter().zip(&cut).enumerate() {
             if layer < solved {
                 let share = volume(from_m, to_m) / volume(self.faces_m[layer], self.faces_m[layer + 1]);
-                let mean = |of: &[C]| (piece.mean[0] * of[spool + i] + piece.mean[1] * of[spool + i + 1]) * share;
+                let mean = |of: &[C]| (piece.mean[0] * of[inner_of[i]] + piece.mean[1] * of[inner_of[i] + 1]) * share;
                 by_drive[layer] += mean(&driven) + by_air * share;
                 by_bore[layer] += mean(&warmed);
             }
