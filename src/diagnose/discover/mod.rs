@@ -177,7 +177,7 @@ mod tests {
     use statrs::distribution::{ContinuousCDF, Normal};
 
     use super::*;
-    use crate::boundary::expose;
+    use crate::diagnose::experiment::expose;
     use crate::chamber::{Assumption, Chamber, Input};
     use crate::diagnose::experiment::fixtures::{model, pattern};
     use crate::diagnose::{Request, Terms, Verdict, diagnose};
