@@ -33,6 +33,7 @@ use crate::coil::CoilError;
 use crate::effect::DeclaredEffect;
 use crate::numeric::noise::white_noise;
 use crate::pattern::Pattern;
+use crate::predict::PredictError;
 use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::units::Unit;
@@ -290,6 +291,8 @@ pub struct RecordNoise {
 pub enum DiagnoseError {
     #[error("a diagnosis needs at least one record")]
     NoRecord,
+    #[error("{record}: {source}")]
+    Record { record: String, source: PredictError },
     #[error(transparent)]
     Coil(#[from] CoilError),
     #[error(transparent)]
