@@ -374,6 +374,16 @@ pub fn rates_rad_per_s(
         .collect()
 }
 
+/// dΩ/dṪ_j of the coil [rad/s per K/s], innermost layer first.
+///
+/// # Errors
+/// A pattern of another layer count; effects that leave a layer no turns.
+pub fn layer_gains_rad_per_k(model: &CoilModel, pattern: &Pattern) -> Result<Vec<f64>, RateError> {
+    let rate = RateModel::new(model, pattern, &[])?;
+    let scale = rate.scale_per_m2() * rate.coil().fibre().path_per_k();
+    Ok(rate.weights().total_m2().iter().map(|w| w * scale).collect())
+}
+
 /// White noise of one rate, from the record alone: what quadratics leave in short windows, steep and spoilt ones left out.
 pub fn noise_floor(record: &Record) -> WhiteNoise {
     white_noise(record.times_s(), record.rate_rad_per_s())
