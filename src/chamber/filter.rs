@@ -108,11 +108,11 @@ pub struct Innovation {
 
 /// Gains and covariance of a row; rows with frozen gains share one.
 #[derive(Debug, Clone)]
-pub(super) struct Gains {
+struct Gains {
     /// Row-major, states: P before the measurements.
-    pub covariance: Vec<f64>,
+    covariance: Vec<f64>,
     /// A gain a measurement, one after another, and 1/S.
-    pub gain: Vec<f64>,
+    gain: Vec<f64>,
 }
 
 /// What a forward pass leaves.
@@ -120,11 +120,11 @@ pub(super) struct Gains {
 pub(super) struct Trace {
     /// In the order of rows, of each its measurements.
     pub innovations: Vec<Innovation>,
-    pub gains: Vec<Gains>,
+    gains: Vec<Gains>,
     /// Of each row its gains; only where they were to be kept.
-    pub gains_of: Vec<u32>,
+    gains_of: Vec<u32>,
     /// Row-major rows × states: before the measurements.
-    pub means: Vec<f64>,
+    means: Vec<f64>,
     pub log_likelihood: f64,
     /// Rows for which the covariance was computed.
     pub thawed: usize,

@@ -13,7 +13,7 @@ use super::system::system;
 use super::{Assumption, Chamber, ChamberError};
 
 /// Times that a record is looked through for gross errors, and for kinks.
-pub(super) const GROSS_ROUNDS: usize = 5;
+const GROSS_ROUNDS: usize = 5;
 const KINK_ROUNDS: usize = 3;
 const KINK_PASSES: usize = 3;
 /// A value so many rows beside a worse one waits for the next round: the worse one may be why it seems one.
@@ -40,8 +40,19 @@ impl<'a> Chamber<'a> {
         Ok((self, fit))
     }
 
-    pub(super) fn looked_through(&mut self, mut fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
-        fit = self.without_gross_errors(fit, records)?;
+    fn looked_through(&mut self, mut fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
+        for _ in 0..GROSS_ROUNDS {
+            let mut found = 0;
+            for &r in records {
+                let gross = self.gross(&fit, r)?;
+                found += gross.len();
+                gross.iter().for_each(|&(row, m)| self.observed[r].series.leave_out(row, m));
+            }
+            if found == 0 {
+                break;
+            }
+            fit = self.fit(&fit.assumed.clone(), &fit.free.clone(), records, Some(&fit), Effort::SHORT)?;
+        }
         for &r in records {
             // Either the air bends wherever readings do, or it is straight but for its kinks, which must be worth being
             // looked for: the record itself says which, by itself.
@@ -62,28 +73,8 @@ impl<'a> Chamber<'a> {
         Ok(fit)
     }
 
-    /// A fit to records without what it says are gross errors.
-    ///
-    /// # Errors
-    /// As [`Chamber::fit`].
-    pub fn without_gross_errors(&mut self, mut fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
-        for _ in 0..GROSS_ROUNDS {
-            let mut found = 0;
-            for &r in records {
-                let gross = self.gross(&fit, r)?;
-                found += gross.len();
-                gross.iter().for_each(|&(row, m)| self.observed[r].series.leave_out(row, m));
-            }
-            if found == 0 {
-                break;
-            }
-            fit = self.fit(&fit.assumed.clone(), &fit.free.clone(), records, Some(&fit), Effort::SHORT)?;
-        }
-        Ok(fit)
-    }
-
     /// Rows and measurements that are gross errors beside what all others say.
-    pub(super) fn gross(&self, fit: &Fit, record: usize) -> Result<Vec<(usize, usize)>, ChamberError> {
+    fn gross(&self, fit: &Fit, record: usize) -> Result<Vec<(usize, usize)>, ChamberError> {
         let place = self.place(fit.assumed.clone(), fit.numbers.clone(), &[record], &fit.courses)?;
         let (Some(side), Some(values)) = (&place.sides[record], &place.values[record]) else {
             return Err(ChamberError::Unsolvable);
@@ -120,7 +111,11 @@ impl<'a> Chamber<'a> {
             // With numbers as they are until nothing is found, and again once they have been fitted to that.
             for _ in 0..KINK_PASSES {
                 let new = self.kinks(&day, record)?;
-                self.spread_kinks(&new, record);
+                for &(row, size) in &new {
+                    // Between two rows a kink is one at either.
+                    let near = row.saturating_sub(1)..(row + KINK_ROWS - 1).min(rows);
+                    self.observed[record].series.rows[near].iter_mut().for_each(|r| r.kink += size * size);
+                }
                 found += new.len();
                 if new.is_empty() {
                     break;
@@ -137,35 +132,6 @@ impl<'a> Chamber<'a> {
         }
         let day = self.fit(&fit.assumed, &[], &[record], Some(&day), Effort::QUICK)?;
         Ok(Some((day, count)))
-    }
-
-    /// Places the kinks of a record's readings by numbers that are known, if it has any and is not all curves.
-    pub(super) fn place_kinks(&mut self, fit: &Fit, record: usize) -> Result<(), ChamberError> {
-        let before = self.observed[record].series.clone();
-        let rows = before.rows.len();
-        self.observed[record].series.rows.iter_mut().for_each(|row| row.bend = 0.0);
-        let mut count = 0;
-        for _ in 0..KINK_ROUNDS * KINK_PASSES {
-            let new = self.kinks(fit, record)?;
-            self.spread_kinks(&new, record);
-            count += new.len();
-            if new.is_empty() || count > rows / FEWEST_ROWS_A_KINK {
-                break;
-            }
-        }
-        if count == 0 || count > rows / FEWEST_ROWS_A_KINK {
-            self.observed[record].series = before;
-        }
-        Ok(())
-    }
-
-    /// Between two rows a kink is one at either.
-    fn spread_kinks(&mut self, kinks: &[(usize, f64)], record: usize) {
-        let rows = &mut self.observed[record].series.rows;
-        for &(row, size) in kinks {
-            let near = row.saturating_sub(1)..(row + KINK_ROWS - 1).min(rows.len());
-            rows[near].iter_mut().for_each(|r| r.kink += size * size);
-        }
     }
 
     /// Rows before which the air has a kink by the readings, and how large it seems [K/s].

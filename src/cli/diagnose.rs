@@ -50,11 +50,12 @@ pub struct Arguments {
     /// Seed of the profiles that the experiment is chosen from
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Seeks no formula for what the listed effects leave
+    /// Seeks no formula for what the listed effects leave; so it is unless --terms is given
     #[arg(long, conflicts_with = "terms")]
     no_discovery: bool,
-    /// Forms and variables that a formula may be made of, such as relaxation, hysteresis, T_mean or a column's name
-    #[arg(long, value_name = "WORD,…", value_delimiter = ',')]
+    /// Seeks a formula for what the listed effects leave: all, or the forms and variables that it may be made of, such as
+    /// relaxation, hysteresis, T_mean or a column's name
+    #[arg(long, value_name = "all|WORD,…", value_delimiter = ',')]
     terms: Vec<String>,
     #[command(flatten)]
     reading: RecordArguments,
@@ -75,8 +76,9 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         holdout: &holdout,
         experiment_seed: wants_experiment.then_some(arguments.seed),
         terms: match arguments.terms.as_slice() {
-            _ if arguments.no_discovery => Terms::None,
-            [] => Terms::All,
+            [] if arguments.no_discovery => Terms::None,
+            [] => Terms::default(),
+            [all] if all == "all" => Terms::All,
             words => Terms::Among(words),
         },
         ..Request::new(&file, &measurements)

@@ -16,7 +16,7 @@ pub mod stream;
 
 use thiserror::Error;
 
-use crate::chamber::{self, Surroundings};
+use crate::boundary::BoundaryError;
 use crate::coil::CoilError;
 use crate::pattern::Pattern;
 use crate::predict::{self, PredictError};
@@ -77,6 +77,8 @@ pub enum CompensateError {
     #[error(transparent)]
     Predict(#[from] PredictError),
     #[error(transparent)]
+    Boundary(#[from] BoundaryError),
+    #[error(transparent)]
     Thermal(#[from] ThermalError),
     #[error(transparent)]
     Rate(#[from] RateError),
@@ -100,7 +102,8 @@ impl Compensator {
     pub fn fit(method: Method, model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<Self, CompensateError> {
         Ok(match method {
             Method::Physical => {
-                let mut physical = Physical::new(model, pattern)?;
+                let boundary = predict::estimate_boundary(model, pattern, record)?;
+                let mut physical = Physical::with_boundary(model, pattern, &boundary, record)?;
                 if let Some(name) = physical
                     .channel_names()
                     .chain(physical.formula_columns())
@@ -108,14 +111,6 @@ impl Compensator {
                 {
                     return Err(CompensateError::MissingChannel { name: name.to_owned() });
                 }
-                let read = predict::read(model, pattern, record)?;
-                let bends = read.boundary.bends.clone();
-                let surroundings = read.with_rates(|chamber, fit| Ok(chamber.surroundings(fit, 0, &bends)))?;
-                let range_k = record
-                    .temperature_k()
-                    .iter()
-                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(*t), high.max(*t)));
-                physical = Physical::within(model, pattern, surroundings, Some(range_k))?;
                 physical.tune(record);
                 Compensator::Physical(Box::new(physical))
             }
@@ -134,20 +129,6 @@ impl Compensator {
             Method::Physical => Ok(Compensator::Physical(Box::new(Physical::new(model, pattern)?))),
             Method::Piecewise | Method::Regression | Method::Learned => Err(CompensateError::NeedsRecord { method }),
         }
-    }
-
-    /// The physical one without a record, in the surroundings and with the offset that earlier records showed.
-    ///
-    /// # Errors
-    /// A model that is not linear.
-    pub fn in_known_surroundings(
-        model: &CoilModel,
-        pattern: &Pattern,
-        learned: &chamber::Learned,
-    ) -> Result<Self, CompensateError> {
-        let mut physical = Physical::within(model, pattern, Surroundings::learned(learned), None)?;
-        physical.offset_rad_per_s = learned.offset_rad_per_s.map_or(0.0, |offset| offset.value);
-        Ok(Compensator::Physical(Box::new(physical)))
     }
 
     pub fn method(&self) -> Method {

@@ -287,8 +287,12 @@ fn primary(pair: Pair<Rule>, parts: &mut Parts) -> Result<Built, ExpressionError
             Ok((Node::Remember(keeper, slot, at.clone(), Box::new(input), Box::new(size)), at))
         }
         _ => {
+            // The part with its parentheses, which the grammar leaves out of the pair.
+            let source = pair.get_input();
+            let from = source[..at.start].rfind('(').unwrap_or(at.start);
+            let to = source[at.end..].find(')').map_or(at.end, |more| at.end + more + 1);
             let (inner, _) = build(pair.into_inner(), parts)?;
-            Ok((inner, at))
+            Ok((inner, from..to))
         }
     }
 }

@@ -12,7 +12,6 @@ use crate::io::json::inputs::InputsJson;
 use crate::io::json::schedule::{RATE_DECIMALS, rounded};
 use crate::io::model::{ModelFile, NamedPattern};
 use crate::io::read::profile_file::print_profile;
-use crate::io::write::boundary_edit::with_boundary;
 use crate::io::write::measurement_folder::{DIAGNOSIS_FILE, MeasurementFiles, PROPOSED_FILE, before_and_after_name};
 use crate::io::write::model_edit::{Remark, with_effect};
 use crate::pattern::Pattern;
@@ -48,7 +47,7 @@ pub struct Request<'a> {
 impl<'a> Request<'a> {
     /// With the model's own pattern; no hold-out and no experiment.
     pub fn new(model: &'a ModelFile, measurements: &'a [Measurement]) -> Self {
-        Self { model, pattern: None, measurements, holdout: &[], experiment_seed: None, terms: Terms::All }
+        Self { model, pattern: None, measurements, holdout: &[], experiment_seed: None, terms: Terms::None }
     }
 }
 
@@ -90,7 +89,7 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
     let all: Vec<&Record> = records.iter().chain(&holdout).collect();
     let seed = request.experiment_seed.filter(|_| !diagnosis.effects.is_empty());
     let experiment = match Chamber::of(&all).zip(seed) {
-        Some((chamber, seed)) => design(&diagnose::contest(&asked, &diagnosis)?, &chamber, seed),
+        Some((chamber, seed)) => design(&diagnose::contest(&asked, &diagnosis)?, &pattern, &chamber, seed),
         None => None,
     };
     let holdout_noise = (!holdout.is_empty()).then(|| noise_of(&holdout));
@@ -141,13 +140,12 @@ impl Answer {
         self.diagnosis.verdict == Verdict::Adequate
     }
 
-    /// The model file with the effects that were found and what surrounds the coil; none where neither was.
+    /// The model file with the effects that were found; none where there are none.
     ///
     /// # Errors
     /// A text that is no model file.
     pub fn extended_source(&self, model: &ModelFile) -> Result<Option<String>, TaskError> {
-        let film = self.document.boundary.surface_film_w_per_m2_k.is_some();
-        if self.document.effects.is_empty() && (!film || self.diagnosis.verdict == Verdict::Unexplained) {
+        if self.document.effects.is_empty() {
             return Ok(None);
         }
         let mut source = model.source.clone();
@@ -155,7 +153,7 @@ impl Answer {
         for (finding, shown) in self.diagnosis.effects.iter().zip(&self.document.effects) {
             source = with_effect(&name, &source, &finding.effect, &remarks(shown))?;
         }
-        Ok(Some(with_boundary(&name, &source, &self.diagnosis.boundary)?))
+        Ok(Some(source))
     }
 
     /// The model file with the listed effects and the proposed terms; none where nothing is proposed.

@@ -235,7 +235,7 @@ impl Way<'_> {
             measurements: self.request.measurements,
             holdout: self.request.holdout,
             experiment_seed: Some(EXPERIMENT_SEED),
-            terms: crate::diagnose::Terms::All,
+            terms: crate::diagnose::Terms::None,
         };
         let found = diagnose::run(&request, &Quietly(self.observer))?;
         if let Some(experiment) = found.experiment_source(file) {
@@ -378,13 +378,6 @@ fn learned_film(file: &ModelFile, comparison: &Value) -> Option<LearnedFilm> {
         return None;
     }
     let records = comparison["records"].as_array()?;
-    if let Some((film, learned)) = file.learned_film().zip(file.learned.as_ref()) {
-        return Some(LearnedFilm {
-            value_w_per_m2_k: film.value,
-            standard_error: Some(film.standard_error).filter(|e| e.is_finite()),
-            records: learned.records,
-        });
-    }
     let films: Vec<f64> = records.iter().filter_map(|r| r["estimated_film_w_per_m2_k"].as_f64()).collect();
     let count = films.len();
     let mean = films.iter().sum::<f64>() / count.max(1) as f64;

@@ -8,7 +8,6 @@
 //! # Source
 //! Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773; Madigan and Raftery, ibid. 89 (1994) 1535 (Occam's window).
 
-mod beside;
 mod explanation;
 mod judge;
 mod odds;
@@ -19,7 +18,6 @@ use crate::chamber::{Chamber, ChamberError, Fit};
 use crate::diagnose::candidate::Candidate;
 use crate::pattern::Pattern;
 
-pub use beside::beside;
 pub use explanation::{Explanation, Member};
 pub(in crate::diagnose) use explanation::{fitted, with, without};
 pub(in crate::diagnose) use odds::EFFECT;

@@ -1,6 +1,5 @@
 //! JSON documents: mirror types of what commands answer, with the keys that scripts read.
 
-pub mod boundary;
 pub mod comparison;
 pub mod diagnosis;
 pub mod effects;

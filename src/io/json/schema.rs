@@ -143,7 +143,6 @@ pub fn model_schema() -> Value {
             "search": search,
             "production": production(),
             "tolerance": tolerance(),
-            "boundary": super::boundary::schema(),
         }),
     ))
 }
@@ -468,18 +467,8 @@ mod tests {
             keys
         };
         assert_eq!(keys(&schema), known(""));
-        for name in [
-            "fibre",
-            "winding",
-            "thermal",
-            "sensor",
-            "record",
-            "profiles",
-            "search",
-            "production",
-            "tolerance",
-            "boundary",
-        ] {
+        for name in ["fibre", "winding", "thermal", "sensor", "record", "profiles", "search", "production", "tolerance"]
+        {
             assert_eq!(keys(&schema["properties"][name]), known(&format!("[{name}]")), "{name}");
         }
         for spec in CATALOGUE {

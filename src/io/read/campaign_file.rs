@@ -176,11 +176,9 @@ impl CampaignFile {
                 return Err(Faults::of_file(path.display().to_string(), message));
             }
             let files = if self.layers.is_empty() {
-                vec![parse_model(path, &source)?.for_search()]
+                vec![parse_model(path, &source)?]
             } else {
-                let with = |&layers: &usize| {
-                    parse_model(path, &with_layers(path, &source, layers)?).map(ModelFile::for_search)
-                };
+                let with = |&layers: &usize| parse_model(path, &with_layers(path, &source, layers)?);
                 self.layers.iter().map(with).collect::<Result<_, _>>()?
             };
             for file in files {

@@ -3,7 +3,7 @@
 use super::formulas_in_c::FormulasInC;
 use serde::Serialize;
 
-use crate::compensate::filter::{FORGOTTEN_ROWS, Filter, Gains, LEAST_LOG_WEIGHT};
+use crate::compensate::filter::{BREAK_PROBABILITY, FORGOTTEN_ROWS, Filter, Gains, LEAST_LOG_WEIGHT};
 use crate::compensate::physical::Physical;
 use crate::text::sink::CComment;
 use crate::units::deg_per_h_from_rad_per_s;
@@ -81,7 +81,7 @@ impl DifferenceEquation {
         if !physical.is_linear() {
             return None;
         }
-        let Filter { transition, rate, reading, level_states, most_hypotheses, break_probability, gains, .. } =
+        let Filter { transition, rate, reading, level_states, most_hypotheses, gains, .. } =
             physical.filter(interval_s, delay_rows);
         let states = rate.len();
         let mut equations = PLAIN.to_vec();
@@ -102,7 +102,7 @@ impl DifferenceEquation {
             reading,
             level_states,
             most_hypotheses,
-            break_probability,
+            break_probability: BREAK_PROBABILITY,
             least_log_weight: LEAST_LOG_WEIGHT,
             forgotten_rows: FORGOTTEN_ROWS,
             gains: gains.iter().map(|g| GainsJson::new(g, states)).collect(),

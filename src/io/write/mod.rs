@@ -2,7 +2,6 @@
 //!
 //! What only this program writes and reads again (a checkpoint, the parts of a front) is read here too.
 
-pub mod boundary_edit;
 pub mod checkpoint;
 pub mod comparison_rows;
 pub mod compensation_file;

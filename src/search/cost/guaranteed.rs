@@ -328,6 +328,9 @@ mod tests {
 
     const RATE_K_PER_S: f64 = 10.0 / 3600.0;
 
+    /// Extrema of the step's response are found to this share of the bound; the margin of its grid is larger.
+    const EXTREMA: f64 = 1e-5;
+
     #[test]
     fn the_bang_bang_profile_attains_the_bound_and_nothing_exceeds_it() {
         let effect_sets: [&[&str]; 5] = [
@@ -355,7 +358,7 @@ mod tests {
                     let solved = SolvedProfiles::new(&model, &[profile]).unwrap();
                     let attained = solved.worst_case(&model, &pattern).unwrap().rate_rad_per_s.abs();
                     let share = attained / bound.rate_rad_per_s;
-                    assert!((0.995..=1.0 + 1e-9).contains(&share), "{effects:?} {extent:?} {classic:?}: {share}");
+                    assert!((0.995..=1.0 + EXTREMA).contains(&share), "{effects:?} {extent:?} {classic:?}: {share}");
                     let cost = samples.cost(&model, &pattern, Norm::Sum).unwrap() / bound.rate_rad_per_s;
                     assert!((0.998..=1.0 + 1e-12).contains(&cost), "{effects:?} {extent:?} {classic:?}: {cost}");
                 }
@@ -382,7 +385,10 @@ mod tests {
                     solved.worst_case(&model, &pattern).unwrap().rate_rad_per_s.abs() / bound.rate_rad_per_s
                 };
                 let attained = worst(&[bound.profile("bang-bang")]);
-                assert!((0.995..=1.0 + 1e-9).contains(&attained), "{power} {time_constant_s} {classic:?}: {attained}");
+                assert!(
+                    (0.995..=1.0 + EXTREMA).contains(&attained),
+                    "{power} {time_constant_s} {classic:?}: {attained}"
+                );
                 let spec = ProfileSpec {
                     max_rate_k_per_s: RATE_K_PER_S,
                     count: 20,
