@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
+use coilwright::compensate::formulas::Columns;
 use coilwright::compensate::stream::{Compensated, Reading, Stream};
 use coilwright::compensate::{Compensator, Method};
 use coilwright::io::fault::Faults;
@@ -161,8 +162,14 @@ impl StreamHandle {
         channels: Vec<Option<f64>>,
     ) -> PyResult<Vec<Out>> {
         let finite = |value: Option<f64>| value.filter(|v| v.is_finite());
+        let mut columns = Columns::default();
         let channel_rad_per_s = match self.compensator.as_ref() {
-            Compensator::Physical(physical) => physical.channel_bias_rad_per_s(channels.into_iter()),
+            Compensator::Physical(physical) => {
+                // The columns of formulas stand behind those of the channels' own effects.
+                let of_formulas = channels.iter().skip(physical.channel_names().count());
+                columns.iter_mut().zip(of_formulas).for_each(|(column, value)| *column = *value);
+                physical.channel_bias_rad_per_s(channels.into_iter())
+            }
             _ => Some(0.0),
         };
         let reading = time_s.is_finite().then(|| Reading {
@@ -170,6 +177,7 @@ impl StreamHandle {
             temperature_k: finite(temperature_c).map(kelvin_from_celsius),
             inner_k: finite(inner_c).map(kelvin_from_celsius),
             channel_rad_per_s,
+            columns,
             rate_rad_per_s: finite(rate_deg_per_h).map(rad_per_s_from_deg_per_h),
         });
         let mut ready = Vec::new();
