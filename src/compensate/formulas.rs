@@ -157,7 +157,7 @@ impl AtWork {
             channels: &values,
             thermal_rate_rad_per_s,
         };
-        let of = |(effect, memory): (&Box<dyn Effect>, &mut Memory)| effect.outside_rate_after(&state, memory);
-        self.bound.iter().zip(&mut self.memories).map(of).filter(|v| v.is_finite()).sum()
+        let each = self.bound.iter().zip(&mut self.memories);
+        each.map(|(effect, memory)| effect.outside_rate_after(&state, memory)).filter(|v| v.is_finite()).sum()
     }
 }

@@ -55,6 +55,7 @@ fn heat_at(heat: Option<BoreHeat>, time_s: f64) -> f64 {
 
 /// What solves the pack.
 #[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one of it in a verification")]
 enum Solution {
     HalfSpace {
         depths_m: Vec<f64>,

@@ -10,6 +10,8 @@ use super::{code, root, run, run_in, stderr, stdout};
 
 /// What takes seconds: only parsed.
 const LONG: &[&str] = &[
+    // It reads what an earlier diagnosis with --terms wrote.
+    "extend coil.toml --proposal",
     "optimise examples/paper-200m.toml --windability any",
     "optimise my-coil.toml",
     "optimise extended.toml",

@@ -99,7 +99,7 @@ impl Allowed {
         let forms: Vec<&String> = self.words.iter().filter(|w| is_form(w)).collect();
         let names: Vec<&String> = self.words.iter().filter(|w| !is_form(w)).collect();
         (forms.is_empty() || forms.iter().any(|f| *f == family.form.key))
-            && (names.is_empty() || family.variables().iter().all(|v| names.iter().any(|n| *n == v)))
+            && (names.is_empty() || family.variables().iter().all(|v| names.contains(&v)))
     }
 }
 

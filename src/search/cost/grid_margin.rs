@@ -55,6 +55,7 @@ pub struct GridMargin {
 }
 
 #[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one of it in a search")]
 enum Kind {
     /// A closed form: no grid.
     None,

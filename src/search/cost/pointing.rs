@@ -165,11 +165,11 @@ pub fn pointing_samples(model: &CoilModel, solved: &SolvedProfiles) -> Result<Sa
                 };
                 let mut before = rest(0);
                 let mut sum = combined(&before, 0.0, &before, 0.0);
-                for row in 1..of_rows.len() {
+                for (row, of_row) in of_rows.iter_mut().enumerate().skip(1) {
                     let here = rest(row);
                     let half_s = 0.5 * (history.times_s[row] - history.times_s[row - 1]);
                     sum = combined(&sum, 1.0, &combined(&before, half_s, &here, half_s), 1.0);
-                    of_rows[row] = combined(&of_rows[row], 1.0, &sum, 1.0);
+                    *of_row = combined(of_row, 1.0, &sum, 1.0);
                     before = here;
                 }
             }
