@@ -62,6 +62,7 @@ pub struct CsvRows<R> {
     count: usize,
 }
 
+#[allow(clippy::len_without_is_empty)]
 impl<R: BufRead> CsvRows<R> {
     pub fn new(input: R) -> Self {
         Self {
@@ -113,6 +114,7 @@ impl<R: BufRead> CsvRows<R> {
     ///
     /// # Errors
     /// An input that fails.
+    #[allow(clippy::should_implement_trait, reason = "what it gives borrows from it and may fail")]
     pub fn next(&mut self) -> io::Result<Option<Piece>> {
         self.begin_piece();
         let Some(first) = self.next_line()? else { return Ok(None) };
@@ -174,6 +176,7 @@ impl<R: BufRead> CsvRows<R> {
     }
 
     /// How many cells the row has; 0 where it is none.
+    #[allow(clippy::len_without_is_empty)] // Asked of rows only.
     pub fn len(&self) -> usize {
         self.count
     }
