@@ -12,9 +12,9 @@
 //!
 //! How far a pattern is behind the best classic where it is furthest behind, in any of these figures or on any set of
 //! unseen profiles, is its regret. The classic with the least regret stays unless a pattern that was found is better by
-//! more than [`TIE`] in the figure and has no more regret than that classic or none at all; or unless every classic is
-//! behind another one by more than [`TIE`] somewhere and a found pattern is not ([`rehearsal`](super::rehearsal) searches
-//! such). Of what is equally good to [`TIE`] the pattern is taken that is easiest to wind: fewest captive runs, then the
+//! more than `TIE` in the figure and has no more regret than that classic or none at all; or unless every classic is
+//! behind another one by more than `TIE` somewhere and a found pattern is not (`rehearsal` searches
+//! such). Of what is equally good to `TIE` the pattern is taken that is easiest to wind: fewest captive runs, then the
 //! smallest climb, then the fewest long crossovers.
 
 use super::anneal::rounds::Found;

@@ -1,7 +1,7 @@
 //! Use cases: what the program is asked for. Each has a `Request`, an `Answer` with the document that the program prints, and a
 //! `run` that an [`Observer`] watches; the faces (command line, Python) parse, call and show.
 //!
-//! The search's own is [`crate::search::run`].
+//! The search's own is [`crate::search::run()`].
 
 pub mod compare;
 pub mod compensate;

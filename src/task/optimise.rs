@@ -82,7 +82,7 @@ impl Wishes {
         })
     }
 
-    /// The request to [`search::run`]; `former` is a pattern to compare with.
+    /// The request to [`search::run()`]; `former` is a pattern to compare with.
     ///
     /// # Errors
     /// As [`Wishes::plan`]; a proof of what no proof is about.

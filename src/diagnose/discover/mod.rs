@@ -1,7 +1,7 @@
 //! Effects that stand in no list: which formula explains what the listed effects leave.
 //!
-//! Each candidate is a term of the joint model ([`grammar`]), scored at a fit with one filter pass; listed effects and
-//! unlisted terms are in one competition ([`search`]), judged on records that were not fitted. A listed effect wins ties: an
+//! Each candidate is a term of the joint model (`grammar`), scored at a fit with one filter pass; listed effects and
+//! unlisted terms are in one competition (`search`), judged on records that were not fitted. A listed effect wins ties: an
 //! unlisted term pays for having been chosen among many.
 //!
 //! # Source

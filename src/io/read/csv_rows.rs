@@ -2,7 +2,7 @@
 //!
 //! A row is what the CSV grammar takes for one (RFC 4180: cells in quotes may hold separators, quotes and line breaks), and it
 //! keeps its text as it stands, so that it can be passed on. A line that begins with `#`, and an empty one, is no row. A quote
-//! that is not closed within [`MOST_LINES`] does not swallow what follows: its line is broken, and reading goes on behind it.
+//! that is not closed within `MOST_LINES` does not swallow what follows: its line is broken, and reading goes on behind it.
 
 use std::collections::VecDeque;
 use std::io::{self, BufRead};
