@@ -12,6 +12,7 @@ use super::{code, root, run, run_in, stderr, stdout};
 const LONG: &[&str] = &[
     // It reads what an earlier diagnosis with --terms wrote.
     "extend coil.toml --proposal",
+    "trim",
     "optimise examples/paper-200m.toml --windability any",
     "optimise my-coil.toml",
     "optimise extended.toml",
