@@ -12,7 +12,6 @@ pub mod measurement;
 pub mod metrics;
 pub mod optimise;
 pub mod pareto;
-pub mod proposal;
 pub mod schedule;
 pub mod temperatures;
 pub mod tolerance;
@@ -27,6 +26,8 @@ pub mod extend;
 pub mod improve;
 #[cfg(feature = "report")]
 pub mod page;
+#[cfg(feature = "report")]
+pub mod proposal;
 #[cfg(feature = "report")]
 mod steps;
 #[cfg(feature = "report")]
