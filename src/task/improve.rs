@@ -126,10 +126,7 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Option<ImproveJ
     let comments = [TomlComment::of(summary["recommendation"]["sentence"].as_str().unwrap_or_default())];
     write_atomically(&new_path, print_pattern(&new, &comments).as_bytes())?;
     let schedule_folder = folder.join("schedule");
-    let wound = schedule::run(&schedule::Request { model: &design, pattern: Some(&new) })?;
-    for (name, text) in wound.files(&design)? {
-        write_atomically(&schedule_folder.join(name), text.as_bytes())?;
-    }
+    way.scheduled(&design, &new, &schedule_folder)?;
 
     let predicted_path = folder.join(PREDICTED);
     let rows = predicted_rows(&extended, &new.pattern, &request.measurements[0].record)?;
@@ -188,6 +185,21 @@ impl Way<'_> {
         let step = name_of(into);
         self.observer.note(&if is_done { format!("{step}: done before") } else { format!("{step} …") });
         is_done
+    }
+
+    /// Writes what the winding machine and the shop floor get.
+    fn scheduled(&mut self, design: &ModelFile, new: &NamedPattern, folder: &Path) -> Result<(), TaskError> {
+        let made_of = made_of(&[&design.source, &print_pattern(new, &[])], &[]);
+        let wound = schedule::run(&schedule::Request { model: design, pattern: Some(new) })?;
+        let files = wound.files(design)?;
+        let names: Vec<&str> = files.iter().map(|(name, _)| name.as_ref()).collect();
+        if !self.is_done(folder, made_of.as_deref(), &names) {
+            for (name, text) in &files {
+                write_atomically(&folder.join(name), text.as_bytes())?;
+            }
+            self.note_done(folder, made_of.as_deref())?;
+        }
+        Ok(())
     }
 
     fn note_done(&mut self, into: &Path, made_of: Option<&str>) -> Result<(), TaskError> {
