@@ -61,14 +61,18 @@ pub enum RecordError {
     Time { row: usize, found_s: f64 },
     #[error("column {column} holds no finite number in row {row}")]
     NotFinite { column: &'static str, row: usize },
+    #[error("rows are {found_s:e} s apart, expected at least {LEAST_INTERVAL_S:e} s: check the unit of time_s")]
+    Interval { found_s: f64 },
 }
 
 /// Fewer rows than this describe no record.
 pub const MIN_ROWS: usize = 3;
+/// Rows that are usually closer are no record: no gyro gives a million rates a second.
+pub const LEAST_INTERVAL_S: f64 = 1e-6;
 
 impl Record {
     /// # Errors
-    /// Too few rows, columns of unequal length, times that do not increase, needed numbers that are not finite.
+    /// Too few rows, columns of unequal length, times that do not increase or are too close, needed numbers that are not finite.
     pub fn new(
         name: impl Into<String>,
         times_s: Vec<f64>,
@@ -93,6 +97,10 @@ impl Record {
         }
         if let Some(row) = (1..rows).find(|&i| times_s[i] <= times_s[i - 1]) {
             return Err(RecordError::Time { row: row + 1, found_s: times_s[row] });
+        }
+        let found_s = usual_interval_s(&times_s);
+        if found_s < LEAST_INTERVAL_S {
+            return Err(RecordError::Interval { found_s });
         }
         Ok(Self {
             name: name.into(),
@@ -220,10 +228,15 @@ impl Record {
 
     /// The usual interval between rows: the median.
     pub fn interval_s(&self) -> f64 {
-        let mut steps: Vec<f64> = self.times_s.windows(2).map(|w| w[1] - w[0]).collect();
-        steps.sort_by(f64::total_cmp);
-        steps[steps.len() / 2]
+        usual_interval_s(&self.times_s)
     }
+}
+
+/// The median of the intervals between at least two times.
+pub fn usual_interval_s(times_s: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = times_s.windows(2).map(|w| w[1] - w[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    steps[steps.len() / 2]
 }
 
 /// As [`Record::gross_errors`], of a stretch of rows.

@@ -33,6 +33,9 @@ const KNOT_PER_INTERVAL: f64 = 0.5;
 /// … and right after a kink, where the outermost layer sets out along t^(3/2), than this, and this share of the time since.
 const KNOT_AFTER_KINK_PER_INTERVAL: f64 = 0.1;
 const KNOT_PER_TIME_SINCE_KINK: f64 = 0.03;
+/// In a longer gap between readings the air is taken to have moved on for so long only [s]: it has then wandered as far as it may
+/// have before a record began, and a variance that grows with the seventh power of time would leave no digit of the readings'.
+const LONGEST_GAP_S: f64 = START_MEMORY_S;
 /// Two times closer than this are one [s].
 pub(super) const SAME_TIME_S: f64 = 1e-6;
 
@@ -274,7 +277,7 @@ impl Scene {
         for (index, &(time_s, event)) in events.iter().enumerate() {
             let mut measurements = Vec::new();
             let mut disturbances = Vec::new();
-            let step_s = events.get(index + 1).map_or(0.0, |next| next.0 - time_s);
+            let step_s = events.get(index + 1).map_or(0.0, |next| (next.0 - time_s).min(LONGEST_GAP_S));
             let mut begins_window = event == Event::WindowStart;
             match event {
                 Event::Reading(reading) => {
@@ -415,6 +418,10 @@ impl Scene {
             let Some(&next_s) = built.stage_times_s.get(stage + 1) else { break };
             if built.kink_stages.contains(&stage) {
                 kink_s = time_s;
+            }
+            if next_s - time_s > LONGEST_GAP_S {
+                // A straight line is as good as any.
+                continue;
             }
             let since_kink_s = time_s - kink_s;
             let near_s = KNOT_AFTER_KINK_PER_INTERVAL * self.interval_s + KNOT_PER_TIME_SINCE_KINK * since_kink_s;

@@ -332,6 +332,9 @@ fn ascend(
         let (below, air_below) = at(left, &air)?;
         let (above, air_above) = at(right, &air)?;
         let curvature = below - 2.0 * best + above;
+        if !curvature.is_finite() {
+            break;
+        }
         let towards = if curvature < 0.0 {
             (0.5 * step * (below - above) / curvature).clamp(-3.0 * step, 3.0 * step)
         } else {

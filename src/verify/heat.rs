@@ -21,9 +21,14 @@ use crate::rate::CoilModel;
 /// Times a piece of a profile, where each profile is stepped, and so many times more for one stated moment …
 const STEPS: usize = 240;
 const CLOSER: usize = 5;
+/// … and so few where it is only asked which profiles are worth all of them, …
+const FEW_STEPS: usize = 40;
 /// … and where it is superposed: closer to its start, and evenly.
 const SPACED_TIMES: usize = 90;
 const EVEN_TIMES: usize = 40;
+/// … and so far apart where it is only asked which pieces are worth all of them: the response to a change of ramp takes a decade of
+/// time to rise, so what stands between two of these is less than twice as large as both.
+const FEW_TIMES_RATIO: f64 = 3.0;
 
 /// Two cuts of a pack that is stepped …
 const CUTS: [Cut; 2] = [Cut { cells_per_layer: 8, slices: 1 }, Cut { cells_per_layer: 16, slices: 1 }];
@@ -60,6 +65,8 @@ enum Solution {
     HalfSpace {
         depths_m: Vec<f64>,
         diffusivity_m2_per_s: f64,
+        /// For ramps that are summed up.
+        gathered: Response,
     },
     Linear(Response),
     /// On two networks, the second twice as fine as the first.
@@ -88,8 +95,9 @@ impl Heat {
         let diffusivity_m2_per_s = physics.diffusivity_m2_per_s();
         let heat = physics.bore_heat;
         let solution = if !physics.is_pack {
-            let depths_m = (0..layers).map(|j| (layers - 1 - j) as f64 * pitch_m).collect();
-            Solution::HalfSpace { depths_m, diffusivity_m2_per_s }
+            let depths_m: Vec<f64> = (0..layers).map(|j| (layers - 1 - j) as f64 * pitch_m).collect();
+            let gathered = Response::half_space(&depths_m, diffusivity_m2_per_s, longest_s);
+            Solution::HalfSpace { depths_m, diffusivity_m2_per_s, gathered }
         } else if physics.conductivity_slope_per_k != 0.0 {
             let cuts = if !physics.flanges.is_empty() { CUTS_BESIDE_FLANGE } else { CUTS };
             Solution::Stepped { networks: cuts.map(|cut| Network::new(model, physics, height_m, cut)), heat }
@@ -110,13 +118,7 @@ impl Heat {
         if let Solution::Stepped { networks, heat } = &self.solution {
             return self.extrapolated(profile, networks, *heat, Some(moment)).pop().unwrap_or_default();
         }
-        let solved = if self.wants_rise { self.layers } else { 0 };
-        let mut state = State {
-            time_s: moment.time_s,
-            rise_k: vec![0.0; solved],
-            rate_k_per_s: vec![0.0; self.layers],
-            ..State::default()
-        };
+        let mut state = self.still(moment.time_s);
         let (mut start_s, mut rate) = (0.0, 0.0);
         let ends = profile.pieces().iter().map(|piece| (piece.rate_k_per_s, piece.duration_s));
         for (next_rate, duration_s) in ends.chain([(0.0, 0.0)]) {
@@ -127,18 +129,46 @@ impl Heat {
             self.add(&mut state, next_rate - rate, lasted_s);
             (start_s, rate) = (start_s + duration_s, next_rate);
         }
-        if let (Solution::Linear(response), true) = (&self.solution, self.has_heat) {
-            let State { rise_k, rate_k_per_s, moment_k_per_s, .. } = &mut state;
-            response.add_heat(moment.time_s, rate_k_per_s, rise_k, moment_k_per_s);
-        }
-        state.rise_k.resize(self.layers, 0.0);
+        self.finish(&mut state);
         state
     }
 
-    fn add(&self, state: &mut State, change: f64, lasted_s: f64) {
+    /// Before anything happened.
+    pub(super) fn still(&self, time_s: f64) -> State {
+        let solved = if self.wants_rise { self.layers } else { 0 };
+        let has_moments = matches!(&self.solution, Solution::Linear(response) if response.has_moments());
+        State {
+            time_s,
+            rise_k: vec![0.0; solved],
+            rate_k_per_s: vec![0.0; self.layers],
+            moment_k_per_s: vec![0.0; if has_moments { self.layers } else { 0 }],
+            ..State::default()
+        }
+    }
+
+    /// Adds what the ramps have no part in.
+    pub(super) fn finish(&self, state: &mut State) {
+        if let (Solution::Linear(response), true) = (&self.solution, self.has_heat) {
+            let State { rise_k, rate_k_per_s, moment_k_per_s, .. } = state;
+            response.add_heat(state.time_s, rate_k_per_s, rise_k, moment_k_per_s);
+        }
+        state.rise_k.resize(self.layers, 0.0);
+    }
+
+    /// What sums up ramps of long ago, where the state is a sum over ramps.
+    pub(super) fn gathered(&self) -> Option<&Response> {
+        match &self.solution {
+            Solution::HalfSpace { gathered, .. } => Some(gathered),
+            Solution::Linear(response) => Some(response),
+            Solution::Stepped { .. } => None,
+        }
+    }
+
+    /// Adds a change of ramp that happened a while ago.
+    pub(super) fn add(&self, state: &mut State, change: f64, lasted_s: f64) {
         let State { rise_k, rate_k_per_s, moment_k_per_s, .. } = state;
         match &self.solution {
-            Solution::HalfSpace { depths_m, diffusivity_m2_per_s } => {
+            Solution::HalfSpace { depths_m, diffusivity_m2_per_s, .. } => {
                 for (j, depth_m) in depths_m.iter().enumerate() {
                     let (rate, rise_s) = half_space(*depth_m, *diffusivity_m2_per_s, lasted_s);
                     rate_k_per_s[j] += change * rate;
@@ -148,7 +178,6 @@ impl Heat {
                 }
             }
             Solution::Linear(response) => {
-                moment_k_per_s.resize(if response.has_moments() { self.layers } else { 0 }, 0.0);
                 response.add_ramp(change, lasted_s, rate_k_per_s, rise_k, moment_k_per_s);
             }
             Solution::Stepped { .. } => {}
@@ -157,30 +186,36 @@ impl Heat {
         state.ambient_rate_k_per_s += change;
     }
 
-    /// The moments at which a piece is looked at: both its ends, close after its start, and evenly.
-    fn moments(&self, start_s: f64, duration_s: f64) -> Vec<Moment> {
+    /// The times since its beginning at which a piece is looked at, but its end: close after its start, and evenly.
+    pub(super) fn times_s(&self, duration_s: f64) -> Vec<f64> {
         let spaced = geometric(self.first_s.min(0.01 * duration_s), duration_s, SPACED_TIMES);
         let even = (1..EVEN_TIMES).map(|i| duration_s * i as f64 / EVEN_TIMES as f64);
         let mut times_s: Vec<f64> = spaced.into_iter().chain(even).filter(|t| *t < duration_s).collect();
         times_s.sort_by(f64::total_cmp);
-        let inside = times_s.into_iter().map(|t| Moment { time_s: start_s + t, after: true });
-        inside.chain([Moment { time_s: start_s + duration_s, after: false }]).collect()
+        times_s
     }
 
-    /// The states that a profile leads through, a list a piece; both one-sided limits at its break points are among them.
-    pub fn pieces(&self, profile: &Profile) -> Vec<Vec<State>> {
-        if let Solution::Stepped { networks, heat } = &self.solution {
-            return vec![self.extrapolated(profile, networks, *heat, None)];
+    /// The same, so few that they only show how large a rate error can become in it.
+    pub(super) fn few_times_s(&self, duration_s: f64) -> Vec<f64> {
+        let first_s = self.first_s.min(0.01 * duration_s);
+        let count = 2 + ((duration_s / first_s).ln() / FEW_TIMES_RATIO.ln()).ceil() as usize;
+        geometric(first_s, duration_s, count).into_iter().filter(|t| *t < duration_s).collect()
+    }
+
+    /// The states that a profile leads through where it is stepped.
+    pub fn steps(&self, profile: &Profile) -> Vec<State> {
+        match &self.solution {
+            Solution::Stepped { networks, heat } => self.extrapolated(profile, networks, *heat, None),
+            Solution::HalfSpace { .. } | Solution::Linear(_) => Vec::new(),
         }
-        let mut start_s = 0.0;
-        let mut pieces = Vec::new();
-        for piece in profile.pieces() {
-            let moments = self.moments(start_s, piece.duration_s);
-            pieces.push(moments.into_iter().map(|moment| self.at(profile, moment)).collect());
-            start_s += piece.duration_s;
+    }
+
+    /// The same by few steps and on the coarser network only, to see which profiles can hold the worst rate error.
+    pub fn few_steps(&self, profile: &Profile) -> Vec<State> {
+        match &self.solution {
+            Solution::Stepped { networks, heat } => self.stepped(profile, &networks[0], *heat, None, FEW_STEPS),
+            Solution::HalfSpace { .. } | Solution::Linear(_) => Vec::new(),
         }
-        pieces.push(vec![self.at(profile, Moment { time_s: start_s, after: true })]);
-        pieces
     }
 
     /// What both networks tend to: their errors are of second order in the cells' width.
@@ -191,8 +226,9 @@ impl Heat {
         heat: Option<BoreHeat>,
         until: Option<Moment>,
     ) -> Vec<State> {
-        let coarse = self.stepped(profile, coarse, heat, until);
-        let mut states = self.stepped(profile, fine, heat, until);
+        let steps = if until.is_some() { STEPS * CLOSER } else { STEPS };
+        let coarse = self.stepped(profile, coarse, heat, until, steps);
+        let mut states = self.stepped(profile, fine, heat, until, steps);
         let mix = |fine: &mut Vec<f64>, coarse: &[f64]| {
             fine.iter_mut().zip(coarse).for_each(|(f, c)| *f = (4.0 * *f - c) / 3.0);
         };
@@ -204,13 +240,14 @@ impl Heat {
         states
     }
 
-    /// All states up to a moment, or to the profile's end.
+    /// All states up to a moment, or to the profile's end; in so many steps a piece.
     fn stepped(
         &self,
         profile: &Profile,
         network: &Network,
         heat: Option<BoreHeat>,
         until: Option<Moment>,
+        steps: usize,
     ) -> Vec<State> {
         let closer = if until.is_some() { CLOSER } else { 1 };
         let until = until.unwrap_or(Moment { time_s: f64::INFINITY, after: true });
@@ -240,7 +277,7 @@ impl Heat {
             };
             let end_s = piece.duration_s.min(until.time_s - start_s);
             let first_s = self.first_s.min(0.1 * piece.duration_s);
-            let mut times_s = geometric(first_s, piece.duration_s, STEPS * closer);
+            let mut times_s = geometric(first_s, piece.duration_s, steps);
             times_s.retain(|t| *t < end_s);
             times_s.push(end_s.max(0.0));
             states.push(state(&nodes, start_s, drive(start_s)));

@@ -45,6 +45,32 @@ pub(super) struct Response {
 
 impl Response {
     pub fn new(pack: &Layers, heat: Option<BoreHeat>, longest_s: f64) -> Self {
+        Self {
+            has_moments: pack.has_moments(),
+            ..Self::of(pack.layers, pack.outermost_is_drive, longest_s, |s| pack.transform(heat, s))
+        }
+    }
+
+    /// Of layers at so many depths below the boundary of a half space, the outermost at it: 1/s e^{−x√(s/K)}.
+    pub fn half_space(depths_m: &[f64], diffusivity_m2_per_s: f64, longest_s: f64) -> Self {
+        let transform = |s: Complex<f64>| {
+            let q = (s / diffusivity_m2_per_s).sqrt();
+            let at = |depth_m: &f64| match *depth_m {
+                0.0 => Complex::new(0.0, 0.0),
+                depth_m => (-q * depth_m).exp() / s,
+            };
+            (depths_m.iter().map(at).collect(), None)
+        };
+        Self::of(depths_m.len(), true, longest_s, transform)
+    }
+
+    /// `transform`: s T̂ of every layer under a unit ramp, but of an outermost one that is the drive; and under the bore's heat.
+    fn of(
+        layers: usize,
+        outermost_is_drive: bool,
+        longest_s: f64,
+        transform: impl Fn(Complex<f64>) -> (Vec<Complex<f64>>, Option<Vec<Complex<f64>>>),
+    ) -> Self {
         let root = (8.0 * WINDOW + 1.0).sqrt();
         let step = root / NODES as f64;
         let (mut ends_s, mut windows) = (Vec::new(), Vec::new());
@@ -57,19 +83,13 @@ impl Response {
                 let s = scale * along * along;
                 // f(t) = (h/π) Σ Im(e^{st} f̂ ds/du) over the upper half.
                 let weight = Complex::new(0.0, 1.0) * along * (2.0 * scale * step / std::f64::consts::PI);
-                let (ramp, heated) = pack.transform(heat, s);
+                let (ramp, heated) = transform(s);
                 Node { s, weight, ramp, heated }
             };
             windows.push((0..NODES).map(node).collect());
             ends_s.push(end_s);
         }
-        Self {
-            layers: pack.layers,
-            outermost_is_drive: pack.outermost_is_drive,
-            has_moments: pack.has_moments(),
-            ends_s,
-            windows,
-        }
+        Self { layers, outermost_is_drive, has_moments: false, ends_s, windows }
     }
 
     pub fn has_moments(&self) -> bool {
@@ -86,6 +106,45 @@ impl Response {
                 *rise += factor * lasted_s;
             }
         }
+    }
+
+    /// The first and the last time of each window, ascending.
+    pub fn windows_s(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        let starts_s = std::iter::once(EARLIEST_S).chain(self.ends_s.iter().copied());
+        starts_s.zip(self.ends_s.iter().copied())
+    }
+
+    /// Lets time pass over what ramps have added up to at the nodes of a window.
+    pub fn pass(&self, window: usize, sums: &mut [Complex<f64>], time_s: f64) {
+        self.windows[window].iter().zip(sums).for_each(|(node, sum)| *sum *= (node.s * time_s).exp());
+    }
+
+    /// Adds a ramp that has lasted for a while to what stands at the nodes of a window.
+    pub fn gather(&self, window: usize, sums: &mut Vec<Complex<f64>>, factor: f64, lasted_s: f64) {
+        sums.resize(NODES, Complex::new(0.0, 0.0));
+        for (node, sum) in self.windows[window].iter().zip(sums) {
+            *sum += (node.s * lasted_s).exp() * factor;
+        }
+    }
+
+    /// As [`Response::add_ramp`] for all ramps that were gathered at a window's nodes, so much later; without what an outermost
+    /// layer that is the drive itself does.
+    pub fn add_gathered(
+        &self,
+        window: usize,
+        sums: &[Complex<f64>],
+        later_s: f64,
+        rate: &mut [f64],
+        rise: &mut [f64],
+        moment: &mut [f64],
+    ) {
+        for (node, sum) in self.windows[window].iter().zip(sums) {
+            self.add_node(node, &node.ramp, (node.s * later_s).exp() * sum, rate, rise, moment);
+        }
+    }
+
+    pub fn outermost_is_drive(&self) -> bool {
+        self.outermost_is_drive
     }
 
     /// Adds what the bore's heat has done since it began.
@@ -108,29 +167,41 @@ impl Response {
         let window = self.ends_s.partition_point(|end| *end < lasted_s).min(self.windows.len() - 1);
         for node in &self.windows[window] {
             let Some(values) = of(node) else { return };
-            let of_rate = node.weight * (node.s * lasted_s).exp() * factor;
-            let of_rise = of_rate / node.s;
-            let (of_means, of_moments) = values.split_at(self.layers);
-            for (sum, factor, values) in
-                [(&mut *rate, of_rate, of_means), (&mut *rise, of_rise, of_means), (&mut *moment, of_rate, of_moments)]
-            {
-                for (sum, value) in sum.iter_mut().zip(values) {
-                    *sum += factor.re * value.im + factor.im * value.re;
-                }
+            self.add_node(node, values, (node.s * lasted_s).exp() * factor, rate, rise, moment);
+        }
+    }
+
+    fn add_node(
+        &self,
+        node: &Node,
+        values: &[Complex<f64>],
+        factor: Complex<f64>,
+        rate: &mut [f64],
+        rise: &mut [f64],
+        moment: &mut [f64],
+    ) {
+        let of_rate = node.weight * factor;
+        let of_rise = of_rate / node.s;
+        let (of_means, of_moments) = values.split_at(self.layers);
+        for (sum, factor, values) in
+            [(rate, of_rate, of_means), (rise, of_rise, of_means), (moment, of_rate, of_moments)]
+        {
+            for (sum, value) in sum.iter_mut().zip(values) {
+                *sum += factor.re * value.im + factor.im * value.re;
             }
         }
     }
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::coil::{Coil, CoilSpec, Fibre, LayerLength};
     use crate::rate::CoilModel;
     use crate::thermal::{Extent, Location, Material};
     use crate::verify::physics::Physics;
 
-    fn model() -> CoilModel {
+    pub fn model() -> CoilModel {
         let fibre = Fibre {
             refractive_index: 1.45,
             thermo_optic_per_k: 1e-5,

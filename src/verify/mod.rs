@@ -9,6 +9,7 @@
 //! are the model as it was read, the profiles, and the parser of a user's formula; [`Verification::taken_as_given`]
 //! says so of each file.
 
+mod along;
 mod expected;
 mod form;
 mod heat;

@@ -88,6 +88,11 @@ impl Optics {
         self.scale_per_m2 * self.kappa_per_k * sizes.fold(0.0, f64::max)
     }
 
+    /// Whether a user's formula is part of the rate error.
+    pub fn has_formula(&self) -> bool {
+        self.physics.biases.iter().any(|bias| matches!(bias, Bias::Formula { .. }))
+    }
+
     /// κ of a layer's fibre in half A and in half B, so warm above 20 °C.
     fn kappas_per_k(&self, layer: usize, rise_k: f64) -> [f64; 2] {
         let p = &self.physics;

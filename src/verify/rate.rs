@@ -7,6 +7,7 @@
 
 use rayon::prelude::*;
 
+use super::along::Along;
 use super::expected::{layer_lengths_m, runs_outbound};
 use super::heat::{Heat, Moment, State};
 use super::optics::Optics;
@@ -31,6 +32,11 @@ const STEPPED_SHARES: [f64; 2] = [1e-3, 1e-5];
 
 /// A place is looked at closely where the rate error exceeds this share of the largest seen.
 const CLOSE_TO_LARGEST: f64 = 0.97;
+/// A piece is looked at more than a few times where what these show exceeds this share of the largest seen: what stands between two
+/// of them is less than twice as large.
+const WORTH_A_LOOK: f64 = 0.5;
+/// A profile is stepped closely where coarse steps, which are off by a few per cent, show this share of the largest seen.
+const WORTH_STEPPING: f64 = 0.8;
 
 /// The last digit of a printed time.
 const PRINTED_TIME_S: f64 = 1e-6;
@@ -145,31 +151,83 @@ fn check_at(
 
 /// The largest |Ω| over all profiles.
 fn worst_over(heat: &Heat, optics: &Optics, profiles: &[Profile]) -> f64 {
-    let size_of = |state: &State| (state.time_s, optics.rate_rad_per_s(state).abs());
-    let seen: Vec<Vec<Vec<(f64, f64)>>> = profiles
+    match heat.is_exact_in_time() {
+        true => worst_of_sums(heat, optics, profiles),
+        false => worst_of_steps(heat, optics, profiles),
+    }
+}
+
+/// Every piece is looked at a few times, and closely where that shows that it may hold the largest.
+fn worst_of_sums(heat: &Heat, optics: &Optics, profiles: &[Profile]) -> f64 {
+    // What a user's formula does between two looks, nobody knows.
+    let are_all_close = optics.has_formula();
+    let few: Vec<Vec<f64>> = profiles
         .par_iter()
-        .map(|profile| heat.pieces(profile).iter().map(|piece| piece.iter().map(size_of).collect()).collect())
-        .collect();
-    let mut worst = seen.iter().flatten().flatten().map(|(_, size)| *size).fold(0.0, f64::max);
-    let least = CLOSE_TO_LARGEST * worst;
-    for (profile, pieces) in seen.iter().enumerate() {
-        for peak in pieces.iter().flat_map(|piece| piece.windows(3)) {
-            let [(from_s, before), (_, size), (to_s, after)] = [peak[0], peak[1], peak[2]];
-            if size < least || size < before || size < after || from_s == to_s {
-                continue;
+        .map(|profile| {
+            let mut largest = Vec::new();
+            let Some(mut along) = Along::new(heat, profile) else { return largest };
+            while let Some((_, duration_s)) = along.go_on() {
+                let times_s = if are_all_close { Vec::new() } else { heat.few_times_s(duration_s) };
+                let size = |time_s: f64| optics.rate_rad_per_s(&along.state(time_s)).abs();
+                largest.push(times_s.into_iter().chain([duration_s]).map(size).fold(0.0, f64::max));
             }
-            let size = if heat.is_exact_in_time() {
-                let at = |time_s: f64| {
-                    optics.rate_rad_per_s(&heat.at(&profiles[profile], Moment { time_s, after: true })).abs()
-                };
-                narrowed(at, from_s, to_s)
-            } else {
-                vertex(peak)
-            };
-            worst = worst.max(size);
+            largest
+        })
+        .collect();
+    let seen = few.iter().flatten().copied().fold(0.0, f64::max);
+    let is_worth = |few: f64| are_all_close || few >= WORTH_A_LOOK * seen;
+    let worst_of = |(profile, few): (&Profile, &Vec<f64>)| -> f64 {
+        let mut worst = few.iter().copied().fold(0.0, f64::max);
+        let Some(mut along) = Along::new(heat, profile).filter(|_| few.iter().any(|few| is_worth(*few))) else {
+            return worst;
+        };
+        while let Some((piece, duration_s)) = along.go_on() {
+            if is_worth(few[piece]) {
+                worst = worst.max(worst_in(&along, heat, optics, duration_s, CLOSE_TO_LARGEST * seen));
+            }
+        }
+        worst
+    };
+    profiles.par_iter().zip(&few).map(worst_of).reduce(|| 0.0, f64::max)
+}
+
+/// The largest |Ω| in one piece; `least` is what a peak must reach to be worth its top.
+fn worst_in(along: &Along, heat: &Heat, optics: &Optics, duration_s: f64, least: f64) -> f64 {
+    let size = |time_s: f64| optics.rate_rad_per_s(&along.state(time_s)).abs();
+    let seen: Vec<(f64, f64)> =
+        heat.times_s(duration_s).into_iter().chain([duration_s]).map(|time_s| (time_s, size(time_s))).collect();
+    let mut worst = seen.iter().map(|(_, size)| *size).fold(0.0, f64::max);
+    for peak in seen.windows(3) {
+        let [(from_s, before), (_, middle), (to_s, after)] = [peak[0], peak[1], peak[2]];
+        if middle >= least && middle >= before && middle >= after && from_s < to_s {
+            worst = worst.max(narrowed(size, from_s, to_s));
         }
     }
     worst
+}
+
+/// Every profile is stepped coarsely, and closely where that shows that it may hold the largest.
+fn worst_of_steps(heat: &Heat, optics: &Optics, profiles: &[Profile]) -> f64 {
+    let sizes = |states: Vec<State>| -> Vec<(f64, f64)> {
+        states.iter().map(|state| (state.time_s, optics.rate_rad_per_s(state).abs())).collect()
+    };
+    let largest = |sizes: &[(f64, f64)]| sizes.iter().map(|(_, size)| *size).fold(0.0, f64::max);
+    let few: Vec<f64> = profiles.par_iter().map(|profile| largest(&sizes(heat.few_steps(profile)))).collect();
+    let seen = few.iter().copied().fold(0.0, f64::max);
+    let is_worth = |few: f64| optics.has_formula() || few >= WORTH_STEPPING * seen;
+    let close: Vec<Vec<(f64, f64)>> = profiles
+        .par_iter()
+        .zip(&few)
+        .filter(|(_, few)| is_worth(**few))
+        .map(|(profile, _)| sizes(heat.steps(profile)))
+        .collect();
+    let worst = close.iter().map(|sizes| largest(sizes)).fold(0.0, f64::max);
+    let peaks = close.iter().flat_map(|sizes| sizes.windows(3));
+    let tops = peaks.filter(|peak| {
+        let [(from_s, before), (_, size), (to_s, after)] = [peak[0], peak[1], peak[2]];
+        size >= CLOSE_TO_LARGEST * worst && size >= before && size >= after && from_s < to_s
+    });
+    tops.map(vertex).fold(worst, f64::max)
 }
 
 /// The largest value of a function with one maximum between two points.

@@ -5,6 +5,8 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use super::ways::Bench;
+
 const MODEL: &str = "examples/paper-200m.toml";
 const BROWSERS: &[&str] = &["chromium", "chromium-browser", "google-chrome", "chrome"];
 
@@ -95,5 +97,47 @@ fn pages_hold_everything_themselves_and_open_without_a_script_error_on_desktop_p
             &["--no-pdf-header-footer", &format!("--print-to-pdf={}", pdf.display()), &address],
         );
         assert!(std::fs::metadata(&pdf).is_ok_and(|found| found.len() > 10_000), "{log}");
+    }
+}
+
+/// A script that ran is seen by the page's title.
+const HOSTILE: &[&str] = &[
+    "</script><script>document.title='ran'</script><img src=x onerror=\"document.title='ran'\">",
+    "--></title></style><svg onload=document.title='ran'><!--<script>'\" onload=\"document.title='ran'",
+    "javascript:document.title='ran'//]]>`${document.title='ran'}`</svg><iframe srcdoc=\"<script>top.document.title='ran'</script>\">",
+];
+
+#[test]
+fn pages_with_hostile_names_in_every_field_run_no_script_in_a_browser() {
+    let Some(browser) = browser() else { return };
+    let elements =
+        |html: &str| html.matches("<script").count() + html.matches("<iframe").count() + html.matches("<img").count();
+    for name in HOSTILE {
+        let bench = Bench::new(name);
+        // What would be seen of a script that runs.
+        std::fs::write(bench.path.join("control.html"), format!("<title>quiet</title><h1>{name}</h1>")).unwrap();
+        let address = |page: &Path| format!("file://{}", page.display());
+        let profile = tempfile::tempdir().unwrap();
+        let (dom, _) = run(browser, profile.path(), &["--dump-dom", &address(&bench.path.join("control.html"))]);
+        assert!(
+            dom.contains("<title>ran</title>") || name.starts_with("-->") || name.starts_with("javascript"),
+            "{dom}"
+        );
+        let short = ["--rounds", "1", "--moves-per-restart", "50"];
+        bench.done(&["schedule", "model.toml", "-o", "shop", "-q"]);
+        bench.done(&[&["optimise", "model.toml", "--init", "pattern.toml", "-o", "run", "-q"][..], &short].concat());
+        bench.done(&["compare", "model.toml", "record.csv", "-o", "compared", "-q"]);
+        bench.done(&["metrics", "record.csv", "-o", "measured", "-q"]);
+        bench.done(&["diagnose", "model.toml", "record.csv", "-o", "diagnosed", "-q"]);
+        let pages = ["shop/traveller", "run/report", "compared/report", "measured/report", "diagnosed/report"];
+        for page in pages.map(|page| bench.path.join(page).with_extension("html")) {
+            let text = std::fs::read_to_string(&page).unwrap();
+            let (dom, log) = run(browser, profile.path(), &["--dump-dom", &address(&page)]);
+            assert!(dom.contains("<h1>") && !dom.contains("<title>ran</title>"), "{}: {log}", page.display());
+            // Neither a script of its own nor one that the page's policy had to refuse.
+            assert!(!log.contains("CONSOLE"), "{}: {log}", page.display());
+            let without_data = |html: &str| html.replace("&lt;", "");
+            assert_eq!(elements(&without_data(&dom)), elements(&text), "{}", page.display());
+        }
     }
 }

@@ -6,7 +6,7 @@
 
 use std::collections::BTreeSet;
 
-use coilwright::text::name_fault;
+use coilwright::text::{is_unseen, name_fault};
 
 use super::sinks::read_again;
 use super::ways::{Bench, COMMANDS, Way, is_clean, model, pattern, quoted, record_as_it_stands};
@@ -57,6 +57,10 @@ const NAMES: &[&str] = &[
     "a\nverify: no violations",
     "a\r\nb",
     "a\rb",
+    "\rb",
+    "b\r",
+    "\tb",
+    "b\n",
     "\u{1b}[2J\u{1b}]0;title\u{7}",
     "\u{9b}31m",
     "del\u{7f}",
@@ -162,8 +166,8 @@ fn a_name_that_cannot_be_seen_as_it_is_is_refused_wherever_it_stands_and_the_ans
         bench.write("profiles.toml", &format!("[profiles]\nmax_rate_c_per_h = 9.0\ncount = 0\n[[profiles.ramp]]\nname = {}\npieces = [{{ rate_c_per_h = 9.0, duration_s = 9.0 }}]\n", quoted(name)));
         refused(&["temperatures", "model.toml", "--profiles", "profiles.toml"]);
         bench.write("record.csv", &record_as_it_stands(name, 60));
-        // A cell's outer white space is no part of a column's name.
-        if name.trim().is_empty() || name_fault(name.trim()).is_some() {
+        // A cell's outer white space that is seen is no part of a column's name.
+        if name_fault(name.trim_matches(|c: char| c.is_whitespace() && !is_unseen(c))).is_some() {
             refused(&["metrics", "record.csv"]);
             refused(&["compare", "model.toml", "record.csv"]);
             refused(&["compensate", "model.toml", "record.csv"]);

@@ -182,7 +182,10 @@ fn however_a_stream_is_damaged_every_line_comes_out_in_order() {
             let quoted = line.replace('"', "\"\"");
             // A cell that a spreadsheet would take for a formula is passed on with an apostrophe before it.
             let found = found.replace("'-", "-");
-            assert!(found.starts_with(line) || found.starts_with(&format!("\"{quoted}")), "{line:?} became {found:?}");
+            assert!(
+                found.starts_with(line) || found.starts_with(&format!("\"{quoted}\"")),
+                "{line:?} became {found:?}"
+            );
         }
     }
 }

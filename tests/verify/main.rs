@@ -64,6 +64,21 @@ fn schedules_of_the_shipped_coils_hold_in_every_form_for_classic_and_searched_wi
 }
 
 #[test]
+fn a_schedule_over_profiles_of_a_thousand_ramps_holds_like_any_other() {
+    for text in [PAPER, WARM] {
+        let text = text.replace("segments = 2", "segments = 1_000").replace("segments = 3", "segments = 1_000");
+        let file = model(&text);
+        let layers = file.model.coil.layers();
+        let (_, mut document) = plan(&file, &classic(Classic::Qua, layers).unwrap());
+        let found = judged(&file, &serde_json::to_string(&document).unwrap()).unwrap();
+        assert_eq!(found.violations, []);
+        document.worst_rate_deg_per_h *= 1.001;
+        let found = judged(&file, &serde_json::to_string(&document).unwrap()).unwrap();
+        assert!(!found.violations.is_empty());
+    }
+}
+
+#[test]
 fn all_violations_come_at_once_with_their_rows() {
     let file = model(PAPER);
     let (_, mut document) = plan(&file, &classic(Classic::Qua, 16).unwrap());

@@ -2,7 +2,8 @@
 //!
 //! A row is what the CSV grammar takes for one (RFC 4180: cells in quotes may hold separators, quotes and line breaks), and it
 //! keeps its text as it stands, so that it can be passed on. A line that begins with `#`, and an empty one, is no row. A quote
-//! that is not closed within `MOST_LINES` does not swallow what follows: its line is broken, and reading goes on behind it.
+//! that is not closed within `MOST_LINES` does not swallow what follows: its line is broken, and reading goes on behind it. So is one
+//! that only a stray quote further down closes: what both make is no row of the columns that are expected.
 
 use std::collections::VecDeque;
 use std::io::{self, BufRead};
@@ -11,6 +12,7 @@ use std::ops::Range;
 use csv_core::{ReadRecordResult, ReaderBuilder};
 
 use super::record_columns::Division;
+use crate::text::is_unseen;
 use crate::text::sink::Cell;
 
 /// A longer line is no row of a record.
@@ -56,6 +58,8 @@ pub struct CsvRows<R> {
     lines_of_piece: u64,
     start: usize,
     bytes_of_piece: usize,
+    /// Of each column whether a cell of it may be words, and so hold a line break; empty where nothing is known of them yet.
+    may_hold_words: Vec<bool>,
     buffer: Vec<u8>,
     cells: String,
     ends: Vec<usize>,
@@ -78,6 +82,7 @@ impl<R: BufRead> CsvRows<R> {
             lines_of_piece: 0,
             start: 0,
             bytes_of_piece: 0,
+            may_hold_words: Vec::new(),
             buffer: Vec::new(),
             cells: String::new(),
             ends: vec![0; 16],
@@ -110,6 +115,11 @@ impl<R: BufRead> CsvRows<R> {
         Ok(None)
     }
 
+    /// Says what follows the header: of each column whether its cells may be words.
+    pub fn expect(&mut self, may_hold_words: impl Iterator<Item = bool>) {
+        self.may_hold_words = may_hold_words.collect();
+    }
+
     /// Reads on; none at the end.
     ///
     /// # Errors
@@ -136,19 +146,26 @@ impl<R: BufRead> CsvRows<R> {
         }
         self.count = 0;
         let mut further = Vec::new();
-        while !self.parse() {
-            let next = match further.len() + 1 < MOST_LINES && self.text.len() < MOST_BYTES {
+        loop {
+            let is_closed = self.parse();
+            if is_closed && (further.is_empty() || self.is_expected()) {
+                break;
+            }
+            let next = match !is_closed && further.len() + 1 < MOST_LINES && self.text.len() < MOST_BYTES {
                 true => self.next_line()?,
                 false => None,
             };
-            let Some(next) = next.filter(|next| next.is_whole) else {
-                // What the quote would have swallowed is read again, line by line.
-                let swallowed: usize = further.iter().map(|line: &PhysicalLine| line.bytes.len()).sum();
-                self.bytes_of_piece -= swallowed;
-                self.lines_of_piece -= further.len() as u64;
-                self.text = String::from_utf8_lossy(&first.bytes).into_owned();
-                further.into_iter().rev().for_each(|line| self.ahead.push_front(line));
-                return Ok(Some(self.broken(UNCLOSED)));
+            let next = match next {
+                Some(next) if next.is_whole => next,
+                unread => {
+                    // What the quote would have swallowed is read again, line by line.
+                    let swallowed: usize = further.iter().map(|line: &PhysicalLine| line.bytes.len()).sum();
+                    self.bytes_of_piece -= swallowed;
+                    self.lines_of_piece -= further.len() as u64;
+                    self.text = String::from_utf8_lossy(&first.bytes).into_owned();
+                    further.into_iter().chain(unread).rev().for_each(|line| self.ahead.push_front(line));
+                    return Ok(Some(self.broken(UNCLOSED)));
+                }
             };
             self.take(&next);
             further.push(next);
@@ -183,10 +200,27 @@ impl<R: BufRead> CsvRows<R> {
 
     /// The cells without their quotes, the spaces around them, and what keeps a spreadsheet from calculating them.
     pub fn cells(&self) -> impl Iterator<Item = &str> + Clone {
+        self.bare_cells().map(|cell| Cell::read(cell.trim()))
+    }
+
+    /// As [`CsvRows::cells`] of a header: what is not seen around a name is left for whoever checks names.
+    pub fn names(&self) -> impl Iterator<Item = &str> + Clone {
+        self.bare_cells().map(|cell| Cell::read(cell.trim_matches(|c: char| c.is_whitespace() && !is_unseen(c))))
+    }
+
+    fn bare_cells(&self) -> impl Iterator<Item = &str> + Clone {
         (0..self.count).map(|i| {
             let from = if i == 0 { 0 } else { self.ends[i - 1] };
-            Cell::read(self.cells.get(from..self.ends[i]).unwrap_or_default().trim())
+            self.cells.get(from..self.ends[i]).unwrap_or_default()
         })
+    }
+
+    /// Whether a row of several lines is one of the columns that are expected.
+    fn is_expected(&self) -> bool {
+        let holds_break = |cell: &str| cell.trim().contains(['\n', '\r']);
+        self.may_hold_words.is_empty()
+            || (self.count == self.may_hold_words.len()
+                && self.bare_cells().zip(&self.may_hold_words).all(|(cell, words)| *words || !holds_break(cell)))
     }
 
     /// The place of a cell in the text; all of it where quotes hide the separators.
@@ -380,6 +414,26 @@ mod tests {
             assert!(found[1..].iter().enumerate().all(|(i, (line, _, cells))| {
                 *line == i as u64 + 2 && cells.as_ref().is_some_and(|c| c[0] == i.to_string())
             }));
+        }
+    }
+
+    #[test]
+    fn a_stray_quote_does_not_swallow_rows_up_to_the_next_one() {
+        for (text, broken) in [
+            ("a,b,note\n1,2,\"\n3,4,x\n5,\",6\n", 2),
+            ("a,b,note\n1,\"\n3,4,x\n5,\",6\n7,8,y\n", 2),
+            ("a,b,note\n1,2,\"two\nlines\"\n3,4,x\n", 0),
+        ] {
+            let mut rows = CsvRows::new(text.as_bytes());
+            rows.header(|_| {}).unwrap().unwrap();
+            rows.expect([false, false, true].into_iter());
+            let (mut found, mut passed) = (Vec::new(), Vec::new());
+            while let Some(piece) = rows.next().unwrap() {
+                found.push(piece);
+                passed.push(rows.text().to_owned());
+            }
+            assert_eq!(found.iter().filter(|piece| **piece != Piece::Row).count(), broken, "{text}");
+            assert_eq!(passed.join("\n"), text.split_once('\n').unwrap().1.trim_end());
         }
     }
 

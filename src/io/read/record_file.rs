@@ -96,7 +96,7 @@ impl<'s> Reading<'s> {
             self.fault(Fault::new(format!("line {}: {why}", rows.line()), Some(header_span)));
             return self.end(None, "");
         }
-        let fields: Vec<&str> = rows.cells().collect();
+        let fields: Vec<&str> = rows.names().collect();
         let columns = match read_header(&fields, self.format, division) {
             Ok(columns) => columns,
             Err(faults) => {
@@ -106,6 +106,7 @@ impl<'s> Reading<'s> {
                 return self.end(None, "");
             }
         };
+        rows.expect(columns.iter().map(|c| c.quantity == Quantity::Channel));
         let mut values: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
         let mut cells = Cells::new(&columns, self.format);
         while let Ok(Some(piece)) = rows.next() {

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::io::fault::{Fault, Faults};
 use crate::numeric::statistics::median;
-use crate::record::{MIN_ROWS, Row};
+use crate::record::{LEAST_INTERVAL_S, MIN_ROWS, RecordError, Row, usual_interval_s};
 use crate::units::celsius_from_kelvin;
 
 use super::csv_rows::{CsvRows, Piece};
@@ -236,6 +236,7 @@ pub fn stream_rows(
         return Err(Faults::of_file(name, NO_HEADER));
     };
     let columns = header_columns(name, piece, &rows, format, division)?;
+    rows.expect(columns.iter().map(|c| c.quantity == Quantity::Channel));
     let place = |quantity: Quantity| columns.iter().position(|c| c.quantity == quantity).unwrap_or(0);
     let (time, temperature, rate) = (place(Quantity::Time), place(Quantity::Temperature), place(Quantity::Rate));
     let mut cells = Cells::new(&columns, format);
@@ -306,6 +307,12 @@ fn look(chunk: &[Row], is_first: bool, temperature: &Column, remarks: &mut Vec<S
     let times_s: Vec<f64> = chunk.iter().map(|r| r.time_s).collect();
     let temperature_k: Vec<f64> = chunk.iter().map(|r| r.temperature_k).collect();
     remarks.extend(suspicions(&times_s, &temperature_k));
+    if times_s.len() >= MIN_ROWS {
+        let found_s = usual_interval_s(&times_s);
+        if found_s < LEAST_INTERVAL_S {
+            faults.push(Fault::new(RecordError::Interval { found_s }.to_string(), None));
+        }
+    }
     let middle_c = celsius_from_kelvin(median(&temperature_k));
     if !PLAUSIBLE_C.contains(&middle_c) {
         faults.push(implausible(temperature, middle_c, None));
@@ -342,7 +349,7 @@ pub(in crate::io) fn header_columns(
     if let Piece::Broken(why) = piece {
         return Err(all(vec![fault((format!("line {}: {why}", header.line()), None))]));
     }
-    let fields: Vec<&str> = header.cells().collect();
+    let fields: Vec<&str> = header.names().collect();
     read_header(&fields, format, division).map_err(|faults| all(faults.into_iter().map(fault).collect()))
 }
 

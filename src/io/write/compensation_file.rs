@@ -95,11 +95,12 @@ pub fn compensate_lines(
     let Some((piece, division)) = rows.header(|line| asides.push(line.to_owned())).map_err(StreamError::Read)? else {
         return Err(Faults::of_file(name, NO_HEADER).into());
     };
-    let places = places(name, piece, &rows, format, division, compensator)?;
+    let (places, may_hold_words) = places(name, piece, &rows, format, division, compensator)?;
     let passed_row = PassedRow { separator: division.separator, decimal_comma: division.decimal_comma };
     sink.separator = char::from(division.separator);
     asides.iter().for_each(|line| sink.plain(&passed_row.aside(line)));
-    let header = passed_row.cells(rows.text(), rows.cells());
+    let header = passed_row.cells(rows.text(), rows.names());
+    rows.expect(may_hold_words.into_iter());
     let separator = sink.separator;
     sink.plain(&format!("{header}{separator}{COMPENSATED}{separator}{FLAGS}"));
     let mut channels = vec![None; places.columns.len()];
@@ -131,6 +132,7 @@ pub fn compensate_lines(
     Ok(summary)
 }
 
+/// With them, of each column whether it may hold words.
 fn places(
     name: &str,
     piece: Piece,
@@ -138,7 +140,7 @@ fn places(
     format: &RecordFormat,
     division: Division,
     compensator: &Compensator,
-) -> Result<Places, Faults> {
+) -> Result<(Places, Vec<bool>), Faults> {
     let columns = header_columns(name, piece, header, format, division)?;
     if let Some(own) = columns.iter().find(|c| [COMPENSATED, FLAGS].contains(&c.name.as_str())) {
         let message = format!(
@@ -147,6 +149,7 @@ fn places(
         );
         return Err(Faults::of_file(name, message));
     }
+    let may_hold_words = columns.iter().map(|c| c.quantity == Quantity::Channel).collect();
     let count = columns.len();
     let names = compensator.channel_names();
     let needed = |c: &Column| match c.quantity {
@@ -160,7 +163,7 @@ fn places(
         found.ok_or_else(|| Faults::of_file(name, format!("the model reads the column {wanted}, which is not there")))
     };
     let channels = names.iter().map(place).collect::<Result<_, _>>()?;
-    Ok(Places { count, columns, channels })
+    Ok((Places { count, columns, channels }, may_hold_words))
 }
 
 /// None where the cells are not as many as the header's or the time is no number; `channels` is room for the further columns.
