@@ -21,14 +21,9 @@ from ._errors import CoilwrightError, Fault, FileError, ModelError, RequestError
 from ._field import Field
 from ._functions import (
     check,
-    compare,
-    diagnose,
     effects,
     evaluate,
     exact,
-    extend,
-    improve,
-    metrics,
     optimise,
     optimize,
     pareto,
@@ -36,6 +31,19 @@ from ._functions import (
     temperatures,
     tolerance,
     verify,
+)
+from ._measured import compare, diagnose, extend, improve, metrics, trim
+from ._measured_results import (
+    CompareResult,
+    Comparison,
+    CompensateResult,
+    DiagnoseResult,
+    ExtendResult,
+    Finding,
+    ImproveResult,
+    MetricsResult,
+    NoiseTerm,
+    TrimResult,
 )
 from ._model import Model
 from ._pattern import Pattern, WindingGraph, WindingStep, classic, classics
@@ -53,27 +61,18 @@ from ._plot import (
     plot_tolerance,
 )
 from ._record import Record
+from ._result import Result
 from ._results import (
-    CompareResult,
-    Comparison,
-    CompensateResult,
-    DiagnoseResult,
     Distribution,
     EvaluateResult,
     ExactResult,
-    ExtendResult,
     FieldEvaluateResult,
-    Finding,
     FoundPattern,
-    ImproveResult,
-    MetricsResult,
-    NoiseTerm,
     OptimiseResult,
     ParetoResult,
     PatternResult,
     Proof,
     Recommendation,
-    Result,
     ScheduleResult,
     SearchResult,
     ToleranceResult,
@@ -120,6 +119,7 @@ __all__ = [
     "SearchResult",
     "Stream",
     "ToleranceResult",
+    "TrimResult",
     "VerifyResult",
     "Violation",
     "Windability",
@@ -161,6 +161,7 @@ __all__ = [
     "show_versions",
     "temperatures",
     "tolerance",
+    "trim",
     "verify",
     "versions",
 ]

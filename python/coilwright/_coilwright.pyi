@@ -151,6 +151,7 @@ def diagnose(
     pattern: PatternArgument | None = None,
     output: str | None = None,
     experiment_seed: int | None = None,
+    terms: list[str] | None = None,
     progress: Progress = None,
 ) -> tuple[Answered, str | None, str | None]: ...
 def extend(
@@ -162,7 +163,11 @@ def extend(
     parameters: list[tuple[str, float]] = ...,
     pattern: PatternArgument | None = None,
     output: str | None = None,
+    proposal: str | None = None,
 ) -> tuple[Answered, str]: ...
+def trim(
+    model: ModelHandle, records: list[RecordArgument], pattern: PatternArgument | None = None
+) -> Answered: ...
 def metrics(
     records: list[RecordArgument], average_s: float, gross: str = "keep", output: str | None = None
 ) -> Answered: ...

@@ -14,9 +14,9 @@ import numpy.typing as npt
 from . import _coilwright
 from ._errors import RequestError
 from ._functions import ModelLike, PathLike, _log, model_of, result_of
+from ._measured_results import CompensateResult
 from ._model import PatternLike, pattern_argument
 from ._record import Record, RecordLike, record_argument
-from ._results import CompensateResult
 
 Array = npt.NDArray[np.float64]
 

@@ -1,31 +1,26 @@
-"""The use cases: each does what the command of its name does and answers with its document."""
+"""The use cases of design: each does what the command of its name does and answers with its document."""
 
 from __future__ import annotations
 
 import json
 import logging
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, TypeVar
 
 from . import _coilwright, _progress
 from ._field import Field
+from ._measured_results import DiagnoseResult
 from ._model import Model, PatternLike, pattern_argument, pattern_arguments
 from ._progress import Progress
-from ._record import RecordLike, record_argument, record_arguments
+from ._record import RecordLike, record_argument
+from ._result import Result
 from ._results import (
-    CompareResult,
-    Comparison,
-    DiagnoseResult,
     EvaluateResult,
     ExactResult,
-    ExtendResult,
     FieldEvaluateResult,
-    ImproveResult,
-    MetricsResult,
     OptimiseResult,
     ParetoResult,
-    Result,
     ScheduleResult,
     ToleranceResult,
     VerifyResult,
@@ -52,11 +47,11 @@ def result_of(kind: type[R], answered: tuple[str, list[str]]) -> R:
     return kind(json.loads(text), notes)
 
 
-def _optional_pattern(pattern: PatternLike | None) -> Any:
+def optional_pattern(pattern: PatternLike | None) -> Any:
     return None if pattern is None else pattern_argument(pattern)
 
 
-def _optional_path(path: PathLike | None) -> str | None:
+def optional_path(path: PathLike | None) -> str | None:
     return None if path is None else os.fspath(path)
 
 
@@ -165,10 +160,10 @@ def optimise(
         answered = _coilwright.optimise(
             model_of(model)._handle,
             options,
-            _optional_pattern(init),
-            _optional_pattern(compare_with),
+            optional_pattern(init),
+            optional_pattern(compare_with),
             prove_s,
-            _optional_path(output),
+            optional_path(output),
             cutting_planes,
             _diagnosis_text(diagnosis),
             at,
@@ -221,7 +216,7 @@ def pareto(
         output: a folder for the table, the pictures and one pattern file a point; an interrupted front goes on from it.
     """
     with _progress.shown(progress, "pareto") as at:
-        answered = _coilwright.pareto(model_of(model)._handle, seed, most_captive, rounds, _optional_path(output), at)
+        answered = _coilwright.pareto(model_of(model)._handle, seed, most_captive, rounds, optional_path(output), at)
     return result_of(ParetoResult, answered)
 
 
@@ -257,7 +252,7 @@ def schedule(
         pattern: without it, the model's own.
         output: a folder for the schedule, the traveller, the winder's program and the cross-section.
     """
-    answered = _coilwright.schedule(model_of(model)._handle, _optional_pattern(pattern), _optional_path(output))
+    answered = _coilwright.schedule(model_of(model)._handle, optional_pattern(pattern), optional_path(output))
     return result_of(ScheduleResult, answered)
 
 
@@ -271,161 +266,6 @@ def verify(model: ModelLike, schedule: PathLike | ScheduleResult) -> VerifyResul
     if isinstance(schedule, ScheduleResult):
         return result_of(VerifyResult, _coilwright.verify(handle, "schedule.json", schedule.to_json()))
     return result_of(VerifyResult, _coilwright.verify(handle, os.fspath(schedule)))
-
-
-def compare(
-    model: ModelLike,
-    records: RecordLike | Sequence[RecordLike],
-    *,
-    pattern: PatternLike | None = None,
-    gross_errors: str = "keep",
-    output: PathLike | None = None,
-    progress: bool | Progress | None = None,
-) -> CompareResult:
-    """A model's prediction beside measured records, and where it fails.
-
-    Args:
-        records: one or several: records, record files, tables with named columns.
-        pattern: the winding that was measured; without it, the model's own.
-        gross_errors: "keep" or "drop" values that stand alone.
-        output: a folder for the document, tables, pictures and the page.
-    """
-    with _progress.shown(progress, "compare") as at:
-        answered, curves = _coilwright.compare(
-            model_of(model)._handle,
-            record_arguments(records),
-            _optional_pattern(pattern),
-            gross_errors,
-            _optional_path(output),
-            at,
-        )
-    result = result_of(CompareResult, answered)
-    object.__setattr__(result, "curves", [Comparison(*curve) for curve in curves])
-    return result
-
-
-def diagnose(
-    model: ModelLike,
-    records: RecordLike | Sequence[RecordLike],
-    *,
-    holdout: RecordLike | Sequence[RecordLike] | None = None,
-    pattern: PatternLike | None = None,
-    output: PathLike | None = None,
-    experiment: bool = False,
-    seed: int = 1,
-    progress: bool | Progress | None = None,
-) -> DiagnoseResult:
-    """Which piece of physics a model lacks: fits every known effect to records and says what is missing, and how sure.
-
-    Args:
-        records: records to fit.
-        holdout: records that are only judged by.
-        experiment: plans the profile that would tell the candidates apart (``experiment_source``).
-        seed: of the profiles that the experiment is chosen from.
-        output: a folder for the document, the ladder, the extended model, residuals and the page.
-    """
-    asked = model_of(model)
-    wanted = experiment or output is not None
-    with _progress.shown(progress, "diagnose") as at:
-        answered, extended, source = _coilwright.diagnose(
-            asked._handle,
-            record_arguments(records),
-            record_arguments(holdout),
-            _optional_pattern(pattern),
-            _optional_path(output),
-            seed if wanted else None,
-            at,
-        )
-    result = result_of(DiagnoseResult, answered)
-    model_extended = None if extended is None else Model.parse(extended, path=asked.path)
-    object.__setattr__(result, "extended", model_extended)
-    object.__setattr__(result, "experiment_source", source)
-    return result
-
-
-def extend(
-    model: ModelLike,
-    effect: str,
-    *,
-    fit: RecordLike | Sequence[RecordLike] | None = None,
-    holdout: RecordLike | Sequence[RecordLike] | None = None,
-    formula: str | None = None,
-    parameters: Mapping[str, float] | None = None,
-    pattern: PatternLike | None = None,
-    output: PathLike | None = None,
-) -> ExtendResult:
-    """Adds an effect to a model, fitted to records; comments and layout of the file are kept.
-
-    Args:
-        effect: its name in files, such as "strain_mismatch" or "channel:supply_v"; "custom" takes a formula.
-        fit: records to fit to; without any the effect gets its start values.
-        holdout: records to show before and after without fitting to them.
-        formula: of a custom effect, in °/h.
-        parameters: of the formula, with their start values.
-        output: the new model file.
-    """
-    asked = model_of(model)
-    answered, source = _coilwright.extend(
-        asked._handle,
-        effect,
-        record_arguments(fit),
-        record_arguments(holdout),
-        formula,
-        [(name, float(value)) for name, value in (parameters or {}).items()],
-        _optional_pattern(pattern),
-        _optional_path(output),
-    )
-    result = result_of(ExtendResult, answered)
-    place = asked.path if output is None else os.fspath(output)
-    object.__setattr__(result, "extended", Model.parse(source, path=place))
-    return result
-
-
-def metrics(
-    records: RecordLike | Sequence[RecordLike],
-    *,
-    average_s: float = 10.0,
-    gross_errors: str = "keep",
-    output: PathLike | None = None,
-) -> MetricsResult:
-    """Bias, stability, Allan deviation and temperature sensitivity of records.
-
-    Args:
-        average_s: averaging time of the bias stability.
-        gross_errors: "keep" or "drop" values that stand alone.
-        output: a folder for the document, the pictures of the Allan deviation and the page.
-    """
-    answered = _coilwright.metrics(record_arguments(records), average_s, gross_errors, _optional_path(output))
-    return result_of(MetricsResult, answered)
-
-
-def improve(
-    model: ModelLike,
-    records: RecordLike | Sequence[RecordLike],
-    *,
-    output: PathLike,
-    holdout: RecordLike | Sequence[RecordLike] | None = None,
-    pattern: PatternLike | None = None,
-    seed: int | None = None,
-    progress: bool | Progress | None = None,
-) -> ImproveResult:
-    """The whole loop: compares and diagnoses records, extends the model, searches the next winding and writes its schedule.
-
-    Args:
-        records: of the coil as it is; the first is the one that is predicted for the new coil.
-        output: the folder of all steps.
-    """
-    with _progress.shown(progress, "improve") as at:
-        answered = _coilwright.improve(
-            model_of(model)._handle,
-            record_arguments(records),
-            record_arguments(holdout),
-            os.fspath(output),
-            _optional_pattern(pattern),
-            seed,
-            at,
-        )
-    return result_of(ImproveResult, answered)
 
 
 def temperatures(

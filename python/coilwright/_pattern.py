@@ -53,9 +53,9 @@ class Pattern(Sequence[int]):
     A pattern is always a permutation of 1 … N for an even N, and never changes.
 
     >>> import coilwright as cw
-    >>> p = cw.Pattern([1, 4, 3, 2])
+    >>> p = cw.Pattern([2, 3, 4, 1])
     >>> len(p), p[0], list(p.reversed())
-    (4, 1, [4, 1, 2, 3])
+    (4, 2, [3, 2, 1, 4])
     >>> p.windability().reels
     2
     """
@@ -184,7 +184,7 @@ def classic(name: str, layers: int) -> Pattern:
 
     >>> import coilwright as cw
     >>> list(cw.classic("qua", 4))
-    [1, 4, 3, 2]
+    [2, 3, 4, 1]
 
     Raises:
         RequestError: a name that is none, or a layer count that the winding has not; it says which are near.

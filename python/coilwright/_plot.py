@@ -8,19 +8,10 @@ import numpy as np
 
 from ._errors import RequestError
 from ._field import Field
+from ._measured_results import CompareResult, CompensateResult, DiagnoseResult, MetricsResult
 from ._pattern import Pattern
 from ._record import Record
-from ._results import (
-    CompareResult,
-    CompensateResult,
-    DiagnoseResult,
-    EvaluateResult,
-    FieldEvaluateResult,
-    MetricsResult,
-    OptimiseResult,
-    ParetoResult,
-    ToleranceResult,
-)
+from ._results import EvaluateResult, FieldEvaluateResult, OptimiseResult, ParetoResult, ToleranceResult
 
 
 _FAR = 30.0

@@ -14,7 +14,7 @@ import numpy as np
 
 import coilwright as cw
 
-cw.show_versions()
+print("coilwright", cw.__version__)
 
 # %% [markdown]
 # ## A coil

@@ -47,7 +47,7 @@ mod _coilwright {
     #[pymodule_export]
     use super::search::{exact, optimise, pareto};
     #[pymodule_export]
-    use super::tasks::{compare, diagnose, evaluate, extend, improve, metrics, schedule, tolerance, verify};
+    use super::tasks::{compare, diagnose, evaluate, extend, improve, metrics, schedule, tolerance, trim, verify};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use coilwright::diagnose::Terms;
 use coilwright::io::fault::Faults;
 use coilwright::io::folder::{HeldFolder, Replacement};
 use coilwright::io::json::Document;
@@ -186,7 +187,7 @@ pub fn compare<'py>(
 
 /// Besides the document: the extended model's text, and the next experiment's.
 #[pyfunction]
-#[pyo3(signature = (model, records, holdout, pattern=None, output=None, experiment_seed=None, progress=None))]
+#[pyo3(signature = (model, records, holdout, pattern=None, output=None, experiment_seed=None, terms=None, progress=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn diagnose(
     py: Python,
@@ -196,6 +197,7 @@ pub fn diagnose(
     pattern: Option<PatternArgument>,
     output: Option<PathBuf>,
     experiment_seed: Option<u64>,
+    terms: Option<Vec<String>>,
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<(Answered, Option<String>, Option<String>)> {
     let file = Arc::clone(&model.file);
@@ -208,6 +210,12 @@ pub fn diagnose(
             pattern: pattern.as_ref(),
             holdout: &held_out,
             experiment_seed,
+            terms: match terms.as_deref() {
+                None => Terms::default(),
+                Some([]) => Terms::None,
+                Some([all]) if all == "all" => Terms::All,
+                Some(words) => Terms::Among(words),
+            },
             ..task::diagnose::Request::new(&file, &taken)
         };
         let answer = task::diagnose::run(&request, &watcher)?;
@@ -222,9 +230,9 @@ pub fn diagnose(
     Ok(((text, worked.notes), extended, experiment))
 }
 
-/// Besides the document: the extended model's text.
+/// An effect by its name, or what the file of a diagnosis proposes; besides the document: the extended model's text.
 #[pyfunction]
-#[pyo3(signature = (model, effect, fit, holdout, formula=None, parameters=Vec::new(), pattern=None, output=None))]
+#[pyo3(signature = (model, effect, fit, holdout, formula=None, parameters=Vec::new(), pattern=None, output=None, proposal=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn extend(
     py: Python,
@@ -236,22 +244,49 @@ pub fn extend(
     parameters: Vec<(String, f64)>,
     pattern: Option<PatternArgument>,
     output: Option<PathBuf>,
+    proposal: Option<PathBuf>,
 ) -> PyResult<(Answered, String)> {
     let file = Arc::clone(&model.file);
     let pattern = one_pattern(py, pattern.as_ref(), &file)?;
     let (fit, holdout) = (measurements(py, &fit, &file.record)?, measurements(py, &holdout, &file.record)?);
     let worked = work(py, None, move |watcher| {
+        let place = output.clone().unwrap_or_default();
+        if let Some(path) = &proposal {
+            let proposed = task::proposal::read_proposal(path, &file)?;
+            let (pattern, proposed) = (pattern.as_ref(), proposed.as_slice());
+            let request = task::proposal::Request { model: &file, pattern, proposed, fit: &fit, holdout: &holdout };
+            let answer = task::proposal::run(&request, &watcher)?;
+            output.as_ref().map_or(Ok(()), |path| answer.write(path))?;
+            let source = answer.source.clone();
+            return Ok((document(answer.document(&place))?, source));
+        }
         let effect = task::extend::effect_of(&effect, formula.as_deref(), &parameters, &file)?;
         let request =
             task::extend::Request { model: &file, pattern: pattern.as_ref(), effect, fit: &fit, holdout: &holdout };
         let answer = task::extend::run(&request, &watcher)?;
-        if let Some(path) = &output {
-            answer.write(path)?;
-        }
+        output.as_ref().map_or(Ok(()), |path| answer.write(path))?;
         let source = answer.source.clone();
-        Ok((document(answer.document(&output.unwrap_or_default()))?, source))
+        Ok((document(answer.document(&place))?, source))
     })?;
     Ok(((worked.answer.0, worked.notes), worked.answer.1))
+}
+
+#[pyfunction]
+#[pyo3(signature = (model, records, pattern=None))]
+pub fn trim(
+    py: Python,
+    model: &ModelHandle,
+    records: Vec<RecordArgument>,
+    pattern: Option<PatternArgument>,
+) -> PyResult<Answered> {
+    let file = Arc::clone(&model.file);
+    let pattern = one_pattern(py, pattern.as_ref(), &file)?;
+    let taken = measurements(py, &records, &file.record)?;
+    let worked = work(py, None, move |watcher| {
+        let request = task::trim::Request { model: &file, pattern: pattern.as_ref(), records: &taken };
+        Ok(document(task::trim::run(&request, &watcher)?)?)
+    })?;
+    Ok(answered(worked))
 }
 
 #[pyfunction]

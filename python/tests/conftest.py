@@ -60,6 +60,18 @@ def day_1() -> cw.Record:
 
 
 @pytest.fixture
+def thinned(tmp_path: Path) -> list[str]:
+    """Every third row of the chamber's days: what takes a diagnosis twice stays short."""
+    places = []
+    for day in (1, 2):
+        lines = (EXAMPLES / f"chamber-day-{day}.csv").read_text(encoding="utf-8").splitlines()
+        path = tmp_path / f"day-{day}.csv"
+        path.write_text("\n".join([*lines[:2], *lines[2::3]]) + "\n", encoding="utf-8")
+        places.append(str(path))
+    return places
+
+
+@pytest.fixture
 def small() -> cw.Model:
     """A coil that is searched in no time, with spreads."""
     return cw.Model(

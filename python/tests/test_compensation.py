@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import pickle
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import coilwright as cw
-from coilwright import _coilwright
 
 COIL = "examples/chamber-coil.toml"
 
@@ -87,18 +85,13 @@ def test_what_needs_a_record_says_so() -> None:
         cw.Compensator(COIL, method="magic")
 
 
-def test_a_million_rows_go_through_in_time(day_1: cw.Record) -> None:
-    rows = 1_000_000
+def test_many_rows_go_through_and_each_depends_on_those_before_it_only(day_1: cw.Record) -> None:
+    # How fast a million go, python/benches/speed.py says.
+    rows = 100_000
     t = np.arange(rows) * 1.0
-    record = cw.Record(time_s=t, temperature_c=25 + 10 * np.sin(t / 7000), rate_deg_per_h=0.1 * np.cos(t / 7000))
+    columns = {"time_s": t, "temperature_c": 25 + 10 * np.sin(t / 7000), "rate_deg_per_h": 0.1 * np.cos(t / 7000)}
     compensator = cw.Compensator(COIL, fit=day_1, method="regression")
-    # Processor time, best of three: what else the machine does is not measured.
-    seconds = []
-    for _ in range(3):
-        start = time.process_time()
-        found = compensator(record)
-        seconds.append(time.process_time() - start)
-    assert found.rate_compensated_deg_per_h is not None and found.rate_compensated_deg_per_h.size == rows
-    print(f"a million rows in {min(seconds):.2f} s")
-    if _coilwright.optimised:
-        assert min(seconds) < 1.2
+    whole = compensator(cw.Record(**columns)).rate_compensated_deg_per_h
+    half = compensator(cw.Record(**{name: values[: rows // 2] for name, values in columns.items()})).rate_compensated_deg_per_h
+    assert whole is not None and half is not None and whole.size == rows
+    assert np.array_equal(whole[: rows // 2 - 100], half[:-100], equal_nan=True)

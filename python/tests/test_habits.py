@@ -215,10 +215,10 @@ def test_the_command_is_the_program(tmp_path: Path) -> None:
 
 
 def test_examples_in_docstrings_hold() -> None:
-    names = ["", "_compensation", "_errors", "_field", "_functions", "_model", "_pattern", "_plot", "_record", "_results", "_search"]
+    names = [path.stem for path in Path(cw.__file__).parent.glob("_*.py") if path.stem != "__main__"]
     tried = 0
     for name in names:
-        module = importlib.import_module(f"coilwright.{name}".rstrip("."))
+        module = cw if name == "__init__" else importlib.import_module(f"coilwright.{name}")
         found = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
         assert found.failed == 0, module
         tried += found.attempted

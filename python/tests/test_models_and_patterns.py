@@ -62,7 +62,8 @@ def test_patterns_are_arrays_that_never_change() -> None:
         p.segments[0] = 2
     with pytest.raises(AttributeError):
         p.name = "yours"  # type: ignore[misc]
-    assert p == cw.Pattern([1, 4, 3, 2]) and hash(p) == hash(cw.classic("qua", 4)) and p != [1, 4, 3, 2]
+    same = cw.Pattern([1, 4, 3, 2])
+    assert p == same and hash(p) == hash(same) and p != [1, 4, 3, 2] and p != cw.classic("qua", 4)
     assert (p[0], p[-1], p[1:3], len(p), 4 in p) == (1, 2, [4, 3], 4, True)
     assert pickle.loads(pickle.dumps(p)).name == "mine"
     assert p.layers_by_segment().tolist() == [1, 4, 3, 2]

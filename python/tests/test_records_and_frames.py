@@ -76,7 +76,7 @@ def test_wrong_columns_are_refused() -> None:
     t = np.arange(10.0)
     with pytest.raises(cw.RequestError, match="temperature_c has 9 values where time_s has 10"):
         cw.Record(time_s=t, temperature_c=t[:9], rate_deg_per_h=t)
-    with pytest.raises(cw.RequestError, match="must increase strictly, row 1"):
+    with pytest.raises(cw.RequestError, match="must increase strictly, row 2"):
         cw.Record(time_s=t[::-1], temperature_c=t, rate_deg_per_h=t)
     with pytest.raises(cw.RequestError, match="no finite number"):
         cw.Record(time_s=t, temperature_c=np.where(t > 5, np.nan, t), rate_deg_per_h=t)

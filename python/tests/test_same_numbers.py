@@ -75,9 +75,11 @@ def test_schedule_and_verify(tmp_path: Path) -> None:
     assert cw.verify(PAPER, ours).violations == []
     # What is wrong is found, by both in the same words.
     path.write_text(path.read_text(encoding="utf-8").replace('"turns"', '"turnz"', 1), encoding="utf-8")
+    misspelt = cw.verify(PAPER, path)
+    assert "turnz" in str(misspelt.violations[0]) and misspelt.to_dict() == answered("verify", PAPER, path, code=1)
     with pytest.raises(cw.FileError) as error:
-        cw.verify(PAPER, path)
-    assert str(error.value) == run_command("verify", PAPER, path).stderr.strip()
+        cw.verify(PAPER, tmp_path / "nowhere.json")
+    assert str(error.value) == run_command("verify", PAPER, tmp_path / "nowhere.json").stderr.strip()
     csv = tmp_path / "schedule.csv"
     lines = csv.read_text(encoding="utf-8").splitlines()
     csv.write_text("\n".join([lines[0], lines[2], lines[1], *lines[3:]]) + "\n", encoding="utf-8")
@@ -93,9 +95,10 @@ def test_compare() -> None:
     assert rmse == pytest.approx(ours.records[0].rmse_deg_per_h, rel=0.2)
 
 
-def test_diagnose() -> None:
-    ours = cw.diagnose(COIL, DAY_1, holdout=DAY_2)
-    assert ours.to_dict() == answered("diagnose", COIL, DAY_1, "--holdout", DAY_2)
+def test_diagnose(thinned: list[str]) -> None:
+    day_1, day_2 = thinned
+    ours = cw.diagnose(COIL, day_1, holdout=day_2)
+    assert ours.to_dict() == answered("diagnose", COIL, day_1, "--holdout", day_2)
     assert ours.extended is not None and ours.extended.effects == [e.kind for e in ours.effects]
 
 
@@ -105,6 +108,29 @@ def test_extend(tmp_path: Path) -> None:
     theirs = answered("extend", COIL, "--effect", "finite_pack", "--fit", DAY_1, "--holdout", DAY_2, "-o", tmp_path / "theirs.toml")
     assert {**ours.to_dict(), "written": ""} == {**theirs, "written": ""}
     assert path.read_text(encoding="utf-8") == (tmp_path / "theirs.toml").read_text(encoding="utf-8") == ours.extended.source
+
+
+def test_what_a_diagnosis_proposes_extends_a_model(tmp_path: Path) -> None:
+    fan, days = "examples/fan-coil.toml", [f"examples/fan-day-{day}.csv" for day in (1, 2, 3)]
+    found = cw.diagnose(fan, days[0], terms=["lagged_size", "fan_a"])
+    assert found.to_dict() == answered("diagnose", fan, days[0], "--terms", "lagged_size,fan_a")
+    assert found.proposals and found.proposals[0].terms
+    kept = tmp_path / "diagnosis.json"
+    kept.write_text(found.to_json(), encoding="utf-8")
+    ours = cw.extend(fan, proposal=found, holdout=days[2])
+    words = ("extend", fan, "--proposal", kept, "--holdout", days[2], "-o", tmp_path / "theirs.toml")
+    assert {**ours.to_dict(), "written": ""} == {**answered(*words), "written": ""}
+    assert ours.extended.source == (tmp_path / "theirs.toml").read_text(encoding="utf-8")
+    assert cw.extend(fan, proposal=kept, holdout=days[2]) == ours and "custom" in repr(ours)
+    for wrong in ({}, {"effect": "spool_mass", "proposal": kept}):
+        with pytest.raises(cw.RequestError, match="expected an effect or a proposal"):
+            cw.extend(fan, **wrong)  # type: ignore[arg-type]
+
+
+def test_trim() -> None:
+    ours = cw.trim(COIL, DAY_1)
+    assert ours.to_dict() == answered("trim", COIL, DAY_1)
+    assert ours.end in ("A", "B") and f"cut {ours.cut_m:.4f} m" in repr(ours)
 
 
 def test_temperatures() -> None:
@@ -130,6 +156,15 @@ def test_compensate(tmp_path: Path) -> None:
     assert written.read_bytes() == ours.csv
 
 
+def test_a_stream_gives_the_lines_that_the_command_prints() -> None:
+    words = ("compensate", COIL, DAY_2, "--fit", DAY_1, "--method", "regression")
+    theirs = [line.split(",") for line in run_command(*words).stdout.splitlines() if not line.startswith("#")][1:]
+    stream = cw.Compensator(COIL, fit=DAY_1, method="regression").stream()
+    rows = [row for line in theirs for row in stream.push(*map(float, line[:3]))] + stream.finish()
+    assert [f"{row.rate_compensated_deg_per_h:.8f}" for row in rows] == [line[-2] for line in theirs]
+    assert ["|".join(row.flags) for row in rows] == [line[-1] for line in theirs]
+
+
 def test_compensate_by_all_methods() -> None:
     ours = cw.compensate(COIL, DAY_2, fit=DAY_1, all_methods=True)
     assert ours.to_dict() == answered("compensate", COIL, DAY_2, "--fit", DAY_1, "--all-methods")
@@ -143,11 +178,11 @@ def test_metrics() -> None:
     assert held.to_dict() == ours.to_dict()
 
 
-def test_improve(tmp_path: Path) -> None:
+def test_improve(tmp_path: Path, thinned: list[str]) -> None:
     coil = tmp_path / "coil.toml"
     cw.Model.read(COIL).copy(profiles={"count": 2, "segments": 2, "duration_s": 600.0}).write(coil)
-    ours = cw.improve(coil, DAY_1, output=tmp_path / "next", seed=2)
-    theirs = answered("improve", coil, DAY_1, "-o", tmp_path / "next-2", "--seed", 2)
+    ours = cw.improve(coil, thinned[0], output=tmp_path / "next", seed=2)
+    theirs = answered("improve", coil, thinned[0], "-o", tmp_path / "next-2", "--seed", 2)
     text = ours.to_json().replace(str(tmp_path / "next"), "F")
     assert text == cw.Result(theirs).to_json().replace(str(tmp_path / "next-2"), "F")
     for name in ("design.toml", "predicted-record.csv", "search/best.toml", "schedule/schedule.csv"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import threading
 import time
 
@@ -78,24 +79,14 @@ def test_wrong_options_are_refused_in_words() -> None:
             cw.search_matrix(a, **options)  # type: ignore[arg-type]
 
 
-def test_an_array_of_8192_samples_and_24_layers_is_searched_at_the_speed_of_rust() -> None:
-    a = np.random.default_rng(2).normal(size=(8192, 24))
-    work = {"rounds": 1, "patience": 1, "restarts": 4, "moves_per_restart": 60_000}
-    options = _options(1, "any", "worst-rate", None, 1, None, 1, None, 4, 60_000)
-    ours, theirs = [], []
-    for _ in range(3):
-        # One after the other, so that whatever else the machine does meets both; the best of three is the speed.
-        start = time.perf_counter()
-        found = cw.search_matrix(a, seed=1, windability="any", **work)
-        ours.append(time.perf_counter() - start)
-        seconds, document = _coilwright.time_search_matrix(a, options)
-        theirs.append(seconds)
-    import json
-
-    assert json.loads(document)["found"] == [f.to_dict() for f in found.found]
-    print(f"8192 x 24: {min(ours):.3f} s from Python, {min(theirs):.3f} s in Rust")
-    # On a machine that does other things besides, three runs differ by more than what is measured: hence the half.
-    assert min(ours) <= 1.05 * min(theirs) + 0.5 * (max(theirs) - min(theirs))
+def test_an_array_is_searched_as_in_rust_alone() -> None:
+    # How fast, python/benches/speed.py says.
+    a = np.random.default_rng(2).normal(size=(512, 24))
+    found = cw.search_matrix(a, seed=1, windability="any", rounds=1, patience=1, restarts=4, moves_per_restart=5_000)
+    options = _options(1, "any", "worst-rate", None, 1, None, 1, None, 4, 5_000)
+    document = json.loads(_coilwright.time_search_matrix(a, options)[1])
+    assert document["found"] == [f.to_dict() for f in found.found]
+    assert document["evaluations"] == found.evaluations
 
 
 def test_a_function_is_searched_to_the_best_of_all_patterns_and_meets_the_array() -> None:
