@@ -68,21 +68,24 @@ def plot_cross_section(pattern: Pattern, ax: Any = None) -> Any:
     return ax
 
 
-def plot_field(field: Field, ax: Any = None, *, quantity: str = "rate_c_per_h") -> Any:
-    """What the layers do over time: ``quantity`` is "rate_c_per_h" or "temperature_c"."""
+def plot_field(field: Field, ax: Any = None, *, quantity: str = "rate_c_per_h", from_mean: bool = False) -> Any:
+    """What the layers do over time: ``quantity`` is "rate_c_per_h" or "temperature_c"; with ``from_mean`` what each has more than all
+    have on average, which is what a winding can cancel."""
     if quantity not in ("rate_c_per_h", "temperature_c"):
         raise RequestError(f'quantity: expected "rate_c_per_h" or "temperature_c", found "{quantity}"')
     ax = _axes(ax)
     import matplotlib
 
     values = getattr(field, quantity)
+    if from_mean:
+        values = values - values.mean(axis=1, keepdims=True)
     count = field.shape[1]
     colours = matplotlib.colormaps["viridis"]
     for layer in range(count):
         label = f"layer {layer + 1}" if layer in (0, count - 1) else None
         ax.plot(field.time_s / 60, values[:, layer], color=colours(layer / max(count - 1, 1)), lw=1, label=label)
     ax.set_xlabel("time [min]")
-    ax.set_ylabel("rate [°C/h]" if quantity == "rate_c_per_h" else "temperature [°C]")
+    ax.set_ylabel(("rate [°C/h]" if quantity == "rate_c_per_h" else "temperature [°C]") + (" less the mean" if from_mean else ""))
     ax.set_title(field.name)
     ax.legend()
     return ax

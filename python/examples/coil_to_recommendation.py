@@ -52,8 +52,8 @@ coil
 # %%
 field = cw.temperatures(coil, rows=300)
 fig, axes = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")
-cw.plot_field(field, ax=axes[0], quantity="temperature_c")
-cw.plot_field(field, ax=axes[1])
+cw.plot_field(field, ax=axes[0])
+cw.plot_field(field, ax=axes[1], from_mean=True)
 plt.show()
 
 # %% [markdown]

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import textwrap
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -161,6 +162,7 @@ def test_every_picture_draws_into_given_axes_and_into_its_own(tmp_path: Path, sm
         (cw.plot_patterns, (searched,)),
         (cw.plot_cross_section, (cw.classic("qua", 16),)),
         (cw.plot_field, (field,)),
+        (partial(cw.plot_field, from_mean=True), (field,)),
         (cw.plot_record, (record,)),
         (cw.plot_comparison, (cw.compare(coil, record),)),
         (cw.plot_tolerance, (cw.tolerance(small),)),
@@ -172,7 +174,7 @@ def test_every_picture_draws_into_given_axes_and_into_its_own(tmp_path: Path, sm
     for draw, arguments in pictures:
         figure, given = plt.subplots()
         assert draw(*arguments, ax=given) is given
-        assert given.has_data(), draw.__name__
+        assert given.has_data(), draw
         own = draw(*arguments)
         assert own is not given and (own.get_xlabel() or own.get_ylabel())
         own.figure.savefig(tmp_path / "picture.png")
