@@ -1,23 +1,26 @@
 //! `campaign`: a grid of searches, in parts and with interruptions, with one table at the end.
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
+use clap::ValueEnum;
+
+use super::budget::parse_duration;
 use super::progress::StopFlag;
 use super::screen::{Screen, held, table};
 use super::{CliError, Ending};
-use crate::io::files::write_atomically;
-use crate::io::folder::{Replacement, remove_numbered};
-use crate::io::read::campaign_file::{
-    CampaignFile, CampaignJson, Cell, CellJson, cell_path, read_campaign, read_cell, summary_csv,
-};
-use crate::report::plot::{Axis, Chart, Series};
-use crate::search::anneal::rounds::{DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Plan, Rounds, Rules};
-use crate::search::answer::Ended;
-use crate::search::cost::objective::Objective;
-use crate::search::run::{Halt, RunError};
-use crate::search::{self, Observer};
-use crate::units::deg_per_h_from_rad_per_s;
+use crate::io::files::WriteError;
+use crate::io::json::campaign::{CampaignJson, WorkflowJson};
+use crate::io::read::campaign_file::{Cell, read_campaign};
+use crate::io::write::campaign_cells::{forget_unfinished, read_cell, state_folder, write_cell, write_table};
+use crate::io::write::checkpoint::{read_checkpoint, write_checkpoint};
+use crate::io::write::workflow::{self, Workflow};
+use crate::report::campaign::{campaign_page, charts, recommendations};
+use crate::search::Observer;
+use crate::search::anneal::rounds::Rounds;
+use crate::search::run::Halt;
+use crate::task::campaign::{Part, search_cell};
 
 /// A grid of searches (coils, layer counts, classes, objectives, seeds)
 #[derive(Debug, clap::Args)]
@@ -26,19 +29,53 @@ use crate::units::deg_per_h_from_rad_per_s;
     layers = [12, 16]                                 # default: the models' own\n  \
     classes = [\"standard\", \"captive:1\", \"any\"]       # default: standard\n  \
     objectives = [\"worst-rate\", \"p95\"]               # default: worst-rate\n  seeds = [1, 2, 3]                                 # default: 1\n\n\
-    What is done is skipped, so the same command goes on after an interruption. Shards may run at the same time or on\n\
-    other machines; copy their cells/ together and run once more without --shard for the table.\n\n\
-    Example:\n  coilwright campaign grid.toml -o results/grid --shard 1/2"
+    A cell's identifier is made of what its result depends on: model, settings, version of the program. What is done is\n\
+    skipped, so the same command goes on after an interruption, and after a change only what has changed is computed.\n\
+    Parts (--shard, --cell) may run at the same time or on other machines; --merge then writes the table, the page and the\n\
+    pictures. A part ends with 1 if a cell of its own is missing, --merge and a whole campaign if any is.\n\n\
+    Examples:\n  coilwright campaign grid.toml --list\n  \
+    coilwright campaign grid.toml -o results/grid --shard 1/2\n  \
+    coilwright campaign grid.toml -o results/grid --merge\n  \
+    coilwright campaign grid.toml --emit slurm -o results/grid-on-slurm"
 )]
 pub struct Arguments {
     /// The campaign file
     campaign: PathBuf,
     /// The folder of the cells' results and the table
-    #[arg(long, short, value_name = "DIR")]
-    output: PathBuf,
-    /// Runs only every n-th cell, beginning with the i-th
-    #[arg(long, value_name = "i/n", value_parser = parse_shard)]
+    #[arg(long, short, value_name = "DIR", required_unless_present = "list")]
+    output: Option<PathBuf>,
+    /// Computes nothing; lists the cells with their identifiers, what each takes on one thread, and which are done
+    #[arg(long, group = "part")]
+    list: bool,
+    /// Runs only the cell of this identifier; may be repeated
+    #[arg(long, value_name = "ID", group = "part")]
+    cell: Vec<String>,
+    /// Runs only the i-th of n parts that cost about the same
+    #[arg(long, value_name = "i/n", value_parser = parse_shard, group = "part")]
     shard: Option<Shard>,
+    /// Computes nothing; writes table, page and pictures of what is done, if nothing is missing
+    #[arg(long, group = "part")]
+    merge: bool,
+    /// Computes nothing; writes a workflow that runs the campaign on an engine
+    #[arg(long, value_enum, group = "part")]
+    emit: Option<Engine>,
+    /// With --emit: what a job should take; cells are grouped accordingly
+    #[arg(long, value_name = "TIME", default_value = "10m", value_parser = parse_duration)]
+    job_time: Duration,
+    /// Threads to use; without it, as many as there are processors; with --emit, of each job: 1 without it
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Within a long cell, writes a checkpoint when the last one is older than this
+    #[arg(long, value_name = "TIME", default_value = "10s", value_parser = parse_duration)]
+    checkpoint_every: Duration,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Engine {
+    /// Snakefile and profiles for this machine and for Slurm: snakemake --profile profiles/laptop
+    Snakemake,
+    /// A job array and the job behind it: bash submit.sh
+    Slurm,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -56,142 +93,228 @@ fn parse_shard(text: &str) -> Result<Shard, String> {
 }
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
-    let stop = StopFlag::listen();
+    if let Some(threads) = arguments.threads {
+        // Fails only where a pool exists already, which then serves as well: results don't depend on it.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
+    }
     let campaign = read_campaign(&arguments.campaign)?;
     let cells = campaign.cells()?;
-    let folder = &arguments.output;
-    // Shards of one campaign may work in one folder at once; they write different files.
-    let _held = if arguments.shard.is_none() { Some(held(folder, "campaign")?) } else { None };
-    let shard = arguments.shard.unwrap_or(Shard { index: 1, count: 1 });
-    let progress = screen.progress("campaign", Some(cells.len() as u64));
+    let whole = Part::whole(&campaign, &cells);
+    let folder = match &arguments.output {
+        Some(folder) if !arguments.list => folder,
+        folder => return list(&whole, folder.as_deref(), screen),
+    };
+    if let Some(engine) = arguments.emit {
+        return emit(arguments, engine, &whole, folder, screen);
+    }
+    if arguments.merge {
+        let _held = held(folder, "campaign")?;
+        return merged(&whole, folder, 0, screen);
+    }
+    let part = match arguments.shard {
+        Some(Shard { index, count }) => Part::dealt(&campaign, &cells, index, count),
+        None if !arguments.cell.is_empty() => Part::of_ids(&campaign, &cells, &arguments.cell)?,
+        None => whole,
+    };
+    let is_whole = arguments.shard.is_none() && arguments.cell.is_empty();
+    // Parts of one campaign may work in one folder at once; they write different files.
+    let _held = if is_whole { Some(held(folder, "campaign")?) } else { None };
+    let stop = StopFlag::listen();
+    let Some(searched) = search(&part, folder, arguments.checkpoint_every, &stop, screen)? else {
+        let answer = part.answer(Some(folder), 0);
+        screen.note(&missing_words(&answer));
+        screen.answer(answer, |answer| text(answer, false))?;
+        return Ok(Ending::Interrupted);
+    };
+    if is_whole {
+        return merged(&part, folder, searched, screen);
+    }
+    let answer = part.answer(Some(folder), searched);
+    let is_complete = answer.missing.is_empty();
+    screen.answer(answer, |answer| text(answer, false))?;
+    Ok(if is_complete { Ending::Done } else { Ending::No })
+}
+
+fn list(whole: &Part, folder: Option<&Path>, screen: &Screen) -> Result<Ending, CliError> {
+    screen.answer(whole.answer(folder, 0), listed)?;
+    Ok(Ending::Done)
+}
+
+fn emit(
+    arguments: &Arguments,
+    engine: Engine,
+    whole: &Part,
+    folder: &Path,
+    screen: &Screen,
+) -> Result<Ending, CliError> {
+    let message = |error: std::io::Error| CliError::Option { option: "--emit", message: error.to_string() };
+    let workflow = Workflow {
+        engine: match engine {
+            Engine::Snakemake => workflow::Engine::Snakemake,
+            Engine::Slurm => workflow::Engine::Slurm,
+        },
+        program: &std::env::current_exe().map_err(message)?,
+        campaign: &arguments.campaign,
+        models: &whole.campaign.models,
+        ids: whole.cells.iter().map(|cell| cell.id.as_str()).collect(),
+        estimated_s: whole.estimated_s(),
+        part_s: arguments.job_time.as_secs_f64(),
+        threads: arguments.threads.unwrap_or(1),
+    };
+    let _held = held(folder, "campaign")?;
+    let files = workflow.write(folder)?.into_iter().map(str::to_owned).collect();
+    let campaign = whole.answer(Some(&folder.join("results")), 0);
+    let answer = WorkflowJson { campaign, engine: workflow.engine.key().to_owned(), parts: workflow.parts(), files };
+    let start = match engine {
+        Engine::Snakemake => "snakemake --profile profiles/laptop",
+        Engine::Slurm => "bash submit.sh",
+    };
+    screen.answer(answer, |answer| {
+        let (cells, parts) = (answer.campaign.cells.len(), answer.parts);
+        format!(
+            "{}: {cells} cells in {parts} jobs\nwrote {} into {}\nrun it there: {start}\n",
+            answer.campaign.campaign,
+            answer.files.join(", "),
+            folder.display()
+        )
+    })?;
+    Ok(Ending::Done)
+}
+
+/// Searches the cells of a part that are not done; how many that were, none if a signal came first.
+fn search(
+    part: &Part,
+    folder: &Path,
+    checkpoint_every: Duration,
+    stop: &StopFlag,
+    screen: &Screen,
+) -> Result<Option<usize>, CliError> {
+    let progress = screen.progress("campaign", Some(part.cells.len() as u64));
     let mut searched = 0;
-    for (index, cell) in cells.iter().enumerate().filter(|(index, _)| index % shard.count == shard.index - 1) {
-        let fingerprint = campaign.fingerprint(cell);
-        if read_cell(folder, index, &fingerprint).is_none() {
-            let Some(found) = search(&campaign, cell, index, fingerprint, &stop)? else { break };
-            let json = serde_json::to_string_pretty(&found).map_err(|e| CliError::Stdout(e.into()))? + "\n";
-            write_atomically(&cell_path(folder, index), json.as_bytes())?;
+    for (place, cell) in part.cells.iter().enumerate() {
+        if read_cell(folder, &cell.id).is_none() {
+            let mut watch = Watch::new(cell, folder, checkpoint_every, stop);
+            // A checkpoint that is damaged is none.
+            let saved = read_checkpoint(&watch.state_folder, &cell.id).unwrap_or(None);
+            let found = search_cell(part.campaign, cell, saved, &mut watch);
+            match (found, watch.fault) {
+                // Another process has the same cell and was faster.
+                _ if read_cell(folder, &cell.id).is_some() => {}
+                (_, Some(fault)) => return Err(fault.into()),
+                (None, None) => return Ok(None),
+                (Some(found), None) => write_cell(folder, &found)?,
+            }
             searched += 1;
         }
-        progress.at(index as u64 + 1, "");
+        progress.at(place as u64 + 1, "");
     }
-    progress.finish();
-    let results: Vec<CellJson> = cells
-        .iter()
-        .enumerate()
-        .filter_map(|(index, cell)| read_cell(folder, index, &campaign.fingerprint(cell)))
-        .collect();
-    let answer = CampaignJson {
-        campaign: campaign.name.clone(),
-        cells: cells.len(),
-        searched,
-        missing: cells.len() - results.len(),
-        results,
-    };
-    if answer.missing == 0 {
-        let csv = summary_csv(&answer.results);
-        let mut files = Replacement::of(folder);
-        files.add("summary.csv", &csv)?;
-        files.add("summary.svg", chart(&answer).as_bytes())?;
-        files.commit(&["summary.csv", "summary.svg"])?;
-        remove_numbered(&folder.join("cells"), answer.cells)?;
+    Ok(Some(searched))
+}
+
+/// The table of a whole campaign, unless something is missing.
+fn merged(whole: &Part, folder: &Path, searched: usize, screen: &Screen) -> Result<Ending, CliError> {
+    let answer = whole.answer(Some(folder), searched);
+    let is_complete = answer.missing.is_empty();
+    if is_complete {
+        let mut further = vec![("report.html".to_owned(), campaign_page(&answer))];
+        further.extend(
+            charts(&answer.results).into_iter().map(|(objective, svg)| (format!("summary-{objective}.svg"), svg)),
+        );
+        write_table(folder, &answer.results, &further)?;
+        forget_unfinished(folder);
         screen.note(&format!("wrote {}", folder.join("summary.csv").display()));
     } else {
-        screen.note(&format!("{} of {} cells are missing: no table yet", answer.missing, answer.cells));
+        screen.note(&missing_words(&answer));
     }
-    screen.answer(answer, text)?;
-    Ok(if stop.is_set() { Ending::Interrupted } else { Ending::Done })
+    screen.answer(answer, |answer| text(answer, true))?;
+    Ok(if is_complete { Ending::Done } else { Ending::No })
 }
 
-/// Searches one cell; none if a signal came first.
-fn search(
-    campaign: &CampaignFile,
-    cell: &Cell,
-    index: usize,
-    fingerprint: String,
-    stop: &StopFlag,
-) -> Result<Option<CellJson>, CliError> {
-    let (model, layers) = (&cell.file.model, cell.file.model.coil.layers());
-    let plan = Plan {
-        seed: cell.seed,
-        restarts_per_round: DEFAULT_RESTARTS_PER_ROUND,
-        moves_per_restart: campaign
-            .moves_per_restart
-            .unwrap_or_else(|| cell.objective.default_moves_per_restart(layers)),
-        rules: Rules {
-            rounds: campaign.rounds.unwrap_or(u64::MAX),
-            patience: DEFAULT_PATIENCE,
-            moves: None,
-            target: None,
-        },
-        starts: Vec::new(),
-    };
-    let request = search::Request {
-        model,
-        profiles: &cell.file.profiles,
-        tolerance: cell.file.tolerance.as_ref(),
-        objective: cell.objective,
-        class: cell.class,
-        plan,
-        saved: None,
-        former: None,
-        prove: false,
-        recommend: false,
-        cuts: false,
-        uncertain: &[],
-    };
-    let answer = match search::run(&request, &mut UntilStopped(stop)) {
-        Ok(answer) => answer.filter(|answer| answer.ended != Ended::Signal),
-        Err(RunError::Judge(error)) => return Err(error.into()),
-        // Nothing was saved that might not fit.
-        Err(RunError::Resume) => None,
-    };
-    Ok(answer.map(|answer| CellJson {
-        cell: index + 1,
-        fingerprint,
-        model: model.name.clone(),
-        layers,
-        windability: cell.class.to_string(),
-        objective: cell.objective.key().to_owned(),
-        seed: cell.seed,
-        worst_rate_deg_per_h: deg_per_h_from_rad_per_s(answer.best.worst.rate_rad_per_s.abs()),
-        objective_deg_per_h: (cell.objective != Objective::WorstPhase)
-            .then(|| deg_per_h_from_rad_per_s(answer.best.objective_rad_per_s)),
-        improvement_over_qua: answer.improvement_over_qua,
-        evaluations: answer.evaluations,
-        stopped_by: answer.ended.key().to_owned(),
-        segments: answer.best.pattern.segments().to_vec(),
-    }))
+/// More identifiers than these are in the JSON document only.
+const MOST_SHOWN: usize = 20;
+
+fn missing_words(answer: &CampaignJson) -> String {
+    let shown: Vec<&str> = answer.missing.iter().take(MOST_SHOWN).map(String::as_str).collect();
+    let further = answer.missing.len() - shown.len();
+    let further = if further > 0 { format!(" and {further} more") } else { String::new() };
+    let (missing, all) = (answer.missing.len(), answer.cells.len());
+    format!("{missing} of {all} cells are missing: {}{further}", shown.join(", "))
 }
 
-/// Ends a search as soon as a signal comes.
-struct UntilStopped<'a>(&'a StopFlag);
+/// Ends a search as soon as a signal comes or another process has done it; keeps its state from time to time.
+struct Watch<'a> {
+    cell: &'a Cell,
+    folder: &'a Path,
+    state_folder: PathBuf,
+    every: Duration,
+    last: Instant,
+    stop: &'a StopFlag,
+    fault: Option<WriteError>,
+}
 
-impl Observer for UntilStopped<'_> {
-    fn advanced(&mut self, _search: &dyn Rounds) -> ControlFlow<Halt> {
-        if self.0.is_set() { ControlFlow::Break(Halt::Signal) } else { ControlFlow::Continue(()) }
+impl<'a> Watch<'a> {
+    fn new(cell: &'a Cell, folder: &'a Path, every: Duration, stop: &'a StopFlag) -> Self {
+        let state_folder = state_folder(folder, &cell.id);
+        Self { cell, folder, state_folder, every, last: Instant::now(), stop, fault: None }
+    }
+}
+
+impl Observer for Watch<'_> {
+    fn advanced(&mut self, search: &dyn Rounds) -> ControlFlow<Halt> {
+        let is_stopped = self.stop.is_set();
+        if is_stopped || self.last.elapsed() >= self.every {
+            if read_cell(self.folder, &self.cell.id).is_some() {
+                return ControlFlow::Break(Halt::Signal);
+            }
+            self.last = Instant::now();
+            self.fault = write_checkpoint(&self.state_folder, &self.cell.id, search.state()).err();
+        }
+        if is_stopped || self.fault.is_some() { ControlFlow::Break(Halt::Signal) } else { ControlFlow::Continue(()) }
     }
 
     fn goes_on(&self) -> bool {
-        !self.0.is_set()
+        !self.stop.is_set()
     }
 }
 
-/// The worst rate of every cell, one series a class.
-fn chart(answer: &CampaignJson) -> String {
-    let mut classes: Vec<&str> = answer.results.iter().map(|r| r.windability.as_str()).collect();
-    classes.sort_unstable();
-    classes.dedup();
-    let mut chart = Chart::new(answer.campaign.clone()).x(Axis::linear("cell")).y(Axis::log("worst rate error [°/h]"));
-    for class in classes {
-        let of_class = answer.results.iter().filter(|r| r.windability == class);
-        let points = of_class.map(|r| (r.cell as f64, r.worst_rate_deg_per_h)).collect();
-        chart = chart.with(Series::points(class, points));
-    }
-    chart.svg()
+fn listed(answer: &CampaignJson) -> String {
+    let rows = answer.cells.iter().map(|c| {
+        vec![
+            c.id.clone(),
+            c.kind.clone(),
+            c.model.clone(),
+            c.layers.to_string(),
+            c.class.clone(),
+            c.objective.clone(),
+            c.seed.to_string(),
+            format!("{:.1}", c.estimated_s),
+            if c.done { "yes" } else { "no" }.to_owned(),
+        ]
+    });
+    let header = ["id", "kind", "model", "layers", "class", "objective", "seed", "about s", "done"];
+    let seconds: f64 = answer.cells.iter().filter(|c| !c.done).map(|c| c.estimated_s).sum();
+    let done = answer.cells.len() - answer.missing.len();
+    let head = format!(
+        "{}: {} cells, {done} done; the others take about {seconds:.0} s on one thread",
+        answer.campaign,
+        answer.cells.len()
+    );
+    format!("{head}\n\n{}", table(&header, rows))
 }
 
-fn text(answer: &CampaignJson) -> String {
+fn text(answer: &CampaignJson, is_whole: bool) -> String {
+    let (cells, searched, missing) = (answer.cells.len(), answer.searched, answer.missing.len());
+    let mut head = format!("{}: {cells} cells, {searched} searched now, {missing} missing\n", answer.campaign);
+    if !answer.failed.is_empty() {
+        head += &format!("{} have no result; the table says why: {}\n", answer.failed.len(), answer.failed.join(", "));
+    }
+    if !is_whole || missing > 0 {
+        return head;
+    }
+    for sentence in recommendations(&answer.results) {
+        head += &format!("{sentence}\n");
+    }
+    let number = |value: Option<f64>, digits: usize| value.map_or_else(|| "–".to_owned(), |v| format!("{v:.digits$}"));
     let rows = answer.results.iter().map(|r| {
         vec![
             r.model.clone(),
@@ -199,18 +322,11 @@ fn text(answer: &CampaignJson) -> String {
             r.windability.clone(),
             r.objective.clone(),
             r.seed.to_string(),
-            format!("{:.4}", r.worst_rate_deg_per_h),
-            r.objective_deg_per_h.map_or_else(|| "–".to_owned(), |o| format!("{o:.4}")),
-            r.improvement_over_qua.map_or_else(|| "–".to_owned(), |f| format!("{f:.3}")),
+            number(r.worst_rate_deg_per_h, 4),
+            number(r.objective_deg_per_h, 4),
+            number(r.improvement_over_qua, 3),
         ]
     });
     let header = ["model", "layers", "class", "objective", "seed", "worst °/h", "objective °/h", "QUA's over it"];
-    format!(
-        "{}: {} cells, {} searched now, {} missing\n\n{}",
-        answer.campaign,
-        answer.cells,
-        answer.searched,
-        answer.missing,
-        table(&header, rows)
-    )
+    format!("{head}\n{}", table(&header, rows))
 }

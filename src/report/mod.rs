@@ -1,6 +1,7 @@
 //! What a reader sees: charts, drawings and pages.
 
 pub mod allan;
+pub mod campaign;
 pub mod comparison;
 pub mod compensation;
 pub mod cross_section;

@@ -3,6 +3,7 @@
 //!
 //! The search's own is [`crate::search::run()`].
 
+pub mod campaign;
 pub mod compare;
 pub mod compensate;
 pub mod evaluate;

@@ -8,6 +8,7 @@
 //! | [`TomlComment`] | what stands behind `#` |
 //! | [`CComment`] | what stands between `/*` and `*/` |
 //! | [`Cell`] | a cell of a CSV table that a person may open in a spreadsheet |
+//! | [`ShellWord`] | one word of a shell's script |
 //! | [`Markup`] | a page or picture (HTML, XML), whose text and attributes are quoted already |
 
 use super::{is_unseen, visible};
@@ -179,6 +180,21 @@ impl AsRef<[u8]> for Cell {
     }
 }
 
+/// One word of a script for bash: nothing in it is expanded, and it ends where it ends.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ShellWord(String);
+
+impl ShellWord {
+    pub fn of(text: &str) -> Self {
+        if text.contains(is_unseen) {
+            // Between $' and ' a byte may be written as three octal digits.
+            let byte = |b: u8| if b.is_ascii_alphanumeric() { char::from(b).to_string() } else { format!("\\{b:03o}") };
+            return Self(format!("$'{}'", text.bytes().map(byte).collect::<String>()));
+        }
+        Self(format!("'{}'", text.replace('\'', "'\\''")))
+    }
+}
+
 /// A whole page or picture: its text and attributes were quoted where they were put in; here every character that XML does
 /// not have, or that nobody sees, is written out.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -190,7 +206,7 @@ impl Markup {
     }
 }
 
-shown_as_it_is!(Line, Block, JsonText, TomlComment, CComment, Cell, Markup);
+shown_as_it_is!(Line, Block, JsonText, TomlComment, CComment, Cell, ShellWord, Markup);
 
 #[cfg(test)]
 mod tests {
@@ -224,11 +240,23 @@ mod tests {
     #[test]
     fn no_sink_lets_a_line_break_or_an_unseen_character_through_but_its_own() {
         for text in HOSTILE {
-            for out in [Line::of(text).0, TomlComment::of(text).0, CComment::of(text).0] {
+            for out in [Line::of(text).0, TomlComment::of(text).0, CComment::of(text).0, ShellWord::of(text).0] {
                 assert!(!out.contains(is_unseen), "{out:?}");
             }
             assert!(!Block::of(text).0.contains(|c| is_unseen(c) && c != '\n'));
             assert!(!Markup::of(text).0.contains(|c| is_unseen(c) && c != '\n'));
+        }
+    }
+
+    #[test]
+    fn a_word_of_a_shell_is_one_and_the_same_text() {
+        for text in HOSTILE.iter().chain(&["it's", "$(id) `id` ${HOME}", "a b; c"]) {
+            let script = format!("printf %s {}", ShellWord::of(text));
+            let out = std::process::Command::new("bash").args(["-c", &script]).output();
+            // Where there is no bash nothing is to be shown.
+            if let Ok(out) = out {
+                assert_eq!(String::from_utf8_lossy(&out.stdout), *text, "{script}");
+            }
         }
     }
 

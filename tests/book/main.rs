@@ -29,13 +29,15 @@ fn every_command_of_the_book_runs() {
         let text = std::fs::read_to_string(&path).unwrap();
         // Each chapter begins in a folder of its own with the examples in it.
         let folder = tempfile::tempdir().unwrap();
-        std::fs::create_dir(folder.path().join("examples")).unwrap();
-        for example in std::fs::read_dir("examples").unwrap() {
-            let example = example.unwrap().path();
-            if example.is_dir() {
-                continue;
+        for examples in ["examples", "examples/campaigns"] {
+            std::fs::create_dir(folder.path().join(examples)).unwrap();
+            for example in std::fs::read_dir(examples).unwrap() {
+                let example = example.unwrap().path();
+                if example.is_dir() {
+                    continue;
+                }
+                std::fs::copy(&example, folder.path().join(examples).join(example.file_name().unwrap())).unwrap();
             }
-            std::fs::copy(&example, folder.path().join("examples").join(example.file_name().unwrap())).unwrap();
         }
         for line in text.lines().filter_map(|line| line.strip_prefix("$ coilwright ")) {
             let arguments: Vec<&str> = line.split_whitespace().collect();

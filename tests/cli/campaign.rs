@@ -1,4 +1,4 @@
-//! Campaigns: shards together equal the whole, and what is done is not done again. The front's points are patterns
+//! Campaigns: parts together equal the whole, what is done is not done again, and what is missing is named. The front's points are patterns
 //! that `schedule` takes.
 
 use std::collections::BTreeMap;
@@ -35,26 +35,190 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
+type Document = serde_json::Value;
+
+fn answered(arguments: &[&str], code: i32) -> Document {
+    let output = coilwright(&[arguments, &["--format", "json", "--quiet"]].concat());
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn ids(found: &Document) -> Vec<String> {
+    found.as_array().unwrap().iter().map(|id| id["id"].as_str().or(id.as_str()).unwrap().to_owned()).collect()
+}
+
 #[test]
-fn shards_together_are_the_whole_and_what_is_done_is_skipped() {
+fn parts_and_single_cells_together_are_the_whole_and_what_is_done_is_skipped() {
     let root = tempfile::tempdir().unwrap();
     let campaign = campaign_file(root.path());
-    let (whole, shards) = (root.path().join("whole"), root.path().join("shards"));
-    let run = |folder: &Path, more: &[&str]| {
-        let folder = folder.display().to_string();
-        let output = coilwright(&[&["campaign", &campaign, "-o", &folder, "--format", "json"], more].concat());
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()
+    let (whole, parts) =
+        (root.path().join("whole").display().to_string(), root.path().join("parts").display().to_string());
+    let run = |folder: &str, more: &[&str], code: i32| {
+        answered(&[&["campaign", &campaign, "-o", folder], more].concat(), code)
     };
-    let first = run(&whole, &[]);
-    assert_eq!((&first["cells"], &first["searched"], &first["missing"]), (&8.into(), &8.into(), &0.into()));
-    assert_eq!(run(&whole, &[])["searched"], 0);
-    assert_eq!(run(&shards, &["--shard", "2/3"])["missing"], 5);
-    assert_eq!(run(&shards, &["--shard", "1/3"])["missing"], 2);
-    assert_eq!(run(&shards, &["--shard", "3/3"])["missing"], 0);
-    let found = files(&whole);
-    assert!(found.contains_key(Path::new("summary.csv")) && found.contains_key(Path::new("summary.svg")));
-    assert_eq!(found, files(&shards));
+    let first = run(&whole, &[], 0);
+    assert_eq!((ids(&first["cells"]).len(), &first["searched"], ids(&first["missing"]).len()), (8, &8.into(), 0));
+    assert_eq!(run(&whole, &[], 0)["searched"], 0);
+
+    // Before anything is done: a list without a folder, and a table that would be incomplete.
+    let listed = answered(&["campaign", &campaign, "--list"], 0);
+    let all = ids(&listed["cells"]);
+    assert_eq!((all.len(), ids(&listed["missing"])), (8, all.clone()));
+    for cell in listed["cells"].as_array().unwrap() {
+        for key in ["id", "kind", "model", "layers", "class", "objective", "seed", "done"] {
+            assert!(!cell[key].is_null(), "{key}: {cell}");
+        }
+        assert_eq!((&cell["done"], &cell["kind"]), (&false.into(), &"search".into()));
+    }
+    assert_eq!(ids(&run(&parts, &["--merge"], 1)["missing"]), all);
+    assert!(!Path::new(&parts).join("summary.csv").exists());
+
+    let second = run(&parts, &["--shard", "2/3"], 0);
+    assert_eq!((ids(&second["cells"]).len(), ids(&second["missing"]).len(), &second["searched"]), (3, 0, &3.into()));
+    let third = ids(&run(&parts, &["--shard", "3/3", "--threads", "1"], 0)["cells"]);
+    let left = ids(&run(&parts, &["--merge"], 1)["missing"]);
+    assert!(left.len() == 3 && left.iter().all(|id| !third.contains(id)));
+    let one = run(&parts, &["--cell", &left[0], "--cell", &left[2]], 0);
+    assert_eq!(one["searched"], 2);
+    let words = coilwright(&["campaign", &campaign, "-o", &parts, "--merge"]);
+    let words = String::from_utf8_lossy(&words.stderr).into_owned();
+    assert!(words.contains(&format!("1 of 8 cells are missing: {}", left[1])), "{words}");
+    run(&parts, &["--cell", &left[1]], 0);
+    assert_eq!(run(&parts, &["--merge"], 0)["searched"], 0);
+    let found = files(Path::new(&whole));
+    for file in ["summary.csv", "summary-worst-rate.svg", "summary-p95.svg", "report.html"] {
+        assert!(found.contains_key(Path::new(file)), "{file}");
+    }
+    assert_eq!(found, files(Path::new(&parts)));
+
+    let unknown = coilwright(&["campaign", &campaign, "-o", &parts, "--cell", "0123456789abcdef"]);
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&unknown.stderr).contains("--list"));
+}
+
+#[test]
+fn only_what_a_change_reaches_is_computed_again_and_a_damaged_cell_is_missing() {
+    let root = tempfile::tempdir().unwrap();
+    let example = std::fs::read_to_string(example()).unwrap();
+    let write = |name: &str, text: &str| std::fs::write(root.path().join(name), text).unwrap();
+    let (path, folder) =
+        (root.path().join("grid.toml").display().to_string(), root.path().join("out").display().to_string());
+    let grid = |models: &str| {
+        format!(
+            "name = \"grid\"\nmodels = {models}\nlayers = [8]\nseeds = [1, 2]\nrounds = 1\nmoves_per_restart = 20\n"
+        )
+    };
+    write("a.toml", &example);
+    write("b.toml", &example.replace("paper 200 m", "another"));
+    write("grid.toml", &grid("[\"a.toml\", \"b.toml\"]"));
+    let run = |more: &[&str], code: i32| answered(&[&["campaign", &path, "-o", &folder], more].concat(), code);
+    let before = ids(&run(&[], 0)["cells"]);
+    assert_eq!(before.len(), 4);
+    // Words for people change nothing; another order, another model in front and another seed add what they add.
+    write("a.toml", &("# a comment\n".to_owned() + &example + "\n[production]\nspool = \"x\"\n"));
+    write("c.toml", &example.replace("paper 200 m", "third"));
+    write("grid.toml", &grid("[\"c.toml\", \"b.toml\", \"a.toml\"]").replace("[1, 2]", "[2, 1]"));
+    assert_eq!(run(&[], 0)["searched"], 2);
+    // The same search twice is one cell.
+    write("c.toml", &example);
+    assert_eq!(ids(&run(&["--list"], 0)["cells"]).len(), 4);
+    write(
+        "b.toml",
+        &example.replace("paper 200 m", "another").replace("max_rate_c_per_h = 10.0", "max_rate_c_per_h = 11.0"),
+    );
+    let changed = run(&["--list"], 0);
+    assert_eq!(ids(&changed["missing"]).len(), 2, "{changed}");
+    assert_eq!(run(&[], 0)["searched"], 2);
+    // What is not whole is not done.
+    let cell = Path::new(&folder).join("cells").join(&before[0][..2]).join(format!("{}.json", before[0]));
+    let text = std::fs::read_to_string(&cell).unwrap();
+    std::fs::write(&cell, &text[..text.len() / 2]).unwrap();
+    assert_eq!(ids(&run(&["--merge"], 1)["missing"]), before[..1]);
+    assert_eq!(run(&[], 0)["searched"], 1);
+    assert_eq!(std::fs::read_to_string(&cell).unwrap(), text);
+}
+
+#[test]
+fn a_long_cell_that_is_killed_goes_on_from_its_checkpoint_and_ends_the_same() {
+    let root = tempfile::tempdir().unwrap();
+    std::fs::copy(example(), root.path().join("paper.toml")).unwrap();
+    let path = root.path().join("grid.toml").display().to_string();
+    let text = "name = \"long\"\nmodels = [\"paper.toml\"]\nlayers = [14]\nrounds = 3\nmoves_per_restart = 60000\n";
+    std::fs::write(&path, text).unwrap();
+    let (killed, whole) = (root.path().join("killed"), root.path().join("whole"));
+    let start = || {
+        let arguments =
+            ["campaign", &path, "-o", &killed.display().to_string(), "--checkpoint-every", "1ms", "--quiet"];
+        Command::new(env!("CARGO_BIN_EXE_coilwright")).args(arguments).spawn().unwrap()
+    };
+    let mut child = start();
+    let unfinished = killed.join("unfinished");
+    let has_checkpoint = || {
+        let folders = std::fs::read_dir(&unfinished).into_iter().flatten().flatten();
+        folders.into_iter().any(|folder| folder.path().join("checkpoint.json").exists())
+    };
+    while !has_checkpoint() && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(start().wait().unwrap().success());
+    assert!(!unfinished.exists());
+    answered(&["campaign", &path, "-o", &whole.display().to_string()], 0);
+    assert_eq!(files(&killed), files(&whole));
+}
+
+#[test]
+fn the_same_cell_twice_at_once_is_one_result() {
+    let root = tempfile::tempdir().unwrap();
+    std::fs::copy(example(), root.path().join("paper.toml")).unwrap();
+    let path = root.path().join("grid.toml").display().to_string();
+    std::fs::write(&path, "name = \"twice\"\nmodels = [\"paper.toml\"]\nrounds = 1\nmoves_per_restart = 2000\n")
+        .unwrap();
+    let (both, alone) = (root.path().join("both"), root.path().join("alone"));
+    let id = ids(&answered(&["campaign", &path, "--list"], 0)["cells"]).remove(0);
+    let shown = both.display().to_string();
+    let start = || {
+        let arguments = ["campaign", &path, "-o", &shown, "--cell", &id, "--checkpoint-every", "1ms", "--quiet"];
+        Command::new(env!("CARGO_BIN_EXE_coilwright"))
+            .args(arguments)
+            .stdout(std::process::Stdio::null())
+            .spawn()
+            .unwrap()
+    };
+    let mut runs: Vec<std::process::Child> = (0..3).map(|_| start()).collect();
+    assert!(runs.iter_mut().all(|run| run.wait().unwrap().success()));
+    answered(&["campaign", &path, "-o", &shown, "--merge"], 0);
+    answered(&["campaign", &path, "-o", &alone.display().to_string()], 0);
+    let mut found = files(&both);
+    // What a run kept of a cell that another one ended first.
+    found.retain(|path, _| !path.starts_with("unfinished"));
+    assert_eq!(found, files(&alone));
+}
+
+#[test]
+fn a_workflow_names_its_jobs_and_a_hostile_path_stays_a_path() {
+    let root = tempfile::tempdir().unwrap();
+    let folder = root.path().join("it's $(touch x) {wild} \"b\"");
+    std::fs::create_dir(&folder).unwrap();
+    let campaign = campaign_file(&folder);
+    for (engine, file) in [("snakemake", "config.json"), ("slurm", "campaign.conf")] {
+        let out = root.path().join(engine);
+        let shown = out.display().to_string();
+        let answer = answered(&["campaign", &campaign, "--emit", engine, "-o", &shown, "--job-time", "1ms"], 0);
+        assert_eq!((&answer["parts"], &answer["engine"]), (&8.into(), &engine.into()));
+        assert_eq!(ids(&answer["missing"]).len(), 8);
+        let text = std::fs::read_to_string(out.join(file)).unwrap();
+        if engine == "snakemake" {
+            let config: Document = serde_json::from_str(&text).unwrap();
+            assert_eq!(config["campaign"], campaign.as_str());
+        } else {
+            let script = format!("{text}printf %s \"$campaign\"");
+            let said = Command::new("bash").args(["-c", &script]).current_dir(root.path()).output().unwrap();
+            assert_eq!(String::from_utf8_lossy(&said.stdout), campaign);
+        }
+    }
+    assert!(!root.path().join("x").exists());
 }
 
 #[test]

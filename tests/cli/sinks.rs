@@ -21,6 +21,17 @@ const SINKS: &[(&str, Reader)] = &[
     ("html", |_, text| page(text)),
     ("h", |path, _| compiles(path)),
     ("gcode", |_, text| machine(text)),
+    // The files of an engine hold nothing from outside.
+    ("", |_, text| assert_eq!(text, include_str!("../../src/io/write/workflow/Snakefile"))),
+    ("yaml", |_, text| {
+        let shipped = [
+            include_str!("../../src/io/write/workflow/laptop.yaml"),
+            include_str!("../../src/io/write/workflow/slurm.yaml"),
+        ];
+        assert!(shipped.contains(&text));
+    }),
+    ("sh", |_, text| script(text)),
+    ("conf", |_, text| script(text)),
 ];
 
 /// A second parser, which shares nothing with the program's own.
@@ -71,6 +82,15 @@ fn page(text: &str) {
     }
     assert!(lower.contains("http-equiv=\"content-security-policy\" content=\"default-src 'none'"));
     assert!(!text.contains(|c| is_unseen(c) && c != '\n'));
+}
+
+/// One assignment or command a line for bash, and nothing unseen.
+fn script(text: &str) {
+    assert!(!text.contains(|c| is_unseen(c) && c != '\n'));
+    match std::process::Command::new("bash").args(["-n", "-c", text]).output() {
+        Ok(out) => assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr)),
+        Err(_) => println!("skipped: there is no bash"),
+    }
 }
 
 fn compiles(header: &Path) {

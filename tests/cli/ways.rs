@@ -323,7 +323,12 @@ fn pareto(b: &Bench) {
 fn campaign(b: &Bench) {
     let found = b.json(&["campaign", "campaign.toml", "-o", "out/campaign"]);
     b.is_name(&found["campaign"]);
-    b.is_name(&b.read_json("out/campaign/cells/00001.json")["model"]);
+    b.is_name(&found["cells"][0]["model"]);
+    let id = found["cells"][0]["id"].as_str().unwrap();
+    b.is_name(&b.read_json(&format!("out/campaign/cells/{}/{id}.json", &id[..2]))["model"]);
+    b.done(&["campaign", "campaign.toml", "--list"]);
+    b.done(&["campaign", "campaign.toml", "--emit", "snakemake", "-o", "out/snakemake"]);
+    b.done(&["campaign", "campaign.toml", "--emit", "slurm", "-o", "out/slurm"]);
     let rows = table(&b.read("out/campaign/summary.csv"));
     assert_eq!(rows[1][1], b.name);
 }

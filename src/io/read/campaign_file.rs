@@ -1,9 +1,9 @@
-//! Campaigns: a grid of searches as a file, one result file a cell, and the table of them all.
+//! Campaign files: a grid of searches, and its cells with their identifiers.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-
-use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 use crate::io::fault::{Fault, Faults};
 use crate::io::files::{read_text, sha256_hex};
@@ -14,8 +14,6 @@ use crate::search::cost::objective::Objective;
 use super::model_file::parse_model;
 use super::pattern_file::states_any;
 use super::toml_reader::{TomlReader, parse};
-use crate::io::table::Table;
-use crate::text::sink;
 
 /// A campaign file, understood: the grid is the product of its lists.
 #[derive(Debug, Clone)]
@@ -34,44 +32,20 @@ pub struct CampaignFile {
 /// One search of a campaign.
 #[derive(Debug, Clone)]
 pub struct Cell {
-    pub file: ModelFile,
+    /// What the search depends on, as [`ID_DIGITS`] hexadecimal digits: the model as far as it matters, the settings, and the program's
+    /// version. What has changed nothing here need not be searched again.
+    pub id: String,
+    pub file: Arc<ModelFile>,
     pub class: WindabilityClass,
     pub objective: Objective,
     pub seed: u64,
 }
 
-/// What a cell found; its file depends on nothing but the cell.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CellJson {
-    pub cell: usize,
-    pub fingerprint: String,
-    pub model: String,
-    pub layers: usize,
-    pub windability: String,
-    pub objective: String,
-    pub seed: u64,
-    pub worst_rate_deg_per_h: f64,
-    /// Null for the phase, which is no rate.
-    pub objective_deg_per_h: Option<f64>,
-    /// QUA's objective over the best pattern's.
-    pub improvement_over_qua: Option<f64>,
-    pub evaluations: u64,
-    pub stopped_by: String,
-    pub segments: Vec<usize>,
-}
+/// Digits of an identifier: among a million cells two agree with a probability below 1e-7.
+pub const ID_DIGITS: usize = 16;
 
-/// The answer of `campaign`.
-#[derive(Debug, Serialize)]
-pub struct CampaignJson {
-    pub campaign: String,
-    pub cells: usize,
-    /// Searched by this call; the others of its shard were there already.
-    pub searched: usize,
-    /// Not there yet: of other shards, or interrupted.
-    pub missing: usize,
-    pub results: Vec<CellJson>,
-}
+/// The only kind of cell so far.
+pub const KIND: &str = "search";
 
 /// Reads and checks a campaign file; model paths are relative to its folder.
 ///
@@ -162,12 +136,13 @@ fn understood<T>(
 }
 
 impl CampaignFile {
-    /// All cells in their order: models outermost, seeds innermost.
+    /// All cells in their order: models outermost, seeds innermost. A search that the grid holds twice is one cell.
     ///
     /// # Errors
     /// The faults of a model file, also those that another layer count causes.
     pub fn cells(&self) -> Result<Vec<Cell>, Faults> {
         let mut cells = Vec::new();
+        let mut seen = BTreeSet::new();
         for path in &self.models {
             let source = read_text(path)?;
             // What is something else altogether is named, not shown: it may be any file of the system.
@@ -182,31 +157,54 @@ impl CampaignFile {
                 self.layers.iter().map(with).collect::<Result<_, _>>()?
             };
             for file in files {
-                for &class in &self.classes {
-                    for &objective in &self.objectives {
-                        for &seed in &self.seeds {
-                            cells.push(Cell { file: file.clone(), class, objective, seed });
-                        }
-                    }
+                if file.tolerance.is_none() && self.objectives.contains(&Objective::P95) {
+                    let message =
+                        "has no [tolerance], which the objective p95 needs: state how much what is built spreads";
+                    return Err(Faults::of_file(path.display().to_string(), message));
                 }
+                self.append_cells(Arc::new(file), &mut seen, &mut cells);
             }
         }
         Ok(cells)
     }
 
-    /// What a cell's result must agree with to be kept.
-    pub fn fingerprint(&self, cell: &Cell) -> String {
-        sha256_hex(&format!(
-            "{}\n{} {} {} {:?} {:?}",
-            cell.file.source,
-            cell.class,
-            cell.objective.key(),
-            cell.seed,
-            self.rounds,
-            self.moves_per_restart
-        ))
+    fn append_cells(&self, file: Arc<ModelFile>, seen: &mut BTreeSet<String>, cells: &mut Vec<Cell>) {
+        let addresses = [false, true].map(|with_tolerance| model_address(&file.source, with_tolerance));
+        for &class in &self.classes {
+            for &objective in &self.objectives {
+                for &seed in &self.seeds {
+                    let settings =
+                        format!("{class} {} {seed} {:?} {:?}", objective.key(), self.rounds, self.moves_per_restart);
+                    let model = &addresses[usize::from(objective == Objective::P95)];
+                    let id = sha256_hex(&format!("{}\n{KIND}\n{model}\n{settings}", env!("CARGO_PKG_VERSION")));
+                    let id = id[..ID_DIGITS].to_owned();
+                    if seen.insert(id.clone()) {
+                        cells.push(Cell { id, file: Arc::clone(&file), class, objective, seed });
+                    }
+                }
+            }
+        }
     }
 }
+
+/// SHA-256 of what a search reads of a model file, whatever its layout, comments and order of keys. The cell states the search,
+/// the production is for the shop floor, and the model's own pattern is not searched from.
+fn model_address(source: &str, with_tolerance: bool) -> String {
+    // The text was understood as a model before.
+    let mut model: serde_json::Value = toml_edit::de::from_str(source).unwrap_or_default();
+    if let Some(tables) = model.as_object_mut() {
+        let unread: &[&str] = if with_tolerance { &UNREAD } else { &[&UNREAD[..], &["tolerance"]].concat() };
+        tables.retain(|name, _| !unread.contains(&name.as_str()));
+        if let Some(winding) = tables.get_mut("winding").and_then(serde_json::Value::as_object_mut) {
+            winding.remove("pattern");
+        }
+    }
+    model.sort_all_objects();
+    sha256_hex(&model.to_string())
+}
+
+/// Tables of a model file that no cell depends on.
+const UNREAD: [&str; 3] = ["search", "production", "record"];
 
 /// Whether a text says at least one of the things that only a model file says.
 fn looks_like_a_model(source: &str) -> bool {
@@ -225,48 +223,32 @@ fn with_layers(path: &Path, source: &str, layers: usize) -> Result<String, Fault
     Ok(document.to_string())
 }
 
-/// The place of a cell's result under a campaign's folder.
-pub fn cell_path(folder: &Path, index: usize) -> PathBuf {
-    folder.join("cells").join(format!("{:05}.json", index + 1))
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// A cell's result, if it is there and is of this cell.
-pub fn read_cell(folder: &Path, index: usize, fingerprint: &str) -> Option<CellJson> {
-    let text = std::fs::read_to_string(cell_path(folder, index)).ok()?;
-    serde_json::from_str::<CellJson>(&text).ok().filter(|found| found.fingerprint == fingerprint)
-}
+    const MODEL: &str = "name = \"m\"\n[fibre]\nrefractive_index = 1.45\n[winding]\nlayers = 8\npattern = \"qua\"\n[tolerance]\nsamples = 8\n[search]\nseed = 1\n";
 
-/// The table of all cells.
-pub fn summary_csv(results: &[CellJson]) -> Vec<u8> {
-    let mut table = Table::with_header([
-        "cell",
-        "model",
-        "layers",
-        "class",
-        "objective",
-        "seed",
-        "worst_rate_deg_per_h",
-        "objective_deg_per_h",
-        "improvement_over_qua",
-        "evaluations",
-        "segments",
-    ]);
-    for found in results {
-        let segments: Vec<String> = found.segments.iter().map(ToString::to_string).collect();
-        let cells = [
-            found.cell.to_string(),
-            found.model.clone(),
-            found.layers.to_string(),
-            found.windability.clone(),
-            found.objective.clone(),
-            found.seed.to_string(),
-            found.worst_rate_deg_per_h.to_string(),
-            found.objective_deg_per_h.map(|o| o.to_string()).unwrap_or_default(),
-            found.improvement_over_qua.map(|f| f.to_string()).unwrap_or_default(),
-            found.evaluations.to_string(),
-            segments.join(" "),
+    #[test]
+    fn what_a_search_does_not_read_leaves_the_address_and_anything_else_changes_it() {
+        let address = |source: &str| model_address(source, false);
+        let same = [
+            "# a comment\n".to_owned() + MODEL,
+            MODEL.replace("seed = 1", "seed = 2"),
+            MODEL.replace("pattern = \"qua\"\n", ""),
+            MODEL.replace("samples = 8", "samples = 9"),
+            MODEL.replace("layers = 8\npattern = \"qua\"", "pattern = \"dip\"\nlayers  =  8"),
+            MODEL.to_owned() + "[production]\nspool = \"x\"\n",
         ];
-        table.row(cells.iter().map(|text| sink::Cell::text(text)));
+        for source in same {
+            assert_eq!(address(&source), address(MODEL), "{source}");
+        }
+        for source in
+            [MODEL.replace("1.45", "1.46"), MODEL.replace("\"m\"", "\"n\""), MODEL.to_owned() + "[sensor]\nx = 1\n"]
+        {
+            assert_ne!(address(&source), address(MODEL), "{source}");
+        }
+        let built = |source: &str| model_address(source, true);
+        assert_ne!(built(MODEL), built(&MODEL.replace("samples = 8", "samples = 9")));
     }
-    table.into_bytes()
 }

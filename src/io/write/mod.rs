@@ -1,7 +1,8 @@
 //! Files out: the folders and files that commands leave behind, each written whole or not at all.
 //!
-//! What only this program writes and reads again (a checkpoint, the parts of a front) is read here too.
+//! What only this program writes and reads again (a checkpoint, the parts of a front, the cells of a campaign) is read here too.
 
+pub mod campaign_cells;
 pub mod checkpoint;
 pub mod comparison_rows;
 pub mod compensation_file;
@@ -14,3 +15,4 @@ pub mod pareto_parts;
 pub mod run_directory;
 pub mod sample_table;
 pub mod traveller;
+pub mod workflow;
