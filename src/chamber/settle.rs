@@ -29,14 +29,23 @@ impl<'a> Chamber<'a> {
     ///
     /// # Errors
     /// As [`Chamber::fit`].
-    pub fn settled(mut self, assumed: &Assumption, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
-        let mut fit = self.best_start(assumed, &[], records)?;
-        fit = self.looked_through(fit, records)?;
+    pub fn settled(self, assumed: &Assumption, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
+        let fit = self.best_start(assumed, &[], records)?;
+        self.settled_from(fit, records)
+    }
+
+    /// The same by a fit that is there already, what is free of its effects included: where a model shows the air at other
+    /// times than the declared one did, its kinks are elsewhere.
+    ///
+    /// # Errors
+    /// As [`Chamber::fit`].
+    pub fn settled_from(mut self, fit: Fit, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
+        let fit = self.looked_through(fit, records)?;
         for other in (0..self.records()).filter(|r| !records.contains(r)) {
-            let day = self.fit(assumed, &[], &[other], Some(&fit), Effort::SHORT)?;
+            let day = self.fit(&fit.assumed, &[], &[other], Some(&fit), Effort::SHORT)?;
             self.looked_through(day, &[other])?;
         }
-        let fit = self.fit(&fit.assumed.clone(), &[], records, Some(&fit), Effort::FULL)?;
+        let fit = self.fit(&fit.assumed.clone(), &fit.free.clone(), records, Some(&fit), Effort::FULL)?;
         Ok((self, fit))
     }
 

@@ -50,11 +50,11 @@ pub struct Arguments {
     /// Seed of the profiles that the experiment is chosen from
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Seeks no formula for what the listed effects leave; so it is unless --terms is given
+    /// Seeks no formula for what the listed effects leave
     #[arg(long, conflicts_with = "terms")]
     no_discovery: bool,
-    /// Seeks a formula for what the listed effects leave: all, or the forms and variables that it may be made of, such as
-    /// relaxation, hysteresis, T_mean or a column's name
+    /// Forms and variables that a formula for what the listed effects leave may be made of, such as relaxation, hysteresis,
+    /// T_mean or a column's name; all without it
     #[arg(long, value_name = "all|WORD,…", value_delimiter = ',')]
     terms: Vec<String>,
     #[command(flatten)]
@@ -77,7 +77,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         experiment_seed: wants_experiment.then_some(arguments.seed),
         terms: match arguments.terms.as_slice() {
             [] if arguments.no_discovery => Terms::None,
-            [] => Terms::default(),
+            [] => Terms::All,
             [all] if all == "all" => Terms::All,
             words => Terms::Among(words),
         },

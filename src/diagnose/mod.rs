@@ -66,10 +66,10 @@ pub struct Request<'a> {
 /// Whether and among which terms an unlisted effect is sought.
 #[derive(Debug, Clone, Copy, Default)]
 pub enum Terms<'a> {
+    #[default]
     All,
     /// Of these forms and variables only.
     Among(&'a [String]),
-    #[default]
     None,
 }
 
@@ -413,7 +413,23 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
         held_out: (given..records.len()).collect(),
         depth: MOST_MEMBERS,
     };
-    let found = joint::search(&question, null, &|share| progress(0.6 * share))?;
+    let found = joint::search(&question, null, &|share| progress(0.5 * share))?;
+    // Gross errors and kinks were those of the declared model: now those of the best.
+    let best = found.explanations.first().filter(|e| !e.members.is_empty()).map(|e| e.fit.clone());
+    let again = match best {
+        Some(fit) => Some(Chamber::new(request.model, &records)?.settled_from(fit, &question.fitted)?.0),
+        None => None,
+    };
+    let (question, found) = match &again {
+        Some(chamber) => {
+            let question = Question { chamber, ..question };
+            let found = joint::again(&question, found)?;
+            (question, found)
+        }
+        None => (question, found),
+    };
+    let chamber = question.chamber;
+    progress(0.6);
     let mut diagnosis = answer::answer(&question, &found, &records)?;
     beyond(request, &question, &found, &mut diagnosis, &|share| progress(0.6 + 0.2 * share))?;
     // Where what is to be fitted shows nothing, the other records may; the former then confirm it.

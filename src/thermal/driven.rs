@@ -111,7 +111,7 @@ impl Memory {
         let mut content = DMatrix::zeros(NODES, count);
         let mut slopes = Vec::with_capacity(count);
         for (&instant, column) in rows.instants.iter().zip(content.as_mut_slice().chunks_exact_mut(NODES)) {
-            slopes.push(contents.at(instant, &mut decay, column).1);
+            slopes.push(contents.at(instant, &mut decay, column).slope);
         }
         let mut memory = content.clone();
         for (column, slope) in memory.as_mut_slice().chunks_exact_mut(NODES).zip(&slopes) {

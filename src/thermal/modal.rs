@@ -22,16 +22,19 @@ pub(super) struct Response {
     lag: DMatrix<f64>,
     /// A Λ⁻¹ 1.
     lag_sum: DVector<f64>,
+    /// What the grid follows the input with at once, though heat takes its time: the share of the surface's own node.
+    at_once: DVector<f64>,
 }
 
 impl Response {
-    pub fn new(steady: DVector<f64>, amplitude: DMatrix<f64>, decay_per_s: &[f64]) -> Self {
+    /// `at_once`: of the outputs, what a change of the input's rate shows in them before any time has passed, by the grid alone.
+    pub fn new(steady: DVector<f64>, amplitude: DMatrix<f64>, decay_per_s: &[f64], at_once: DVector<f64>) -> Self {
         let mut lag = amplitude.clone();
         for (mut column, l) in lag.column_iter_mut().zip(decay_per_s) {
             column /= *l;
         }
         let lag_sum = lag.column_sum();
-        Self { steady, amplitude, lag, lag_sum }
+        Self { steady, amplitude, lag, lag_sum, at_once }
     }
 
     pub fn plus(&self, other: &Self) -> Self {
@@ -40,6 +43,7 @@ impl Response {
             amplitude: &self.amplitude + &other.amplitude,
             lag: &self.lag + &other.lag,
             lag_sum: &self.lag_sum + &other.lag_sum,
+            at_once: &self.at_once + &other.at_once,
         }
     }
 }
@@ -87,6 +91,15 @@ pub(super) struct Contents {
     content: Vec<f64>,
 }
 
+/// An input at one instant.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct InputAt {
+    pub value: f64,
+    pub slope: f64,
+    /// By how much the slope has changed in this very instant.
+    pub kink: f64,
+}
+
 /// One input and how it acts.
 #[derive(Debug, Clone)]
 struct Track {
@@ -120,8 +133,8 @@ impl Contents {
         Self { input: input.clone(), content }
     }
 
-    /// Writes the modes' contents at an instant; returns the input's value and slope there.
-    pub fn at(&self, instant: Instant, decay: &mut Decay, state: &mut [f64]) -> (f64, f64) {
+    /// Writes the modes' contents at an instant; returns the input there.
+    pub fn at(&self, instant: Instant, decay: &mut Decay, state: &mut [f64]) -> InputAt {
         let modes = state.len();
         let knots = self.input.knots();
         let past = match instant.side {
@@ -130,14 +143,20 @@ impl Contents {
         };
         let Some(knot) = past.checked_sub(1) else {
             state.fill(0.0);
-            return (self.input.first_value(), 0.0);
+            return InputAt { value: self.input.first_value(), ..InputAt::default() };
         };
         let elapsed_s = instant.time_s - knots[knot];
         let stored = &self.content[knot * modes..(knot + 1) * modes];
         for ((s, stored), left) in state.iter_mut().zip(stored).zip(decay.after(elapsed_s)) {
             *s = stored * left;
         }
-        (self.input.values()[knot] + self.input.slope_of(knot) * elapsed_s, self.input.slope_of(knot))
+        let slope = self.input.slope_of(knot);
+        let before = knot.checked_sub(1).map_or(0.0, |k| self.input.slope_of(k));
+        InputAt {
+            value: self.input.values()[knot] + slope * elapsed_s,
+            slope,
+            kink: if elapsed_s == 0.0 { slope - before } else { 0.0 },
+        }
     }
 }
 
@@ -190,7 +209,7 @@ impl PackField {
         let mut temperature = wanted.temperatures().then(|| DMatrix::zeros(self.outputs, batch.len()));
         let mut rate = wanted.rates().then(|| DMatrix::zeros(self.outputs, batch.len()));
         let mut decay = Decay::new(&self.decay_per_s);
-        let mut inputs = vec![(0.0, 0.0); batch.len()];
+        let mut inputs = vec![InputAt::default(); batch.len()];
         for track in &self.tracks {
             let mut remembered = 0;
             for ((&instant, column), input) in
@@ -203,15 +222,18 @@ impl PackField {
             let contents = state.rows(0, remembered);
             if let Some(temperature) = &mut temperature {
                 temperature.gemm(1.0, &response.lag.columns(0, remembered), &contents, 1.0);
-                for (mut column, &(value, slope)) in temperature.column_iter_mut().zip(&inputs) {
-                    column.axpy(value, &response.steady, 1.0);
-                    column.axpy(-slope, &response.lag_sum, 1.0);
+                for (mut column, input) in temperature.column_iter_mut().zip(&inputs) {
+                    column.axpy(input.value, &response.steady, 1.0);
+                    column.axpy(-input.slope, &response.lag_sum, 1.0);
                 }
             }
             if let Some(rate) = &mut rate {
                 rate.gemm(-1.0, &response.amplitude.columns(0, remembered), &contents, 1.0);
-                for (mut column, &(_, slope)) in rate.column_iter_mut().zip(&inputs) {
-                    column.axpy(slope, &response.steady, 1.0);
+                for (mut column, input) in rate.column_iter_mut().zip(&inputs) {
+                    column.axpy(input.slope, &response.steady, 1.0);
+                    if input.kink != 0.0 {
+                        column.axpy(-input.kink, &response.at_once, 1.0);
+                    }
                 }
             }
         }

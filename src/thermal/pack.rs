@@ -172,8 +172,15 @@ impl Pack {
             }
             DMatrix::from_vec(outputs, modes.len(), columns)
         };
-        let boundary = Response::new(boundary_steady, amplitude(|mode| mode.boundary), &decay_per_s);
-        let ambient = has_ambient.then(|| Response::new(ambient_steady, amplitude(|mode| mode.ambient), &decay_per_s));
+        // A layer that is the drive does follow it at once; one that ends at it has a share of the surface's node.
+        let mut at_once = DVector::zeros(outputs);
+        for (own, &share) in at_once.iter_mut().zip(&network.drive_share).filter(|(_, share)| **share < 1.0) {
+            *own = share;
+        }
+        let boundary = Response::new(boundary_steady, amplitude(|mode| mode.boundary), &decay_per_s, at_once);
+        let nothing = DVector::zeros(outputs);
+        let ambient =
+            has_ambient.then(|| Response::new(ambient_steady, amplitude(|mode| mode.ambient), &decay_per_s, nothing));
         let heat = path.bore_heat.map(|bore_heat| {
             (bore_heat, DMatrix::from_fn(outputs, modes.len(), |j, i| modes[i].seen[j] * modes[i].heat))
         });

@@ -48,6 +48,10 @@ impl Explanation {
         let prior: f64 = members
             .iter()
             .map(|m| match m {
+                // Any of the layers may be the one.
+                Member::Effect(c) if question.candidates[*c].is_of_layer() => {
+                    EFFECT.log - (question.model.coil.layers() as f64).ln()
+                }
                 Member::Effect(_) => EFFECT.log,
                 Member::Refitted(_) => REFITTED.log,
                 Member::Winding(w) if windings[*w].exchanged.is_some() => {

@@ -11,6 +11,7 @@
 mod explanation;
 mod judge;
 mod odds;
+mod screen;
 mod search;
 mod winding;
 
@@ -21,8 +22,8 @@ use crate::pattern::Pattern;
 pub use explanation::{Explanation, Member};
 pub(in crate::diagnose) use explanation::{fitted, with, without};
 pub(in crate::diagnose) use odds::EFFECT;
-pub(in crate::diagnose) use search::{Proposal, proposals};
-pub use search::{promise, refit_without, search, settle_one};
+pub(in crate::diagnose) use screen::{Proposal, proposals};
+pub use search::{again, promise, refit_without, search, settle_one};
 pub use winding::Winding;
 
 /// What is asked of the search.

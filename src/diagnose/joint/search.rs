@@ -6,11 +6,10 @@ use rayon::prelude::*;
 
 use super::explanation::{fitted, with, without};
 use super::judge::judge;
+use super::screen::{Proposal, foremost, proposals};
 use super::winding::promising;
 use super::{Explanation, Found, Member, Outcome, Question, Winding};
 use crate::chamber::{Assumption, Effort, Fit, Free, Quantity};
-use crate::effect::DeclaredEffect;
-use crate::units::Unit;
 
 /// Members that are fitted after each score test, as far as they promise this much …
 const TRIED: usize = 6;
@@ -88,115 +87,29 @@ pub fn search(question: &Question, null: Fit, progress: &(dyn Fn(f64) + Sync)) -
     Ok(Found { explanations, promised, windings })
 }
 
+/// What was found, judged again in a chamber that is looked through with the best of it ([`crate::chamber::Chamber::settled_from`]).
+///
+/// # Errors
+/// A declared model that cannot be solved for these records.
+pub fn again(question: &Question, found: Found) -> Outcome<Found> {
+    let Found { explanations, promised, windings } = found;
+    let mut explanations: Vec<Explanation> = explanations
+        .into_par_iter()
+        .filter_map(|e| {
+            let begin = (e.fit.assumed.clone(), e.fit.free.clone());
+            fitted(question, &windings, e.members, &begin, &e.fit, Effort::QUICK)
+        })
+        .collect();
+    judge(question, &windings, &mut explanations);
+    let has_declared = explanations.iter().any(|e| e.members.is_empty());
+    has_declared.then_some(Found { explanations, promised, windings }).ok_or(crate::chamber::ChamberError::Unsolvable)
+}
+
 fn keep(cache: &mut Cache, explanation: Explanation) {
     let key = explanation.key();
     if cache.get(&key).is_none_or(|known| explanation.merit > known.merit) {
         cache.insert(key, explanation);
     }
-}
-
-/// One more member, where its fit begins, and what the score test promises.
-#[derive(Debug, Clone)]
-pub(in crate::diagnose) struct Proposal {
-    pub member: Member,
-    pub values: Option<Vec<f64>>,
-    pub gain: f64,
-}
-
-/// The score test of every candidate from each of its starts.
-pub(in crate::diagnose) fn proposals(question: &Question, best: &Explanation) -> Outcome<Vec<Proposal>> {
-    let mut asked: Vec<(usize, Vec<f64>)> = Vec::new();
-    for (place, candidate) in question.candidates.iter().enumerate() {
-        let there = best.members.iter().any(|m| match m {
-            Member::Effect(own) => question.candidates[*own].kind() == candidate.kind(),
-            _ => false,
-        });
-        // With a default a parameter joins only once the effect is there.
-        let fuller = question.candidates[..place].iter().any(|c| candidate.is_fuller_than(c));
-        if !there && !fuller {
-            asked.extend(candidate.starts.iter().map(|start| (place, start.clone())));
-        }
-    }
-    let changed: Vec<Option<Assumption>> = asked
-        .iter()
-        .map(|(place, start)| with(question, &[], &best.fit, Member::Effect(*place), Some(start.clone())).map(|a| a.0))
-        .collect();
-    let places: Vec<usize> = (0..asked.len()).filter(|&i| changed[i].is_some()).collect();
-    let changed: Vec<Assumption> = changed.into_iter().flatten().collect();
-    let directions = question.chamber.score_models(&best.fit, &changed)?;
-    let mut all = Vec::new();
-    for (&i, direction) in places.iter().zip(directions) {
-        let Some(direction) = direction else { continue };
-        let (place, start) = &asked[i];
-        let effect = &question.candidates[*place].effect;
-        let (least, most) = range(effect, &question.candidates[*place].free);
-        let (gain, amplitude) = direction.gain(least, most);
-        let values = scaled(effect, &question.candidates[*place].free, start, amplitude);
-        all.push(Proposal { member: Member::Effect(*place), values: Some(values), gain });
-    }
-    Ok(best_layers(question, all))
-}
-
-/// Of what every layer has a candidate for, only the layer that promises most: its neighbours look alike.
-fn best_layers(question: &Question, proposals: Vec<Proposal>) -> Vec<Proposal> {
-    let candidate = |p: &Proposal| match p.member {
-        Member::Effect(place) => Some(&question.candidates[place]).filter(|c| c.is_of_layer()),
-        _ => None,
-    };
-    let outdone = |p: &Proposal| {
-        candidate(p).is_some_and(|own| {
-            proposals.iter().any(|o| candidate(o).is_some_and(|c| c.kind() == own.kind()) && o.gain > p.gain)
-        })
-    };
-    let kept: Vec<bool> = proposals.iter().map(|p| !outdone(p)).collect();
-    proposals.into_iter().zip(kept).filter_map(|(p, keep)| keep.then_some(p)).collect()
-}
-
-/// Multiples of a start that a score test may look for: either sign where the parameter has both.
-fn range(effect: &DeclaredEffect, free: &[usize]) -> (f64, f64) {
-    let parameters = effect.parameters();
-    if free.iter().any(|&i| parameters[i].lower < 0.0 && parameters[i].unit != Unit::Celsius) {
-        (-100.0, 100.0)
-    } else if free.iter().any(|&i| parameters[i].unit == Unit::One) {
-        (-4.0, 4.0)
-    } else {
-        (0.0, 2.0)
-    }
-}
-
-/// A start moved to where the score test wants it; what only has an order stays where it is.
-fn scaled(effect: &DeclaredEffect, free: &[usize], start: &[f64], amplitude: f64) -> Vec<f64> {
-    let parameters = effect.parameters();
-    let mut values = start.to_vec();
-    for &i in free {
-        let p = &parameters[i];
-        if p.unit == Unit::Celsius {
-            continue;
-        }
-        // A parameter without a bound, such as a channel's gain, has nothing to keep away from.
-        let inset = if (p.upper - p.lower).is_finite() { 1e-6 * (p.upper - p.lower) } else { 0.0 };
-        let inside = |v: f64| v.clamp(p.lower + inset, p.upper - inset);
-        if p.lower < 0.0 {
-            values[i] = inside(amplitude * start[i]);
-        } else if p.unit == Unit::One && p.lower > 0.0 {
-            values[i] = inside(start[i].powf(amplitude));
-        }
-    }
-    values
-}
-
-/// The best promise of each candidate.
-fn foremost(proposals: &[Proposal]) -> Vec<(usize, f64)> {
-    let mut best: BTreeMap<usize, f64> = BTreeMap::new();
-    for proposal in proposals {
-        if let Member::Effect(place) = proposal.member {
-            let known = best.entry(place).or_insert(f64::NEG_INFINITY);
-            *known = known.max(proposal.gain);
-        }
-    }
-    let mut all: Vec<(usize, f64)> = best.into_iter().collect();
-    all.sort_by(|a, b| b.1.total_cmp(&a.1));
-    all
 }
 
 /// Members that are no effects of the catalogue. What cannot be scored is fitted wherever something is missing.
@@ -276,6 +189,8 @@ fn choose(mut proposals: Vec<Proposal>) -> Vec<Proposal> {
 }
 
 fn fit_all(question: &Question, windings: &[Winding], best: &Explanation, tried: Vec<Proposal>) -> Vec<Explanation> {
+    let mut calm = best.fit.clone();
+    calm.calm(&question.fitted);
     tried
         .into_par_iter()
         .filter_map(|proposal| {
@@ -289,7 +204,11 @@ fn fit_all(question: &Question, windings: &[Winding], best: &Explanation, tried:
                     from.filter_map(|start| fitted(question, windings, members.clone(), &begin, &start, Effort::QUICK));
                 return fits.max_by(|a, b| a.merit.total_cmp(&b.merit));
             }
-            let known = fitted(question, windings, members.clone(), &begin, &best.fit, Effort::QUICK);
+            // Wander that stood for what was missing may stay where it is: each begins without it, too.
+            let known = [&best.fit, &calm]
+                .into_par_iter()
+                .filter_map(|from| fitted(question, windings, members.clone(), &begin, from, Effort::QUICK))
+                .max_by(|a, b| a.merit.total_cmp(&b.merit));
             if !matches!(proposal.member, Member::Winding(_)) {
                 return known;
             }

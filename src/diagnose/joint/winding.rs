@@ -23,11 +23,11 @@ pub struct Winding {
     pub promised: f64,
 }
 
-/// Windings that are worth a fit: this many, if they promise so much.
+/// Exchanges of two layers that are looked at more closely, if the score test promises so much of them.
+const EXCHANGES_LOOKED_AT: usize = 24;
+const WORTH_A_LOOK: f64 = 5.0;
+/// Windings that are worth a fit.
 const TRIED: usize = 4;
-const WORTH_A_FIT: f64 = 5.0;
-/// … and of the classics so many.
-const CLASSICS_TRIED: usize = 2;
 
 /// The most promising other windings for a fit.
 pub(super) fn promising(question: &Question, fit: &Fit) -> Outcome<Vec<Winding>> {
@@ -63,15 +63,14 @@ pub(super) fn promising(question: &Question, fit: &Fit) -> Outcome<Vec<Winding>>
             }
         }
     }
-    all.retain(|w| w.promised > WORTH_A_FIT);
+    all.retain(|w| w.promised > WORTH_A_LOOK);
     all.sort_by(|a, b| b.promised.total_cmp(&a.promised));
-    all.truncate(TRIED);
+    all.truncate(EXCHANGES_LOOKED_AT);
     all.extend(classics(question, fit));
-    Ok(all)
+    Ok(most_likely(question, fit, all))
 }
 
-/// Another classic, or the declared winding connected the other way round, is no small change: the likelihood says what it
-/// does, with a gyro that does not wander, before anything is fitted.
+/// Other classics, and the declared winding connected the other way round.
 fn classics(question: &Question, fit: &Fit) -> Vec<Winding> {
     let layers = question.pattern.layers();
     let known = Classic::ALL.into_iter().filter_map(|c| Some((c.pattern(layers).ok()?, Some(c.key()))));
@@ -83,17 +82,22 @@ fn classics(question: &Question, fit: &Fit) -> Vec<Winding> {
             }
         }
     }
+    all
+}
+
+/// Another winding is no small change: the likelihood says what each does, with a gyro that does not wander, before anything
+/// else is fitted.
+fn most_likely(question: &Question, fit: &Fit, mut all: Vec<Winding>) -> Vec<Winding> {
     let mut start = fit.clone();
     start.calm(&question.fitted);
     all.par_iter_mut().for_each(|winding| {
         let mut assumed = fit.assumed.clone();
         assumed.pattern = winding.pattern.clone();
-        if let Ok(there) = question.chamber.fit(&assumed, &fit.free, &question.fitted, Some(&start), Effort::SHORT) {
-            winding.promised = there.posterior() - fit.posterior();
-        }
+        let there = question.chamber.fit(&assumed, &fit.free, &question.fitted, Some(&start), Effort::SHORT);
+        winding.promised = there.map_or(f64::NEG_INFINITY, |there| there.posterior() - fit.posterior());
     });
     all.sort_by(|a, b| b.promised.total_cmp(&a.promised));
-    all.truncate(CLASSICS_TRIED);
+    all.truncate(TRIED);
     all
 }
 

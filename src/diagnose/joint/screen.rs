@@ -1,0 +1,133 @@
+//! The score test: what each effect of the catalogue promises beside a fit, and where a fit with it should begin.
+
+use std::collections::BTreeMap;
+
+use super::explanation::with;
+use super::{Explanation, Member, Outcome, Question};
+use crate::chamber::Assumption;
+use crate::effect::DeclaredEffect;
+use crate::units::Unit;
+
+/// A direction is looked at so near to the fit, as a share of the start: a layer that is five per cent off multiplies what the
+/// air's turbulence does to the rate, and such variances hide what its mean explains.
+const TESTED_SHARE: f64 = 0.02;
+
+/// One more member, where its fit begins, and what the score test promises.
+#[derive(Debug, Clone)]
+pub(in crate::diagnose) struct Proposal {
+    pub member: Member,
+    pub values: Option<Vec<f64>>,
+    pub gain: f64,
+}
+
+/// The score test of every candidate from each of its starts.
+pub(in crate::diagnose) fn proposals(question: &Question, best: &Explanation) -> Outcome<Vec<Proposal>> {
+    let mut asked: Vec<(usize, Vec<f64>)> = Vec::new();
+    for (place, candidate) in question.candidates.iter().enumerate() {
+        let there = best.members.iter().any(|m| match m {
+            Member::Effect(own) => question.candidates[*own].kind() == candidate.kind(),
+            _ => false,
+        });
+        // With a default a parameter joins only once the effect is there.
+        let fuller = question.candidates[..place].iter().any(|c| candidate.is_fuller_than(c));
+        if !there && !fuller {
+            asked.extend(candidate.starts.iter().map(|start| (place, start.clone())));
+        }
+    }
+    let changed: Vec<Option<Assumption>> = asked
+        .iter()
+        .map(|(place, start)| {
+            let candidate = &question.candidates[*place];
+            let values = match is_sized(&candidate.effect, &candidate.free) {
+                true => scaled(&candidate.effect, &candidate.free, start, TESTED_SHARE),
+                false => start.clone(),
+            };
+            with(question, &[], &best.fit, Member::Effect(*place), Some(values)).map(|a| a.0)
+        })
+        .collect();
+    let places: Vec<usize> = (0..asked.len()).filter(|&i| changed[i].is_some()).collect();
+    let changed: Vec<Assumption> = changed.into_iter().flatten().collect();
+    let directions = question.chamber.score_models(&best.fit, &changed)?;
+    let mut all = Vec::new();
+    for (&i, direction) in places.iter().zip(directions) {
+        let Some(direction) = direction else { continue };
+        let (place, start) = &asked[i];
+        let effect = &question.candidates[*place].effect;
+        let free = &question.candidates[*place].free;
+        let share = if is_sized(effect, free) { TESTED_SHARE } else { 1.0 };
+        let (least, most) = range(effect, free);
+        let (gain, amplitude) = direction.gain(least / share, most / share);
+        let values = scaled(effect, free, start, amplitude * share);
+        all.push(Proposal { member: Member::Effect(*place), values: Some(values), gain });
+    }
+    Ok(best_layers(question, all))
+}
+
+/// Of what every layer has a candidate for, only the layer that promises most: its neighbours look alike.
+fn best_layers(question: &Question, proposals: Vec<Proposal>) -> Vec<Proposal> {
+    let candidate = |p: &Proposal| match p.member {
+        Member::Effect(place) => Some(&question.candidates[place]).filter(|c| c.is_of_layer()),
+        _ => None,
+    };
+    let outdone = |p: &Proposal| {
+        candidate(p).is_some_and(|own| {
+            proposals.iter().any(|o| candidate(o).is_some_and(|c| c.kind() == own.kind()) && o.gain > p.gain)
+        })
+    };
+    let kept: Vec<bool> = proposals.iter().map(|p| !outdone(p)).collect();
+    proposals.into_iter().zip(kept).filter_map(|(p, keep)| keep.then_some(p)).collect()
+}
+
+/// Multiples of a start that a score test may look for: either sign where the parameter has both.
+fn range(effect: &DeclaredEffect, free: &[usize]) -> (f64, f64) {
+    let parameters = effect.parameters();
+    if free.iter().any(|&i| parameters[i].lower < 0.0 && parameters[i].unit != Unit::Celsius) {
+        (-100.0, 100.0)
+    } else if free.iter().any(|&i| parameters[i].unit == Unit::One) {
+        (-4.0, 4.0)
+    } else {
+        (0.0, 2.0)
+    }
+}
+
+/// Whether a start can be made smaller, down to nothing.
+fn is_sized(effect: &DeclaredEffect, free: &[usize]) -> bool {
+    let mut free =
+        effect.parameters().into_iter().enumerate().filter(|(i, p)| free.contains(i) && p.unit != Unit::Celsius);
+    free.any(|(_, p)| p.lower < 0.0 || (p.unit == Unit::One && p.lower > 0.0))
+}
+
+/// A start moved to where the score test wants it; what only has an order stays where it is.
+fn scaled(effect: &DeclaredEffect, free: &[usize], start: &[f64], amplitude: f64) -> Vec<f64> {
+    let parameters = effect.parameters();
+    let mut values = start.to_vec();
+    for &i in free {
+        let p = &parameters[i];
+        if p.unit == Unit::Celsius {
+            continue;
+        }
+        // A parameter without a bound, such as a channel's gain, has nothing to keep away from.
+        let inset = if (p.upper - p.lower).is_finite() { 1e-6 * (p.upper - p.lower) } else { 0.0 };
+        let inside = |v: f64| v.clamp(p.lower + inset, p.upper - inset);
+        if p.lower < 0.0 {
+            values[i] = inside(amplitude * start[i]);
+        } else if p.unit == Unit::One && p.lower > 0.0 {
+            values[i] = inside(start[i].powf(amplitude));
+        }
+    }
+    values
+}
+
+/// The best promise of each candidate.
+pub(super) fn foremost(proposals: &[Proposal]) -> Vec<(usize, f64)> {
+    let mut best: BTreeMap<usize, f64> = BTreeMap::new();
+    for proposal in proposals {
+        if let Member::Effect(place) = proposal.member {
+            let known = best.entry(place).or_insert(f64::NEG_INFINITY);
+            *known = known.max(proposal.gain);
+        }
+    }
+    let mut all: Vec<(usize, f64)> = best.into_iter().collect();
+    all.sort_by(|a, b| b.1.total_cmp(&a.1));
+    all
+}
