@@ -47,7 +47,7 @@ pub struct Request<'a> {
 impl<'a> Request<'a> {
     /// With the model's own pattern; no hold-out and no experiment.
     pub fn new(model: &'a ModelFile, measurements: &'a [Measurement]) -> Self {
-        Self { model, pattern: None, measurements, holdout: &[], experiment_seed: None, terms: Terms::None }
+        Self { model, pattern: None, measurements, holdout: &[], experiment_seed: None, terms: Terms::default() }
     }
 }
 

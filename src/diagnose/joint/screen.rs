@@ -1,16 +1,23 @@
 //! The score test: what each effect of the catalogue promises beside a fit, and where a fit with it should begin.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+
+use rayon::prelude::*;
 
 use super::explanation::with;
 use super::{Explanation, Member, Outcome, Question};
-use crate::chamber::Assumption;
+use crate::chamber::{Assumption, Effort};
 use crate::effect::DeclaredEffect;
 use crate::units::Unit;
 
 /// A direction is looked at so near to the fit, as a share of the start: a layer that is five per cent off multiplies what the
 /// air's turbulence does to the rate, and such variances hide what its mean explains.
 const TESTED_SHARE: f64 = 0.02;
+/// Where the score test promises more, its order is not to be relied on …
+const LARGE: f64 = 25.0;
+/// … among those that promise this share of the most; so many are fitted, all layers of a coil among them.
+const CLOSE: f64 = 0.5;
+const LOOKED_AT: usize = 40;
 
 /// One more member, where its fit begins, and what the score test promises.
 #[derive(Debug, Clone)]
@@ -20,8 +27,35 @@ pub(in crate::diagnose) struct Proposal {
     pub gain: f64,
 }
 
-/// The score test of every candidate from each of its starts.
+/// The score test of every candidate from each of its starts; of what every layer has one for, the best layer's.
 pub(in crate::diagnose) fn proposals(question: &Question, best: &Explanation) -> Outcome<Vec<Proposal>> {
+    Ok(best_layers(question, scored(question, best)?))
+}
+
+/// The same, and where something large is missing a short fit of what promises most: the score test then says alike of
+/// whatever follows the mean rate, because the gyro's wander stands for all of it.
+pub(super) fn looked_at(question: &Question, best: &Explanation) -> Outcome<Vec<Proposal>> {
+    let mut all = scored(question, best)?;
+    all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let least = LARGE.max(CLOSE * all.first().map_or(0.0, |p| p.gain));
+    let mut seen = BTreeSet::new();
+    let mut calm = best.fit.clone();
+    calm.calm(&question.fitted);
+    let close: Vec<usize> =
+        (0..all.len()).filter(|&i| all[i].gain > least && seen.insert(all[i].member)).take(LOOKED_AT).collect();
+    let gains: Vec<(usize, f64)> = close
+        .into_par_iter()
+        .filter_map(|i| {
+            let (assumed, free) = with(question, &[], &best.fit, all[i].member, all[i].values.clone())?;
+            let there = question.chamber.fit(&assumed, &free, &question.fitted, Some(&calm), Effort::SHORT).ok()?;
+            Some((i, there.posterior() - best.fit.posterior()))
+        })
+        .collect();
+    gains.into_iter().for_each(|(i, gain)| all[i].gain = all[i].gain.max(gain));
+    Ok(best_layers(question, all))
+}
+
+fn scored(question: &Question, best: &Explanation) -> Outcome<Vec<Proposal>> {
     let mut asked: Vec<(usize, Vec<f64>)> = Vec::new();
     for (place, candidate) in question.candidates.iter().enumerate() {
         let there = best.members.iter().any(|m| match m {
@@ -60,7 +94,7 @@ pub(in crate::diagnose) fn proposals(question: &Question, best: &Explanation) ->
         let values = scaled(effect, free, start, amplitude * share);
         all.push(Proposal { member: Member::Effect(*place), values: Some(values), gain });
     }
-    Ok(best_layers(question, all))
+    Ok(all)
 }
 
 /// Of what every layer has a candidate for, only the layer that promises most: its neighbours look alike.

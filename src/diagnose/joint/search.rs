@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::explanation::{fitted, with, without};
 use super::judge::judge;
-use super::screen::{Proposal, foremost, proposals};
+use super::screen::{Proposal, foremost, looked_at, proposals};
 use super::winding::promising;
 use super::{Explanation, Found, Member, Outcome, Question, Winding};
 use crate::chamber::{Assumption, Effort, Fit, Free, Quantity};
@@ -42,7 +42,7 @@ pub fn search(question: &Question, null: Fit, progress: &(dyn Fn(f64) + Sync)) -
     cache.insert(best.key(), best.clone());
     let mut promised = Vec::new();
     for stage in 0..question.depth {
-        let mut proposals = proposals(question, &best)?;
+        let mut proposals = looked_at(question, &best)?;
         if stage == 0 {
             // Where a gyro that wanders as gyros do is enough, nothing is wound otherwise.
             if best.is_outside() || proposals.iter().any(|p| p.gain > PLAIN) {
