@@ -18,6 +18,8 @@ const LARGE: f64 = 25.0;
 /// … among those that promise this share of the most; so many are fitted, all layers of a coil among them.
 const CLOSE: f64 = 0.5;
 const LOOKED_AT: usize = 40;
+/// Layers whose halves lie on the same side differ little; what was not fitted to tells them apart.
+const LAYERS_TRIED: usize = 3;
 
 /// One more member, where its fit begins, and what the score test promises.
 #[derive(Debug, Clone)]
@@ -29,7 +31,7 @@ pub(in crate::diagnose) struct Proposal {
 
 /// The score test of every candidate from each of its starts; of what every layer has one for, the best layer's.
 pub(in crate::diagnose) fn proposals(question: &Question, best: &Explanation) -> Outcome<Vec<Proposal>> {
-    Ok(best_layers(question, scored(question, best)?))
+    Ok(best_layers(question, scored(question, best)?, 1))
 }
 
 /// The same, and where something large is missing a short fit of what promises most: the score test then says alike of
@@ -52,7 +54,7 @@ pub(super) fn looked_at(question: &Question, best: &Explanation) -> Outcome<Vec<
         })
         .collect();
     gains.into_iter().for_each(|(i, gain)| all[i].gain = all[i].gain.max(gain));
-    Ok(best_layers(question, all))
+    Ok(best_layers(question, all, LAYERS_TRIED))
 }
 
 fn scored(question: &Question, best: &Explanation) -> Outcome<Vec<Proposal>> {
@@ -97,15 +99,16 @@ fn scored(question: &Question, best: &Explanation) -> Outcome<Vec<Proposal>> {
     Ok(all)
 }
 
-/// Of what every layer has a candidate for, only the layer that promises most: its neighbours look alike.
-fn best_layers(question: &Question, proposals: Vec<Proposal>) -> Vec<Proposal> {
+/// Of what every layer has a candidate for, only the layers that promise most: their neighbours look alike.
+fn best_layers(question: &Question, proposals: Vec<Proposal>, count: usize) -> Vec<Proposal> {
     let candidate = |p: &Proposal| match p.member {
         Member::Effect(place) => Some(&question.candidates[place]).filter(|c| c.is_of_layer()),
         _ => None,
     };
     let outdone = |p: &Proposal| {
         candidate(p).is_some_and(|own| {
-            proposals.iter().any(|o| candidate(o).is_some_and(|c| c.kind() == own.kind()) && o.gain > p.gain)
+            let of_kind = |o: &&Proposal| candidate(o).is_some_and(|c| c.kind() == own.kind());
+            proposals.iter().filter(of_kind).filter(|o| o.gain > p.gain).count() >= count
         })
     };
     let kept: Vec<bool> = proposals.iter().map(|p| !outdone(p)).collect();

@@ -12,7 +12,7 @@ use super::{Explanation, Found, Member, Outcome, Question, Winding};
 use crate::chamber::{Assumption, Effort, Fit, Free, Quantity};
 
 /// Members that are fitted after each score test, as far as they promise this much …
-const TRIED: usize = 6;
+const TRIED: usize = 8;
 const WORTH_A_FIT: f64 = 3.0;
 /// … and this share of what the first does.
 const WORTH_BESIDE: f64 = 0.08;
