@@ -86,7 +86,9 @@ def test_a_model_of_keywords_names_what_is_wrong_with_it() -> None:
     ],
 )
 def test_ctrl_c_ends_long_work(call: str) -> None:
-    program = f"import coilwright as cw\nprint('ready', flush=True)\n{call}\n"
+    # A shell that starts the tests in the background has the interrupt ignored by all that come after it.
+    heeded = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    program = f"{heeded}import coilwright as cw\nprint('ready', flush=True)\n{call}\n"
     process = subprocess.Popen(
         [sys.executable, "-c", program], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
@@ -95,7 +97,10 @@ def test_ctrl_c_ends_long_work(call: str) -> None:
     if process.poll() is not None:
         pytest.skip("the work was over before it could be interrupted")
     process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=60)
+    try:
+        _, said = process.communicate(timeout=60)
+    finally:
+        process.kill()
     assert "KeyboardInterrupt" in said and process.returncode != 0, said
 
 
