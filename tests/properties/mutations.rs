@@ -185,7 +185,7 @@ fn a_damaged_stream_is_compensated_to_a_table_or_its_header_is_refused() {
     let mut random = ChaCha8Rng::seed_from_u64(13);
     let mut rows = 0;
     for (_, seed) in corpus("compensation") {
-        for change in 0..1000 {
+        for change in 0..400 {
             let text = if change == 0 { seed.clone() } else { mutate(&seed, &mut random) };
             let mut out = Vec::new();
             let format = RecordFormat::default();
@@ -206,7 +206,7 @@ fn a_damaged_stream_is_compensated_to_a_table_or_its_header_is_refused() {
             }
         }
     }
-    assert!(rows > 2500, "{rows}");
+    assert!(rows > 1000, "{rows}");
 }
 
 #[test]
