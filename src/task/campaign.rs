@@ -115,7 +115,8 @@ const BOUNDED_LAYERS: usize = 16;
 const BOUNDS_OVER_MOVES: f64 = 10.0;
 
 /// What a cell takes on one thread, to deal and to group cells by: within a factor of two of what was measured for 8 to 24
-/// layers of the paper's coil (`results/campaigns`), elsewhere an order of magnitude.
+/// layers of the paper's coil (`results/campaigns`) but for the guaranteed rate, of which it says a third; elsewhere an order of
+/// magnitude.
 pub fn estimated_s(campaign: &CampaignFile, cell: &Cell) -> f64 {
     let layers = cell.file.model.coil.layers();
     let plan = plan(campaign, cell);

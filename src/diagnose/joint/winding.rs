@@ -4,7 +4,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::{Outcome, Question};
-use crate::chamber::{Effort, Fit, Scores};
+use crate::chamber::{Effort, Fit};
 use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
 use crate::rate::{LayerWeights, RateModel};
@@ -19,7 +19,7 @@ pub struct Winding {
     pub reversed: bool,
     /// The two layers that changed places, counted from 0 innermost.
     pub exchanged: Option<(usize, usize)>,
-    /// Rise of the log likelihood that the score test promises.
+    /// Rise of the log posterior in a short fit with it; until then what the score test promises.
     pub promised: f64,
 }
 
@@ -49,7 +49,7 @@ pub(super) fn promising(question: &Question, fit: &Fit) -> Outcome<Vec<Winding>>
     let mut all = Vec::new();
     let mut look = |pattern: Pattern, classic, reversed, exchanged| -> Outcome<()> {
         if pattern != fit.assumed.pattern && !all.iter().any(|w: &Winding| w.pattern == pattern) {
-            let promised = gain(&scores, &(gains(&pattern)? - &own));
+            let promised = scores.gain_of(&(gains(&pattern)? - &own));
             all.push(Winding { pattern, classic, reversed, exchanged, promised });
         }
         Ok(())
@@ -99,8 +99,4 @@ fn most_likely(question: &Question, fit: &Fit, mut all: Vec<Winding>) -> Vec<Win
     all.sort_by(|a, b| b.promised.total_cmp(&a.promised));
     all.truncate(TRIED);
     all
-}
-
-fn gain(scores: &Scores, change: &DVector<f64>) -> f64 {
-    scores.gain_of(change)
 }
