@@ -10,7 +10,7 @@ use crate::io::files::write_atomically;
 use crate::io::read::model_file::read_model;
 use crate::io::read::profile_file::read_profile_file;
 use crate::io::write::model_edit::with_ramps;
-use crate::task::evaluate::{Answer, Request, run as evaluate};
+use crate::task::evaluate::{Answer, COLUMNS, Request, cells, run as evaluate};
 
 /// Worst rate error of windings over a model's profiles
 #[derive(Debug, clap::Args)]
@@ -46,38 +46,6 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         write_atomically(path, listed.as_bytes())?;
         screen.note(&format!("{} profiles listed in {}", extremes.len(), path.display()));
     }
-    screen.answer(body, |body| {
-        let rows = body.patterns.iter().map(|p| {
-            vec![
-                p.name.clone(),
-                format!("{:.4}", p.worst_rate_deg_per_h),
-                p.guaranteed_worst_rate_deg_per_h.map_or("-".to_owned(), |g| format!("{g:.4}")),
-                p.grid_margin_deg_per_h.map_or("-".to_owned(), |m| format!("{m:.1e}")),
-                p.worst_pointing_error_deg.map_or("-".to_owned(), |p| format!("{p:.5}")),
-                format!("{:.3e}", p.worst_phase_rad),
-                p.worst_profile.clone(),
-                format!("{:.2}", p.worst_time_s),
-                p.windability.class.clone(),
-                p.windability.reels.to_string(),
-                p.windability.max_climb.to_string(),
-            ]
-        });
-        table(
-            &[
-                "pattern",
-                "worst °/h",
-                "guaranteed °/h",
-                "grid ± °/h",
-                "pointing °",
-                "phase rad",
-                "profile",
-                "at s",
-                "class",
-                "reels",
-                "climb",
-            ],
-            rows,
-        )
-    })?;
+    screen.answer(body, |body| table(&COLUMNS, body.patterns.iter().map(|p| cells(p).to_vec())))?;
     Ok(Ending::Done)
 }

@@ -10,6 +10,7 @@ mod diagnose;
 mod effects;
 mod evaluate;
 mod exact;
+mod explore;
 mod extend;
 mod former;
 mod improve;
@@ -95,6 +96,7 @@ pub enum Format {
 enum Command {
     Evaluate(evaluate::Arguments),
     Exact(exact::Arguments),
+    Explore(explore::Arguments),
     Effects(effects::Arguments),
     Temperatures(temperatures::Arguments),
     Tolerance(tolerance::Arguments),
@@ -225,6 +227,7 @@ fn carry_out(command: &Command, screen: &Screen) -> Result<Ending, CliError> {
     match command {
         Command::Evaluate(arguments) => evaluate::run(arguments, screen),
         Command::Exact(arguments) => exact::run(arguments, screen),
+        Command::Explore(arguments) => explore::run(arguments, screen),
         Command::Effects(arguments) => effects::run(arguments, screen),
         Command::Temperatures(arguments) => temperatures::run(arguments, screen),
         Command::Tolerance(arguments) => tolerance::run(arguments, screen),

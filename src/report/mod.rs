@@ -6,6 +6,7 @@ pub mod comparison;
 pub mod compensation;
 pub mod cross_section;
 pub mod diagnosis;
+pub mod explorer;
 pub mod improvement;
 pub mod ladder;
 pub mod measurement;

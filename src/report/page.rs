@@ -67,7 +67,7 @@ pub(super) fn figure(svg: &str, caption: &str) -> Markup {
     }
 }
 
-const STYLE: &str = "
+pub(super) const STYLE: &str = "
 :root{--ink:#1b1f24;--paper:#fff;--soft:#f3f5f7;--line:#cfd5db;--a:#2f7fd6;--b:#d9730d}
 @media(prefers-color-scheme:dark){:root{--ink:#e3e6ea;--paper:#15181c;--soft:#1f242a;--line:#3b424a}}
 *{box-sizing:border-box}

@@ -31,9 +31,11 @@ pub enum ReportError {
     Profile { name: String },
 }
 
+/// The page; `explorer` is the file beside it in which the model can be tried, if there is one.
+///
 /// # Errors
 /// A summary that does not fit its model.
-pub fn search_page(run: &Run) -> Result<String, ReportError> {
+pub fn search_page(run: &Run, explorer: Option<&str>) -> Result<String, ReportError> {
     let summary = &run.summary;
     let best = Pattern::new(summary.best.segments.clone())?;
     let qua = summary.baselines.iter().find(|p| p.name == "qua");
@@ -46,6 +48,9 @@ pub fn search_page(run: &Run) -> Result<String, ReportError> {
             p { (summary.statement) }
         } @else {
             p.big { (summary.statement) }
+        }
+        @if let Some(explorer) = explorer {
+            p.screen { a href=(explorer) { "Try other windings by hand in the explorer" } ": move layers, and see at once what evaluate says of them." }
         }
         @if let Some(former) = &summary.compared_with { p { b { (former.statement) } } }
         (facts(run))
@@ -183,19 +188,18 @@ fn over_time(run: &Run) -> Result<Vec<(String, String)>, ReportError> {
     for profile in shown {
         let solved = SolvedProfiles::new(&run.file.model, std::slice::from_ref(profile))?;
         let history = &solved.profiles()[0].history;
-        let mut chart = Chart::new(format!("Rate error under {}", profile.name()))
-            .x(Axis::linear("time [min]"))
-            .y(Axis::linear("rate error [°/h]"));
         // The best one last, on top of the others.
         let baselines = run.summary.baselines.iter().filter(|p| p.name != run.summary.best.name);
         let patterns: Vec<&RunPattern> = baselines.chain(std::iter::once(&run.summary.best)).collect();
+        let mut series = Vec::with_capacity(patterns.len());
         for found in patterns {
             let pattern = Pattern::new(found.segments.clone())?;
             let model = RateModel::new(&run.file.model, &pattern, &[]).map_err(SearchError::from)?;
-            let rates = model.series_rad_per_s(history);
-            let points = history.times_s.iter().zip(rates).map(|(t, r)| (min_from_s(*t), deg_per_h_from_rad_per_s(r)));
-            chart = chart.with(Series::line(&found.name, points.collect()));
+            let rates: Vec<f64> = model.series_rad_per_s(history).into_iter().map(deg_per_h_from_rad_per_s).collect();
+            series.push((found.name.as_str(), rates));
         }
+        let times_min: Vec<f64> = history.times_s.iter().map(|t| min_from_s(*t)).collect();
+        let (chart, scale) = on_a_readable_scale(profile.name(), &times_min, &series);
         let sufferers: Vec<&str> =
             all(run).filter(|p| p.worst_profile == profile.name()).map(|p| p.name.as_str()).collect();
         let what = if sufferers.is_empty() {
@@ -203,10 +207,37 @@ fn over_time(run: &Run) -> Result<Vec<(String, String)>, ReportError> {
         } else {
             format!("At their worst under this profile: {}.", sufferers.join(", "))
         };
-        figures.push((chart.svg(), what));
+        figures.push((chart.svg(), what + &scale));
         figures.push((profile_chart(profile), format!("What drives it: {}, from a steady state.", profile.name())));
     }
     Ok(figures)
+}
+
+/// From here on the smallest of the patterns' errors would be a line at zero on a linear scale.
+const UNREADABLE: f64 = 4.0;
+/// A logarithmic scale reaches this far below the largest error of the pattern that has the smallest.
+const SHOWN_BELOW: f64 = 30.0;
+
+/// Errors of patterns over time, on a scale on which the best of them can be read; what is to be said of the scale.
+fn on_a_readable_scale(profile: &str, times_min: &[f64], series: &[(&str, Vec<f64>)]) -> (Chart, String) {
+    let largest = |rates: &[f64]| rates.iter().fold(0.0, |most: f64, r| most.max(r.abs()));
+    let tops: Vec<f64> = series.iter().map(|(_, rates)| largest(rates)).filter(|top| *top > 0.0).collect();
+    let least = tops.iter().copied().fold(f64::INFINITY, f64::min);
+    let is_wide = largest(&tops) > UNREADABLE * least;
+    let mut chart = Chart::new(format!("Rate error under {profile}")).x(Axis::linear("time [min]"));
+    let floor = least / SHOWN_BELOW;
+    chart = if is_wide {
+        chart.y(Axis::log("|rate error| [°/h]").reaching(floor))
+    } else {
+        chart.y(Axis::linear("rate error [°/h]"))
+    };
+    let shown = |rate: f64| if is_wide { rate.abs().max(floor) } else { rate };
+    for (name, rates) in series {
+        let points = times_min.iter().zip(rates).map(|(t, rate)| (*t, shown(*rate)));
+        chart = chart.with(Series::line(*name, points.collect()));
+    }
+    let words = format!(" Sizes of the errors, on a logarithmic scale; what is below {floor:.1e} °/h is drawn there.");
+    (chart, if is_wide { words } else { String::new() })
 }
 
 const TOLERANCE_COILS: usize = 300;

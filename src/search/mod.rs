@@ -16,6 +16,7 @@ pub mod prospect;
 pub mod recommendation;
 mod rehearsal;
 pub mod run;
+pub mod swap;
 pub mod validation;
 mod weighing;
 

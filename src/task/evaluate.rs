@@ -6,9 +6,9 @@ use crate::io::json::{EvaluateJson, GuaranteedBesideJson, PatternJson};
 use crate::io::model::{Advice, ModelFile, NamedPattern};
 use crate::pattern::Pattern;
 use crate::profile::Profile;
-use crate::rate::RateModel;
+use crate::rate::{CoilModel, RateModel};
 use crate::search::aside::Aside;
-use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
+use crate::search::cost::guaranteed::{Guaranteed, GuaranteedError, UnitStep};
 use crate::search::cost::worst_case::{SolvedProfiles, WorstCase};
 use crate::search::outlook::OtherBoundary;
 use crate::units::deg_per_h_from_rad_per_s;
@@ -31,6 +31,69 @@ pub struct Answer {
     pub extremes: Result<Vec<Profile>, GuaranteedError>,
 }
 
+/// What is worked out once a model, for any of its windings.
+#[derive(Debug)]
+pub struct Groundwork {
+    pub solved: SolvedProfiles,
+    pub step: Result<UnitStep, GuaranteedError>,
+    guaranteed_model: CoilModel,
+    guaranteed_beside: Vec<GuaranteedBesideJson>,
+    steepest_k_per_s: f64,
+    aside: Aside,
+}
+
+/// A winding, judged.
+#[derive(Debug)]
+pub struct Judged {
+    pub body: PatternJson,
+    pub worst: WorstCase,
+    pub bound: Option<Guaranteed>,
+}
+
+impl Groundwork {
+    /// On the solved profiles of the model.
+    ///
+    /// # Errors
+    /// A model that cannot be solved.
+    pub fn on(solved: SolvedProfiles, file: &ModelFile) -> Result<Self, TaskError> {
+        let (guaranteed_model, left_out) = file.model.without_unguaranteed(file.profiles.max_rate_k_per_s);
+        let steepest = solved.profiles().iter().map(|p| p.profile.max_rate_k_per_s());
+        Ok(Self {
+            step: UnitStep::new(&guaranteed_model, file.profiles.max_rate_k_per_s),
+            guaranteed_beside: GuaranteedBesideJson::all(&left_out),
+            guaranteed_model,
+            steepest_k_per_s: steepest.fold(file.profiles.max_rate_k_per_s, f64::max),
+            aside: Aside::new(&file.model, &solved)?,
+            solved,
+        })
+    }
+
+    /// Judges a winding.
+    ///
+    /// # Errors
+    /// A pattern of another layer count.
+    pub fn judge(&self, file: &ModelFile, NamedPattern { name, pattern }: &NamedPattern) -> Result<Judged, TaskError> {
+        let worst = self.solved.worst_case(&file.model, pattern)?;
+        let phase_rad = RateModel::new(&file.model, pattern, &[])?.phase_rad(worst.rate_rad_per_s);
+        let bound = match &self.step {
+            Ok(step) => Some(step.guaranteed(&self.guaranteed_model, pattern)?),
+            Err(_) => None,
+        };
+        let bound_rad_per_s = bound.as_ref().map(|b| b.rate_rad_per_s);
+        let grid_margin_rad_per_s = self.aside.margin.of(&self.solved, pattern, self.steepest_k_per_s)?;
+        let pointing = self.aside.pointing(&file.model, &self.solved, pattern, file.profiles.max_rate_k_per_s)?;
+        let body = PatternJson::new(name, pattern, &worst, phase_rad, bound_rad_per_s);
+        Ok(Judged { body: body.with_margin(grid_margin_rad_per_s).with_pointing(&pointing), worst, bound })
+    }
+
+    /// What a reader of the guaranteed rates should know.
+    pub fn notes(&self) -> Vec<String> {
+        let beside = self.guaranteed_beside.iter().map(|formula| format!("note: {}", formula.in_words()));
+        let unbounded = self.step.as_ref().err().filter(|e| matches!(e, GuaranteedError::Effect { .. }));
+        beside.chain(unbounded.map(|reason| format!("note: {reason}"))).collect()
+    }
+}
+
 /// Evaluates.
 ///
 /// # Errors
@@ -40,37 +103,21 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
     advise(file, observer);
     let all = if request.patterns.is_empty() { own_and_classics(file) } else { request.patterns.to_vec() };
     let solved = SolvedProfiles::new(&file.model, &file.profiles.profiles())?;
-    let (guaranteed_model, left_out) = file.model.without_unguaranteed(file.profiles.max_rate_k_per_s);
-    let guaranteed_beside = GuaranteedBesideJson::all(&left_out);
-    for formula in &guaranteed_beside {
-        observer.note(&format!("note: {}", formula.in_words()));
-    }
-    let step = UnitStep::new(&guaranteed_model, file.profiles.max_rate_k_per_s);
-    if let Err(reason @ GuaranteedError::Effect { .. }) = &step {
-        observer.note(&format!("note: {reason}"));
+    let groundwork = Groundwork::on(solved, file)?;
+    for note in groundwork.notes() {
+        observer.note(&note);
     }
     let after = SolvedProfiles::after_the_ends(&file.model, &file.profiles.profiles())?;
-    let steepest = solved.profiles().iter().map(|p| p.profile.max_rate_k_per_s());
-    let steepest = steepest.fold(file.profiles.max_rate_k_per_s, f64::max);
-    let aside = Aside::new(&file.model, &solved)?;
     let mut patterns = Vec::with_capacity(all.len());
     let mut extremes = Vec::new();
-    for (index, NamedPattern { name, pattern }) in all.iter().enumerate() {
+    for (index, named) in all.iter().enumerate() {
+        let name = &named.name;
         observer.at(index as f64 / all.len() as f64, name);
-        let worst = solved.worst_case(&file.model, pattern)?;
+        let Judged { body, worst, bound } = groundwork.judge(file, named)?;
         if let Some(after) = &after {
-            warn_of_growth(name, &worst, &after.worst_case(&file.model, pattern)?, observer);
+            warn_of_growth(name, &worst, &after.worst_case(&file.model, &named.pattern)?, observer);
         }
-        let phase_rad = RateModel::new(&file.model, pattern, &[])?.phase_rad(worst.rate_rad_per_s);
-        let bound = match &step {
-            Ok(step) => Some(step.guaranteed(&guaranteed_model, pattern)?),
-            Err(_) => None,
-        };
-        let bound_rad_per_s = bound.as_ref().map(|b| b.rate_rad_per_s);
-        let grid_margin_rad_per_s = aside.margin.of(&solved, pattern, steepest)?;
-        let pointing = aside.pointing(&file.model, &solved, pattern, file.profiles.max_rate_k_per_s)?;
-        let body = PatternJson::new(name, pattern, &worst, phase_rad, bound_rad_per_s);
-        patterns.push(body.with_margin(grid_margin_rad_per_s).with_pointing(&pointing));
+        patterns.push(body);
         extremes.extend(bound.map(|b| b.profile(&format!("bang-bang-{name}"))));
     }
     if file.model.prescribes_outermost_layer() && holds_a_tie(&patterns) {
@@ -82,9 +129,42 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
         observer.note(&format!("note: {sentence}"));
     }
     let other_boundary = other.as_ref().map(OtherBoundaryJson::of);
+    let Groundwork { step, guaranteed_beside, .. } = groundwork;
     let document = EvaluateJson { model: file.model.name.clone(), patterns, other_boundary, guaranteed_beside };
     Ok(Answer { document, extremes: step.map(|_| extremes) })
 }
+
+/// What the table of windings says of one, under [`COLUMNS`].
+pub fn cells(p: &PatternJson) -> [String; 11] {
+    [
+        p.name.clone(),
+        format!("{:.4}", p.worst_rate_deg_per_h),
+        p.guaranteed_worst_rate_deg_per_h.map_or("-".to_owned(), |g| format!("{g:.4}")),
+        p.grid_margin_deg_per_h.map_or("-".to_owned(), |m| format!("{m:.1e}")),
+        p.worst_pointing_error_deg.map_or("-".to_owned(), |p| format!("{p:.5}")),
+        format!("{:.3e}", p.worst_phase_rad),
+        p.worst_profile.clone(),
+        format!("{:.2}", p.worst_time_s),
+        p.windability.class.clone(),
+        p.windability.reels.to_string(),
+        p.windability.max_climb.to_string(),
+    ]
+}
+
+/// The heads of the table of windings.
+pub const COLUMNS: [&str; 11] = [
+    "pattern",
+    "worst °/h",
+    "guaranteed °/h",
+    "grid ± °/h",
+    "pointing °",
+    "phase rad",
+    "profile",
+    "at s",
+    "class",
+    "reels",
+    "climb",
+];
 
 /// The winding that one would take: the smallest guaranteed worst rate, or worst rate where nothing is guaranteed.
 fn best_of(answers: &[PatternJson]) -> Option<&PatternJson> {

@@ -8,6 +8,7 @@ pub mod compare;
 pub mod compensate;
 pub mod evaluate;
 pub mod exact;
+pub mod explore;
 pub mod field;
 pub mod measurement;
 pub mod metrics;
@@ -21,6 +22,8 @@ pub mod trim;
 // They leave pages, pictures and words that pages share.
 #[cfg(feature = "report")]
 pub mod diagnose;
+#[cfg(feature = "report")]
+pub mod explore_page;
 #[cfg(feature = "report")]
 pub mod extend;
 #[cfg(feature = "report")]

@@ -10,7 +10,7 @@ use super::ways::Bench;
 const MODEL: &str = "examples/paper-200m.toml";
 const BROWSERS: &[&str] = &["chromium", "chromium-browser", "google-chrome", "chrome"];
 
-fn browser() -> Option<&'static str> {
+pub(super) fn browser() -> Option<&'static str> {
     let found = BROWSERS
         .iter()
         .copied()

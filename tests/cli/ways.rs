@@ -23,6 +23,7 @@ pub const COMMANDS: &[(&str, Way)] = &[
     ("check", Way::Quick(|b| drop(b.done(&["check", "model.toml"])))),
     ("evaluate", Way::Quick(evaluate)),
     ("exact", Way::Quick(exact)),
+    ("explore", Way::Quick(explore)),
     ("schedule", Way::Quick(schedule)),
     ("verify", Way::Quick(verify)),
     ("temperatures", Way::Quick(temperatures)),
@@ -170,6 +171,18 @@ fn evaluate(b: &Bench) {
 fn exact(b: &Bench) {
     b.done(&["exact", "model.toml", "-o", "out/exact.toml", "--samples", "out/samples.csv"]);
     b.done(&["schedule", "model.toml", "--pattern", "out/exact.toml"]);
+}
+
+fn explore(b: &Bench) {
+    b.done(&["explore", "model.toml", "pattern.toml", "-o", "out/explorer.html"]);
+    let page = b.read("out/explorer.html");
+    let held = page.split("id=\"data\">").nth(1).and_then(|rest| rest.split("</script>").next()).unwrap();
+    let held: Value = serde_json::from_str(held).unwrap();
+    b.is_name(&held["patterns"][0]["name"]);
+    assert_eq!(held["patterns"].as_array().map(Vec::len), Some(1), "the same pattern is listed once");
+    let source = toml(held["source"].as_str().unwrap());
+    b.is_name(&source["name"]);
+    assert!(source["winding"].get("pattern").is_none(), "the page has no other file at hand");
 }
 
 fn schedule(b: &Bench) {

@@ -5,6 +5,7 @@ pub mod comparison;
 pub mod diagnosis;
 pub mod effects;
 pub mod experiment;
+pub mod explore;
 pub mod further_schemas;
 pub mod improve;
 pub mod inputs;

@@ -39,6 +39,11 @@ pub struct RunSummary {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct RunRecommendation {
     pub sentence: String,
+    /// Empty where an older version wrote the summary.
+    #[serde(default)]
+    pub pattern: String,
+    #[serde(default)]
+    pub segments: Vec<usize>,
     #[serde(default)]
     pub reasons: Vec<String>,
 }

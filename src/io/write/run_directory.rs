@@ -96,7 +96,7 @@ pub fn write_request(folder: &Path, request: &Request) -> Result<(), WriteError>
 }
 
 /// What a search may leave; the summary first: while it is there, the rest is of its run.
-const KINDS: [&str; 10] = [
+const KINDS: [&str; 11] = [
     "summary.json",
     "best.toml",
     "baselines.csv",
@@ -104,6 +104,7 @@ const KINDS: [&str; 10] = [
     "schedule.csv",
     "schedule.json",
     "report.html",
+    "explorer.html",
     CHECKPOINT_FILE,
     "run.toml",
     "model.toml",

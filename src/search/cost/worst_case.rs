@@ -222,6 +222,11 @@ impl SolvedProfile {
         past
     }
 
+    /// The rate error at every sample.
+    pub fn series_rad_per_s(&self, rate_model: &RateModel) -> Vec<f64> {
+        rate_model.series_after(&self.history, &mut self.past(rate_model))
+    }
+
     /// The coefficients of the layer weights at any instant, with all that was before it.
     pub(in crate::search) fn response_at(&self, rate_model: &RateModel, instant: Instant) -> WeightResponse {
         let mut past = self.past(rate_model);

@@ -1,0 +1,14 @@
+// Asks the explorer's module, without a page: `node ask_module.mjs MODULE.wasm.gz REQUESTS.json` prints the answers.
+import { readFileSync } from "node:fs";
+import { gunzipSync } from "node:zlib";
+
+const { instance } = await WebAssembly.instantiate(gunzipSync(readFileSync(process.argv[2])), {});
+const { memory, room, answer, answered } = instance.exports;
+const ask = (request) => {
+  const text = new TextEncoder().encode(JSON.stringify(request));
+  const at = room(text.length);
+  new Uint8Array(memory.buffer, at, text.length).set(text);
+  const length = answer();
+  return JSON.parse(new TextDecoder().decode(new Uint8Array(memory.buffer, answered(), length)));
+};
+console.log(JSON.stringify(JSON.parse(readFileSync(process.argv[3], "utf8")).map(ask)));
