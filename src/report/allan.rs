@@ -70,7 +70,7 @@ pub(super) fn section(metrics: &MetricsJson) -> Markup {
             @if record.allan.is_empty() {
                 p { (record.file) ": no stretch without a gap is long enough for an Allan deviation." }
             } @else {
-                (figure(&allan_chart(record).svg(), &caption(record)))
+                (figure(&allan_chart(record).svg_to_read(), &caption(record)))
             }
         }
     }

@@ -24,7 +24,7 @@ pub struct Picture {
 pub fn pictures(number: usize, record: &RecordComparisonJson, rows: &[ComparisonRow]) -> Vec<Picture> {
     let picture = |name: &str, chart: Chart, caption: String| Picture {
         file: format!("record-{number}-{name}.svg"),
-        svg: chart.svg(),
+        svg: chart.svg_to_read(),
         caption,
     };
     let noise = record.noise_floor_deg_per_h;

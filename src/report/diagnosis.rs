@@ -161,7 +161,7 @@ pub(super) fn section(body: &DiagnosisJson, tables: &[Vec<DiagnosisRow>]) -> Mar
     html! {
         h2 { "Diagnosis" }
         p.big { (verdict_in_words(body)) }
-        (figure(&ladder_chart(body).svg(), "The ladder: the error as declared and after each piece of physics that was found, on the records that were fitted and on those that were not. No model can get below the noise floor."))
+        (figure(&ladder_chart(body).svg_to_read(), "The ladder: the error as declared and after each piece of physics that was found, on the records that were fitted and on those that were not. No model can get below the noise floor."))
         ul { @for step in &body.ladder_in_words { li { (step) } } }
         (ladder_table(body))
         @if !body.effects.is_empty() { h2 { "What is missing" } (effects(&body.effects)) }
@@ -173,7 +173,7 @@ pub(super) fn section(body: &DiagnosisJson, tables: &[Vec<DiagnosisRow>]) -> Mar
         @if !body.effects.is_empty() || !body.proposals.is_empty() {
             @for (record, rows) in body.inputs.records.iter().zip(tables) {
                 @let noise = if record.role == "held out" { body.holdout_noise_floor_deg_per_h } else { None };
-                (figure(&before_and_after_chart(&format!("Residual of {}", record.file), rows, noise.unwrap_or(body.noise_floor_deg_per_h)).svg(),
+                (figure(&before_and_after_chart(&format!("Residual of {}", record.file), rows, noise.unwrap_or(body.noise_floor_deg_per_h)).svg_to_read(),
                     &format!("{}, {}: the residual of the declared model and what the effects found leave of it.", record.file, record.role)))
             }
         }
@@ -182,7 +182,7 @@ pub(super) fn section(body: &DiagnosisJson, tables: &[Vec<DiagnosisRow>]) -> Mar
             ul { @for line in refitted_in_words(body) { li { (line) } } }
         }
         h2 { "Noise, told apart" }
-        (figure(&noise_chart(body).svg(), "What the rate consists of beside what the coil does, and how much of the air would stay unseen if it were measured otherwise."))
+        (figure(&noise_chart(body).svg_to_read(), "What the rate consists of beside what the coil does, and how much of the air would stay unseen if it were measured otherwise."))
         ul { @for line in noise_in_words(body) { li { (line) } } }
         h2 { "How sure" }
         ul { @for line in posterior_in_words(body) { li { (line) } } }
@@ -253,7 +253,7 @@ fn experiment(found: &ExperimentJson) -> Markup {
     html! {
         p { "Of " (found.profiles_tried) " profiles within what the records show the chamber to be capable of, this one tells the candidates apart best: " (found.statement) "." }
         ul { @for pair in &found.expectations { li { (pair) } } }
-        (figure(&experiment_chart(found).svg(), &format!("The profile {}, {:.2} h, from a steady state at 20 °C.", found.profile, h_from_s(found.duration_s))))
+        (figure(&experiment_chart(found).svg_to_read(), &format!("The profile {}, {:.2} h, from a steady state at 20 °C.", found.profile, h_from_s(found.duration_s))))
         div.scroll { table {
             thead { tr { th { "Piece" } th { "Rate [°C/h]" } th { "Duration [s]" } } }
             tbody { @for (i, piece) in found.pieces.iter().enumerate() { tr {

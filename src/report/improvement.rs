@@ -51,5 +51,5 @@ fn predicted_chart(rows: &[PredictedRow]) -> String {
         .with(Series::line("predicted", line(|row| row.rate_deg_per_h)))
         .with(Series::dashed("lower", line(|row| row.low_deg_per_h)))
         .with(Series::dashed("upper", line(|row| row.high_deg_per_h)))
-        .svg()
+        .svg_to_read()
 }

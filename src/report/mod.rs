@@ -18,4 +18,5 @@ pub mod search_run;
 pub mod temperatures;
 pub mod thesis2021;
 pub mod traveller;
+mod words;
 pub mod yan1998;

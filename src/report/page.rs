@@ -28,7 +28,7 @@ pub(super) fn page(title: &str, body: &Markup) -> String {
             }
             body {
                 main { (body) }
-                script { (PreEscaped(ZOOM)) }
+                script { (PreEscaped(SCRIPT)) }
             }
         }
     };
@@ -40,7 +40,7 @@ fn policy() -> String {
     let hash = |text: &str| format!("'sha256-{}'", BASE64.encode(&Sha256::digest(text.as_bytes())));
     format!(
         "default-src 'none'; script-src {}; style-src {} {}; img-src data:; base-uri 'none'; form-action 'none'",
-        hash(ZOOM),
+        hash(SCRIPT),
         hash(STYLE),
         hash(plot::STYLE)
     )
@@ -52,7 +52,7 @@ pub fn assets() -> Assets {
     Assets {
         style_sha256: hex(STYLE),
         drawing_style_sha256: hex(plot::STYLE),
-        script_sha256: hex(ZOOM),
+        script_sha256: hex(SCRIPT),
         policy: policy(),
     }
 }
@@ -87,10 +87,14 @@ dl.facts dt{color:var(--ink);opacity:.75}dl.facts dd{margin:0;overflow-wrap:anyw
 .big{font-size:1.35rem;font-weight:700}
 figure{margin:1rem 0}figcaption{font-size:.86rem;opacity:.8;max-width:46rem}
 .pair{display:flex;flex-wrap:wrap;gap:1rem}.pair figure{flex:1 1 20rem;min-width:0;margin:0}
+.two{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,32rem),1fr));gap:1rem}.two figure{margin:0;min-width:0}
 figure svg{max-width:100%;height:auto;display:block}
 .zoom{cursor:zoom-in}
 .zoom.open{position:fixed;inset:0;z-index:9;background:var(--paper);overflow:hidden;cursor:grab;touch-action:none}
 .zoom.open svg{max-width:none;width:100%;height:100%;transform-origin:0 0}
+.read{font-size:.86rem;font-variant-numeric:tabular-nums;min-height:1.5em;margin:.2rem 0;max-width:none}
+.lines button{font:inherit;font-size:.82rem;color:var(--ink);background:var(--soft);border:1px solid var(--line);border-radius:3px;margin:0 .3rem .3rem 0;cursor:pointer}
+.lines [aria-pressed=false]{text-decoration:line-through}
 .fill{min-width:5rem}.long{min-width:10.5rem}.keep{white-space:nowrap}
 .a{color:var(--a)}.b{color:var(--b)}
 td code{display:inline-block;min-width:12rem}
@@ -98,24 +102,15 @@ code,pre{font-family:ui-monospace,'DejaVu Sans Mono',monospace;font-size:.86em;o
 @media screen and (max-width:40rem){figure .zoom:not(.open){overflow-x:auto}figure .zoom:not(.open) svg{max-width:none;width:560px}body{font-size:15px}dl.facts{grid-template-columns:1fr}dl.facts dt{margin-top:.3rem}}
 @page{margin:14mm 12mm 16mm;@bottom-right{content:'page ' counter(page) ' of ' counter(pages);font:9pt sans-serif}}
 @media print{
-:root{--ink:#000;--paper:#fff;--soft:#eee;--line:#888}
+.two{display:block}:root{--ink:#000;--paper:#fff;--soft:#eee;--line:#888}
 body{font-size:10pt}main{max-width:none;padding:0}
 h1{font-size:15pt}h2{font-size:12pt;break-after:avoid}
 table{font-size:7.6pt;width:100%}th,td{padding:1.5pt 3pt}thead{display:table-header-group}tr{break-inside:avoid}
-figure{break-inside:avoid}figure svg{max-height:225mm}.scroll{overflow:visible;padding-right:1.5pt}.fill{min-width:0}.long{min-width:26mm}.screen{display:none}td code{min-width:0}
+figure{break-inside:avoid}figure svg{max-height:225mm}.scroll{overflow:visible;padding-right:1.5pt}.fill{min-width:0}.long{min-width:26mm}.screen,.read,.lines{display:none}td code{min-width:0}
 details::details-content{content-visibility:visible;block-size:auto}summary{list-style:none}
 }
 ";
 
-/// Opens a picture over the whole window; wheel and drag zoom and move it, Escape or a click closes it.
-const ZOOM: &str = "
-for(const z of document.querySelectorAll('.zoom')){let k=1,x=0,y=0,p=null,moved=false;const s=()=>z.querySelector('svg');
-const set=()=>s().style.transform=z.classList.contains('open')?`translate(${x}px,${y}px) scale(${k})`:'';
-const close=()=>{z.classList.remove('open');k=1;x=y=0;set()};
-z.addEventListener('click',()=>{if(moved){moved=false;return}z.classList.contains('open')?close():z.classList.add('open');set()});
-z.addEventListener('keydown',e=>{if(e.key==='Escape')close();if(e.key==='Enter'){z.classList.toggle('open');set()}});
-z.addEventListener('wheel',e=>{if(!z.classList.contains('open'))return;e.preventDefault();const f=e.deltaY<0?1.2:1/1.2;x=e.clientX-(e.clientX-x)*f;y=e.clientY-(e.clientY-y)*f;k*=f;set()},{passive:false});
-z.addEventListener('pointerdown',e=>{if(z.classList.contains('open'))p=[e.clientX-x,e.clientY-y]});
-z.addEventListener('pointermove',e=>{if(p&&e.buttons){x=e.clientX-p[0];y=e.clientY-p[1];moved=true;set()}});
-z.addEventListener('pointerup',()=>p=null)}
-";
+/// Opens a picture over the whole window; wheel and drag zoom and move it, Escape or a click closes it. Shows a chart's values
+/// under the pointer, in all charts over the same time at once, and switches its lines on and off.
+const SCRIPT: &str = include_str!("page.js");

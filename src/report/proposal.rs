@@ -77,7 +77,7 @@ pub(super) fn section(body: &DiagnosisJson) -> Markup {
                 p { (term.text) ": it looks like " (term.reading) "." }
                 ul { @for (key, parameter) in &term.parameters { li { (parameter_in_words(key, parameter)) } } }
                 @if let Some(chart) = term_chart(term) {
-                    (figure(&chart.svg(), "What is left of the records without this term, averaged over a few rows, against the variable it depends on; the line is the term as fitted on the first record, in the order of time, so that what remembers draws a loop."))
+                    (figure(&chart.svg_to_read(), "What is left of the records without this term, averaged over a few rows, against the variable it depends on; the line is the term as fitted on the first record, in the order of time, so that what remembers draws a loop."))
                 }
             }
             ul { @for line in proposal_in_words(proposal).iter().skip_while(|l| !l.starts_with("  predicts") && !l.starts_with("  only")) { li { (line.trim()) } } }

@@ -8,6 +8,7 @@ use thiserror::Error;
 use super::cross_section::cross_section;
 use super::page::{figure, page};
 use super::plot::{Axis, Chart, Mark, Series};
+use super::words;
 use crate::io::files::sha256_hex;
 use crate::io::read::run_reader::{Run, RunPattern};
 use crate::pattern::{Pattern, PatternError};
@@ -56,6 +57,7 @@ pub fn search_page(run: &Run, explorer: Option<&str>) -> Result<String, ReportEr
         (facts(run))
         h2 { "Patterns compared" }
         (baselines(run))
+        (words::of_windings())
         (figure(&relative_bars(run), "Worst rate error over all listed and sampled profiles, and, where it exists, the guaranteed worst over every profile within the model's largest ramp."))
         h2 { "Cross-sections" }
         div.pair {
@@ -65,13 +67,13 @@ pub fn search_page(run: &Run, explorer: Option<&str>) -> Result<String, ReportEr
             }
         }
         h2 { "Rate error over time" }
-        @for (svg, caption) in over_time(run)? { (figure(&svg, &caption)) }
-        h2 { "Tolerance" }
-        @let (svg, caption) = tolerance(run, &best)?;
-        (figure(&svg, &caption))
-        h2 { "What it costs the winding shop" }
-        @let (svg, caption) = trade_off(run);
-        (figure(&svg, &caption))
+        div.two { @for (svg, caption) in over_time(run)? { (figure(&svg, &caption)) } }
+        @let (tolerated, about_tolerance) = tolerance(run, &best)?;
+        @let (traded, about_trade_off) = trade_off(run);
+        div.two {
+            section { h2 { "Tolerance" } (figure(&tolerated, &about_tolerance)) }
+            section { h2 { "What it costs the winding shop" } (figure(&traded, &about_trade_off)) }
+        }
         h2 { "How the search went" }
         (figure(&convergence(run), &format!("Best value known after so many judged moves; {} rounds, ended by: {}.", summary.rounds, summary.stopped_by)))
         (certificate(run))
@@ -165,7 +167,7 @@ fn relative_bars(run: &Run) -> String {
     if let Some(qua) = run.summary.baselines.iter().find(|p| p.name == "qua") {
         chart = chart.mark(Mark::vertical("QUA", qua.worst_rate_deg_per_h));
     }
-    chart.svg()
+    chart.svg_to_read()
 }
 
 /// For the profile that is worst for the best pattern and the first listed one: the profile, and every pattern's error.
@@ -207,37 +209,28 @@ fn over_time(run: &Run) -> Result<Vec<(String, String)>, ReportError> {
         } else {
             format!("At their worst under this profile: {}.", sufferers.join(", "))
         };
-        figures.push((chart.svg(), what + &scale));
+        figures.push((chart.svg_to_read(), what + &scale));
         figures.push((profile_chart(profile), format!("What drives it: {}, from a steady state.", profile.name())));
     }
     Ok(figures)
 }
 
-/// From here on the smallest of the patterns' errors would be a line at zero on a linear scale.
-const UNREADABLE: f64 = 4.0;
 /// A logarithmic scale reaches this far below the largest error of the pattern that has the smallest.
-const SHOWN_BELOW: f64 = 30.0;
+const SHOWN_BELOW: f64 = 300.0;
 
-/// Errors of patterns over time, on a scale on which the best of them can be read; what is to be said of the scale.
+/// Sizes of patterns' errors over time, on a scale on which the best of them can be read; what is to be said of the scale.
 fn on_a_readable_scale(profile: &str, times_min: &[f64], series: &[(&str, Vec<f64>)]) -> (Chart, String) {
     let largest = |rates: &[f64]| rates.iter().fold(0.0, |most: f64, r| most.max(r.abs()));
-    let tops: Vec<f64> = series.iter().map(|(_, rates)| largest(rates)).filter(|top| *top > 0.0).collect();
-    let least = tops.iter().copied().fold(f64::INFINITY, f64::min);
-    let is_wide = largest(&tops) > UNREADABLE * least;
-    let mut chart = Chart::new(format!("Rate error under {profile}")).x(Axis::linear("time [min]"));
-    let floor = least / SHOWN_BELOW;
-    chart = if is_wide {
-        chart.y(Axis::log("|rate error| [°/h]").reaching(floor))
-    } else {
-        chart.y(Axis::linear("rate error [°/h]"))
-    };
-    let shown = |rate: f64| if is_wide { rate.abs().max(floor) } else { rate };
+    let tops = series.iter().map(|(_, rates)| largest(rates)).filter(|top| *top > 0.0);
+    let floor = tops.fold(f64::INFINITY, f64::min) / SHOWN_BELOW;
+    let mut chart = Chart::new(format!("Size of the rate error under {profile}"))
+        .x(Axis::linear("time [min]"))
+        .y(Axis::log("|rate error| [°/h]"));
     for (name, rates) in series {
-        let points = times_min.iter().zip(rates).map(|(t, rate)| (*t, shown(*rate)));
+        let points = times_min.iter().zip(rates).map(|(t, rate)| (*t, rate.abs().max(floor)));
         chart = chart.with(Series::line(*name, points.collect()));
     }
-    let words = format!(" Sizes of the errors, on a logarithmic scale; what is below {floor:.1e} °/h is drawn there.");
-    (chart, if is_wide { words } else { String::new() })
+    (chart, format!(" What is below {floor:.1e} °/h is drawn there."))
 }
 
 const TOLERANCE_COILS: usize = 300;
@@ -303,7 +296,7 @@ fn declared_tolerance(run: &Run, best: &Pattern, declared: &ToleranceSpec) -> Re
         spec.seed,
         words.join(". ")
     );
-    Ok((chart.svg(), caption))
+    Ok((chart.svg_to_read(), caption))
 }
 
 fn bin_edges(values: &[f64]) -> Vec<f64> {
@@ -347,7 +340,7 @@ fn turn_tolerance(run: &Run, best: &Pattern) -> Result<String, ReportError> {
         .y(Axis::linear("coils [1]"))
         .with(Series::histogram("", &edges, &counts))
         .mark(Mark::vertical("as designed", run.summary.best.worst_rate_deg_per_h))
-        .svg())
+        .svg_to_read())
 }
 
 fn profile_chart(profile: &Profile) -> String {
@@ -360,7 +353,7 @@ fn profile_chart(profile: &Profile) -> String {
         .x(Axis::linear("time [min]"))
         .y(Axis::linear("boundary's rate [°C/h]").reaching(0.0))
         .with(Series::step("", times_min.zip(held).collect()))
-        .svg()
+        .svg_to_read()
 }
 
 /// The searched front where there is one, else the patterns of this search.
@@ -375,7 +368,7 @@ fn trade_off(run: &Run) -> (String, String) {
     let better = "Every step to the left is an easier crossover, every step down a smaller error.";
     match &run.front {
         None => (
-            chart.with(compared("patterns compared")).svg(),
+            chart.with(compared("patterns compared")).svg_to_read(),
             format!(
                 "The patterns compared above, not a searched front: coilwright pareto searches one, and with this folder as its -o it is shown here. {better}"
             ),
@@ -391,7 +384,7 @@ fn trade_off(run: &Run) -> (String, String) {
                 chart = chart.with(Series::points(format!("front, {count} captive"), points));
             }
             (
-                chart.svg(),
+                chart.svg_to_read(),
                 format!(
                     "The front that coilwright pareto searched (captive reels are weighed besides), and the patterns compared above. {better}"
                 ),
@@ -413,7 +406,7 @@ fn convergence(run: &Run) -> String {
     if let Some(bound) = run.summary.proof.lower_bound_deg_per_h {
         chart = chart.mark(Mark::horizontal("proved lower bound", bound));
     }
-    chart.svg()
+    chart.svg_to_read()
 }
 
 fn certificate(run: &Run) -> Markup {

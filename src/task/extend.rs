@@ -149,7 +149,11 @@ pub fn unknown_effect(stated: &str) -> TaskError {
         .iter()
         .copied()
         .chain([CHANNEL, CUSTOM])
-        .map(|spec| (strsim::jaro_winkler(spec.kind, stated), spec.kind))
+        // A part of a name, such as "film", means it more surely than letters that resemble.
+        .map(|spec| {
+            let is_part = stated.len() > 2 && spec.kind.contains(stated);
+            (strsim::jaro_winkler(spec.kind, stated) + f64::from(u8::from(is_part)), spec.kind)
+        })
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map_or("", |(_, kind)| kind);
     TaskError::UnknownEffect { stated: stated.to_owned(), nearest }

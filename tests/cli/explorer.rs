@@ -154,9 +154,6 @@ fn a_page_with_hostile_names_runs_no_script_but_its_own() {
     page.close();
 }
 
-/// How long a hand waits at most in these tests; a machine under load computes for seconds.
-pub(super) const PATIENCE: Duration = Duration::from_secs(90);
-
 /// What the program carries was built from an older model, if this fails: run `explorer/build`.
 #[test]
 fn the_module_that_the_program_carries_answers_as_the_library_does() {

@@ -7,7 +7,7 @@ use data_encoding::BASE64;
 use maud::{DOCTYPE, PreEscaped, html};
 use sha2::{Digest, Sha256};
 
-use super::page;
+use super::{page, words};
 use crate::io::json::explore::ExplorerDataJson;
 use crate::text::sink::{JsonText, Markup};
 
@@ -67,15 +67,7 @@ pub fn explorer_page(model: &str, data: &ExplorerDataJson) -> Result<String, ser
                         (number("captive", "captive runs", "…", ""))
                         (number("climb", "largest climb", "…", "layers"))
                     }
-                    details {
-                        summary { "What these words mean" }
-                        p { b { "Worst" } ": the largest size of the rate error under the model's profiles, at any time. "
-                            b { "Guaranteed" } ": no profile of any length whose ramps are no steeper makes it larger. "
-                            b { "Class" } ": " code { "standard" } " can be wound with no captive run; "
-                            code { "captive:2" } " holds at most two. " b { "Captive run" }
-                            ": fibre both ends of which are on the coil already, so that its reel must travel around the coil. "
-                            b { "Climb" } ": how many layers a crossover passes from one segment of the fibre to the next." }
-                    }
+                    (words::of_windings())
                     div.bench {
                         section aria-labelledby="section-layers" {
                             h2 id="section-layers" { "The winding" }

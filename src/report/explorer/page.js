@@ -318,7 +318,7 @@ function drawRates() {
   const { series } = state;
   if (!series) return;
   const svg = $("rates"), width = Math.max(280, svg.parentElement.clientWidth), height = 300;
-  const box = { left: 62, right: width - 10, top: 10, bottom: height - 40 };
+  const box = { left: 62, right: width - 16, top: 10, bottom: height - 40 };
   const minutes = series.times_s.map((t) => t / 60), end = minutes[minutes.length - 1];
   const range = state.zoom || [0, end];
   const log = $("scale").value === "log";
@@ -369,7 +369,8 @@ function drawRates() {
 function legend() {
   const { series } = state;
   let row = 0;
-  const here = Math.max(0, series.times_s.findIndex((t) => t >= state.time));
+  // At a kink both sides have the same time; the later one is what the scrubber means.
+  const here = Math.max(0, series.times_s.findLastIndex((t) => t <= state.time));
   $("legend").replaceChildren(...series.names.map((name) => {
     const index = row++, value = series.rates_deg_per_h[index][here];
     const button = element("button", { type: "button", onclick: () => {
@@ -455,6 +456,7 @@ function begin() {
   makeLayers();
   $("typed").value = state.segments.join(" ");
   $("name").value = state.name;
+  $("undo").disabled = $("redo").disabled = true;
   showLayers();
 }
 

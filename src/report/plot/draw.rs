@@ -8,7 +8,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::axis::three_digits;
 use super::layout::{Layout, LegendShape, MARK_ROW_PX, ROW_PX, TEXT_PX, text_width_px};
 use super::{Along, Chart, Series, Shape};
-use crate::text::sink::Markup;
+use crate::text::sink::{JsonText, Markup};
 
 /// The backend counts whole pixels; drawing on a finer grid and shrinking the picture keeps slopes smooth.
 const FINE: i32 = 4;
@@ -55,7 +55,7 @@ fn text<'a>(words: &'a str, x_px: i32, y_px: i32, h: HPos, v: VPos) -> Text<'a, 
     Text::new(words, (x_px * FINE, y_px * FINE), style)
 }
 
-pub(super) fn svg(chart: &Chart) -> String {
+pub(super) fn svg(chart: &Chart, to_read: bool) -> String {
     let layout = Layout::new(chart);
     let (width, height) = (chart.width_px, layout.height as u32);
     let mut out = String::new();
@@ -65,16 +65,36 @@ pub(super) fn svg(chart: &Chart) -> String {
         let _ = draw(chart, &layout, &root);
         let _ = root.present();
     }
-    finish(&out, chart, width, height)
+    let read = if to_read { axes(chart, &layout) } else { String::new() };
+    finish(&out, chart, width, height, &read)
+}
+
+/// An attribute that says where the axes are, in the picture's own units, and which colour each line has.
+fn axes(chart: &Chart, layout: &Layout) -> String {
+    let series = chart.series.iter().enumerate().filter(|(_, s)| matches!(s.shape, Shape::Line | Shape::Step));
+    let series = series.map(|(index, s)| {
+        let RGBColor(red, green, blue) = colour(index);
+        serde_json::json!({ "name": s.name, "colour": format!("#{red:02X}{green:02X}{blue:02X}") })
+    });
+    let frame = [layout.left, layout.top, layout.right, layout.bottom].map(|px| px * FINE);
+    let plot = serde_json::json!({
+        "frame": frame,
+        "x": (layout.x.low, layout.x.high, chart.x.is_log()),
+        "y": (layout.y.low, layout.y.high, chart.y.is_log()),
+        "x_label": chart.x.label,
+        "y_label": chart.y.label,
+        "series": series.collect::<Vec<_>>(),
+    });
+    format!(" data-plot='{}'", JsonText::embedded(&plot.to_string()))
 }
 
 /// Gives the picture its natural size, a title for screen readers, and the reader's colours.
-fn finish(drawn: &str, chart: &Chart, width: u32, height: u32) -> String {
+fn finish(drawn: &str, chart: &Chart, width: u32, height: u32, read: &str) -> String {
     let body = drawn.split_once('>').map_or("", |(_, rest)| rest);
     let title = if chart.title.is_empty() { &chart.y.label } else { &chart.title };
     let title = title.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
     let picture = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"chart\" role=\"img\" width=\"{width}\" height=\"{height}\" \
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"chart\"{read} role=\"img\" width=\"{width}\" height=\"{height}\" \
          viewBox=\"0 0 {} {}\"><title>{title}</title><style>{STYLE}</style>{}",
         width * FINE as u32,
         height * FINE as u32,

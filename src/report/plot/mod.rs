@@ -264,7 +264,12 @@ impl Chart {
 
     /// The picture: one `<svg>` element, as a file of its own or inside a page.
     pub fn svg(&self) -> String {
-        draw::svg(self)
+        draw::svg(self, false)
+    }
+
+    /// The same with its axes and names beside it, from which a page's script reads values under the pointer.
+    pub fn svg_to_read(&self) -> String {
+        draw::svg(self, true)
     }
 }
 
@@ -277,6 +282,21 @@ mod tests {
         let chart = Chart::new("a < b & c").with(Series::line("x", vec![(0.0, 1.0), (1.0, f64::NAN), (2.0, 3.0)]));
         assert_eq!(chart.svg(), chart.svg());
         assert!(chart.svg().contains("a &lt; b &amp; c"));
+    }
+
+    #[test]
+    fn a_chart_to_read_says_where_its_axes_are_whatever_its_names_hold() {
+        let hostile = "'><script>\"&";
+        let chart = Chart::new("x").y(Axis::log("y")).with(Series::line(hostile, vec![(0.0, 1.0), (1.0, 100.0)]));
+        let drawn = chart.svg_to_read();
+        assert!(!drawn.contains("<script>"));
+        let held = drawn.split("data-plot='").nth(1).and_then(|rest| rest.split('\'').next()).unwrap();
+        let held: serde_json::Value = serde_json::from_str(held).unwrap();
+        assert_eq!(held["series"][0]["name"], hostile);
+        assert_eq!(held["y"], serde_json::json!([0.0, 2.0, true]));
+        let colour = held["series"][0]["colour"].as_str().unwrap();
+        assert!(drawn.contains(&format!("stroke=\"{colour}\"")), "the script finds lines by their colour");
+        assert!(!chart.svg().contains("data-plot"));
     }
 
     #[test]

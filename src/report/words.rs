@@ -1,0 +1,23 @@
+//! Words that pages about windings use, explained once a page.
+
+use maud::{Markup, html};
+
+use crate::pattern::classic::Classic;
+
+/// What worst, guaranteed, class, captive and climb mean, and what the classics' short names stand for.
+pub(super) fn of_windings() -> Markup {
+    html! {
+        details {
+            summary { "What these words mean" }
+            p { b { "Worst" } ": the largest size of the rate error under the model's profiles, at any time. "
+                b { "Guaranteed" } ": no profile of any length whose ramps are no steeper makes it larger. "
+                b { "Class" } ": " code { "standard" } " can be wound with no captive run; "
+                code { "captive:2" } " holds at most two. " b { "Captive run" }
+                ": fibre both ends of which are on the coil already, so that its reel must travel around the coil. "
+                b { "Climb" } ": how many layers a crossover passes from one segment of the fibre to the next." }
+            p { @for (index, classic) in Classic::ALL.into_iter().enumerate() {
+                @if index > 0 { ", " } b { (classic.key()) } " " (classic.title())
+            } "." }
+        }
+    }
+}
