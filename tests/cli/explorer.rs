@@ -43,7 +43,7 @@ const PATTERNS: usize = 10;
 
 /// Permutations that no two runs differ in (Fisher and Yates, with a multiplicative generator).
 fn shuffled(seed: u64) -> Vec<usize> {
-    let mut state = seed * 2_862_933_555_777_941_757 + 3_037_000_493;
+    let mut state = seed.wrapping_mul(2_862_933_555_777_941_757).wrapping_add(3_037_000_493);
     let mut segments: Vec<usize> = (1..=LAYERS).collect();
     for i in (1..LAYERS).rev() {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -214,22 +214,25 @@ fn alike(a: &Value, b: &Value, at: &str) {
             let largest = one.iter().filter_map(Value::as_f64).fold(0.0, |most: f64, v| most.max(v.abs()));
             for (i, (x, y)) in one.iter().zip(other).enumerate() {
                 match (x.as_f64(), y.as_f64()) {
-                    (Some(x), Some(y)) => assert!((x - y).abs() <= 1e-9 * largest, "{at}[{i}]: {x} {y}"),
+                    (Some(x), Some(y)) => assert!((x - y).abs() <= 1e-6 * largest, "{at}[{i}]: {x} {y}"),
                     _ => alike(x, y, &format!("{at}[{i}]")),
                 }
             }
         }
         (Value::Number(x), Value::Number(y)) => {
             let (x, y) = (x.as_f64().unwrap(), y.as_f64().unwrap());
-            // The grid's margin is a difference that nearly cancels; the instant of a maximum is flat.
-            let allowed = if at.contains("margin") {
-                1e-3
-            } else if at.contains("time") {
-                1e-6
-            } else {
-                1e-9
-            };
-            assert!((x - y).abs() <= allowed * x.abs().max(1e-12), "{at}: {x} {y}");
+            // At a maximum the curve is flat: a search for it that takes another turn in the last bits ends elsewhere. The
+            // grid's margin is a difference that may be all rounding: it is held against what a reader can see of a rate. What
+            // is outside the coil follows a temperature that here is close to where it began.
+            let coarse = ["margin", "time", "rest"].iter().any(|part| at.contains(part));
+            let allowed = if coarse { 1e-3 } else { 1e-6 };
+            let least = if at.contains("margin") { 1e-3 } else { 1e-12 };
+            assert!((x - y).abs() <= allowed * x.abs().max(least), "{at}: {x} {y}");
+        }
+        // Numbers in words, as the table prints them.
+        (Value::String(x), Value::String(y)) if at.contains("cells") && x.parse::<f64>().is_ok() => {
+            let (x, y): (f64, f64) = (x.parse().unwrap(), y.parse().unwrap());
+            assert!((x - y).abs() <= 1e-3 * x.abs().max(0.1), "{at}: {x} {y}");
         }
         _ => assert_eq!(a, b, "{at}"),
     }
