@@ -7,7 +7,8 @@ moves=${MOVES:-500}
 [ -x "$program" ] || { echo "no program at $program: cargo build first" >&2; exit 2; }
 fail() { echo "FAILED: $*" >&2; exit 1; }
 
-cp examples/paper-200m.toml "$work/paper.toml"
+# Two profiles (PROFILES=2) are enough where many cells are compared.
+sed "s/^count = .*/count = ${PROFILES:-64}/" examples/paper-200m.toml >"$work/paper.toml"
 cat >"$work/grid.toml" <<TOML
 name = "engine"
 models = ["paper.toml"]

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# A campaign under Slurm with two nodes on this one machine: the same bytes as one process, also after a task was killed with -9
-# and after a node was lost.
+# A campaign under Slurm with two nodes on this one machine: the same bytes as one process, also after a task was killed with -9, after a
+# node was lost, after tasks found the disk full, and where both nodes ran every part at the same time.
 #
 #   tests/engines/slurm.sh                as root, with Debian's slurm-wlm and munge
 #
@@ -20,6 +20,7 @@ ended() {
   local code=$?
   for process in "${started[@]}"; do kill "$process" 2>/dev/null || true; done
   for process in "${started[@]}"; do wait "$process" 2>/dev/null || true; done
+  mountpoint -q "$work/full/results" && umount "$work/full/results"
   [ $code = 0 ] || tail -n 20 "$work"/*.log 2>/dev/null
   rm -rf "$work"
 }
@@ -70,19 +71,50 @@ done
 [ "$(sinfo -h -N -o %t | grep -c idle)" = 2 ] || { sinfo -N || true; echo "skipped: Slurm's two nodes do not start here"; tail -n 5 "$work"/slurm*.log; exit 77; }
 
 emit() { "$program" campaign "$work/grid.toml" --emit slurm -o "$work/$1" --job-time "${JOB_TIME:-300ms}" --quiet; }
-submitted() { (cd "$work/$1" && bash submit.sh "${@:2}") | tee /dev/stderr | sed 's/.*table: job //'; }
+submitted() { (cd "$work/$1" && bash submit.sh "${@:2}") | tee >(cat >&2) | sed 's/.*table: job //'; }
 # Until the last job has ended.
 ended_well() {
+  local began=$SECONDS
   for _ in $(seq "${PATIENCE_S:-300}"); do
     [ -z "$(squeue -h -j "$1" 2>/dev/null)" ] && break
     sleep 1
   done
   scontrol show job "$1" | grep -q 'JobState=COMPLETED' || { scontrol show job "$1" | grep -E 'JobState|Reason'; cat "$work/$2/logs/"* | tail -n 20; fail "$3"; }
-  same "$work/$2/results" "$3"
+  same "$work/$2/results" "$3 ($((SECONDS - began)) s)"
 }
 
 emit plain
-ended_well "$(submitted plain)" plain "two nodes"
+ended_well "$(submitted plain)" plain "two nodes, $cells cells"
+
+# Every part on both nodes at once, so that each cell is computed by two tasks; the second only adds tasks, the table is one.
+emit twice
+mkdir -p "$work/twice/logs"
+(cd "$work/twice" && . ./campaign.conf && sbatch --parsable --nodelist=n2 --array="1-$parts" --output=logs/again-%a.log array.sh >again)
+table=$(submitted twice --nodelist=n1)
+ended_well "$table" twice "every cell twice at once"
+while [ -n "$(squeue -h -j "$(cat "$work/twice/again")" 2>/dev/null)" ]; do sleep 1; done
+rm -rf "$work/twice/results/unfinished"
+same "$work/twice/results" "the same after the second run of every cell"
+
+# A disk that is full until a task has failed on it.
+emit full
+mkdir -p "$work/full/results"
+if mount -t tmpfs -o size=64m tmpfs "$work/full/results"; then
+  cat >"$work/starved" <<SH
+#!/bin/bash
+"$program" "\$@"; code=\$?
+[ \$code = 2 ] && { echo full >>"$work/was-full"; rm -f results/.balloon; }
+exit \$code
+SH
+  chmod +x "$work/starved"
+  sed -i "s|^program=.*|program='$work/starved'|" "$work/full/campaign.conf"
+  dd if=/dev/zero of="$work/full/results/.balloon" bs=64k 2>/dev/null || true
+  ended_well "$(submitted full)" full "a full disk"
+  [ -s "$work/was-full" ] || fail "no task found the disk full"
+  echo "$(wc -l <"$work/was-full") tasks had found the disk full"
+else
+  echo "skipped: no file system of its own can be mounted here"
+fi
 
 # A task is killed, then a node is lost while its tasks run.
 emit faults
