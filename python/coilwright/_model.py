@@ -281,7 +281,7 @@ def pattern_arguments(stated: PatternLike | Sequence[Any] | None) -> list[str | 
         return []
     if isinstance(stated, (Pattern, str, os.PathLike)):
         return [pattern_argument(stated)]
-    entries = list(stated)
+    entries: list[Any] = list(stated)
     if entries and all(isinstance(entry, (int, np.integer)) for entry in entries):
         return [pattern_argument(entries)]
     return [pattern_argument(entry) for entry in entries]

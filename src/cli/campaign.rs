@@ -1,4 +1,4 @@
-//! `campaign`: a grid of searches, in parts and with interruptions, with one table at the end.
+//! `campaign`: searches, built coils or the gyros of a fleet, in parts and with interruptions, with one table at the end.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -9,26 +9,36 @@ use clap::ValueEnum;
 use super::budget::parse_duration;
 use super::progress::StopFlag;
 use super::screen::{Screen, held, table};
+use super::watching::Watching;
 use super::{CliError, Ending};
 use crate::io::files::WriteError;
-use crate::io::json::campaign::{CampaignJson, WorkflowJson};
-use crate::io::read::campaign_file::{Cell, read_campaign};
-use crate::io::write::campaign_cells::{forget_unfinished, read_cell, state_folder, write_cell, write_table};
+use crate::io::json::campaign::{CampaignJson, CellJson, WorkflowJson};
+use crate::io::read::campaign_file::grid::{Search, SearchGrid};
+use crate::io::read::campaign_file::{Cell, Kind, Work, read_campaign};
+use crate::io::write::campaign_cells::{forget_unfinished, is_done, read_cell, state_folder, write_cell, write_table};
 use crate::io::write::checkpoint::{read_checkpoint, write_checkpoint};
 use crate::io::write::workflow::{self, Workflow};
+use crate::report::built_coils::{built_coils_page, built_coils_table};
 use crate::report::campaign::{campaign_page, charts, recommendations};
+use crate::report::fleet::fleet_page;
 use crate::search::Observer;
 use crate::search::anneal::rounds::Rounds;
 use crate::search::run::Halt;
-use crate::task::campaign::{Part, search_cell};
+use crate::task::campaign::coils::judge_block;
+use crate::task::campaign::gyros::{diagnose_gyro, measure_gyro};
+use crate::task::campaign::search::search_cell;
+use crate::task::campaign::{Part, Table};
 
-/// A grid of searches (coils, layer counts, classes, objectives, seeds)
+/// A grid of searches, a million built coils, or the gyros of a fleet, on one machine or many
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "A campaign file:\n  name = \"two coils\"\n  models = [\"paper-200m.toml\", \"coil-998m.toml\"]   # beside the campaign file\n  \
     layers = [12, 16]                                 # default: the models' own\n  \
     classes = [\"standard\", \"captive:1\", \"any\"]       # default: standard\n  \
     objectives = [\"worst-rate\", \"p95\"]               # default: worst-rate\n  seeds = [1, 2, 3]                                 # default: 1\n\n\
+    Other kinds:\n  kind = \"tolerance\"  built coils in blocks: models, patterns, samples, coils_per_cell, seed, limit_deg_per_h\n  \
+    kind = \"metrics\"    the data sheet of each [[gyro]] with its name and records, and what the batch has in common\n  \
+    kind = \"diagnose\"   the same with a diagnosis: model, [[gyro]] with name, records, holdout\n\n\
     A cell's identifier is made of what its result depends on: model, settings, version of the program. What is done is\n\
     skipped, so the same command goes on after an interruption, and after a change only what has changed is computed.\n\
     Parts (--shard, --cell) may run at the same time or on other machines; --merge then writes the table, the page and the\n\
@@ -120,7 +130,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     // Parts of one campaign may work in one folder at once; they write different files.
     let _held = if is_whole { Some(held(folder, "campaign")?) } else { None };
     let stop = StopFlag::listen();
-    let Some(searched) = search(&part, folder, arguments.checkpoint_every, &stop, screen)? else {
+    let Some(searched) = compute(&part, folder, arguments.checkpoint_every, &stop, screen)? else {
         let answer = part.answer(Some(folder), 0);
         screen.note(&missing_words(&answer));
         screen.answer(answer, |answer| text(answer, false))?;
@@ -155,7 +165,7 @@ fn emit(
         },
         program: &std::env::current_exe().map_err(message)?,
         campaign: &arguments.campaign,
-        models: &whole.campaign.models,
+        inputs: &whole.campaign.inputs(),
         ids: whole.cells.iter().map(|cell| cell.id.as_str()).collect(),
         estimated_s: whole.estimated_s(),
         part_s: arguments.job_time.as_secs_f64(),
@@ -181,8 +191,8 @@ fn emit(
     Ok(Ending::Done)
 }
 
-/// Searches the cells of a part that are not done; how many that were, none if a signal came first.
-fn search(
+/// Computes the cells of a part that are not done; how many that were, none if a signal came first.
+fn compute(
     part: &Part,
     folder: &Path,
     checkpoint_every: Duration,
@@ -190,37 +200,51 @@ fn search(
     screen: &Screen,
 ) -> Result<Option<usize>, CliError> {
     let progress = screen.progress("campaign", Some(part.cells.len() as u64));
-    let mut searched = 0;
+    let watching = Watching::quiet(screen);
+    let mut computed = 0;
     for (place, cell) in part.cells.iter().enumerate() {
-        if read_cell(folder, &cell.id).is_none() {
-            let mut watch = Watch::new(cell, folder, checkpoint_every, stop);
-            // A checkpoint that is damaged is none.
-            let saved = read_checkpoint(&watch.state_folder, &cell.id).unwrap_or(None);
-            let found = search_cell(part.campaign, cell, saved, &mut watch);
-            match (found, watch.fault) {
-                // Another process has the same cell and was faster.
-                _ if read_cell(folder, &cell.id).is_some() => {}
-                (_, Some(fault)) => return Err(fault.into()),
-                (None, None) => return Ok(None),
-                (Some(found), None) => write_cell(folder, &found)?,
+        if !is_done(folder, cell) {
+            match (&cell.work, &part.campaign.kind) {
+                (Work::Search(search), Kind::Search(grid)) => {
+                    let watch = Watch::new(cell, folder, checkpoint_every, stop);
+                    if !searched(grid, cell, search, watch)? {
+                        return Ok(None);
+                    }
+                }
+                (Work::Search(_), _) => {}
+                _ if stop.is_set() => return Ok(None),
+                (Work::Tolerance(block), _) => write_cell(folder, &judge_block(&cell.id, block))?,
+                (Work::Metrics(gyro), _) => write_cell(folder, &measure_gyro(&cell.id, gyro, &watching)?)?,
+                (Work::Diagnose(gyro), _) => write_cell(folder, &diagnose_gyro(&cell.id, gyro, &watching)?)?,
             }
-            searched += 1;
+            computed += 1;
         }
         progress.at(place as u64 + 1, "");
     }
-    Ok(Some(searched))
+    Ok(Some(computed))
+}
+
+/// Searches one cell; false if a signal came first.
+fn searched(grid: &SearchGrid, cell: &Cell, search: &Search, mut watch: Watch) -> Result<bool, CliError> {
+    // A checkpoint that is damaged is none.
+    let saved = read_checkpoint(&watch.state_folder, &cell.id).unwrap_or(None);
+    let found = search_cell(grid, &cell.id, search, saved, &mut watch);
+    match (found, watch.fault) {
+        // Another process has the same cell and was faster.
+        _ if is_done(watch.folder, cell) => {}
+        (_, Some(fault)) => return Err(fault.into()),
+        (None, None) => return Ok(false),
+        (Some(found), None) => write_cell(watch.folder, &found)?,
+    }
+    Ok(true)
 }
 
 /// The table of a whole campaign, unless something is missing.
 fn merged(whole: &Part, folder: &Path, searched: usize, screen: &Screen) -> Result<Ending, CliError> {
-    let answer = whole.answer(Some(folder), searched);
-    let is_complete = answer.missing.is_empty();
-    if is_complete {
-        let mut further = vec![("report.html".to_owned(), campaign_page(&answer))];
-        further.extend(
-            charts(&answer.results).into_iter().map(|(objective, svg)| (format!("summary-{objective}.svg"), svg)),
-        );
-        write_table(folder, &answer.results, &further)?;
+    let (answer, table) = whole.merged(folder, searched);
+    let is_complete = table.is_some();
+    if let Some(table) = table {
+        write_table(folder, &table.csv, &pages(&whole.campaign.kind, &answer, &table))?;
         forget_unfinished(folder);
         screen.note(&format!("wrote {}", folder.join("summary.csv").display()));
     } else {
@@ -228,6 +252,18 @@ fn merged(whole: &Part, folder: &Path, searched: usize, screen: &Screen) -> Resu
     }
     screen.answer(answer, |answer| text(answer, true))?;
     Ok(if is_complete { Ending::Done } else { Ending::No })
+}
+
+/// The page, and the pictures that stand beside it.
+fn pages(kind: &Kind, answer: &CampaignJson, table: &Table) -> Vec<(String, String)> {
+    let page = match (kind, &answer.fleet) {
+        (Kind::Search(_), _) => campaign_page(answer),
+        (_, Some(fleet)) => fleet_page(&answer.campaign, fleet, &table.gyros),
+        (_, None) => built_coils_page(answer),
+    };
+    let pictures = charts(&answer.results);
+    let pictures = pictures.into_iter().map(|(objective, svg)| (format!("summary-{objective}.svg"), svg));
+    std::iter::once(("report.html".to_owned(), page)).chain(pictures).collect()
 }
 
 /// More identifiers than these are in the JSON document only.
@@ -263,7 +299,7 @@ impl Observer for Watch<'_> {
     fn advanced(&mut self, search: &dyn Rounds) -> ControlFlow<Halt> {
         let is_stopped = self.stop.is_set();
         if is_stopped || self.last.elapsed() >= self.every {
-            if read_cell(self.folder, &self.cell.id).is_some() {
+            if read_cell::<CellJson>(self.folder, &self.cell.id).is_some() {
                 return ControlFlow::Break(Halt::Signal);
             }
             self.last = Instant::now();
@@ -278,15 +314,17 @@ impl Observer for Watch<'_> {
 }
 
 fn listed(answer: &CampaignJson) -> String {
+    let word = |value: &Option<String>| value.clone().unwrap_or_else(|| "–".to_owned());
     let rows = answer.cells.iter().map(|c| {
+        let whose = c.coils.map(|[first, last]| format!("coils {first} to {last}")).or_else(|| c.gyro.clone());
         vec![
             c.id.clone(),
             c.kind.clone(),
-            c.model.clone(),
-            c.layers.to_string(),
-            c.class.clone(),
-            c.objective.clone(),
-            c.seed.to_string(),
+            word(&c.model),
+            word(&c.layers.map(|layers| layers.to_string())),
+            whose.unwrap_or_else(|| word(&c.class)),
+            word(&c.objective),
+            word(&c.seed.map(|seed| seed.to_string())),
             format!("{:.1}", c.estimated_s),
             if c.done { "yes" } else { "no" }.to_owned(),
         ]
@@ -304,12 +342,19 @@ fn listed(answer: &CampaignJson) -> String {
 
 fn text(answer: &CampaignJson, is_whole: bool) -> String {
     let (cells, searched, missing) = (answer.cells.len(), answer.searched, answer.missing.len());
-    let mut head = format!("{}: {cells} cells, {searched} searched now, {missing} missing\n", answer.campaign);
+    let mut head = format!("{}: {cells} cells, {searched} computed now, {missing} missing\n", answer.campaign);
     if !answer.failed.is_empty() {
         head += &format!("{} have no result; the table says why: {}\n", answer.failed.len(), answer.failed.join(", "));
     }
     if !is_whole || missing > 0 {
         return head;
+    }
+    if let Some(fleet) = &answer.fleet {
+        return head + &fleet.sentences.iter().map(|sentence| format!("{sentence}\n")).collect::<String>();
+    }
+    if !answer.built_coils.is_empty() {
+        let (header, rows) = built_coils_table(&answer.built_coils);
+        return format!("{head}\n{}", table(&header, rows));
     }
     for sentence in recommendations(&answer.results) {
         head += &format!("{sentence}\n");

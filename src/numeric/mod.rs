@@ -10,6 +10,7 @@ pub mod maximise;
 pub mod noise;
 pub mod piecewise;
 pub mod pyramid;
+pub mod quantiles;
 pub mod span;
 pub mod spectrum;
 pub mod state_space;

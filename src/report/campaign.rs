@@ -279,6 +279,8 @@ mod tests {
             missing: Vec::new(),
             failed,
             results,
+            built_coils: Vec::new(),
+            fleet: None,
         };
         let page = campaign_page(&answer);
         assert!(page.contains("no turns") && page.contains("1 of 4 cells have no result"));

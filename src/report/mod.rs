@@ -1,12 +1,14 @@
 //! What a reader sees: charts, drawings and pages.
 
 pub mod allan;
+pub mod built_coils;
 pub mod campaign;
 pub mod comparison;
 pub mod compensation;
 pub mod cross_section;
 pub mod diagnosis;
 pub mod explorer;
+pub mod fleet;
 pub mod improvement;
 pub mod ladder;
 pub mod measurement;

@@ -1,19 +1,20 @@
-//! A campaign's cells: which belong together, what each costs, what a search of one finds, and the table of them all.
+//! A campaign's cells: which belong together, what each costs, what is found about one, and the table of them all.
 
 use std::path::Path;
 
-use crate::io::json::campaign::{CampaignJson, CellJson, CellStateJson};
-use crate::io::read::campaign_file::{CampaignFile, Cell, KIND};
+use crate::io::json::campaign::{BlockJson, CampaignJson, CellDocument, CellJson, CellStateJson, GyroJson};
+use crate::io::read::campaign_file::{CampaignFile, Cell, Kind, Work};
 use crate::io::write::campaign_cells::read_cell;
-use crate::pattern::windability::WindabilityClass;
-use crate::search::anneal::rounds::{DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Plan, Rules, State};
-use crate::search::answer::{Answer, Ended};
-use crate::search::cost::objective::Objective;
-use crate::search::run::RunError;
-use crate::search::{self, Observer};
-use crate::units::deg_per_h_from_rad_per_s;
+use crate::io::write::campaign_tables;
+use crate::rate::CoilModel;
 
 use super::TaskError;
+
+mod batch;
+pub mod coils;
+pub mod gyros;
+mod measures;
+pub mod search;
 
 /// Some of a campaign's cells, in the grid's order.
 #[derive(Debug, Clone)]
@@ -63,33 +64,131 @@ impl<'a> Part<'a> {
 
     /// The answer about these cells; `searched` of them were computed just now. Without a folder nothing is done.
     pub fn answer(&self, folder: Option<&Path>, searched: usize) -> CampaignJson {
-        let found: Vec<Option<CellJson>> =
-            self.cells.iter().map(|cell| folder.and_then(|folder| read_cell(folder, &cell.id))).collect();
-        let ids = |of: &dyn Fn(&Option<CellJson>) -> bool| -> Vec<String> {
-            self.cells.iter().zip(&found).filter(|(_, found)| of(found)).map(|(cell, _)| cell.id.clone()).collect()
-        };
-        CampaignJson {
+        let mut answer = CampaignJson {
             campaign: self.campaign.name.clone(),
-            cells: self.cells.iter().zip(&found).map(|(cell, found)| self.state(cell, found.is_some())).collect(),
+            cells: Vec::with_capacity(self.cells.len()),
             searched,
-            missing: ids(&Option::is_none),
-            failed: ids(&|found| found.as_ref().is_some_and(|found| found.failure.is_some())),
-            results: found.into_iter().flatten().collect(),
+            missing: Vec::new(),
+            failed: Vec::new(),
+            results: Vec::new(),
+            built_coils: Vec::new(),
+            fleet: None,
+        };
+        for cell in &self.cells {
+            let found = folder.and_then(|folder| Found::read(folder, cell));
+            match &found {
+                None => answer.missing.push(cell.id.clone()),
+                Some(found) if found.failure().is_some() => answer.failed.push(cell.id.clone()),
+                Some(_) => {}
+            }
+            answer.cells.push(self.state(cell, found.is_some()));
+            if let Some(Found::Search(found)) = found {
+                answer.results.push(*found);
+            }
         }
+        answer
+    }
+
+    /// The answer about a whole campaign, and its table if nothing is missing.
+    pub fn merged(&self, folder: &Path, searched: usize) -> (CampaignJson, Option<Table>) {
+        let mut answer = self.answer(Some(folder), searched);
+        if !answer.missing.is_empty() {
+            return (answer, None);
+        }
+        let mut gyros = Vec::new();
+        let table = match &self.campaign.kind {
+            Kind::Search(_) => campaign_tables::searches(&answer.results),
+            Kind::Tolerance(_) => {
+                answer.built_coils = coils::merged(folder, &self.cells);
+                campaign_tables::built_coils(&answer.built_coils)
+            }
+            Kind::Metrics(_) | Kind::Diagnose(_) => {
+                gyros = self.cells.iter().filter_map(|cell| read_cell::<GyroJson>(folder, &cell.id)).collect();
+                answer.fleet = Some(batch::of(self.campaign.kind.key(), &gyros));
+                campaign_tables::gyros(&gyros)
+            }
+        };
+        (answer, Some(Table { csv: table, gyros }))
     }
 
     fn state(&self, cell: &Cell, done: bool) -> CellStateJson {
-        CellStateJson {
+        let state = CellStateJson {
             id: cell.id.clone(),
-            kind: KIND.to_owned(),
-            model: cell.file.model.name.clone(),
-            layers: cell.file.model.coil.layers(),
-            class: cell.class.to_string(),
-            objective: cell.objective.key().to_owned(),
-            seed: cell.seed,
+            kind: self.campaign.kind.key().to_owned(),
+            model: None,
+            layers: None,
+            class: None,
+            objective: None,
+            seed: None,
+            coils: None,
+            gyro: None,
             done,
             estimated_s: estimated_s(self.campaign, cell),
+        };
+        let of = |model: &CoilModel| (Some(model.name.clone()), Some(model.coil.layers()));
+        match &cell.work {
+            Work::Search(search) => {
+                let (model, layers) = of(&search.file.model);
+                let (class, objective) = (search.class.to_string(), search.objective.key().to_owned());
+                let seed = Some(search.seed);
+                CellStateJson { model, layers, class: Some(class), objective: Some(objective), seed, ..state }
+            }
+            Work::Tolerance(block) => {
+                let (model, layers) = of(&block.file.model);
+                let coils = Some([block.coils.start + 1, block.coils.end]);
+                CellStateJson { model, layers, seed: Some(block.spec.seed), coils, ..state }
+            }
+            Work::Metrics(gyro) | Work::Diagnose(gyro) => {
+                let (model, layers) = gyro.file.as_ref().map_or((None, None), |file| of(&file.model));
+                CellStateJson { model, layers, gyro: Some(gyro.name.clone()), ..state }
+            }
         }
+    }
+}
+
+/// What a table is written from beside the answer.
+#[derive(Debug)]
+pub struct Table {
+    pub csv: Vec<u8>,
+    /// Of a fleet.
+    pub gyros: Vec<GyroJson>,
+}
+
+/// A cell's result.
+enum Found {
+    Search(Box<CellJson>),
+    Block(Box<BlockJson>),
+    Gyro(Box<GyroJson>),
+}
+
+impl Found {
+    fn read(folder: &Path, cell: &Cell) -> Option<Self> {
+        match &cell.work {
+            Work::Search(_) => read_cell(folder, &cell.id).map(|found| Found::Search(Box::new(found))),
+            Work::Tolerance(_) => read_cell(folder, &cell.id).map(|found| Found::Block(Box::new(found))),
+            Work::Metrics(_) | Work::Diagnose(_) => {
+                read_cell(folder, &cell.id).map(|found| Found::Gyro(Box::new(found)))
+            }
+        }
+    }
+
+    fn failure(&self) -> Option<&str> {
+        match self {
+            Found::Search(found) => found.failure(),
+            Found::Block(found) => found.failure(),
+            Found::Gyro(found) => found.failure(),
+        }
+    }
+}
+
+/// What a cell takes on one thread, to deal and to group cells by.
+fn estimated_s(campaign: &CampaignFile, cell: &Cell) -> f64 {
+    match (&campaign.kind, &cell.work) {
+        (Kind::Search(grid), Work::Search(search)) => search::estimated_s(grid, search),
+        (_, Work::Tolerance(block)) => coils::estimated_s(block),
+        (_, Work::Metrics(gyro) | Work::Diagnose(gyro)) => gyros::estimated_s(gyro),
+        // A search stands in a grid.
+        (_, Work::Search(_)) => 0.0,
     }
 }
 
@@ -97,116 +196,6 @@ impl<'a> Part<'a> {
 fn player(place: usize, count: usize) -> usize {
     let (turn, at) = (place / count, place % count);
     if turn.is_multiple_of(2) { at } else { count - 1 - at }
-}
-
-/// Rounds that searches take until so many were without a better pattern.
-const USUAL_ROUNDS: u64 = DEFAULT_PATIENCE + 2;
-
-/// What the shared starts and the refinement at the end take, in rounds.
-const FURTHER_ROUNDS: u64 = 7;
-
-/// Seconds of one thread for the fields and baselines, and for a move and layer.
-const BEGINNING_S: f64 = 0.3;
-const MOVE_S: f64 = 1.2e-8;
-const QUANTILE_MOVE_S: f64 = 4e-7;
-
-/// Beyond so many layers a search over permutations ends with bounds that take so many times what the moves take.
-const BOUNDED_LAYERS: usize = 16;
-const BOUNDS_OVER_MOVES: f64 = 10.0;
-
-/// What a cell takes on one thread, to deal and to group cells by: within a factor of two of what was measured for 8 to 24
-/// layers of the paper's coil (`results/campaigns`) but for the guaranteed rate, of which it says a third; elsewhere an order of
-/// magnitude.
-pub fn estimated_s(campaign: &CampaignFile, cell: &Cell) -> f64 {
-    let layers = cell.file.model.coil.layers();
-    let plan = plan(campaign, cell);
-    let rounds = plan.rules.rounds.min(USUAL_ROUNDS) + FURTHER_ROUNDS;
-    let moves = (rounds * plan.restarts_per_round as u64 * plan.moves_per_restart) as f64;
-    let move_s = if cell.objective == Objective::P95 { QUANTILE_MOVE_S } else { MOVE_S };
-    let is_bounded = cell.class != WindabilityClass::Standard && layers > BOUNDED_LAYERS;
-    BEGINNING_S + moves * layers as f64 * move_s * if is_bounded { BOUNDS_OVER_MOVES } else { 1.0 }
-}
-
-fn plan(campaign: &CampaignFile, cell: &Cell) -> Plan {
-    let layers = cell.file.model.coil.layers();
-    Plan {
-        seed: cell.seed,
-        restarts_per_round: DEFAULT_RESTARTS_PER_ROUND,
-        moves_per_restart: campaign
-            .moves_per_restart
-            .unwrap_or_else(|| cell.objective.default_moves_per_restart(layers)),
-        rules: Rules {
-            rounds: campaign.rounds.unwrap_or(u64::MAX),
-            patience: DEFAULT_PATIENCE,
-            moves: None,
-            target: None,
-        },
-        starts: Vec::new(),
-    }
-}
-
-/// Searches one cell; `saved` is where an interrupted search of it was. None if the observer ended it.
-///
-/// What a model itself does not permit is a result as well: the cell's failure.
-pub fn search_cell(
-    campaign: &CampaignFile,
-    cell: &Cell,
-    saved: Option<State>,
-    observer: &mut dyn Observer,
-) -> Option<CellJson> {
-    let request = search::Request {
-        model: &cell.file.model,
-        profiles: &cell.file.profiles,
-        tolerance: cell.file.tolerance.as_ref(),
-        objective: cell.objective,
-        class: cell.class,
-        plan: plan(campaign, cell),
-        saved,
-        former: None,
-        prove: false,
-        recommend: false,
-        cuts: false,
-        uncertain: &[],
-    };
-    match search::run(&request, observer) {
-        Ok(answer) => answer.filter(|answer| answer.ended != Ended::Signal).map(|answer| found(cell, &answer)),
-        Err(RunError::Judge(error)) => Some(CellJson { failure: Some(error.to_string()), ..nothing(cell) }),
-        // A state that does not fit is of no use.
-        Err(RunError::Resume) => search_cell(campaign, cell, None, observer),
-    }
-}
-
-fn found(cell: &Cell, answer: &Answer) -> CellJson {
-    let best = &answer.best;
-    CellJson {
-        worst_rate_deg_per_h: Some(deg_per_h_from_rad_per_s(best.worst.rate_rad_per_s.abs())),
-        objective_deg_per_h: (cell.objective != Objective::WorstPhase)
-            .then(|| deg_per_h_from_rad_per_s(best.objective_rad_per_s)),
-        improvement_over_qua: answer.improvement_over_qua,
-        evaluations: answer.evaluations,
-        stopped_by: answer.ended.key().to_owned(),
-        segments: best.pattern.segments().to_vec(),
-        ..nothing(cell)
-    }
-}
-
-fn nothing(cell: &Cell) -> CellJson {
-    CellJson {
-        id: cell.id.clone(),
-        kind: KIND.to_owned(),
-        model: cell.file.model.name.clone(),
-        layers: cell.file.model.coil.layers(),
-        windability: cell.class.to_string(),
-        objective: cell.objective.key().to_owned(),
-        seed: cell.seed,
-        worst_rate_deg_per_h: None,
-        objective_deg_per_h: None,
-        improvement_over_qua: None,
-        evaluations: 0,
-        stopped_by: "failure".to_owned(),
-        segments: Vec::new(),
-        failure: None,
-    }
 }
 
 #[cfg(test)]

@@ -119,7 +119,7 @@ fn the_pictures_of_the_physics_are_what_their_example_writes() {
     }
 }
 
-/// The campaign file is read by `tests/cli/schemas.rs`; everything else in TOML is part of a model file.
+/// Campaign files are read by `tests/cli`; everything else in TOML is part of a model file.
 #[test]
 fn every_piece_of_a_model_file_in_the_book_is_understood() {
     let coil = std::fs::read_to_string("examples/paper-200m.toml").unwrap();
@@ -127,7 +127,7 @@ fn every_piece_of_a_model_file_in_the_book_is_understood() {
     for entry in std::fs::read_dir("docs/src").unwrap().map(|e| e.unwrap().path()).filter(|p| p.is_file()) {
         let text = std::fs::read_to_string(&entry).unwrap();
         for block in text.split("```toml\n").skip(1).filter_map(|rest| rest.split("```").next()) {
-            if block.contains("models = ") {
+            if block.contains("models = ") || block.contains("[[gyro]]") {
                 continue;
             }
             let whole = format!("{coil}\n{block}");

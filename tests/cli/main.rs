@@ -3,6 +3,7 @@
 mod bad_input;
 mod browser;
 mod campaign;
+mod campaign_kinds;
 mod commands;
 mod compare;
 mod compensate;

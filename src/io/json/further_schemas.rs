@@ -5,26 +5,52 @@ use serde_json::{Value, json};
 use crate::search::cost::objective::Objective;
 
 use super::SCHEMA_VERSION;
+use super::campaign::KINDS;
 use super::schema::{described, name, table, with_dialect};
 
 /// The schema of a campaign file.
 pub fn campaign_schema() -> Value {
     let objectives: Vec<&str> = Objective::ALL.iter().map(|o| o.key()).chain(["guaranteed"]).collect();
     let list = |items: Value, description: &str| json!({ "type": "array", "minItems": 1, "items": items, "description": description });
-    with_dialect(table(
+    let text = || json!({ "type": "string" });
+    let gyro = table(
+        "a gyro of a fleet",
+        &["name", "records"],
+        json!({
+            "name": name("of the gyro"),
+            "records": list(text(), "record files, beside the campaign file"),
+            "holdout": list(text(), "diagnose: records that are only judged by"),
+            "model": described("string", "diagnose: in place of the fleet's"),
+        }),
+    );
+    let mut schema = table(
         "coilwright campaign file",
-        &["name", "models"],
+        &["name"],
         json!({
             "name": name("of the campaign"),
-            "models": list(json!({ "type": "string" }), "model files, beside the campaign file"),
-            "layers": list(json!({ "type": "integer", "minimum": 2 }), "in place of the models' own"),
-            "classes": list(json!({ "type": "string", "pattern": "^(standard|any|captive:[0-9]+)$" }), "without it: standard"),
-            "objectives": list(json!({ "enum": objectives }), "without it: worst-rate"),
-            "seeds": list(json!({ "type": "integer", "minimum": 0 }), "without it: 1"),
-            "rounds": { "type": "integer", "minimum": 1 },
-            "moves_per_restart": { "type": "integer", "minimum": 1 },
+            "kind": { "enum": KINDS, "description": "without it: search" },
+            "models": list(text(), "search, tolerance: model files, beside the campaign file"),
+            "layers": list(json!({ "type": "integer", "minimum": 2 }), "search: in place of the models' own"),
+            "classes": list(json!({ "type": "string", "pattern": "^(standard|any|captive:[0-9]+)$" }), "search; without it: standard"),
+            "objectives": list(json!({ "enum": objectives }), "search; without it: worst-rate"),
+            "seeds": list(json!({ "type": "integer", "minimum": 0 }), "search; without it: 1"),
+            "rounds": { "type": "integer", "minimum": 1, "description": "search" },
+            "moves_per_restart": { "type": "integer", "minimum": 1, "description": "search" },
+            "patterns": list(text(), "tolerance: windings or pattern files beside the campaign file; QUA always joins"),
+            "samples": { "type": "integer", "minimum": 2, "description": "tolerance: coils of each model; without it: the model's own" },
+            "coils_per_cell": { "type": "integer", "minimum": 1, "description": "tolerance; without it: 10000" },
+            "seed": { "type": "integer", "minimum": 0, "description": "tolerance: of the draws; without it: the model's own" },
+            "limit_deg_per_h": { "type": "number", "exclusiveMinimum": 0, "description": "tolerance: a coil whose worst case is larger is scrap" },
+            "model": described("string", "diagnose: of all gyros that state none"),
+            "gyro": list(gyro, "metrics, diagnose: the fleet"),
+            "average_s": { "type": "number", "exclusiveMinimum": 0, "description": "metrics: averaging time of the bias stability; without it: 10" },
+            "columns": described("string", "metrics, diagnose: as --columns"),
+            "bad_rows": { "enum": ["refuse", "skip"], "description": "metrics, diagnose; without it: refuse" },
+            "terms": list(text(), "diagnose: as --terms, or none"),
         }),
-    ))
+    );
+    schema["anyOf"] = json!([{ "required": ["models"] }, { "required": ["gyro"] }]);
+    with_dialect(schema)
 }
 
 /// The schema of the compensator that `compensate --export` writes.

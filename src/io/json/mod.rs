@@ -1,11 +1,13 @@
 //! JSON documents: mirror types of what commands answer, with the keys that scripts read.
 
+pub mod built_coils;
 pub mod campaign;
 pub mod comparison;
 pub mod diagnosis;
 pub mod effects;
 pub mod experiment;
 pub mod explore;
+pub mod fleet;
 pub mod further_schemas;
 pub mod improve;
 pub mod inputs;

@@ -4,10 +4,9 @@ use std::path::{Path, PathBuf};
 
 use crate::io::files::{WriteError, write_atomically};
 use crate::io::folder::Replacement;
-use crate::io::json::campaign::CellJson;
-use crate::io::table::Table;
+use crate::io::json::campaign::{BlockJson, CellDocument, CellJson, GyroJson};
+use crate::io::read::campaign_file::{Cell, Work};
 use crate::search::cost::objective::Objective;
-use crate::text::sink;
 
 use super::checkpoint::CHECKPOINT_FILE;
 
@@ -20,19 +19,28 @@ pub fn cell_path(folder: &Path, id: &str) -> PathBuf {
 }
 
 /// A cell's result, if it is there, whole and of this cell.
-pub fn read_cell(folder: &Path, id: &str) -> Option<CellJson> {
+pub fn read_cell<T: CellDocument>(folder: &Path, id: &str) -> Option<T> {
     let text = std::fs::read_to_string(cell_path(folder, id)).ok()?;
-    serde_json::from_str::<CellJson>(&text).ok().filter(|found| found.id == id)
+    serde_json::from_str::<T>(&text).ok().filter(|found| found.id() == id)
+}
+
+/// Whether a cell's result is there.
+pub fn is_done(folder: &Path, cell: &Cell) -> bool {
+    match &cell.work {
+        Work::Search(_) => read_cell::<CellJson>(folder, &cell.id).is_some(),
+        Work::Tolerance(_) => read_cell::<BlockJson>(folder, &cell.id).is_some(),
+        Work::Metrics(_) | Work::Diagnose(_) => read_cell::<GyroJson>(folder, &cell.id).is_some(),
+    }
 }
 
 /// Writes what a cell found, whole or not at all; then its interrupted state is of no more use.
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn write_cell(folder: &Path, found: &CellJson) -> Result<(), WriteError> {
-    let json = serde_json::to_string_pretty(found).expect("a cell's numbers are finite") + "\n";
-    write_atomically(&cell_path(folder, &found.id), json.as_bytes())?;
-    forget_state(folder, &found.id);
+pub fn write_cell<T: CellDocument>(folder: &Path, found: &T) -> Result<(), WriteError> {
+    let json = serde_json::to_string_pretty(found).expect("a cell's numbers can be written") + "\n";
+    write_atomically(&cell_path(folder, found.id()), json.as_bytes())?;
+    forget_state(folder, found.id());
     Ok(())
 }
 
@@ -57,9 +65,9 @@ pub fn forget_unfinished(folder: &Path) {
 ///
 /// # Errors
 /// Files that cannot be written.
-pub fn write_table(folder: &Path, results: &[CellJson], further: &[(String, String)]) -> Result<(), WriteError> {
+pub fn write_table(folder: &Path, table: &[u8], further: &[(String, String)]) -> Result<(), WriteError> {
     let mut files = Replacement::of(folder);
-    files.add("summary.csv", &summary_csv(results))?;
+    files.add("summary.csv", table)?;
     for (name, text) in further {
         files.add(name, text.as_bytes())?;
     }
@@ -70,44 +78,4 @@ pub fn write_table(folder: &Path, results: &[CellJson], further: &[(String, Stri
         Objective::ALL.iter().map(|objective| format!("summary-{}.svg", objective.key())).collect();
     let names: Vec<&str> = names.into_iter().chain(former.iter().map(String::as_str)).chain(["summary.svg"]).collect();
     files.commit(&names)
-}
-
-/// The table of all cells, in the grid's order.
-fn summary_csv(results: &[CellJson]) -> Vec<u8> {
-    let mut table = Table::with_header([
-        "cell",
-        "model",
-        "layers",
-        "class",
-        "objective",
-        "seed",
-        "worst_rate_deg_per_h",
-        "objective_deg_per_h",
-        "improvement_over_qua",
-        "evaluations",
-        "segments",
-        "id",
-        "failure",
-    ]);
-    for (index, found) in results.iter().enumerate() {
-        let segments: Vec<String> = found.segments.iter().map(ToString::to_string).collect();
-        let number = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
-        let cells = [
-            (index + 1).to_string(),
-            found.model.clone(),
-            found.layers.to_string(),
-            found.windability.clone(),
-            found.objective.clone(),
-            found.seed.to_string(),
-            number(found.worst_rate_deg_per_h),
-            number(found.objective_deg_per_h),
-            number(found.improvement_over_qua),
-            found.evaluations.to_string(),
-            segments.join(" "),
-            found.id.clone(),
-            found.failure.clone().unwrap_or_default(),
-        ];
-        table.row(cells.iter().map(|text| sink::Cell::text(text)));
-    }
-    table.into_bytes()
 }

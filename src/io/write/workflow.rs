@@ -44,7 +44,8 @@ pub struct Workflow<'a> {
     /// This program, where the parts find it.
     pub program: &'a Path,
     pub campaign: &'a Path,
-    pub models: &'a [PathBuf],
+    /// What the cells are made from.
+    pub inputs: &'a [PathBuf],
     pub ids: Vec<&'a str>,
     /// Of all cells, on one thread.
     pub estimated_s: f64,
@@ -94,7 +95,7 @@ impl Workflow<'_> {
             program: absolute(self.program),
             campaign: absolute(self.campaign),
             inputs: std::iter::once(self.campaign)
-                .chain(self.models.iter().map(PathBuf::as_path))
+                .chain(self.inputs.iter().map(PathBuf::as_path))
                 .map(absolute)
                 .collect(),
             address: format!("{}-{parts}", &sha256_hex(&self.ids.join("\n"))[..ID_DIGITS]),
@@ -167,7 +168,7 @@ mod tests {
 
     fn workflow(ids: usize, estimated_s: f64, engine: Engine) -> Workflow<'static> {
         let (program, campaign) = (Path::new("/bin/coilwright"), Path::new("/grid.toml"));
-        Workflow { engine, program, campaign, models: &[], ids: vec!["x"; ids], estimated_s, part_s: 600.0, threads: 1 }
+        Workflow { engine, program, campaign, inputs: &[], ids: vec!["x"; ids], estimated_s, part_s: 600.0, threads: 1 }
     }
 
     #[test]

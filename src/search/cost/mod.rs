@@ -4,6 +4,7 @@
 //! shop puts up with, and which samples are worth running on.
 
 pub mod columns;
+mod deviates;
 pub mod grid_margin;
 pub mod guaranteed;
 pub mod objective;

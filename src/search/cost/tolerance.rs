@@ -20,10 +20,9 @@
 //! # Source
 //! Shares one spread at a time: Saltelli et al., Global Sensitivity Analysis (2008), section 1.2.
 
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use std::ops::Range;
+
 use rayon::prelude::*;
-use statrs::distribution::{ContinuousCDF, Normal};
 use statrs::statistics::Statistics;
 use thiserror::Error;
 
@@ -32,6 +31,7 @@ use crate::effect::{self, Address, DeclaredEffect};
 use crate::pattern::Pattern;
 use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;
+use crate::search::cost::deviates::Deviates;
 use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
 use crate::search::cost::sampled_coils::quantile;
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
@@ -166,14 +166,6 @@ impl ToleranceSpec {
     }
 }
 
-/// One coil's standard normal deviates.
-#[derive(Debug, Clone)]
-struct Deviates {
-    turns: Vec<f64>,
-    /// In the order of [`Spread::ALL`]; the first is not used.
-    others: [f64; 6],
-}
-
 /// A factor is not varied below this: a coil with less is no coil.
 const LEAST_FACTOR: f64 = 0.1;
 
@@ -188,11 +180,24 @@ pub struct Coils<'a> {
 
 impl<'a> Coils<'a> {
     /// # Errors
-    /// No spread at all, a film's spread without a film, models that cannot be solved.
+    /// As [`Self::among`].
     pub fn new(
         model: &'a CoilModel,
         profiles: &'a ProfileSpec,
         spec: &'a ToleranceSpec,
+    ) -> Result<Self, ToleranceError> {
+        Self::among(model, profiles, spec, 0..spec.samples.max(2) as u64)
+    }
+
+    /// Some of all the coils that the seed draws, counted from 0: they are the same however many stand before and behind them.
+    ///
+    /// # Errors
+    /// No spread at all, a film's spread without a film, models that cannot be solved.
+    pub fn among(
+        model: &'a CoilModel,
+        profiles: &'a ProfileSpec,
+        spec: &'a ToleranceSpec,
+        coils: Range<u64>,
     ) -> Result<Self, ToleranceError> {
         let active = spec.active();
         if active.is_empty() {
@@ -203,13 +208,7 @@ impl<'a> Coils<'a> {
             return Err(ToleranceError::NoFilm);
         }
         let judge = Judge::new(model, profiles)?;
-        let mut random = ChaCha8Rng::seed_from_u64(spec.seed);
-        let normal = Normal::standard();
-        let mut draw = || normal.inverse_cdf(random.random::<f64>().max(f64::MIN_POSITIVE));
-        let layers = model.coil.layers();
-        let deviates = (0..spec.samples.max(2))
-            .map(|_| Deviates { turns: (0..layers).map(|_| draw()).collect(), others: std::array::from_fn(|_| draw()) })
-            .collect();
+        let deviates = Deviates::of(spec.seed, model.coil.layers(), coils);
         Ok(Self { model, spec, active, judge, deviates })
     }
 
@@ -229,6 +228,25 @@ impl<'a> Coils<'a> {
     /// The models of all coils, in their order.
     pub fn built(&self) -> impl IndexedParallelIterator<Item = Result<CoilModel, SearchError>> {
         self.deviates.par_iter().map(|coil| built(self.model, self.spec, &self.active, coil))
+    }
+
+    /// The worst case of each pattern as declared, without spreads.
+    ///
+    /// # Errors
+    /// A pattern of another layer count.
+    pub fn nominal_rad_per_s(&self, patterns: &[Pattern]) -> Result<Vec<f64>, SearchError> {
+        self.judge.worst(self.model, None, patterns)
+    }
+
+    /// The worst case of each pattern in every coil.
+    ///
+    /// # Shapes
+    /// Coils × patterns.
+    ///
+    /// # Errors
+    /// A pattern of another layer count.
+    pub fn worst_rad_per_s(&self, patterns: &[Pattern]) -> Result<Vec<Vec<f64>>, SearchError> {
+        self.worst(&self.active, patterns)
     }
 
     /// The worst case of each pattern in every coil, with some of the spreads only.
@@ -277,8 +295,8 @@ pub fn study(
 ) -> Result<Vec<Distribution>, ToleranceError> {
     let coils = Coils::new(model, profiles, spec)?;
     let active = &coils.active;
-    let nominal = coils.judge.worst(model, None, patterns)?;
-    let together = coils.worst(active, patterns)?;
+    let nominal = coils.nominal_rad_per_s(patterns)?;
+    let together = coils.worst_rad_per_s(patterns)?;
     let alone: Vec<Vec<Vec<f64>>> = if active.len() == 1 {
         vec![together.clone()]
     } else {
@@ -422,77 +440,4 @@ impl From<CoilError> for ToleranceError {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::coil::LayerLength;
-    use crate::pattern::classic::Classic;
-    use crate::search::cost::samples::tests::{model, profiles};
-
-    fn profile_spec() -> ProfileSpec {
-        let listed = profiles();
-        ProfileSpec { max_rate_k_per_s: 0.003, count: 0, segments: 1, duration_s: 100.0, seed: 1, listed }
-    }
-
-    fn exact() -> ToleranceSpec {
-        ToleranceSpec {
-            turns_per_layer_sd: 0.0,
-            radial_pitch_sd: 0.0,
-            midpoint_offset_sd_m: 0.0,
-            diffusivity_sd: 0.0,
-            film_sd: 0.0,
-            mismatch_sd: 0.0,
-            samples: 200,
-            seed: 3,
-            limit_rad_per_s: None,
-        }
-    }
-
-    #[test]
-    fn a_spread_of_the_mismatch_alone_has_the_quantiles_of_its_closed_form() {
-        // A pattern without any error of its own: the worst case of coil and mismatch is linear in |m| once m is large.
-        let model = model(8, LayerLength::Equal, &[]);
-        let spec = ToleranceSpec { mismatch_sd: 0.05, limit_rad_per_s: Some(1.0), ..exact() };
-        let qua = Classic::Qua.pattern(8).unwrap();
-        let found = &study(&model, &profile_spec(), &spec, &[qua]).unwrap()[0];
-        assert_eq!(found.variance_shares, vec![(Spread::Mismatch, 1.0)]);
-        assert_eq!(found.yield_share, Some(1.0));
-        assert!(found.median_rad_per_s() <= found.p95_rad_per_s() && found.p95_rad_per_s() <= found.p99_rad_per_s());
-        let fibre = model.coil.fibre();
-        let per_mismatch = fibre.refractive_index * fibre.path_per_k() * model.coil.length_m() * 0.003
-            / (4.0 * model.coil.mean_diameter_m());
-        // The settled part n κ m L Ṫ/4D is a lower bound of what a mismatch adds to |G(∞)|.
-        assert!(found.p95_rad_per_s() >= 1.5 * 0.05 * per_mismatch);
-    }
-
-    #[test]
-    fn the_same_seed_gives_the_same_coils_and_another_seed_others() {
-        let model = model(8, LayerLength::Actual, &["surface_film"]);
-        let spec = ToleranceSpec {
-            turns_per_layer_sd: 0.3,
-            radial_pitch_sd: 0.01,
-            diffusivity_sd: 0.1,
-            film_sd: 0.2,
-            midpoint_offset_sd_m: 0.02,
-            samples: 12,
-            ..exact()
-        };
-        let patterns = [Classic::Dip.pattern(8).unwrap(), Classic::Qua.pattern(8).unwrap()];
-        let of = |threads: usize, seed: u64| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| study(&model, &profile_spec(), &ToleranceSpec { seed, ..spec.clone() }, &patterns).unwrap())
-        };
-        assert_eq!(of(1, 3), of(2, 3));
-        assert_ne!(of(1, 3), of(1, 4));
-        let shares: f64 = of(1, 3)[0].variance_shares.iter().map(|s| s.1).sum();
-        assert!((shares - 1.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_film_that_is_not_there_cannot_spread_and_no_spread_is_no_study() {
-        let model = model(8, LayerLength::Equal, &[]);
-        let qua = [Classic::Qua.pattern(8).unwrap()];
-        let error = study(&model, &profile_spec(), &ToleranceSpec { film_sd: 0.1, ..exact() }, &qua).unwrap_err();
-        assert_eq!(error, ToleranceError::NoFilm);
-        assert_eq!(study(&model, &profile_spec(), &exact(), &qua).unwrap_err(), ToleranceError::NoSpread);
-    }
-}
+mod tests;

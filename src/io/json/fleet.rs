@@ -1,0 +1,99 @@
+//! What the gyros of a fleet have in common, and what is single.
+
+use serde::Serialize;
+
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct FleetJson {
+    /// "metrics" or "diagnose".
+    pub kind: String,
+    /// Those with a result.
+    pub gyros: usize,
+    /// What a reader should know first.
+    pub sentences: Vec<String>,
+    /// Numbers of the data sheets.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub measures: Vec<MeasureJson>,
+    /// How the bias goes with temperature in all gyros; null where fewer than two share temperatures.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub thermal_curve: Option<ThermalCurveJson>,
+    /// Verdict of each diagnosis, in the gyros' order.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub verdicts: Vec<VerdictJson>,
+    /// Effects that were found in any gyro; what most have first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub effects: Vec<FleetEffectJson>,
+}
+
+/// One number over the fleet.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MeasureJson {
+    pub key: String,
+    pub unit: String,
+    pub median: f64,
+    /// From gyro to gyro, by the median absolute deviation, as a Gaussian's standard deviation; of positive numbers as a factor.
+    pub spread: f64,
+    pub spread_is_factor: bool,
+    /// For numbers with a sign: the share of their mean square that one number for the whole batch would take away.
+    pub common_share: Option<f64>,
+    pub values: Vec<GyroValueJson>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GyroValueJson {
+    pub gyro: String,
+    pub value: f64,
+    /// Null for numbers that were not fitted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub standard_error: Option<f64>,
+    /// Further from the others than chance explains: in one batch of twenty any gyro would be, in any measure.
+    pub single: bool,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ThermalCurveJson {
+    /// Bias about each gyro's own mean.
+    pub points: Vec<ThermalPointJson>,
+    /// The share of the gyros' thermal mean square that the curve of the others takes away.
+    pub common_share: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ThermalPointJson {
+    pub temperature_c: f64,
+    pub bias_deg_per_h: f64,
+    pub gyros: usize,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VerdictJson {
+    pub gyro: String,
+    pub verdict: String,
+    pub effects: Vec<String>,
+    pub noise_floor_deg_per_h: f64,
+}
+
+/// An effect over the fleet.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FleetEffectJson {
+    pub kind: String,
+    /// Gyros whose diagnosis found it.
+    pub found_in: Vec<String>,
+    /// Gyros in which another effect was found that this one explains as well.
+    pub equivalent_in: Vec<String>,
+    /// Whether at least half of the gyros have it, found or as an equivalent.
+    pub common: bool,
+    pub parameters: Vec<FleetParameterJson>,
+}
+
+/// A fitted parameter of an effect over the gyros that have it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FleetParameterJson {
+    pub parameter: String,
+    pub unit: String,
+    /// Weighted by the gyros' errors and their spread.
+    pub mean: f64,
+    pub standard_error: f64,
+    /// From gyro to gyro beyond their errors, as a standard deviation.
+    pub spread: f64,
+    pub values: Vec<GyroValueJson>,
+}

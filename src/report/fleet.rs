@@ -1,0 +1,127 @@
+//! The page of a fleet: what its gyros have in common, what is single, and each gyro's own numbers.
+
+use maud::{Markup, html};
+
+use super::page::{figure, page};
+use super::plot::{Axis, Chart, Mark, Series};
+use crate::io::json::campaign::GyroJson;
+use crate::io::json::fleet::{FleetEffectJson, FleetJson, GyroValueJson, MeasureJson};
+
+/// More gyros than these do not fit one picture; the table has them all.
+const MOST_DRAWN: usize = 60;
+
+/// The whole page.
+pub fn fleet_page(name: &str, fleet: &FleetJson, gyros: &[GyroJson]) -> String {
+    let (common, others): (Vec<&String>, Vec<&String>) =
+        fleet.sentences.iter().partition(|s| s.starts_with("common: "));
+    let failed: Vec<&GyroJson> = gyros.iter().filter(|gyro| gyro.failure.is_some()).collect();
+    let body = html! {
+        h1 { (name) }
+        dl.facts {
+            dt { "gyros" } dd { (gyros.len()) ", " (fleet.gyros) " of them with a result" }
+            dt { "asked" } dd { (fleet.kind) }
+            dt { "program" } dd { (concat!("coilwright ", env!("CARGO_PKG_VERSION"))) }
+        }
+        h2 { "What the batch has in common" }
+        @for sentence in &common { p { (sentence.trim_start_matches("common: ")) } }
+        @if common.is_empty() { p { "Nothing that was looked for." } }
+        h2 { "What is single" }
+        @for sentence in &others { p { (sentence.trim_start_matches("single: ")) } }
+        @if others.is_empty() { p { "Nothing: no gyro stands apart." } }
+        @if !fleet.effects.is_empty() { (effects(&fleet.effects, fleet.gyros)) }
+        @if !fleet.verdicts.is_empty() { (verdicts(fleet)) }
+        @if let Some(curve) = &fleet.thermal_curve {
+            h2 { "Bias over temperature" }
+            @let points = curve.points.iter().map(|p| (p.temperature_c, p.bias_deg_per_h)).collect();
+            @let chart = Chart::new("The batch's bias over temperature").size(860, 240)
+                .x(Axis::linear("temperature [°C]")).y(Axis::linear("about each gyro's own mean [°/h]")).with(Series::points("batch", points));
+            (figure(&chart.svg(), &format!("Means over the gyros. The curve of the others takes {:.0} % of a gyro's own thermal mean square away.", 100.0 * curve.common_share)))
+        }
+        @if !fleet.measures.is_empty() { (measures(&fleet.measures)) }
+        h2 { "What failed" }
+        @if failed.is_empty() { p { "Nothing: every gyro has a result." } } @else {
+            div.scroll { table {
+                tr { th.word { "gyro" } th.word { "why" } }
+                @for gyro in failed { tr { td.word { (gyro.gyro) } td.word { (gyro.failure.as_deref().unwrap_or_default()) } } }
+            } }
+        }
+    };
+    page(name, &body)
+}
+
+fn effects(effects: &[FleetEffectJson], gyros: usize) -> Markup {
+    html! {
+        h2 { "Effects" }
+        div.scroll { table {
+            tr { th.word { "effect" } th { "found in" } th { "as an equal explanation in" } th.word { "parameters over the gyros that have it" } }
+            @for effect in effects { tr {
+                td.word { (effect.kind) }
+                td { (effect.found_in.len()) " of " (gyros) }
+                td { (effect.equivalent_in.len()) }
+                td.word { @for p in &effect.parameters {
+                    (format!("{} = {:.4} ± {:.4} {}, from gyro to gyro ± {:.4}", p.parameter, p.mean, p.standard_error, p.unit, p.spread)) br;
+                } }
+            } }
+        } }
+        @for effect in effects { @for p in effect.parameters.iter().filter(|p| p.values.len() > 1) {
+            (figure(
+                &values(&format!("{} of {}", p.parameter, effect.kind), &p.unit, p.mean, &p.values),
+                "Each gyro; the line is the batch's mean.",
+            ))
+        } }
+    }
+}
+
+fn verdicts(fleet: &FleetJson) -> Markup {
+    html! {
+        h2 { "Each gyro" }
+        div.scroll { table {
+            tr { th.word { "gyro" } th.word { "verdict" } th.word { "effects" } th { "noise floor °/h" } }
+            @for v in &fleet.verdicts { tr {
+                td.word { (v.gyro) } td.word { (v.verdict) } td.word { (v.effects.join(", ")) } td { (format!("{:.4}", v.noise_floor_deg_per_h)) }
+            } }
+        } }
+    }
+}
+
+fn measures(measures: &[MeasureJson]) -> Markup {
+    html! {
+        h2 { "Data sheets" }
+        div.scroll { table {
+            tr { th.word { "measure" } th { "median" } th { "from gyro to gyro" } th { "gyros" } th { "common share" } th.word { "single" } }
+            @for m in measures { tr {
+                td.word { (m.key) } td { (format!("{:.6} {}", m.median, m.unit)) }
+                td { (spread(m)) } td { (m.values.len()) }
+                td { (m.common_share.map_or_else(|| "–".to_owned(), |share| format!("{:.0} %", 100.0 * share))) }
+                td.word { (m.values.iter().filter(|v| v.single).map(|v| v.gyro.as_str()).collect::<Vec<_>>().join(", ")) }
+            } }
+        } }
+        @for m in measures { (figure(&values(&m.key, &m.unit, m.median, &m.values), "Each gyro; the line is the batch's median.")) }
+    }
+}
+
+fn spread(measure: &MeasureJson) -> String {
+    if measure.spread_is_factor {
+        format!("a factor of {:.3}", measure.spread)
+    } else {
+        format!("± {:.6} {}", measure.spread, measure.unit)
+    }
+}
+
+/// One lying bar a gyro, those that stand apart in a colour of their own.
+fn values(title: &str, unit: &str, usual: f64, values: &[GyroValueJson]) -> String {
+    let drawn = &values[..values.len().min(MOST_DRAWN)];
+    let of = |single: bool| -> Vec<f64> {
+        drawn.iter().map(|v| if v.single == single { v.value } else { f64::NAN }).collect()
+    };
+    let mut chart = Chart::new(title.to_owned())
+        .size(860, 240)
+        .x(Axis::linear(format!("[{unit}]")))
+        .categories(drawn.iter().map(|v| v.gyro.clone()))
+        .with(Series::bars("as the batch", &of(false)))
+        .mark(Mark::vertical("batch", usual));
+    if drawn.iter().any(|v| v.single) {
+        chart = chart.with(Series::bars("apart", &of(true)));
+    }
+    chart.svg()
+}

@@ -1,0 +1,106 @@
+//! A campaign's gyros: what each costs, and what its records say.
+
+use std::fs::File;
+
+use crate::io::fault::Faults;
+use crate::io::json::campaign::GyroJson;
+use crate::io::json::inputs::RecordInputJson;
+use crate::io::read::campaign_file::Kind;
+use crate::io::read::campaign_file::fleet::{Gyro, StatedFile};
+use crate::task::measurement::GrossErrors;
+use crate::task::metrics::{self, Settings, measure_stream};
+use crate::task::{Observer, TaskError};
+
+/// Seconds of one thread for a byte of a record: metrics of a million rows take about two seconds.
+const METRICS_BYTE_S: f64 = 5e-8;
+/// Seconds of one thread for a diagnosis, of a few hundred rows or of thousands.
+const DIAGNOSIS_S: f64 = 60.0;
+
+pub(super) fn estimated_s(gyro: &Gyro) -> f64 {
+    let size = |file: &StatedFile| std::fs::metadata(&file.path).map_or(0, |found| found.len());
+    let bytes: u64 = gyro.records.iter().chain(&gyro.holdout).map(size).sum();
+    bytes as f64 * METRICS_BYTE_S + if gyro.file.is_some() { DIAGNOSIS_S } else { 0.0 }
+}
+
+fn nothing(id: &str, kind: &str, gyro: &Gyro) -> GyroJson {
+    let (id, kind, gyro) = (id.to_owned(), kind.to_owned(), gyro.name.clone());
+    GyroJson { id, kind, gyro, metrics: None, diagnosis: None, failure: None }
+}
+
+/// The data sheet of one gyro. What its records do not permit is a result as well: its failure.
+///
+/// # Errors
+/// A record that cannot be opened.
+pub fn measure_gyro(id: &str, gyro: &Gyro, observer: &dyn Observer) -> Result<GyroJson, TaskError> {
+    let settings = Settings { average_s: gyro.settings.average_s, gross_errors: GrossErrors::Keep };
+    let mut measured = Vec::with_capacity(gyro.records.len());
+    for file in &gyro.records {
+        let unreadable = |e| Faults::of_file(file.path.display().to_string(), format!("cannot be read: {e}"));
+        let source = File::open(&file.path).map_err(unreadable)?;
+        let input =
+            RecordInputJson { file: file.stated.clone(), sha256: file.sha256.clone(), role: "measured".to_owned() };
+        match measure_stream(input, &file.stated, source, &gyro.format, &settings, observer) {
+            Ok(found) => measured.push(found),
+            Err(error) => return Ok(failed(id, Kind::METRICS, gyro, &error)),
+        }
+    }
+    Ok(match metrics::document(measured) {
+        Ok(metrics) => GyroJson { metrics: Some(metrics), ..nothing(id, Kind::METRICS, gyro) },
+        Err(error) => failed(id, Kind::METRICS, gyro, &error),
+    })
+}
+
+fn failed(id: &str, kind: &str, gyro: &Gyro, error: &TaskError) -> GyroJson {
+    // Drawn faults are several lines; the first says what.
+    let words = error.to_string();
+    let first = words.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
+    GyroJson { failure: Some(first), ..nothing(id, kind, gyro) }
+}
+
+#[cfg(feature = "report")]
+mod diagnosed {
+    use super::{GyroJson, Kind, Observer, TaskError, failed, nothing};
+    use crate::diagnose::Terms;
+    use crate::io::files::read_text;
+    use crate::io::read::campaign_file::fleet::{Gyro, StatedFile};
+    use crate::io::read::record_file::parse_record_as;
+    use crate::task::diagnose::{Request, run};
+    use crate::task::measurement::Measurement;
+
+    /// The diagnosis of one gyro. What its records do not permit is a result as well: its failure.
+    ///
+    /// # Errors
+    /// A record that cannot be opened; a gyro without a model.
+    pub fn diagnose_gyro(id: &str, gyro: &Gyro, observer: &dyn Observer) -> Result<GyroJson, TaskError> {
+        let Some(file) = &gyro.file else { return Err(TaskError::PatternMissing) };
+        let taken = |files: &[StatedFile]| -> Result<Vec<(String, String)>, TaskError> {
+            files.iter().map(|file| Ok((file.stated.clone(), read_text(&file.path)?))).collect()
+        };
+        let (records, holdout) = (taken(&gyro.records)?, taken(&gyro.holdout)?);
+        let sha256 = |files: &[StatedFile]| files.iter().map(|file| file.sha256.clone()).collect::<Vec<_>>();
+        let understood = |texts: &[(String, String)], sha256: Vec<Option<String>>| {
+            let measurement = |((stated, text), sha256): (&(String, String), Option<String>)| {
+                let read = parse_record_as(stated, text, &gyro.format)?;
+                let (skipped_rows, remarks) = (read.skipped_rows, read.remarks);
+                Ok(Measurement { record: read.record, file: stated.clone(), sha256, skipped_rows, remarks })
+            };
+            texts.iter().zip(sha256).map(measurement).collect::<Result<Vec<_>, TaskError>>()
+        };
+        let found = understood(&records, sha256(&gyro.records)).and_then(|measurements| {
+            let holdout = understood(&holdout, sha256(&gyro.holdout))?;
+            let terms = match gyro.settings.terms.as_deref() {
+                None => Terms::All,
+                Some([none]) if none == "none" => Terms::None,
+                Some([all]) if all == "all" => Terms::All,
+                Some(words) => Terms::Among(words),
+            };
+            run(&Request { holdout: &holdout, terms, ..Request::new(file, &measurements) }, observer)
+        });
+        Ok(match found {
+            Ok(answer) => GyroJson { diagnosis: Some(answer.document), ..nothing(id, Kind::DIAGNOSE, gyro) },
+            Err(error) => failed(id, Kind::DIAGNOSE, gyro, &error),
+        })
+    }
+}
+#[cfg(feature = "report")]
+pub use diagnosed::diagnose_gyro;
