@@ -18,7 +18,7 @@ use super::damage::damaged;
 use super::ways::{COMMANDS, Way};
 
 /// So long in every run of the tests.
-const USUAL: Duration = Duration::from_secs(40);
+const USUAL: Duration = Duration::from_secs(25);
 /// Files that are tried at least, whatever the time: each way twice.
 const LEAST_ROUNDS: usize = 1;
 const MOST_FAILURES: usize = 20;
@@ -53,6 +53,8 @@ const WAYS: &[(&str, &[&str])] = &[
     ("model.toml", &["compensate", "model.toml", "record.csv", "--fit", "record.csv", "--export", "out/embedded"]),
     ("model.toml", &["diagnose", "model.toml", "record.csv", "--format", "json", "-o", "out"]),
     ("model.toml", &["extend", "model.toml", "--effect", "spool_mass", "-o", "out/extended.toml"]),
+    ("model.toml", &["explore", "model.toml", "-o", "out/explorer.html"]),
+    ("pattern.toml", &["explore", "model.toml", "pattern.toml", "-o", "out/explorer.html"]),
     ("model.toml", &["report", "run"]),
     ("model.toml", &["trim", "model.toml", "record.csv", "--format", "json"]),
     ("record.csv", &["trim", "model.toml", "record.csv"]),
