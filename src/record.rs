@@ -219,6 +219,21 @@ impl Record {
         Ok(record)
     }
 
+    /// Some rows in a row.
+    ///
+    /// # Errors
+    /// Too few rows left.
+    pub fn stretch(&self, rows: std::ops::Range<usize>) -> Result<Self, RecordError> {
+        let keep = |values: &[f64]| values[rows.clone()].to_vec();
+        let mut record =
+            Self::new(self.name.clone(), keep(&self.times_s), keep(&self.temperature_k), keep(&self.rate_rad_per_s))?;
+        record.inner_k = self.inner_k.as_deref().map(keep);
+        record.ambient_k = self.ambient_k.as_deref().map(keep);
+        record.channels =
+            self.channels.iter().map(|c| Channel { name: c.name.clone(), values: keep(&c.values) }).collect();
+        Ok(record)
+    }
+
     /// Intervals between rows that are at least twice the usual one: the row after the gap and its length.
     pub fn gaps(&self) -> Vec<(usize, f64)> {
         let usual_s = self.interval_s();

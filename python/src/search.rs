@@ -212,7 +212,7 @@ pub fn optimise(
     diagnosis: Option<String>,
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Answered> {
-    let file = Arc::clone(&model.file);
+    let file = Arc::new((*model.file).clone().for_search());
     let diagnosis =
         diagnosis.map(|text| serde_json::from_str::<DiagnosisJson>(&text)).transpose().map_err(|error| {
             let message = format!("line {}: cannot be understood: {error}; give what diagnose answers", error.line());

@@ -8,7 +8,7 @@ mod tests {
     use crate::chamber::filter::{self, Move, System};
     use crate::chamber::point::{CoilSide, Observed};
     use crate::chamber::prior::Quantity;
-    use crate::chamber::series::Series;
+    use crate::chamber::series::{Origin, Series};
     use crate::chamber::system::{Numbers, system};
     use crate::chamber::{Assumption, Chamber, Effort, Free, Input};
     use crate::coil::{Coil, CoilSpec, Fibre, LayerLength};
@@ -167,7 +167,7 @@ mod tests {
     }
 
     fn observed(model: &CoilModel, record: &Record) -> (Series, f64) {
-        (Series::new(record, model.rate_mean_s, 30.0), 294.0)
+        (Series::new(record, model.rate_mean_s, 30.0, Origin::Measured), 294.0)
     }
 
     fn check(assumed: &Assumption, averaged: bool) {
@@ -179,7 +179,7 @@ mod tests {
         series.rows[9].kink = 1e-6;
         assert_eq!(series.averaged > 1, averaged);
         let numbers = Numbers::medians(&series);
-        let seen = Observed { record, series, channels: Vec::new(), mean_k };
+        let seen = Observed { record, series, channels: Vec::new(), mean_k, blind: false };
         let side = CoilSide::new(assumed, numbers.get(Quantity::Film), 4, &seen).unwrap();
         let system = system(&side.parts(assumed), &numbers, &seen.series);
         let values = filter::Values { of: seen.series.values.clone() };
@@ -253,7 +253,7 @@ mod tests {
         let times_s: Vec<f64> = (0..48).map(|i| 10.0 * f64::from(i) + 2.9 * (1.7 * f64::from(i * i)).sin()).collect();
         let uneven =
             Record::new("uneven", times_s, even.temperature_k().to_vec(), even.rate_rad_per_s().to_vec()).unwrap();
-        let series = Series::new(&uneven, 10.0, 30.0);
+        let series = Series::new(&uneven, 10.0, 30.0, Origin::Measured);
         // A mean over ten seconds is one, however soon the next row comes.
         assert!(series.overlaps && series.shapes.iter().any(|s| s.window_s == 10.0 && s.slot == 1));
         check_on(&Assumption::new(model(Vec::new()), dip()), &uneven, false);
@@ -286,7 +286,7 @@ mod tests {
         let assumed = Assumption::new(model(Vec::new()), dip());
         let (series, mean_k) = observed(&assumed.model, &record);
         let numbers = Numbers::medians(&series);
-        let mut seen = Observed { record: &record, series, channels: Vec::new(), mean_k };
+        let mut seen = Observed { record: &record, series, channels: Vec::new(), mean_k, blind: false };
         let side = CoilSide::new(&assumed, 25.0, 5, &seen).unwrap();
         let values = filter::Values { of: seen.series.values.clone() };
         let system = system(&side.parts(&assumed), &numbers, &seen.series);

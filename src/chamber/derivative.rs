@@ -30,6 +30,19 @@ pub(super) struct Derivatives {
 }
 
 impl Derivatives {
+    /// As [`Self::add_to`] for values without noise, whose variances say nothing.
+    pub fn add_values_to(&self, base: &[Innovation], score: &mut DVector<f64>, information: &mut DMatrix<f64>) {
+        let sum = |a: &[f64], b: &mut dyn Iterator<Item = f64>| -> f64 {
+            a.iter().zip(b).zip(base).map(|((a, b), i)| a * b / i.variance).sum()
+        };
+        for (&p, column) in self.parameters.iter().zip(&self.columns) {
+            score[p] -= sum(&column.value, &mut base.iter().map(|b| b.value));
+            for (&q, other) in self.parameters.iter().zip(&self.columns) {
+                information[(p, q)] += sum(&column.value, &mut other.value.iter().copied());
+            }
+        }
+    }
+
     pub fn add_to(&self, base: &[Innovation], score: &mut DVector<f64>, information: &mut DMatrix<f64>) {
         let weighted: Vec<(Vec<f64>, Vec<f64>)> = self
             .columns

@@ -108,11 +108,11 @@ pub struct Innovation {
 
 /// Gains and covariance of a row; rows with frozen gains share one.
 #[derive(Debug, Clone)]
-struct Gains {
+pub(super) struct Gains {
     /// Row-major, states: P before the measurements.
-    covariance: Vec<f64>,
+    pub covariance: Vec<f64>,
     /// A gain a measurement, one after another, and 1/S.
-    gain: Vec<f64>,
+    pub gain: Vec<f64>,
 }
 
 /// What a forward pass leaves.
@@ -120,11 +120,11 @@ struct Gains {
 pub(super) struct Trace {
     /// In the order of rows, of each its measurements.
     pub innovations: Vec<Innovation>,
-    gains: Vec<Gains>,
+    pub gains: Vec<Gains>,
     /// Of each row its gains; only where they were to be kept.
-    gains_of: Vec<u32>,
+    pub gains_of: Vec<u32>,
     /// Row-major rows × states: before the measurements.
-    means: Vec<f64>,
+    pub means: Vec<f64>,
     pub log_likelihood: f64,
     /// Rows for which the covariance was computed.
     pub thawed: usize,

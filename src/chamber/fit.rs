@@ -113,7 +113,7 @@ impl Chamber<'_> {
             .collect()
     }
 
-    fn parameters(
+    pub(super) fn parameters(
         &self,
         assumed: &Assumption,
         free: &[Free],
@@ -137,7 +137,7 @@ impl Chamber<'_> {
     }
 
     /// Smooths the courses of records for which the model needs one, or that have none.
-    fn settle_courses(
+    pub(super) fn settle_courses(
         &self,
         assumed: &Assumption,
         numbers: &[Numbers],

@@ -28,6 +28,7 @@
 //! Durbin and Koopman, Time Series Analysis by State Space Methods (2012), chapters 4 and 7 (filter, smoother, score); Kass
 //! and Raftery, J. Am. Stat. Assoc. 90 (1995) 773 (Laplace's evidence); Rao, Proc. Camb. Phil. Soc. 44 (1948) 50 (score test).
 
+mod causal;
 mod course;
 #[cfg(test)]
 mod dense;
@@ -36,11 +37,15 @@ mod discretise;
 mod filter;
 mod fit;
 mod fitted;
+mod foreseen;
 mod known;
+mod learned;
+mod long;
 mod noise;
 mod parameter;
 mod point;
 pub mod prior;
+mod readings;
 mod score;
 mod scorer;
 mod series;
@@ -57,17 +62,21 @@ use crate::rate::{CoilModel, RateError};
 use crate::record::Record;
 use crate::thermal::ThermalError;
 use point::Observed;
-use series::Series;
+use series::{Origin, Series};
 use system::driven_by_air;
 
+pub use causal::{Causal, Surroundings};
 pub use course::Prediction;
 pub use filter::Innovation;
 pub use fit::{Effort, Fit};
 pub use fitted::{EffectEstimate, EffectEstimates};
+pub use foreseen::Hold;
 pub use known::Reference;
+pub use learned::{Estimate, Learned};
 pub use noise::{Noise, Remedy};
 pub use parameter::{Free, Parameter, Place, Scale};
-pub use prior::{PRIORS, Prior, Quantity};
+pub use prior::{BREAK_K2_PER_S2, BREAKS_PER_S, PRIORS, Prior, Quantity};
+pub use readings::Bend;
 pub use score::{Column, Direction, Scores};
 pub use scorer::{Scored, Scorer};
 pub use states::RowStates;
@@ -140,6 +149,20 @@ impl<'a> Chamber<'a> {
     /// # Errors
     /// A model that cannot be solved; records whose temperature does not change or whose rate has no noise.
     pub fn new(model: &CoilModel, records: &[&'a Record]) -> Result<Self, ChamberError> {
+        let chamber = Self::made(model, records, Origin::Measured)?;
+        chamber.checked()?;
+        Ok(chamber)
+    }
+
+    /// Rates without noise are no measurements.
+    fn checked(&self) -> Result<(), ChamberError> {
+        match self.observed.iter().find(|o| !(o.series.noise_floor_rad_per_s > 0.0)) {
+            Some(silent) => Err(ChamberError::NoNoise { record: silent.record.name().to_owned() }),
+            None => Ok(()),
+        }
+    }
+
+    fn made(model: &CoilModel, records: &[&'a Record], origin: Origin) -> Result<Self, ChamberError> {
         let path = model.heat_path()?;
         let (driven, _) = driven_by_air(&path, USUAL_FILM_W_PER_M2_K);
         let thickness_m = path.shape.layers as f64 * path.shape.radial_pitch_m;
@@ -153,12 +176,9 @@ impl<'a> Chamber<'a> {
             if !(high > low) {
                 return Err(ChamberError::Constant { record: record.name().to_owned(), range_k: high - low });
             }
-            let series = Series::new(record, model.rate_mean_s, pack_s);
-            if !(series.noise_floor_rad_per_s > 0.0) {
-                return Err(ChamberError::NoNoise { record: record.name().to_owned() });
-            }
+            let series = Series::new(record, model.rate_mean_s, pack_s, origin);
             let channels = record.channels().iter().map(|c| c.name.clone()).collect();
-            observed.push(Observed { record, mean_k: 0.5 * (low + high), series, channels });
+            observed.push(Observed { record, mean_k: 0.5 * (low + high), series, channels, blind: false });
         }
         let modes = if path.extent == crate::thermal::Extent::HalfSpace {
             HALF_SPACE_MODES

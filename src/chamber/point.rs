@@ -34,6 +34,8 @@ pub(super) struct Observed<'a> {
     pub series: Series,
     pub channels: Vec<String>,
     pub mean_k: f64,
+    /// Its rates are not measurements.
+    pub blind: bool,
 }
 
 impl CoilSide {
@@ -142,11 +144,16 @@ impl CoilSide {
         Ok(rates)
     }
 
+    /// Whether a course is one of this side's outputs.
+    pub fn fits(&self, course: &Reference) -> bool {
+        course.outputs == self.reduced.outputs
+    }
+
     /// The course that states and known changes make.
     ///
     /// # Errors
     /// A conductivity that is not positive.
-    fn reference(
+    pub fn reference(
         &self,
         assumed: &Assumption,
         observed: &Observed,
@@ -289,8 +296,10 @@ pub(super) fn quantities(assumed: &Assumption, observed: &Observed) -> Result<Ve
     if observed.record.ambient_k().is_some() {
         all.push(Quantity::AmbientNoise);
     }
+    if !observed.blind {
+        all.extend([Quantity::RateNoise, Quantity::WanderShare, Quantity::WanderTime]);
+    }
     all.extend([
-        Quantity::RateNoise,
         Quantity::RestNoise,
         Quantity::BendNoise,
         Quantity::TurbulenceSize,
@@ -298,8 +307,6 @@ pub(super) fn quantities(assumed: &Assumption, observed: &Observed) -> Result<Ve
         Quantity::RippleSize,
         Quantity::RipplePeriod,
         Quantity::RippleCoherence,
-        Quantity::WanderShare,
-        Quantity::WanderTime,
         Quantity::StartSlope,
     ]);
     if assumed.drift {

@@ -96,6 +96,36 @@ const fn relative(quantity: Quantity, median: f64, deviation: f64, reason: &'sta
 }
 
 impl Quantity {
+    /// Its key in files, unit and all.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Film => "surface_film_w_per_m2_k",
+            Self::ReadingNoise => "reading_noise_k",
+            Self::InnerNoise => "inner_noise_k",
+            Self::AmbientNoise => "ambient_noise_k",
+            Self::RateNoise => "rate_noise_deg_per_h",
+            Self::RestNoise => "rest_noise_k2_per_s3",
+            Self::BendNoise => "bend_noise_k2_per_s3",
+            Self::TurbulenceSize => "turbulence_k",
+            Self::TurbulenceTime => "turbulence_s",
+            Self::RippleSize => "ripple_k",
+            Self::RipplePeriod => "ripple_period_s",
+            Self::RippleCoherence => "ripple_coherence_s",
+            Self::WanderShare => "wander_per_white_noise",
+            Self::WanderTime => "wander_s",
+            Self::DriftSize => "drift_deg_per_h",
+            Self::DriftTime => "drift_s",
+            Self::CycleSize => "cycle_deg_per_h",
+            Self::CyclePeriod => "cycle_period_s",
+            Self::StartSlope => "start_slope_k_per_s",
+        }
+    }
+
+    /// Whether it is an angular rate, in SI rad/s.
+    pub fn is_rate(self) -> bool {
+        matches!(self, Self::RateNoise | Self::DriftSize | Self::CycleSize)
+    }
+
     pub fn prior(self) -> &'static Prior {
         let found = PRIORS.iter().find(|p| p.quantity == self);
         found.unwrap_or(&PRIORS[0])
@@ -106,6 +136,11 @@ impl Quantity {
         self == Quantity::Film
     }
 }
+
+/// How often a chamber's air breaks from one ramp into another, and the mean square of the change of its slope
+/// \[(K/s)²\]: every fifty minutes by 2 K/min, so much wider than one record shows that the next one breaks within it.
+pub const BREAKS_PER_S: f64 = 1.0 / 3000.0;
+pub const BREAK_K2_PER_S2: f64 = 1e-3;
 
 /// Standard deviation of the pack's first temperature about the first reading \[K\].
 pub(super) const START_K: f64 = 1.0;

@@ -41,6 +41,14 @@ pub(super) struct Series {
     shape_of: Vec<u16>,
 }
 
+/// Where a record comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Origin {
+    Measured,
+    /// Worked out, without noise.
+    Planned,
+}
+
 /// How a row is measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Shape {
@@ -75,14 +83,14 @@ const LEVELS: f64 = 8.0;
 
 impl Series {
     /// `pack_s`: the shortest time in which the pack evens out that a row should resolve.
-    pub fn new(record: &Record, rate_mean_s: f64, pack_s: f64) -> Self {
+    pub fn new(record: &Record, rate_mean_s: f64, pack_s: f64, origin: Origin) -> Self {
         let mut columns: [Vec<f64>; MEASURED] = [
             record.temperature_k().to_vec(),
             record.inner_k().map(<[f64]>::to_vec).unwrap_or_default(),
             record.ambient_k().map(<[f64]>::to_vec).unwrap_or_default(),
             record.rate_rad_per_s().to_vec(),
         ];
-        let gross = record.gross_errors();
+        let gross = if origin == Origin::Measured { record.gross_errors() } else { Vec::new() };
         for error in &gross {
             columns[if error.column == "rate" { RATE } else { 0 }][error.row] = f64::NAN;
         }

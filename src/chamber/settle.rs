@@ -9,6 +9,7 @@ use super::filter::{self, RATE};
 use super::fit::{Effort, Fit};
 use super::point::{BLIND_RAD2_PER_S2, CoilSide, run_kept};
 use super::prior::{GROSS_FACTOR, GROSS_SHARE, KINKS_PER_ROW, Quantity};
+use super::readings::Bend;
 use super::system::system;
 use super::{Assumption, Chamber, ChamberError};
 
@@ -50,18 +51,7 @@ impl<'a> Chamber<'a> {
     }
 
     fn looked_through(&mut self, mut fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
-        for _ in 0..GROSS_ROUNDS {
-            let mut found = 0;
-            for &r in records {
-                let gross = self.gross(&fit, r)?;
-                found += gross.len();
-                gross.iter().for_each(|&(row, m)| self.observed[r].series.leave_out(row, m));
-            }
-            if found == 0 {
-                break;
-            }
-            fit = self.fit(&fit.assumed.clone(), &fit.free.clone(), records, Some(&fit), Effort::SHORT)?;
-        }
+        fit = self.without_gross_errors(fit, records)?;
         for &r in records {
             // Either the air bends wherever readings do, or it is straight but for its kinks, which must be worth being
             // looked for: the record itself says which, by itself.
@@ -78,6 +68,26 @@ impl<'a> Chamber<'a> {
                     fit.numbers[r] = curved.numbers[r];
                 }
             }
+        }
+        Ok(fit)
+    }
+
+    /// A fit to records without what it says are gross errors.
+    ///
+    /// # Errors
+    /// As [`Chamber::fit`].
+    fn without_gross_errors(&mut self, mut fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
+        for _ in 0..GROSS_ROUNDS {
+            let mut found = 0;
+            for &r in records {
+                let gross = self.gross(&fit, r)?;
+                found += gross.len();
+                gross.iter().for_each(|&(row, m)| self.observed[r].series.leave_out(row, m));
+            }
+            if found == 0 {
+                break;
+            }
+            fit = self.fit(&fit.assumed.clone(), &fit.free.clone(), records, Some(&fit), Effort::SHORT)?;
         }
         Ok(fit)
     }
@@ -120,11 +130,7 @@ impl<'a> Chamber<'a> {
             // With numbers as they are until nothing is found, and again once they have been fitted to that.
             for _ in 0..KINK_PASSES {
                 let new = self.kinks(&day, record)?;
-                for &(row, size) in &new {
-                    // Between two rows a kink is one at either.
-                    let near = row.saturating_sub(1)..(row + KINK_ROWS - 1).min(rows);
-                    self.observed[record].series.rows[near].iter_mut().for_each(|r| r.kink += size * size);
-                }
+                self.spread_kinks(&new, record);
                 found += new.len();
                 if new.is_empty() {
                     break;
@@ -141,6 +147,24 @@ impl<'a> Chamber<'a> {
         }
         let day = self.fit(&fit.assumed, &[], &[record], Some(&day), Effort::QUICK)?;
         Ok(Some((day, count)))
+    }
+
+    /// Straight but for these bends.
+    pub(super) fn bend_at(&mut self, bends: &[Bend], record: usize) {
+        let series = &mut self.observed[record].series;
+        series.rows.iter_mut().for_each(|row| row.bend = 0.0);
+        let row = |bend: &Bend| series.times_s.partition_point(|t| *t <= bend.time_s);
+        let kinks: Vec<(usize, f64)> = bends.iter().map(|bend| (row(bend), bend.slope_change_k_per_s)).collect();
+        self.spread_kinks(&kinks, record);
+    }
+
+    /// Between two rows a kink is one at either.
+    fn spread_kinks(&mut self, kinks: &[(usize, f64)], record: usize) {
+        let rows = &mut self.observed[record].series.rows;
+        for &(row, size) in kinks {
+            let near = row.saturating_sub(1)..(row + KINK_ROWS - 1).min(rows.len());
+            rows[near].iter_mut().for_each(|r| r.kink += size * size);
+        }
     }
 
     /// Rows before which the air has a kink by the readings, and how large it seems [K/s].

@@ -128,6 +128,11 @@ pub(super) struct Layout {
 
 impl Layout {
     pub fn new(parts: &Parts, series: &Series) -> Self {
+        Self::with(parts, series.overlaps, series.averaged > 1)
+    }
+
+    /// `overlaps`: rates' windows do; `averaged`: readings are means.
+    pub fn with(parts: &Parts, overlaps: bool, averaged: bool) -> Self {
         let mut size = 0;
         let mut take = |count: usize| {
             size += count;
@@ -142,8 +147,8 @@ impl Layout {
         let drift = parts.drift.then(|| take(1));
         let cycle = parts.cycle.then(|| take(2));
         let (offset, window) = (take(1), take(1));
-        let windows = [window, if series.overlaps { take(1) } else { window }];
-        let reading = (series.averaged > 1).then(|| take(1));
+        let windows = [window, if overlaps { take(1) } else { window }];
+        let reading = averaged.then(|| take(1));
         let modes = parts.reduced.modes();
         Self {
             modes,
@@ -161,6 +166,20 @@ impl Layout {
             reading,
             size,
         }
+    }
+
+    /// How many states come before the gyro's own.
+    pub fn own(&self) -> usize {
+        self.wander
+    }
+
+    /// The states that show the air's temperature in equilibrium.
+    pub fn levels(&self) -> impl Iterator<Item = usize> {
+        (0..self.modes).chain(self.skin).chain([self.trend]).chain(self.lag)
+    }
+
+    pub fn offset(&self) -> usize {
+        self.offset
     }
 
     /// The states whose sum is the air.
@@ -252,7 +271,7 @@ pub(super) fn system(parts: &Parts, numbers: &Numbers, series: &Series) -> Syste
 }
 
 /// c: the rate per kelvin a second of each state.
-fn response(parts: &Parts, layout: &Layout) -> Vec<f64> {
+pub(super) fn response(parts: &Parts, layout: &Layout) -> Vec<f64> {
     let mut row = vec![0.0; layout.size];
     for (output, gain) in parts.gains.outputs.iter().enumerate().filter(|(_, g)| **g != 0.0) {
         row.iter_mut().zip(layout.output(parts.reduced, output)).for_each(|(r, a)| *r += gain * a);
@@ -262,7 +281,7 @@ fn response(parts: &Parts, layout: &Layout) -> Vec<f64> {
 }
 
 /// What each thermometer shows.
-fn places(parts: &Parts, layout: &Layout) -> [Vec<f64>; RATE] {
+pub(super) fn places(parts: &Parts, layout: &Layout) -> [Vec<f64>; RATE] {
     let place = sensor_place(parts, layout);
     let sensor = match layout.lag {
         Some(lag) => (0..layout.size).map(|i| f64::from(i == lag)).collect(),
@@ -296,7 +315,7 @@ fn rate_row(layout: &Layout, f: &[f64], response: &[f64], shape: &Shape) -> Vec<
 }
 
 /// F, the diagonal of G without the trend's noise, and that of the trend's per unit of its density.
-fn dynamics(parts: &Parts, layout: &Layout, numbers: &Numbers) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+pub(super) fn dynamics(parts: &Parts, layout: &Layout, numbers: &Numbers) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let n = layout.size;
     let (mut f, mut g) = (vec![0.0; n * n], vec![0.0; n]);
     let get = |q: Quantity| numbers.get(q);

@@ -7,7 +7,7 @@ use super::screen::{Screen, table};
 use super::watching::Watching;
 use super::{CliError, Ending};
 use crate::io::files::write_atomically;
-use crate::io::read::model_file::read_model;
+use crate::io::read::model_file::read_design;
 use crate::io::read::profile_file::read_profile_file;
 use crate::io::write::model_edit::with_ramps;
 use crate::task::evaluate::{Answer, COLUMNS, Request, cells, run as evaluate};
@@ -33,7 +33,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
-    let mut file = read_model(&arguments.model)?;
+    let mut file = read_design(&arguments.model)?;
     if let Some(path) = &arguments.profiles {
         file.profiles = read_profile_file(path)?;
     }

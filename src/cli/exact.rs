@@ -13,7 +13,7 @@ use super::{CliError, Ending};
 use crate::io::files::write_atomically;
 use crate::io::json::ExactJson;
 use crate::io::model::NamedPattern;
-use crate::io::read::model_file::read_model;
+use crate::io::read::model_file::read_design;
 use crate::io::read::pattern_file::print_pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::search::cost::objective::Objective;
@@ -58,7 +58,7 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let started = Instant::now();
-    let file = read_model(&arguments.model)?;
+    let file = read_design(&arguments.model)?;
     let class = arguments.windability.unwrap_or(file.search.windability);
     let request = Request {
         class,

@@ -106,6 +106,9 @@ fn text(body: &ExtendJson) -> String {
     for (key, parameter) in &body.effect.parameters {
         text += &format!("  {key} = {}\n", value_in_words(parameter));
     }
+    if let Some(boundary) = &body.boundary {
+        text += &format!("{}\n", boundary.words());
+    }
     if body.before.inputs.records.iter().all(|r| r.role != "fitted") {
         text += "no record to fit to was given: the values are start values, not fitted ones\n";
     }

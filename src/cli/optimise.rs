@@ -15,7 +15,7 @@ use crate::io::files::read_text;
 use crate::io::json::diagnosis::DiagnosisJson;
 use crate::io::json::search::OptimiseJson;
 use crate::io::model::ModelFile;
-use crate::io::read::model_file::read_model;
+use crate::io::read::model_file::read_design;
 use crate::io::read::posterior::drawn_models;
 use crate::io::write::checkpoint::{BROKEN_FILE, CHECKPOINT_FILE, read_checkpoint, set_broken_aside};
 use crate::io::write::run_directory::Request;
@@ -161,7 +161,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
     }
     let stop = StopFlag::listen();
-    let file = read_model(&arguments.model)?;
+    let file = read_design(&arguments.model)?;
     for advice in &file.advice {
         screen.note(&format!("note: {advice}"));
     }

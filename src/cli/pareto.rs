@@ -7,7 +7,7 @@ use super::screen::{Screen, held, table};
 use super::watching::Watching;
 use super::{CliError, Ending};
 use crate::io::json::pareto::{ParetoJson, PointJson};
-use crate::io::read::model_file::read_model;
+use crate::io::read::model_file::read_design;
 use crate::task::pareto::{DEFAULT_MOST_CAPTIVE, DEFAULT_ROUNDS, Request, run as weigh};
 
 /// The front of worst-case error against windability and robustness
@@ -38,7 +38,7 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let stop = StopFlag::listen();
-    let file = read_model(&arguments.model)?;
+    let file = read_design(&arguments.model)?;
     let folder = arguments.output.as_deref();
     let _held = folder.map(|folder| held(folder, "pareto")).transpose()?;
     let request = Request {

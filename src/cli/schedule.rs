@@ -7,7 +7,7 @@ use super::screen::{Screen, held, table};
 use super::{CliError, Ending};
 use crate::io::folder::Replacement;
 use crate::io::json::schedule::{ScheduleJson, crossover_words};
-use crate::io::read::model_file::read_model;
+use crate::io::read::model_file::read_design;
 use crate::schedule::Schedule;
 use crate::task::schedule::{Request, run as plan};
 
@@ -29,7 +29,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
-    let file = read_model(&arguments.model)?;
+    let file = read_design(&arguments.model)?;
     let pattern = pattern_asked(&file, arguments.pattern.as_deref())?;
     let answer = plan(&Request { model: &file, pattern: pattern.as_ref() })?;
     if let Some(folder) = &arguments.output {

@@ -7,7 +7,7 @@ use super::screen::{Screen, table};
 use super::watching::Watching;
 use super::{CliError, Ending};
 use crate::io::json::tolerance::ToleranceJson;
-use crate::io::read::model_file::read_model;
+use crate::io::read::model_file::read_design;
 use crate::task::tolerance::{Request, run as study};
 use crate::units::rad_per_s_from_deg_per_h;
 
@@ -36,7 +36,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
-    let file = read_model(&arguments.model)?;
+    let file = read_design(&arguments.model)?;
     let patterns = patterns_asked(&file, &arguments.pattern)?;
     let request = Request {
         model: &file,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::screen::Screen;
 use super::{CliError, Ending};
-use crate::io::read::model_file::read_model;
+use crate::io::read::model_file::read_design;
 use crate::io::read::schedule_reader::read_claim;
 use crate::task::verify::{Answer, Request, run as verify};
 use crate::text::sink::Line;
@@ -22,7 +22,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
-    let file = read_model(&arguments.model)?;
+    let file = read_design(&arguments.model)?;
     let claim = read_claim(&arguments.schedule)?;
     let claim_name = arguments.schedule.display().to_string();
     let Answer { document: body, profiles } = verify(&Request { model: &file, claim: &claim, claim_name: &claim_name });

@@ -8,11 +8,11 @@
 //!
 //! | symbol | meaning | in code |
 //! |---|---|---|
-//! | x | modes of the pack, air temperature and its slope, and the sensor where it lags | `Hypothesis::state` |
+//! | x | the chamber's states: modes of the pack, the air's trend, turbulence and ripple, the sensor where it lags ([`crate::chamber`]) | `Hypothesis::state` |
 //! | o_j | rate error of the row j rows ago, given all readings until now | `Hypothesis::chain` |
 //! | a | rows since the air's slope broke; the last entry: long ago | `Hypothesis::age` |
 //! | k_a, κ_a, f_a | Kalman gains of the states and of the fixed-lag smoother, variance of e | `Gains` |
-//! | p | probability of a break in a row | `BREAK_PROBABILITY` |
+//! | p | probability of a break in a row | `break_probability` |
 //!
 //! A chamber's air runs along straight lines and breaks between them: with one fixed gain a filter either follows breaks too
 //! late or noise all the time. Covariances depend on no reading, so all gains are known beforehand, row by row after a
@@ -27,10 +27,8 @@
 
 use nalgebra::DMatrix;
 
-/// Breaks are sought once in so many rows,
-pub const BREAK_PROBABILITY: f64 = 1.0 / 300.0;
-/// and as large as any chamber's [(K/s)²].
-const BREAK_VARIANCE_K2_PER_S2: f64 = 1e-3;
+use crate::chamber::Causal;
+
 /// A hypothesis so much less likely than the best is dropped (natural logarithm).
 pub const LEAST_LOG_WEIGHT: f64 = -10.0;
 /// Gains this near to those of long ago are those of long ago.
@@ -52,47 +50,48 @@ pub struct Dynamics {
     pub reading: DMatrix<f64>,
     /// Where the air's temperature and, if there is one, the sensor's are.
     pub level_states: Vec<usize>,
-    /// Covariance of states and newest rate error for a unit shock of the slope somewhere within the row.
+    /// Covariance of states and newest rate error for a unit shock of the slope somewhere within the row; and for all other
+    /// noise of the air in a row.
     shock: DMatrix<f64>,
+    noise: DMatrix<f64>,
 }
 
 impl Dynamics {
-    /// # Shapes
-    /// `dynamics` n × n with x' = dynamics · x; `functional`, `reading` 1 × n; the rate error is the change of `functional`
-    /// over the last `window_s` of each row, per second.
-    pub fn new(
-        dynamics: &DMatrix<f64>,
-        functional: &DMatrix<f64>,
-        reading: DMatrix<f64>,
-        level_states: Vec<usize>,
-        slope: usize,
-        interval_s: f64,
-        window_s: f64,
-    ) -> Self {
-        let n = dynamics.nrows();
-        let after = |time_s: f64| (dynamics * time_s).exp();
+    /// Of a chamber's system; the rate error is the change of its functional over the last `window_s` of each row, per second.
+    pub fn new(causal: &Causal, interval_s: f64, window_s: f64) -> Self {
+        let n = causal.states;
+        let dynamics = DMatrix::from_row_slice(n, n, &causal.dynamics);
+        let functional = DMatrix::from_row_slice(1, n, &causal.functional);
+        let after = |time_s: f64| (&dynamics * time_s).exp();
         let transition = after(interval_s);
         let is_mean = window_s > 0.0;
         let rate = if is_mean {
-            (functional * (&transition - after(interval_s - window_s))) / window_s
+            (&functional * (&transition - after(interval_s - window_s))) / window_s
         } else {
-            functional * dynamics * &transition
+            &functional * &dynamics * &transition
         };
         let mut shock = DMatrix::zeros(n + 1, n + 1);
+        let mut noise = DMatrix::zeros(n + 1, n + 1);
         for place in 0..PLACES {
             let at_s = (place as f64 + 0.5) / PLACES as f64 * interval_s;
-            let response = after(interval_s - at_s).column(slope).into_owned();
-            let newest = if is_mean {
-                let before_s = interval_s - window_s - at_s;
-                let before = if before_s > 0.0 { (functional * after(before_s).column(slope))[(0, 0)] } else { 0.0 };
-                ((functional * &response)[(0, 0)] - before) / window_s
-            } else {
-                (functional * dynamics * &response)[(0, 0)]
+            let (responses, before_s) = (after(interval_s - at_s), interval_s - window_s - at_s);
+            let before = (is_mean && before_s > 0.0).then(|| &functional * after(before_s));
+            let rates = if is_mean { &functional * &responses } else { &functional * &dynamics * &responses };
+            let add = |state: usize, size: f64, sum: &mut DMatrix<f64>| {
+                let mut newest = rates[(0, state)];
+                if is_mean {
+                    newest = (newest - before.as_ref().map_or(0.0, |b| b[(0, state)])) / window_s;
+                }
+                let all = responses.column(state).into_owned().push(newest);
+                *sum += &all * all.transpose() * (size / PLACES as f64);
             };
-            let all = response.push(newest);
-            shock += &all * all.transpose() / PLACES as f64;
+            add(causal.slope, 1.0, &mut shock);
+            for (state, &density) in causal.noise.iter().enumerate().filter(|(_, d)| **d > 0.0) {
+                add(state, density * interval_s, &mut noise);
+            }
         }
-        Self { transition, rate, reading, level_states, shock }
+        let reading = DMatrix::from_row_slice(1, n, &causal.reading);
+        Self { transition, rate, reading, level_states: causal.level_states.clone(), shock, noise }
     }
 
     fn states(&self) -> usize {
@@ -105,6 +104,9 @@ impl Dynamics {
 pub struct Tuning {
     /// How much the air's slope wanders between breaks, in a row [(K/s)²].
     pub slope_variance: f64,
+    /// That the slope breaks in a row, and by how much [(K/s)²].
+    pub break_probability: f64,
+    pub break_variance: f64,
     pub noise_k: f64,
     pub delay_rows: usize,
     /// At least 1; with 1 there are no breaks.
@@ -139,11 +141,14 @@ pub struct Filter {
     pub reading: Vec<f64>,
     pub level_states: Vec<usize>,
     pub most_hypotheses: usize,
+    pub break_probability: f64,
     /// By age; the last one is for long ago.
     pub gains: Vec<Gains>,
     /// −½ ln f by age.
     log_factors: Vec<f64>,
     hypotheses: Vec<Hypothesis>,
+    /// The first reading, from which all temperatures of the states count: what is the same everywhere makes no rate.
+    origin_k: f64,
     /// Log-weight, index of the parent, age.
     branches: Vec<(f64, usize, usize)>,
     errors: Vec<f64>,
@@ -163,13 +168,14 @@ struct Covariance<'a> {
 impl Covariance<'_> {
     /// One row further, the slope shaken with this variance somewhere within it.
     fn step(&mut self, slope_variance: f64) -> Gains {
-        let Dynamics { transition, rate, reading, shock, .. } = self.dynamics;
+        let Dynamics { transition, rate, reading, shock, noise, .. } = self.dynamics;
         let n = transition.nrows();
+        let shaken = shock * slope_variance + noise;
         for j in (1..self.cross.len()).rev() {
             self.cross[j] = &self.cross[j - 1] * transition.transpose();
         }
-        self.cross[0] = rate * &self.p * transition.transpose() + shock.view((n, 0), (1, n)) * slope_variance;
-        self.p = transition * &self.p * transition.transpose() + shock.view((0, 0), (n, n)) * slope_variance;
+        self.cross[0] = rate * &self.p * transition.transpose() + shaken.view((n, 0), (1, n));
+        self.p = transition * &self.p * transition.transpose() + shaken.view((0, 0), (n, n));
         let seen = &self.p * reading.transpose();
         let variance = (reading * &seen)[(0, 0)] + self.noise_variance;
         let gain = &seen / variance;
@@ -218,7 +224,7 @@ fn schedule(dynamics: &Dynamics, tuning: &Tuning) -> Vec<Gains> {
     }
     let mut gains = Vec::new();
     if tuning.hypotheses > 1 {
-        gains.push(covariance.step(tuning.slope_variance + BREAK_VARIANCE_K2_PER_S2));
+        gains.push(covariance.step(tuning.slope_variance + tuning.break_variance));
         while gains.len() < MOST_AGES {
             let next = covariance.step(tuning.slope_variance);
             let is_near = gains.len() > tuning.delay_rows && difference(&next, &long_ago, n) < NEAR;
@@ -242,9 +248,11 @@ impl Filter {
             reading: dynamics.reading.as_slice().to_vec(),
             level_states: dynamics.level_states.clone(),
             most_hypotheses: tuning.hypotheses.max(1),
+            break_probability: tuning.break_probability,
             log_factors: gains.iter().map(|g| -0.5 * g.variance.ln()).collect(),
             gains,
             hypotheses: Vec::new(),
+            origin_k: 0.0,
             branches: Vec::new(),
             errors: Vec::new(),
             spare: Vec::new(),
@@ -267,14 +275,15 @@ impl Filter {
         if self.hypotheses.is_empty() {
             return Vec::new();
         }
-        (0..self.n).map(|i| self.hypotheses.iter().map(|h| h.weight * h.values[i]).sum()).collect()
+        let mut state: Vec<f64> =
+            (0..self.n).map(|i| self.hypotheses.iter().map(|h| h.weight * h.values[i]).sum()).collect();
+        self.level_states.iter().for_each(|&level| state[level] += self.origin_k);
+        state
     }
 
     fn start(&mut self, temperature_k: f64) {
-        let mut values = vec![0.0; self.gains[0].gain.len()];
-        for &level in &self.level_states {
-            values[level] = temperature_k;
-        }
+        self.origin_k = temperature_k;
+        let values = vec![0.0; self.gains[0].gain.len()];
         // As if a break had just been: the slope is not known.
         self.hypotheses = vec![Hypothesis { log_weight: 0.0, age: 0, values, weight: 1.0 }];
     }
@@ -312,15 +321,15 @@ impl Filter {
         self.branches.clear();
         self.errors.clear();
         for (parent, hypothesis) in self.hypotheses.iter().enumerate() {
-            let error = temperature_k - dot(&self.reading, &hypothesis.values[..self.n]);
+            let error = temperature_k - self.origin_k - dot(&self.reading, &hypothesis.values[..self.n]);
             self.errors.push(error);
             let mut add = |age: usize, prior: f64| {
                 let fit = self.log_factors[age] - 0.5 * error * error / self.gains[age].variance;
                 self.branches.push((hypothesis.log_weight + prior + fit, parent, age));
             };
-            add((hypothesis.age + 1).min(long_ago), (-BREAK_PROBABILITY).ln_1p());
+            add((hypothesis.age + 1).min(long_ago), (-self.break_probability).ln_1p());
             if has_breaks {
-                add(0, BREAK_PROBABILITY.ln());
+                add(0, self.break_probability.ln());
             }
         }
         // Stable: of equals the one of the likelier parent comes first.

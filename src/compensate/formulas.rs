@@ -27,8 +27,6 @@ pub struct Formulas {
     effects: Vec<DeclaredEffect>,
     coil: Coil,
     columns: Vec<String>,
-    /// What each mode takes from each layer's temperature.
-    amplitude: DMatrix<f64>,
 }
 
 impl Formulas {
@@ -39,15 +37,15 @@ impl Formulas {
         (CoilModel { effects: rest, ..model.clone() }, formulas)
     }
 
-    /// None where there are no formulas; `amplitude` layers × modes.
-    pub fn new(coil: &Coil, effects: Vec<DeclaredEffect>, amplitude: DMatrix<f64>) -> Option<Self> {
+    /// None where there are no formulas.
+    pub fn new(coil: &Coil, effects: Vec<DeclaredEffect>) -> Option<Self> {
         let mut columns: Vec<String> = Vec::new();
         for name in effects.iter().flat_map(DeclaredEffect::channels) {
             if !columns.contains(&name) {
                 columns.push(name);
             }
         }
-        (!effects.is_empty()).then(|| Self { effects, coil: coil.clone(), columns, amplitude })
+        (!effects.is_empty()).then(|| Self { effects, coil: coil.clone(), columns })
     }
 
     /// At most [`MOST_COLUMNS`] of them are read.
@@ -57,10 +55,6 @@ impl Formulas {
 
     pub fn effects(&self) -> &[DeclaredEffect] {
         &self.effects
-    }
-
-    pub fn amplitude(&self) -> &DMatrix<f64> {
-        &self.amplitude
     }
 
     /// `temperatures`: layers × states; `dynamics` states × states; places of the air and its slope among the states.

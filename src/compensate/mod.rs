@@ -16,12 +16,12 @@ pub mod stream;
 
 use thiserror::Error;
 
-use crate::boundary::BoundaryError;
+use crate::chamber::{self, Assumption, Chamber, ChamberError, Surroundings};
 use crate::coil::CoilError;
 use crate::pattern::Pattern;
-use crate::predict::{self, PredictError};
+use crate::predict::PredictError;
 use crate::rate::{CoilModel, RateError};
-use crate::record::Record;
+use crate::record::{Record, RecordError};
 use crate::thermal::ThermalError;
 use empirical::{PiecewiseBias, Regression};
 use formulas::Columns;
@@ -77,13 +77,37 @@ pub enum CompensateError {
     #[error(transparent)]
     Predict(#[from] PredictError),
     #[error(transparent)]
-    Boundary(#[from] BoundaryError),
+    Record(#[from] RecordError),
+    #[error(transparent)]
+    Chamber(#[from] ChamberError),
     #[error(transparent)]
     Thermal(#[from] ThermalError),
     #[error(transparent)]
     Rate(#[from] RateError),
     #[error(transparent)]
     Coil(#[from] CoilError),
+}
+
+/// Fewer rows than this hold no ramp.
+const LEAST_ROWS: usize = 16;
+/// Surroundings are fitted to at most so many rows of the chamber: a day of half-minute rows, more than they need.
+const MOST_ROWS_FITTED: usize = 4000;
+
+/// What readings and rates of a record say of chamber, film and sensor; of a long one, those of the stretch that moves most.
+fn surroundings(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<Surroundings, CompensateError> {
+    if record.rows() < LEAST_ROWS {
+        return Err(CompensateError::TooFew { needed: LEAST_ROWS, found: record.rows() });
+    }
+    let assumed = Assumption::new(model.clone(), pattern.clone());
+    let busiest = Chamber::of_readings(model, &[record])?.busiest(0, MOST_ROWS_FITTED);
+    let stretch = record.stretch(busiest)?;
+    // Rates without noise are those of a simulation: what they weigh beside readings cannot be told.
+    let chamber = match Chamber::new(model, &[&stretch]) {
+        Err(ChamberError::NoNoise { .. }) => Chamber::of_readings(model, &[&stretch])?,
+        chamber => chamber?,
+    };
+    let (chamber, fit) = chamber.settled(&assumed, &[0])?;
+    Ok(chamber.surroundings(&fit, 0))
 }
 
 fn listed(effects: &[String]) -> String {
@@ -102,8 +126,7 @@ impl Compensator {
     pub fn fit(method: Method, model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<Self, CompensateError> {
         Ok(match method {
             Method::Physical => {
-                let boundary = predict::estimate_boundary(model, pattern, record)?;
-                let mut physical = Physical::with_boundary(model, pattern, &boundary, record)?;
+                let mut physical = Physical::new(model, pattern)?;
                 if let Some(name) = physical
                     .channel_names()
                     .chain(physical.formula_columns())
@@ -111,6 +134,12 @@ impl Compensator {
                 {
                     return Err(CompensateError::MissingChannel { name: name.to_owned() });
                 }
+                let surroundings = surroundings(model, pattern, record)?;
+                let range_k = record
+                    .temperature_k()
+                    .iter()
+                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(*t), high.max(*t)));
+                physical = Physical::within(model, pattern, surroundings, Some(range_k))?;
                 physical.tune(record);
                 Compensator::Physical(Box::new(physical))
             }
@@ -129,6 +158,20 @@ impl Compensator {
             Method::Physical => Ok(Compensator::Physical(Box::new(Physical::new(model, pattern)?))),
             Method::Piecewise | Method::Regression | Method::Learned => Err(CompensateError::NeedsRecord { method }),
         }
+    }
+
+    /// The physical one without a record, in the surroundings and with the offset that earlier records showed.
+    ///
+    /// # Errors
+    /// A model that is not linear.
+    pub fn in_known_surroundings(
+        model: &CoilModel,
+        pattern: &Pattern,
+        learned: &chamber::Learned,
+    ) -> Result<Self, CompensateError> {
+        let mut physical = Physical::within(model, pattern, Surroundings::learned(learned), None)?;
+        physical.offset_rad_per_s = learned.offset_rad_per_s.map_or(0.0, |offset| offset.value);
+        Ok(Compensator::Physical(Box::new(physical)))
     }
 
     pub fn method(&self) -> Method {

@@ -1,66 +1,55 @@
 //! The physical compensator: the coil's own model driven by one thermometer, as a small difference equation.
 //!
 //! ```text
-//! x = (y_1 … y_m, a, s [, z]),  y_i' = −λ_i y_i + s,  a' = s,  s' = white + breaks,  τ z' = T_out − z
-//! Ω_coil = ω·x,   Ω = f(T) (Ω_coil + Ω_h(t)) + b(T) + Σ g_c c + Ω_0
+//! x: the chamber's system, its air seen through the sensor,   Ω_coil = c·dx/dt
+//! Ω = f(T) (Ω_coil + Ω_h(t)) + b(T) + Σ g_c c + Ω_0
 //! ```
 //!
 //! | symbol | meaning | in code |
 //! |---|---|---|
-//! | y_i, a, s | modes of the pack behind its film, air temperature and its rate | `decay_per_s`, `outer`, `functional` |
-//! | z | the sensor behind its lag | `lag_s` |
+//! | x | modes of the pack behind its film, the air's trend, turbulence and ripple, the sensor | [`crate::chamber::Causal`] |
 //! | f(T), Ω_h | factor of the coil's error over temperature; heat from the electronics | `factor`, `heating` |
 //! | b(T), g_c | bias over temperature; rate per unit of a further column | `bias`, `channels` |
 //! | Ω_0 | offset of the record it was tuned on | `offset_rad_per_s` |
 //!
-//! How x is known from the readings is in [`super::filter`]. Film and thermometer's noise come from the boundary's estimate
-//! of a record; how much the slope wanders, the delay and the offset from the record's rate.
+//! How x is known from the readings is in [`super::filter`]: the model of `compare` and `diagnose`, run forwards. Film,
+//! thermometer and air are those that a record's readings and rates showed together; delay and offset are chosen by what
+//! the filter leaves of the record's rate.
 //!
 //! Holds for models that are linear in the temperatures' rates, besides a factor and a bias over temperature. A conductivity
 //! that depends on temperature is taken at the middle of the fitted record's temperatures, and how much it differs at its
-//! ends is stated. Modes that settle within a quarter of a row follow at once.
+//! ends is stated.
 //!
 //! # Source
-//! As [`super::filter`]; the pack's modes as in [`crate::thermal::pack`].
+//! As [`super::filter`]; the chamber as in [`crate::chamber`].
 
 mod beside;
-
-use nalgebra::DMatrix;
 
 use super::CompensateError;
 use super::filter::{Dynamics, Filter, Tuning};
 use super::formulas::Formulas;
 use super::heating::Heating;
-use crate::boundary::Boundary;
+use crate::chamber::{BREAK_K2_PER_S2, BREAKS_PER_S, Causal, Surroundings};
 use crate::effect::DeclaredEffect;
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::pattern::Pattern;
 use crate::rate::{CoilModel, RateModel};
 use crate::record::Record;
 use crate::thermal::pack::Pack;
-use crate::thermal::{Extent, HeatPath, Location, Material, ThermalHistory};
+use crate::thermal::{Extent, HeatPath, Location, Material, ThermalError, ThermalHistory};
 use crate::units::REFERENCE_TEMPERATURE_K;
 
-/// The film where no record told it: moving air in a chamber.
-const USUAL_FILM_W_PER_M2_K: f64 = 25.0;
-/// The thermometer's noise where no record told it.
-const USUAL_NOISE_K: f64 = 0.005;
-/// (K/s)² per s; a chamber's air between its breaks.
-const USUAL_SLOPE_NOISE: f64 = 3e-10;
 const USUAL_DELAY_S: f64 = 100.0;
 /// Hypotheses about the last break of the air's slope.
 pub const USUAL_HYPOTHESES: usize = 8;
-/// Slope noises within this factor of the best mean square are as good: the largest follows most of what another record
-/// may hold.
-const AS_GOOD: f64 = 1.1;
+/// Wanders within this factor of the best mean square are as good: the largest follows most of what another record may hold.
+const WANDER_AS_GOOD: f64 = 1.1;
 /// Delays within this factor are as good: the shortest is taken.
 const DELAY_AS_GOOD: f64 = 1.01;
-/// Modes faster than this many times a row follow at once.
-const FAST: f64 = 4.0;
-/// A half space is this many packs deep: heat does not come back within hours.
-const DEEP: usize = 6;
-/// A radius this many times the pack's makes a slab of it.
-const FLAT: f64 = 1e3;
+/// Noise of the air's slope between breaks that is tried \[K²/s³\], largest first: 10 to the power of so many halves.
+const WANDER_HALF_DECADES: std::ops::RangeInclusive<i32> = 12..=24;
+/// Rows that tell delay, wander and offset.
+const MOST_ROWS_TUNED: usize = 20_000;
 /// The most rows that a compensator looks ahead.
 pub const MOST_DELAY_ROWS: usize = 512;
 const TABLE_FROM_K: f64 = REFERENCE_TEMPERATURE_K - 100.0;
@@ -69,15 +58,11 @@ const TABLE_ROWS: usize = 201;
 /// The model as far as compensation needs it, and the tuning.
 #[derive(Debug, Clone)]
 pub struct Physical {
-    /// λ_i, ascending [1/s].
-    decay_per_s: Vec<f64>,
-    /// What each mode takes from the outermost layer's temperature.
-    outer: Vec<f64>,
-    /// What each mode takes from the rate error's integral [rad/K].
-    functional: Vec<f64>,
-    /// Of the air's temperature in the rate error's integral [rad/K].
-    functional_air: f64,
-    location: Location,
+    path: HeatPath,
+    /// dΩ/dṪ_j, and dΩ/dȧ.
+    gains: Vec<f64>,
+    gain_air: f64,
+    surroundings: Surroundings,
     lag_s: f64,
     rate_mean_s: f64,
     /// Over temperature, where the model has a bias that depends on it.
@@ -92,8 +77,6 @@ pub struct Physical {
     linearised: Option<Linearised>,
     /// At least 1; with 1 it is one difference equation without breaks.
     pub hypotheses: usize,
-    pub noise_k: f64,
-    pub slope_noise_k2_per_s3: f64,
     pub delay_s: f64,
     pub offset_rad_per_s: f64,
 }
@@ -107,50 +90,28 @@ pub struct Linearised {
 }
 
 impl Physical {
-    /// From a model, with usual values for what only a record can tell.
+    /// From a model, with surroundings as they usually are.
     ///
     /// # Errors
     /// A model that is not linear in the rates, or whose heat path cannot be solved.
     pub fn new(model: &CoilModel, pattern: &Pattern) -> Result<Self, CompensateError> {
-        Self::with_film(model, pattern, USUAL_FILM_W_PER_M2_K, USUAL_NOISE_K, None)
+        Self::within(model, pattern, Surroundings::usual(), None)
     }
 
-    /// With film and noise from a record's boundary.
+    /// Within surroundings that records showed; `range_k` is that of their temperatures.
     ///
     /// # Errors
     /// As [`Physical::new`].
-    pub fn with_boundary(
+    pub fn within(
         model: &CoilModel,
         pattern: &Pattern,
-        boundary: &Boundary,
-        record: &Record,
-    ) -> Result<Self, CompensateError> {
-        let film = boundary.air().film_w_per_m2_k.unwrap_or(USUAL_FILM_W_PER_M2_K);
-        let range_k = record
-            .temperature_k()
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(*t), high.max(*t)));
-        Self::with_film(model, pattern, film, boundary.air().noise_k, Some(range_k))
-    }
-
-    fn with_film(
-        model: &CoilModel,
-        pattern: &Pattern,
-        film_w_per_m2_k: f64,
-        noise_k: f64,
+        surroundings: Surroundings,
         range_k: Option<(f64, f64)>,
     ) -> Result<Self, CompensateError> {
         let (model, formulas) = &Formulas::split(model);
         let mut path = model.heat_path()?;
-        let real_layers = path.shape.layers;
-        let mut buried = 0;
-        if path.extent == Extent::HalfSpace {
-            path.extent = Extent::Pack;
-            buried = (DEEP - 1) * real_layers;
-            path.shape.layers = real_layers + buried;
-            path.shape.bore_radius_m = FLAT * path.shape.radial_pitch_m * real_layers as f64;
-        }
-        let cannot_be_heated = buried > 0 || matches!(path.material, Material::Diffusivity { .. });
+        let is_half_space = path.extent == Extent::HalfSpace;
+        let cannot_be_heated = is_half_space || matches!(path.material, Material::Diffusivity { .. });
         if path.flange.is_some() || (path.bore_heat.is_some() && cannot_be_heated) {
             let is_refused = |one: &CoilModel| {
                 one.heat_path().is_ok_and(|p| p.flange.is_some() || (p.bore_heat.is_some() && cannot_be_heated))
@@ -158,39 +119,32 @@ impl Physical {
             return Err(not_linear(model, is_refused));
         }
         let linearised = linearise(&mut path, range_k);
-        let location = path.location;
-        path.location = Location::Ambient;
-        if location == Location::OuterLayer {
-            path.film_w_per_m2_k = match path.material {
-                Material::Conductivity { .. } => Some(film_w_per_m2_k),
-                Material::Diffusivity { .. } => None,
-            };
-        }
-        let pack = Pack::new(&path)?;
-        let Some(linear) = linear_gains(model, pattern, real_layers)? else {
-            let is_refused = |one: &CoilModel| matches!(linear_gains(one, pattern, real_layers), Ok(None));
+        let layers = path.shape.layers;
+        let Some(linear) = linear_gains(model, pattern, layers)? else {
+            let is_refused = |one: &CoilModel| matches!(linear_gains(one, pattern, layers), Ok(None));
             return Err(not_linear(model, is_refused));
         };
         let LinearModel { gains, gain_air, factor, bias, channels } = linear;
-        let mut order: Vec<usize> = (0..pack.decays_per_s().len()).collect();
-        order.sort_by(|a, b| pack.decays_per_s()[*a].total_cmp(&pack.decays_per_s()[*b]));
-        let slowest_per_s = order.first().map_or(f64::INFINITY, |&i| pack.decays_per_s()[i]);
-        let mut heating = Heating::of(&path, &gains, slowest_per_s, model.rate_mean_s, model.sensor_lag_s())?;
-        if location == Location::Ambient {
-            heating = heating.map(Heating::unseen);
+        let mut heating = None;
+        if path.bore_heat.is_some() {
+            let mut heated = path.clone();
+            heated.location = Location::Ambient;
+            if path.location == Location::OuterLayer {
+                heated.film_w_per_m2_k = Some(surroundings.film_w_per_m2_k);
+            }
+            let slowest_per_s = Pack::new(&heated)?.decays_per_s().iter().copied().fold(f64::INFINITY, f64::min);
+            heating = Heating::of(&heated, &gains, slowest_per_s, model.rate_mean_s, model.sensor_lag_s())?;
+            if path.location == Location::Ambient {
+                heating = heating.map(Heating::unseen);
+            }
+            path.bore_heat = None;
         }
-        let functional = |mode: usize| -> f64 {
-            gains.iter().enumerate().map(|(layer, gain)| gain * pack.amplitude(buried + layer, mode)).sum()
-        };
-        let amplitude =
-            DMatrix::from_fn(real_layers, order.len(), |layer, mode| pack.amplitude(buried + layer, order[mode]));
-        Ok(Self {
-            formulas: Formulas::new(&model.coil, formulas.clone(), amplitude),
-            decay_per_s: order.iter().map(|&i| pack.decays_per_s()[i]).collect(),
-            outer: order.iter().map(|&i| pack.amplitude(path.shape.layers - 1, i)).collect(),
-            functional: order.iter().map(|&i| functional(i)).collect(),
-            functional_air: gains.iter().sum::<f64>() + gain_air,
-            location,
+        let found = Self {
+            formulas: Formulas::new(&model.coil, formulas.clone()),
+            path,
+            gains,
+            gain_air,
+            surroundings,
             lag_s: model.sensor_lag_s(),
             rate_mean_s: model.rate_mean_s,
             bias,
@@ -199,36 +153,44 @@ impl Physical {
             channels,
             linearised,
             hypotheses: USUAL_HYPOTHESES,
-            noise_k,
-            slope_noise_k2_per_s3: USUAL_SLOPE_NOISE,
             delay_s: USUAL_DELAY_S,
             offset_rad_per_s: 0.0,
-        })
+        };
+        found.causal(1.0)?;
+        Ok(found)
     }
 
-    /// Chooses slope noise, delay and offset so that a record's rate is compensated best.
+    /// Chooses delay and offset so that a record's rate is compensated best, and how much more the air's slope wanders to a
+    /// filter that does not know beforehand when it breaks.
     pub fn tune(&mut self, record: &Record) {
         let interval_s = record.interval_s();
-        let dynamics = self.dynamics(interval_s);
+        let Ok(dynamics) = self.dynamics(interval_s) else { return };
+        let part = record.stretch(0..record.rows().min(MOST_ROWS_TUNED));
+        let record = part.as_ref().unwrap_or(record);
         let beside = self.formulas_over(record);
-        let trials: Vec<(f64, Vec<f64>, Vec<f64>)> = (-24..=-12)
-            .map(|exponent| {
+        let least = |squares: &[f64]| squares.iter().copied().fold(f64::INFINITY, f64::min);
+        let trials: Vec<(Surroundings, Vec<f64>, Vec<f64>)> = WANDER_HALF_DECADES
+            .map(|halves| {
                 let mut trial = self.clone();
-                trial.slope_noise_k2_per_s3 = 10f64.powf(0.5 * f64::from(exponent));
+                trial.surroundings = self.surroundings.wandering(10f64.powf(-0.5 * f64::from(halves)));
                 let (squares, means) = trial.misfit(&dynamics, record, &beside);
-                (trial.slope_noise_k2_per_s3, squares, means)
+                (trial.surroundings, squares, means)
             })
             .collect();
-        let least = |squares: &[f64]| squares.iter().copied().fold(f64::INFINITY, f64::min);
         let best = trials.iter().map(|t| least(&t.1)).fold(f64::INFINITY, f64::min);
-        let Some((slope_noise, squares, means)) = trials.iter().rev().find(|t| least(&t.1) <= AS_GOOD * best) else {
+        let Some((surroundings, squares, means)) = trials.into_iter().find(|t| least(&t.1) <= WANDER_AS_GOOD * best)
+        else {
             return;
         };
-        let own = least(squares);
+        let own = least(&squares);
         let lag = squares.iter().position(|s| *s <= DELAY_AS_GOOD * own).unwrap_or(0).max(1);
-        self.slope_noise_k2_per_s3 = *slope_noise;
+        self.surroundings = surroundings;
         self.delay_s = lag as f64 * interval_s;
         self.offset_rad_per_s = means[lag];
+    }
+
+    pub fn surroundings(&self) -> &Surroundings {
+        &self.surroundings
     }
 
     /// Variance and mean of the compensated rate at each lag.
@@ -263,57 +225,21 @@ impl Physical {
         sums.iter().map(|(n, sum, square)| ((square - sum * sum / n) / n, sum / n)).unzip()
     }
 
-    /// Modes that are states: the others follow within a row.
-    fn slow_modes(&self, interval_s: f64) -> usize {
-        self.decay_per_s.iter().take_while(|l| **l * interval_s < FAST).count()
+    fn causal(&self, interval_s: f64) -> Result<Causal, ThermalError> {
+        Causal::new(&self.path, &self.gains, self.gain_air, self.lag_s, &self.surroundings, interval_s)
     }
 
-    fn dynamics(&self, interval_s: f64) -> Dynamics {
-        let slow = self.slow_modes(interval_s);
-        let has_lag = self.lag_s > 0.0;
-        let n = slow + 2 + usize::from(has_lag);
-        let (air, slope) = (slow, slow + 1);
-        // What the fast modes take, being s/λ.
-        let fast = |of: &[f64]| -> f64 { of.iter().zip(&self.decay_per_s).skip(slow).map(|(c, l)| -c / l).sum() };
-        let row = |of_air: f64, of: &[f64]| -> DMatrix<f64> {
-            let mut row = DMatrix::zeros(1, n);
-            for (mode, c) in of[..slow].iter().enumerate() {
-                row[mode] = -c;
-            }
-            row[air] = of_air;
-            row[slope] = fast(of);
-            row
-        };
-        let outer = match self.location {
-            Location::OuterLayer => row(1.0, &self.outer),
-            Location::Ambient => row(1.0, &vec![0.0; self.outer.len()]),
-        };
-        let mut dynamics = DMatrix::zeros(n, n);
-        for (mode, l) in self.decay_per_s[..slow].iter().enumerate() {
-            dynamics[(mode, mode)] = -l;
-            dynamics[(mode, slope)] = 1.0;
-        }
-        dynamics[(air, slope)] = 1.0;
-        let mut reading = outer.clone();
-        let mut level_states = vec![air];
-        if has_lag {
-            for column in 0..n {
-                dynamics[(n - 1, column)] = outer[column] / self.lag_s;
-            }
-            dynamics[(n - 1, n - 1)] = -1.0 / self.lag_s;
-            reading = DMatrix::zeros(1, n);
-            reading[n - 1] = 1.0;
-            level_states.push(n - 1);
-        }
-        let functional = row(self.functional_air, &self.functional);
-        let window_s = self.rate_mean_s.min(interval_s);
-        Dynamics::new(&dynamics, &functional, reading, level_states, slope, interval_s, window_s)
+    fn dynamics(&self, interval_s: f64) -> Result<Dynamics, ThermalError> {
+        Ok(Dynamics::new(&self.causal(interval_s)?, interval_s, self.rate_mean_s.min(interval_s)))
     }
 
     fn tuning(&self, interval_s: f64, delay_rows: usize) -> Tuning {
+        let (least, most) = BREAK_PROBABILITIES;
         Tuning {
-            slope_variance: self.slope_noise_k2_per_s3 * interval_s,
-            noise_k: self.noise_k.max(LEAST_NOISE_K),
+            slope_variance: self.surroundings.rest_noise_k2_per_s3() * interval_s,
+            break_probability: (BREAKS_PER_S * interval_s).clamp(least, most),
+            break_variance: BREAK_K2_PER_S2,
+            noise_k: self.surroundings.reading_noise_k().max(LEAST_NOISE_K),
             delay_rows,
             hypotheses: self.hypotheses,
         }
@@ -321,7 +247,9 @@ impl Physical {
 
     /// The filter for records of one interval.
     pub fn filter(&self, interval_s: f64, delay_rows: usize) -> Filter {
-        Filter::new(&self.dynamics(interval_s), &self.tuning(interval_s, delay_rows))
+        // What was solved for one interval is solved for another: only how many modes are states differs.
+        let dynamics = self.dynamics(interval_s).expect("the heat path was solved when the compensator was made");
+        Filter::new(&dynamics, &self.tuning(interval_s, delay_rows))
     }
 
     /// Further columns that the model reads.
@@ -373,6 +301,8 @@ impl Physical {
 /// Rows of delay that are tried while tuning.
 const TRIAL_DELAY_ROWS: usize = 30;
 const LEAST_NOISE_K: f64 = 1e-6;
+/// A row is never sure to hold a break, nor sure not to.
+const BREAK_PROBABILITIES: (f64, f64) = (1e-6, 0.1);
 
 /// Takes the conductivity at the middle of a range of temperatures.
 fn linearise(path: &mut HeatPath, range_k: Option<(f64, f64)>) -> Option<Linearised> {

@@ -86,6 +86,7 @@ pub(super) fn answer(question: &Question, found: &Found, records: &[&Record]) ->
         suggested_experiment,
         cautions,
         extended: named.fit.assumed.model.clone(),
+        boundary: question.chamber.learned(&named.fit)?,
         posterior: posterior(question, found),
         refitted: refitted(question, named),
         hypothesis,

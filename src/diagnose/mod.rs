@@ -13,15 +13,11 @@
 //! Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773 (evidence); Rao, Proc. Camb. Phil. Soc. 44 (1948) 50 (score test);
 //! Madigan and Raftery, J. Am. Stat. Assoc. 89 (1994) 1535 (a set that holds a smaller one as good is that one).
 
-mod anchor;
 mod answer;
 mod candidate;
-mod conductivity;
 mod describe;
 pub mod discover;
-mod evidence;
 pub mod experiment;
-mod field;
 mod joint;
 pub mod plain;
 mod standing;
@@ -32,7 +28,7 @@ pub mod trim;
 
 use thiserror::Error;
 
-use crate::chamber::{Assumption, Chamber, ChamberError, EffectEstimates, Effort, Noise};
+use crate::chamber::{Assumption, Chamber, ChamberError, EffectEstimates, Effort, Learned, Noise};
 use crate::coil::CoilError;
 use crate::effect::DeclaredEffect;
 use crate::numeric::noise::white_noise;
@@ -238,6 +234,8 @@ pub struct Diagnosis {
     pub noise: Vec<RecordNoise>,
     /// Formulas that explain what no listed effect does, best first.
     pub proposals: Vec<discover::Proposal>,
+    /// What the fitted records say of film, offset and chamber, with the accepted effects.
+    pub boundary: Learned,
 }
 
 /// What one set of explanations holds of the posterior mass.
@@ -328,6 +326,7 @@ pub struct Extension {
     pub extended: CoilModel,
     pub reduced_chi_square_before: f64,
     pub reduced_chi_square_after: f64,
+    pub boundary: Learned,
 }
 
 /// Fits one kind of effect, whatever the evidence says about it; a custom effect starts from the values given.
@@ -351,14 +350,15 @@ pub fn extend(request: &Request, effect: &DeclaredEffect) -> Result<Extension, D
         held_out: Vec::new(),
         depth: 1,
     };
-    joint::settle_one(&question, &base)
-        .map(|(best, reduced)| Extension {
-            finding: describe::alone(&question, &best, &base),
-            extended: best.fit.assumed.model.clone(),
-            reduced_chi_square_before: reduced.0,
-            reduced_chi_square_after: reduced.1,
-        })
-        .ok_or_else(|| DiagnoseError::NoFit { kind: effect.kind() })
+    let (best, reduced) =
+        joint::settle_one(&question, &base).ok_or_else(|| DiagnoseError::NoFit { kind: effect.kind() })?;
+    Ok(Extension {
+        finding: describe::alone(&question, &best, &base),
+        extended: best.fit.assumed.model.clone(),
+        reduced_chi_square_before: reduced.0,
+        reduced_chi_square_after: reduced.1,
+        boundary: chamber.learned(&best.fit)?,
+    })
 }
 
 /// The least change of temperature that says anything: of the sensor's noise, and at all [K].
@@ -474,18 +474,9 @@ fn beyond(
 /// What a diagnosis leaves to be told apart by an experiment.
 ///
 /// # Errors
-/// Records whose boundary cannot be estimated.
+/// Records that say nothing, models that cannot be solved.
 pub fn contest(request: &Request, diagnosis: &Diagnosis) -> Result<Contest, DiagnoseError> {
-    let mut evidence = evidence::Evidence::new(request.model, request.pattern, request.records, request.holdout)?;
-    let rivals = diagnosis.effects.iter().flat_map(|e| &e.equivalents).map(|e| &e.extended);
-    for model in rivals.chain([&diagnosis.extended]) {
-        if !evidence.is_anchored(model) && model.sensor_lag_s() > 0.0 {
-            evidence.bracket(model, evidence::Begin::Nearby)?;
-        } else if !evidence.is_anchored(model) {
-            evidence.anchor(model, evidence::Begin::Nearby)?;
-        }
-    }
-    Ok(Contest::new(&evidence, request.model, diagnosis))
+    Contest::new(request, diagnosis)
 }
 
 impl From<ChamberError> for DiagnoseError {

@@ -6,7 +6,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::experiment::fixtures::{effect, model, pattern};
 use super::*;
-use crate::boundary::expose;
+use crate::diagnose::experiment::expose;
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::rate::RateModel;
 use crate::thermal::solve;

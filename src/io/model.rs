@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use crate::chamber::{Estimate, Learned};
+use crate::effect::DeclaredEffect;
 use crate::io::record_format::RecordFormat;
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
@@ -11,6 +13,7 @@ use crate::rate::CoilModel;
 use crate::schedule::production::Production;
 use crate::search::cost::objective::Objective;
 use crate::search::cost::tolerance::ToleranceSpec;
+use crate::thermal::Location;
 
 /// A model file, understood.
 #[derive(Debug, Clone)]
@@ -30,6 +33,35 @@ pub struct ModelFile {
     pub advice: Vec<Advice>,
     /// winding.length_m, where it is stated.
     pub stated_length_m: Option<f64>,
+    /// What records taught of film, offset and chamber.
+    pub learned: Option<Learned>,
+}
+
+impl ModelFile {
+    /// As a search sees it: profiles are courses of the air, which reaches the coil through the film that records showed.
+    pub fn for_search(mut self) -> Self {
+        if let Some(film) = self.learned_film() {
+            self.model.effects.push(DeclaredEffect::film(film.value));
+            self.advice.retain(|a| !matches!(a, Advice::PrescribedBoundary { .. }));
+            self.advice.push(Advice::LearnedFilm {
+                film_w_per_m2_k: film.value,
+                standard_error_w_per_m2_k: film.standard_error,
+            });
+        }
+        self
+    }
+
+    /// What a search behind a learned film should say.
+    pub fn learned_film_note(&self) -> Option<&Advice> {
+        self.advice.iter().find(|a| matches!(a, Advice::LearnedFilm { .. }))
+    }
+
+    /// The film that records showed, where the model declares none and is not driven by the air already.
+    pub fn learned_film(&self) -> Option<Estimate> {
+        let film = self.learned.as_ref()?.film_w_per_m2_k?;
+        let path = self.model.heat_path().ok()?;
+        (path.location == Location::OuterLayer && path.film_w_per_m2_k.is_none()).then_some(film)
+    }
 }
 
 /// A pattern under the name by which it was asked for.
@@ -71,6 +103,10 @@ pub enum Advice {
         "the outermost layer's temperature is prescribed: the first instant of a ramp then heats that layer alone, and windings that put the same pieces of fibre there, such as dip and qua, tie; where air surrounds the coil declare the effect {film} with sensor.location = \"ambient\""
     )]
     PrescribedBoundary { film: &'static str },
+    #[error(
+        "profiles are courses of the air, which reaches the coil through the film of {film_w_per_m2_k:.3} ± {standard_error_w_per_m2_k:.2} W/(m²K) that the records showed ([boundary]); take that table out to prescribe the outermost layer"
+    )]
+    LearnedFilm { film_w_per_m2_k: f64, standard_error_w_per_m2_k: f64 },
 }
 
 /// A value outside the range in which it usually lies.

@@ -55,9 +55,13 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
     let named = pattern_or_own(request.model, request.pattern)?;
     let model = &request.model.model;
     let fitted = fitted(request, observer)?;
-    let mut compensator = match &fitted {
-        Some(record) => Compensator::fit(request.method, model, &named.pattern, record)?,
-        None => Compensator::declared(request.method, model, &named.pattern)?,
+    let mut compensator = match (&fitted, &request.model.learned) {
+        (Some(record), _) => Compensator::fit(request.method, model, &named.pattern, record)?,
+        (None, Some(learned)) if request.method == Method::Physical => {
+            observer.note("film, chamber and offset are those that the model file states as [boundary]");
+            Compensator::in_known_surroundings(model, &named.pattern, learned)?
+        }
+        (None, _) => Compensator::declared(request.method, model, &named.pattern)?,
     };
     if let Compensator::Physical(physical) = &mut compensator {
         if request.linear {

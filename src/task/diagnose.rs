@@ -89,7 +89,7 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
     let all: Vec<&Record> = records.iter().chain(&holdout).collect();
     let seed = request.experiment_seed.filter(|_| !diagnosis.effects.is_empty());
     let experiment = match Chamber::of(&all).zip(seed) {
-        Some((chamber, seed)) => design(&diagnose::contest(&asked, &diagnosis)?, &pattern, &chamber, seed),
+        Some((chamber, seed)) => design(&diagnose::contest(&asked, &diagnosis)?, &chamber, seed),
         None => None,
     };
     let holdout_noise = (!holdout.is_empty()).then(|| noise_of(&holdout));

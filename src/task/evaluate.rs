@@ -99,7 +99,7 @@ impl Groundwork {
 /// # Errors
 /// A model that cannot be solved, patterns of another layer count.
 pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskError> {
-    let file = request.model;
+    let file = &request.model.clone().for_search();
     advise(file, observer);
     let all = if request.patterns.is_empty() { own_and_classics(file) } else { request.patterns.to_vec() };
     let solved = SolvedProfiles::new(&file.model, &file.profiles.profiles())?;

@@ -96,7 +96,7 @@ const PROGRESS_STEPS: u64 = 1000;
 /// # Errors
 /// A model that cannot be solved, an objective that nothing is proved about.
 pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskError> {
-    let file = request.model;
+    let file = &request.model.clone().for_search();
     advise(file, observer);
     let model = &file.model;
     let solved = SolvedProfiles::new(model, &file.profiles.profiles())?;

@@ -8,11 +8,13 @@ use crate::effect::custom::{Formula, FormulaError};
 use crate::effect::{CATALOGUE, CHANNEL, CUSTOM, DeclaredEffect};
 use crate::io::fault::{Fault, Faults};
 use crate::io::files::write_atomically;
+use crate::io::json::boundary::BoundaryJson;
 use crate::io::json::comparison::{CompareJson, RecordComparisonJson};
 use crate::io::json::diagnosis::{ExtendJson, FindingJson};
 use crate::io::json::inputs::{InputsJson, RecordInputJson};
 use crate::io::model::{ModelFile, NamedPattern};
 use crate::io::read::effect_tables::channel_fault;
+use crate::io::write::boundary_edit::with_boundary;
 use crate::io::write::model_edit::with_effect;
 use crate::rate::CoilModel;
 use crate::record::Record;
@@ -41,6 +43,8 @@ pub struct Answer {
     /// With the file's comments and layout kept.
     pub source: String,
     pub effect: FindingJson,
+    /// What the records said of film, offset and chamber; none without a record to fit to.
+    pub boundary: Option<BoundaryJson>,
     pub before: CompareJson,
     pub after: CompareJson,
 }
@@ -48,8 +52,8 @@ pub struct Answer {
 impl Answer {
     /// As the program prints it.
     pub fn document(self, written: &Path) -> ExtendJson {
-        let Self { effect, before, after, .. } = self;
-        ExtendJson { written: written.display().to_string(), effect, before, after }
+        let Self { effect, boundary, before, after, .. } = self;
+        ExtendJson { written: written.display().to_string(), effect, boundary, before, after }
     }
 
     /// Writes the extended model.
@@ -77,17 +81,17 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
         }
     }
     let records: Vec<Record> = given[..request.fit.len()].iter().map(|(n, _)| n.record.clone()).collect();
-    let (finding, extended) = if records.is_empty() {
+    let (finding, extended, learned) = if records.is_empty() {
         let mut model = file.model.clone();
         model.effects.retain(|e| e.kind() != wanted.kind());
         model.effects.push(wanted.clone());
-        (Finding::unfitted(wanted.clone()), model)
+        (Finding::unfitted(wanted.clone()), model, None)
     } else {
         let terms = diagnose::Terms::None;
         let asked =
             diagnose::Request { model: &file.model, pattern: &named.pattern, records: &records, holdout: &[], terms };
         let extension = diagnose::extend(&asked, wanted)?;
-        (extension.finding, extension.extended)
+        (extension.finding, extension.extended, Some(extension.boundary))
     };
     let compared = |model: &CoilModel| -> Result<CompareJson, TaskError> {
         let mut shown = Vec::with_capacity(given.len());
@@ -101,8 +105,12 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
     };
     let (before, after) = (compared(&file.model)?, compared(&extended)?);
     let effect = FindingJson::new(&finding);
-    let source = with_effect(&file.path.display().to_string(), &file.source, &finding.effect, &remarks(&effect))?;
-    Ok(Answer { source, effect, before, after })
+    let name = file.path.display().to_string();
+    let mut source = with_effect(&name, &file.source, &finding.effect, &remarks(&effect))?;
+    if let Some(learned) = &learned {
+        source = with_boundary(&name, &source, learned)?;
+    }
+    Ok(Answer { source, effect, boundary: learned.as_ref().map(BoundaryJson::new), before, after })
 }
 
 /// An effect by its name in files, at its start; `custom` takes a formula and its parameters.

@@ -390,6 +390,13 @@ fn learned_film(file: &ModelFile, comparison: &Value) -> Option<LearnedFilm> {
         return None;
     }
     let records = comparison["records"].as_array()?;
+    if let Some((film, learned)) = file.learned_film().zip(file.learned.as_ref()) {
+        return Some(LearnedFilm {
+            value_w_per_m2_k: film.value,
+            standard_error: Some(film.standard_error).filter(|e| e.is_finite()),
+            records: learned.records,
+        });
+    }
     let films: Vec<f64> = records.iter().filter_map(|r| r["estimated_film_w_per_m2_k"].as_f64()).collect();
     let count = films.len();
     let mean = films.iter().sum::<f64>() / count.max(1) as f64;

@@ -71,7 +71,7 @@ impl Answer {
 /// # Errors
 /// A model that cannot be solved; parts that cannot be kept.
 pub fn run(request: &Request, observer: &dyn Observer) -> Result<Option<Answer>, TaskError> {
-    let (file, seed) = (request.model, request.seed);
+    let (file, seed) = (&request.model.clone().for_search(), request.seed);
     let solved = SolvedProfiles::new(&file.model, &file.profiles.profiles())?;
     let unit_step = UnitStep::new(&file.model, file.profiles.max_rate_k_per_s).ok();
     let evaluator = Evaluator {

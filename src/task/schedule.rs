@@ -28,7 +28,7 @@ pub struct Answer {
 /// # Errors
 /// No pattern, one of another layer count, a model that cannot be solved.
 pub fn run(request: &Request) -> Result<Answer, TaskError> {
-    let file = request.model;
+    let file = &request.model.clone().for_search();
     let pattern = pattern_or_own(file, request.pattern)?;
     let coil = file.model.wound_coil().map_err(crate::rate::RateError::from)?;
     let schedule = Schedule::new(&coil, &pattern.pattern)?;

@@ -51,11 +51,11 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
     let file = request.model;
     advise(file, observer);
     let (drive, history) = match request.driver {
-        Driver::Profile { name, rows } => of_profile(file, name, rows)?,
+        Driver::Profile { name, rows } => of_profile(&file.clone().for_search(), name, rows)?,
         Driver::Measurement(measurement) => {
             let noticed = measurement.noticed(GrossErrors::Keep, Some(file), observer)?;
             let own = file.pattern.as_ref().map(|named| named.pattern.clone());
-            // Temperatures don't depend on the pattern; the boundary's estimate weighs the layers by it.
+            // Temperatures don't depend on the pattern; effects may weigh the layers by it.
             let pattern = own.or_else(|| Classic::Zyl.pattern(file.model.coil.layers()).ok());
             let pattern = pattern.expect("every even layer count has a cylindrical winding");
             (noticed.record.name().to_owned(), predict(&file.model, &pattern, &noticed.record)?.history)

@@ -33,7 +33,7 @@ impl<'a> Request<'a> {
 /// # Errors
 /// A model without tolerances, or one that cannot be solved.
 pub fn run(request: &Request, observer: &dyn Observer) -> Result<ToleranceJson, TaskError> {
-    let file = request.model;
+    let file = &request.model.clone().for_search();
     advise(file, observer);
     let Some(declared) = &file.tolerance else {
         return Err(TaskError::NoTolerance { path: file.path.display().to_string() });

@@ -26,7 +26,7 @@ pub struct Answer {
 
 /// Checks with code that shares nothing with what emitted the claim.
 pub fn run(request: &Request) -> Answer {
-    let file = request.model;
+    let file = &request.model.clone().for_search();
     let truth = Truth {
         model: &file.model,
         profiles: &file.profiles,

@@ -42,7 +42,54 @@ fn before_and_after_are_comparisons_of_every_record_given() {
         assert_eq!(answer[side]["inputs"]["records"][0]["role"], "fitted");
         assert!(answer[side]["records"][0]["regimes"].as_array().is_some_and(|r| r.len() >= 4));
     }
-    assert!(written.ends_with("\n[[effect]]\nkind = \"finite_pack\"\n"), "{written}");
+    assert!(written.contains("\n[[effect]]\nkind = \"finite_pack\"\n\n# Learned from a record."), "{written}");
+}
+
+/// What a search makes of the extended model is what it makes of a model that declares the learned film, and not what it
+/// makes of a prescribed outermost layer.
+#[test]
+fn the_film_that_the_records_showed_drives_searches_and_leaves_records_their_sensor() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let (complete, declared, prescribed) = (path("complete.toml"), path("declared.toml"), path("prescribed.toml"));
+    let answer = super::json(&[
+        "extend",
+        COIL,
+        "--effect",
+        "finite_pack",
+        "--fit",
+        RECORD,
+        "--holdout",
+        "examples/chamber-day-2.csv",
+        "-o",
+        &complete,
+    ]);
+    let film = &answer["boundary"]["surface_film_w_per_m2_k"];
+    let (value, error) = (film["value"].as_f64().unwrap(), film["standard_error"].as_f64().unwrap());
+    println!("film {value} ± {error}");
+    assert!(error > 0.0 && error < 0.2 * value);
+    assert!(answer["boundary"]["offset_deg_per_h"]["standard_error"].as_f64().is_some_and(|e| e > 0.0));
+    let written = std::fs::read_to_string(&complete).unwrap();
+    let without = &written[..written.find("\n# Learned from").unwrap()];
+    std::fs::write(&prescribed, without).unwrap();
+    let stated = basic_toml::from_str::<serde_json::Value>(&written).unwrap()["boundary"]["surface_film_w_per_m2_k"]
+        .as_f64()
+        .unwrap();
+    let film = format!("\n[[effect]]\nkind = \"surface_film\"\nfilm_w_per_m2_k = {stated:?}\n");
+    std::fs::write(&declared, format!("{without}{film}")).unwrap();
+    let worst = |model: &str| {
+        let answer = super::json(&["evaluate", model, "--pattern", "qua", "--pattern", "dip"]);
+        [0, 1].map(|i| answer["patterns"][i]["guaranteed_worst_rate_deg_per_h"].as_f64().unwrap())
+    };
+    let (learned, declared, prescribed) = (worst(&complete), worst(&declared), worst(&prescribed));
+    println!("learned {learned:?}, declared {declared:?}, prescribed {prescribed:?}");
+    for (a, b) in learned.iter().zip(&declared) {
+        assert!((a / b - 1.0).abs() < 1e-9);
+    }
+    assert!(learned.iter().zip(&prescribed).all(|(a, b)| a < b));
+    let said = run(&["evaluate", &complete, "--pattern", "qua"]);
+    assert!(stderr(&said).contains("profiles are courses of the air"), "{}", stderr(&said));
+    assert_eq!(code(&run(&["compare", &complete, RECORD, "--strict", "-q"])), 0);
 }
 
 #[test]

@@ -146,8 +146,8 @@ fn heat_in_the_bore_and_a_factor_over_temperature_are_compensated_as_the_model_h
     let ramps = |t: f64| 20.0 + 0.01 * (t - 2000.0).clamp(0.0, 3000.0) - 0.01 * (t - 7000.0).clamp(0.0, 3000.0);
     let heat = "[[effect]]\nkind = \"self_heating\"\npower_w_per_m2 = 120.0\ntime_constant_s = 900.0\n";
     let factor = "[[effect]]\nkind = \"thermo_optic_temperature\"\nslope_per_k = 0.004\n";
-    // The factor is taken at the thermometer's temperature for all layers; left out it would leave a tenth.
-    for (name, effects, tolerance) in [("neither", "", 0.02), ("heat", heat, 0.02), ("factor", factor, 0.05)] {
+    // A chamber of which nothing is known may ripple, and what ripples is not followed at once. The factor is taken at the thermometer's temperature for all layers; left out it would leave a tenth.
+    for (name, effects, tolerance) in [("neither", "", 0.03), ("heat", heat, 0.03), ("factor", factor, 0.05)] {
         let (left, raw) = left_of(effects, ramps);
         println!("{name}: {left:.2e} of {raw:.2e} rad/s");
         assert!(left < tolerance * raw, "{name}");

@@ -35,27 +35,11 @@ impl Physical {
     /// The formulas, ready for rows of one interval.
     pub(in crate::compensate) fn formulas_at_work(&self, interval_s: f64) -> Option<AtWork> {
         let formulas = self.formulas.as_ref()?;
-        let slow = self.slow_modes(interval_s);
-        let n = slow + 2 + usize::from(self.lag_s > 0.0);
-        let amplitude = formulas.amplitude();
-        let temperatures = DMatrix::from_fn(amplitude.nrows(), n, |layer, state| {
-            if state < slow {
-                -amplitude[(layer, state)]
-            } else if state == slow {
-                1.0
-            } else if state == slow + 1 {
-                (slow..self.decay_per_s.len()).map(|mode| -amplitude[(layer, mode)] / self.decay_per_s[mode]).sum()
-            } else {
-                0.0
-            }
-        });
-        let mut dynamics = DMatrix::zeros(n, n);
-        for (mode, l) in self.decay_per_s[..slow].iter().enumerate() {
-            dynamics[(mode, mode)] = -l;
-            dynamics[(mode, slow + 1)] = 1.0;
-        }
-        dynamics[(slow, slow + 1)] = 1.0;
-        Some(formulas.at_work(temperatures, &dynamics, (slow, slow + 1)))
+        let causal = self.causal(interval_s).ok()?;
+        let n = causal.states;
+        let temperatures = DMatrix::from_row_slice(causal.layers.len() / n, n, &causal.layers);
+        let dynamics = DMatrix::from_row_slice(n, n, &causal.dynamics);
+        Some(formulas.at_work(temperatures, &dynamics, (causal.slope - 1, causal.slope)))
     }
 
     /// What formulas read of a record's row.

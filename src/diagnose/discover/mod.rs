@@ -177,8 +177,8 @@ mod tests {
     use statrs::distribution::{ContinuousCDF, Normal};
 
     use super::*;
-    use crate::boundary::expose;
     use crate::chamber::{Assumption, Chamber, Input};
+    use crate::diagnose::experiment::expose;
     use crate::diagnose::experiment::fixtures::{model, pattern};
     use crate::diagnose::{Request, Terms, Verdict, diagnose};
     use crate::numeric::piecewise::PiecewiseLinear;

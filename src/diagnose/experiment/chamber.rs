@@ -29,16 +29,8 @@ const MOST_LEGS: usize = 60;
 /// Where in the chamber's range swings are tried.
 const MIDDLES: [(&str, f64); 3] = [("middle", 0.5), ("cold", 0.0), ("warm", 1.0)];
 const SAMPLED: usize = 40;
-const SAMPLED_SMALL: usize = 4;
 /// Legs of the swings that are tried.
 const SWINGS_S: [f64; 5] = [300.0, 450.0, 700.0, 1100.0, 1800.0];
-
-/// From how many profiles one is chosen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Choice {
-    Small,
-    Large,
-}
 
 impl Chamber {
     /// None where the records hold no change of temperature.
@@ -81,7 +73,7 @@ struct Leg {
     soak_share: f64,
 }
 
-pub(super) fn profiles(chamber: &Chamber, choice: Choice, seed: u64) -> Vec<Profile> {
+pub(super) fn profiles(chamber: &Chamber, seed: u64) -> Vec<Profile> {
     let (cold, warm) = (chamber.coldest_k, chamber.warmest_k);
     let leg = |to_k: f64, rate_share: f64, soak_share: f64| Leg { to_k, rate_share, soak_share };
     let between = |share: f64| cold + share * (warm - cold);
@@ -96,11 +88,7 @@ pub(super) fn profiles(chamber: &Chamber, choice: Choice, seed: u64) -> Vec<Prof
         ),
         ("staircase".to_owned(), [0.25, 0.5, 0.75, 1.0, 0.0].map(|s| leg(between(s), 1.0, 0.12)).into()),
     ];
-    let (middles, sampled) = match choice {
-        Choice::Large => (&MIDDLES[..], SAMPLED),
-        Choice::Small => (&MIDDLES[..1], SAMPLED_SMALL),
-    };
-    for &(name, middle) in middles {
+    for (name, middle) in MIDDLES {
         for leg_s in SWINGS_S.map(|s| s.max(shortest_leg_s)) {
             let swing = (leg_s * chamber.rate_k_per_s / (warm - cold)).min(1.0);
             let low = (middle - 0.5 * swing).clamp(0.0, 1.0 - swing);
@@ -109,7 +97,7 @@ pub(super) fn profiles(chamber: &Chamber, choice: Choice, seed: u64) -> Vec<Prof
         }
     }
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    for i in 0..sampled {
+    for i in 0..SAMPLED {
         // Lengths from the shortest to half of the duration, evenly by their logarithm.
         let longest = (0.5 * chamber.duration_s / shortest_leg_s).max(1.0);
         let scale_s = shortest_leg_s * longest.powf(random.random::<f64>());
@@ -172,7 +160,7 @@ mod tests {
 
     #[test]
     fn every_profile_stays_within_what_the_chamber_can_do() {
-        let profiles = profiles(&CHAMBER, Choice::Large, 3);
+        let profiles = profiles(&CHAMBER, 3);
         assert_eq!(profiles.len(), 60);
         for profile in &profiles {
             let course = profile.temperature(REFERENCE_TEMPERATURE_K);

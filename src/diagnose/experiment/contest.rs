@@ -1,33 +1,19 @@
 //! What a diagnosis leaves to be told apart, and what the records at hand say about each candidate.
 
-use nalgebra::DMatrix;
-
-use super::super::anchor::way_of;
-use super::super::evidence::{Case, Evidence, Role, sum_of_squares};
-use super::super::{Diagnosis, Verdict};
-use crate::boundary::Air;
-use crate::effect::Acts;
+use super::super::{DiagnoseError, Diagnosis, Request, Verdict};
+use crate::chamber::{Assumption, Chamber, Effort, Fit, Free, Hold, Quantity};
 use crate::rate::CoilModel;
+use crate::record::Record;
 
-/// A candidate, with what is free in it and how firmly the records hold that.
+/// A candidate, fitted to the records at hand in their chamber.
 #[derive(Debug, Clone)]
 pub struct Rival {
     pub name: String,
-    pub model: CoilModel,
-    pub(super) free: Vec<Free>,
-    /// R with |R (p − p̂)|² = rise of the records' χ².
-    pub(super) hold: DMatrix<f64>,
-    /// Of all records at hand.
-    pub(super) chi_square: f64,
-    /// Film and noises as they were estimated under it.
-    pub(super) air: Air,
-}
-
-/// A parameter that is fitted: which of which effect.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Free {
-    effect: usize,
-    parameter: usize,
+    pub(super) fit: Fit,
+    /// What the records say of its free numbers and of the film.
+    pub(super) hold: Option<Hold>,
+    /// −2 ln L of all records at hand.
+    pub(super) deviance: f64,
 }
 
 /// The candidates, and what is the same for all of them.
@@ -36,116 +22,83 @@ pub struct Contest {
     pub(super) rivals: Vec<Rival>,
     /// What they are candidates to be added to.
     pub(super) without: Option<Rival>,
+    /// The chamber, sensor and gyro of the experiment: as the likeliest candidate found them.
+    pub(super) air: Option<Fit>,
     pub(super) noise_rad_per_s: f64,
-    /// What χ² is counted in: 1, or what the best candidate leaves a row, whichever is more.
+    /// What χ² is counted in: 1, or what the likeliest candidate leaves a rate in units of what it expects, if that is more.
     pub(super) variance: f64,
 }
 
-/// Share of a parameter's size, and of its range, over which derivatives are taken.
-const STEP_SHARE: f64 = 1e-3;
-const STEP_SHARE_OF_RANGE: f64 = 1e-6;
-
 impl Contest {
-    /// Of a diagnosis whose evidence is still there.
-    pub(in super::super) fn new(evidence: &Evidence, declared: &CoilModel, diagnosis: &Diagnosis) -> Self {
-        // The finest record is what the next one will be like.
-        let finest = evidence.of(Role::Fit).min_by(|a, b| a.record.interval_s().total_cmp(&b.record.interval_s()));
-        let rival = |(name, model): (String, CoilModel)| Rival::new(evidence, finest?, declared, name, model);
-        let rivals: Vec<Rival> = candidates(declared, diagnosis).into_iter().filter_map(rival).collect();
-        let without = (!rivals.is_empty()).then(|| without_candidates(declared, diagnosis)).and_then(rival);
-        let rows = (evidence.rows(Role::Fit) + evidence.rows(Role::Holdout)).max(1);
-        let least = rivals.iter().map(|r| r.chi_square).fold(f64::INFINITY, f64::min);
-        Self {
-            variance: if least.is_finite() { (least / rows as f64).max(1.0) } else { 1.0 },
-            noise_rad_per_s: finest.map_or(0.0, |case| case.noise_rad_per_s),
-            rivals,
-            without,
+    /// Of a diagnosis: every candidate is fitted again to the records that it was drawn from.
+    ///
+    /// # Errors
+    /// Records that say nothing, models that cannot be solved.
+    pub(in super::super) fn new(request: &Request, diagnosis: &Diagnosis) -> Result<Self, DiagnoseError> {
+        let candidates = candidates(request.model, diagnosis);
+        let mut contest = Self { rivals: Vec::new(), without: None, air: None, noise_rad_per_s: 0.0, variance: 1.0 };
+        if candidates.is_empty() {
+            return Ok(contest);
         }
+        let records: Vec<&Record> = request.records.iter().chain(request.holdout).collect();
+        let fitted: Vec<usize> = (0..request.records.len()).collect();
+        let held_out: Vec<usize> = (request.records.len()..records.len()).collect();
+        let declared = Assumption::new(request.model.clone(), request.pattern.clone());
+        let (chamber, mut from) = Chamber::new(request.model, &records)?.settled(&declared, &fitted)?;
+        let mut rival = |(name, model): (String, CoilModel)| -> Result<Rival, DiagnoseError> {
+            let free = free_numbers(request.model, &model);
+            let assumed = Assumption::new(model, request.pattern.clone());
+            let fit = chamber.fit(&assumed, &free, &fitted, Some(&from), Effort::QUICK)?;
+            from = fit.clone();
+            let mut deviance = -2.0 * fit.log_likelihood;
+            for &record in &held_out {
+                deviance -= 2.0 * chamber.held_out(&fit, record)?.log_likelihood;
+            }
+            Ok(Rival { name, hold: fit.hold(), fit, deviance })
+        };
+        // The likeliest first: its chamber is where the others begin.
+        let mut rivals = Vec::with_capacity(candidates.len());
+        for candidate in candidates.into_iter().rev() {
+            rivals.push(rival(candidate)?);
+        }
+        rivals.reverse();
+        contest.without = Some(rival(without_candidates(request.model, diagnosis))?);
+        let likeliest = rivals.iter().min_by(|a, b| a.deviance.total_cmp(&b.deviance));
+        // The finest record is what the next one will be like.
+        let finest = fitted.into_iter().min_by(|&a, &b| records[a].interval_s().total_cmp(&records[b].interval_s()));
+        if let (Some(likeliest), Some(finest)) = (likeliest, finest) {
+            let whiteness = chamber.noise(&likeliest.fit, finest)?.whiteness;
+            contest.variance = whiteness.powi(2).max(1.0);
+            contest.noise_rad_per_s = likeliest.fit.number(Quantity::RateNoise, finest);
+            contest.air = Some(likeliest.fit.of_record(finest));
+        }
+        contest.rivals = rivals;
+        Ok(contest)
     }
 
     /// Whether one candidate is a special case of another, so that no data could speak against the latter.
     pub(super) fn is_within(&self, special: usize, general: usize) -> bool {
-        let general = &self.rivals[general].model.effects;
-        let special = &self.rivals[special].model.effects;
+        let effects = |rival: usize| &self.rivals[rival].fit.assumed.model.effects;
+        let (special, general) = (effects(special), effects(general));
         special.len() < general.len() && special.iter().zip(general).all(|(a, b)| a.kind() == b.kind())
     }
 }
 
 impl Rival {
-    fn new(evidence: &Evidence, finest: &Case, declared: &CoilModel, name: String, model: CoilModel) -> Option<Self> {
-        let location = model.heat_path().ok()?.location;
-        let anchor = finest.anchor_for(location, &way_of(&model), model.sensor_lag_s())?;
-        let air = finest.anchors[anchor].boundary.air().clone();
-        let residuals = evidence.residuals(&model, Role::Fit)?;
-        let unseen = evidence.residuals(&model, Role::Holdout)?;
-        let chi_square = sum_of_squares(&residuals) + sum_of_squares(&unseen);
-        let free = free_parameters(declared, &model);
-        let mut rival = Self { name, model, free, hold: DMatrix::zeros(0, 0), chi_square, air };
-        let columns = rival.derivatives(&residuals, |moved| evidence.residuals(moved, Role::Fit))?;
-        if !columns.is_empty() {
-            let flat: Vec<f64> = columns.into_iter().flatten().collect();
-            rival.hold = DMatrix::from_vec(residuals.len(), rival.free.len(), flat).qr().r();
-        }
-        Some(rival)
-    }
-
     /// The experiments that would isolate what is fitted.
     pub(super) fn isolating(&self) -> Vec<&'static str> {
-        let mut effects: Vec<usize> = self.free.iter().map(|f| f.effect).collect();
+        let mut effects: Vec<usize> = self.fit.free.iter().map(|f| f.effect).collect();
         effects.dedup();
-        effects.into_iter().map(|e| self.model.effects[e].spec().experiment).collect()
+        effects.into_iter().map(|e| self.fit.assumed.model.effects[e].spec().experiment).collect()
     }
 
-    /// Whether a free parameter changes what boundary is made of readings.
-    pub(super) fn moves_boundary(&self) -> bool {
-        let acts = |f: &Free| self.model.effects[f.effect].spec().acts;
-        self.free.iter().any(|f| matches!(acts(f), Acts::HeatPath | Acts::Sensor))
-    }
-
-    /// Values of the free parameters, SI.
-    pub(super) fn values(&self) -> Vec<f64> {
-        self.free.iter().map(|f| self.model.effects[f.effect].values()[f.parameter]).collect()
-    }
-
-    /// Bounds of the free parameters, SI.
-    pub(super) fn bounds(&self) -> Vec<(f64, f64)> {
-        let declared = |f: &Free| self.model.effects[f.effect].parameters()[f.parameter].clone();
-        self.free.iter().map(declared).map(|p| (p.lower, p.upper)).collect()
-    }
-
-    /// The model with other values of the free parameters.
-    pub(super) fn with(&self, values: &[f64]) -> Option<CoilModel> {
-        let mut model = self.model.clone();
-        for (free, &value) in self.free.iter().zip(values) {
-            let mut all = model.effects[free.effect].values().to_vec();
-            all[free.parameter] = value;
-            model.effects[free.effect] = model.effects[free.effect].with_values(all).ok()?;
-        }
-        Some(model)
-    }
-
-    /// Of whatever a model gives, with respect to each free parameter; inwards where a bound is near.
-    pub(super) fn derivatives(
-        &self,
-        at: &[f64],
-        give: impl Fn(&CoilModel) -> Option<Vec<f64>>,
-    ) -> Option<Vec<Vec<f64>>> {
-        let values = self.values();
-        let column = |(place, (lower, upper)): (usize, (f64, f64))| {
-            let range = if (upper - lower).is_finite() { upper - lower } else { 0.0 };
-            let size = (STEP_SHARE * values[place].abs()).max(STEP_SHARE_OF_RANGE * range).max(f64::EPSILON);
-            let step = if values[place] + size <= upper { size } else { -size };
-            let mut moved = values.clone();
-            moved[place] += step;
-            let moved = give(&self.with(&moved)?)?;
-            Some(moved.iter().zip(at).map(|(m, a)| (m - a) / step).collect())
-        };
-        self.bounds().into_iter().enumerate().map(column).collect()
+    pub(super) fn model(&self) -> &CoilModel {
+        &self.fit.assumed.model
     }
 }
 
 /// What was added to the declared model and fitted. A parameter that has a default is held there unless it was fitted too.
-fn free_parameters(declared: &CoilModel, model: &CoilModel) -> Vec<Free> {
+fn free_numbers(declared: &CoilModel, model: &CoilModel) -> Vec<Free> {
     let added = model.effects.iter().enumerate().skip(declared.effects.len());
     added
         .flat_map(|(place, effect)| {
@@ -155,7 +108,7 @@ fn free_parameters(declared: &CoilModel, model: &CoilModel) -> Vec<Free> {
             if fitted.is_empty() && !effect.values().is_empty() {
                 fitted.push(0);
             }
-            fitted.into_iter().map(move |parameter| Free { effect: place, parameter })
+            fitted.into_iter().map(move |parameter| Free { effect: place, parameter, stated_within: None })
         })
         .collect()
 }
@@ -237,21 +190,24 @@ pub(in crate::diagnose) mod tests {
         }
     }
 
-    /// All of whose effects are fitted; no record holds them.
+    /// The white noise of a rate [rad/s].
+    pub const NOISE_RAD_PER_S: f64 = 1e-7;
+
+    /// All of whose effects are fitted; no record holds them. The chamber is a usual one, its film 25 W/(m²K).
     pub fn rival(name: &str, model: CoilModel) -> Rival {
-        let free = free_parameters(&super::tests::model(Vec::new()), &model);
-        let hold = DMatrix::zeros(free.len(), free.len());
-        let air = Air { film_w_per_m2_k: Some(25.0), jerk_noise_k2_per_s7: 1e-22, kinks: Vec::new(), noise_k: 0.004 };
-        Rival { name: name.to_owned(), model, free, hold, chi_square: 0.0, air }
+        let free = free_numbers(&super::tests::model(Vec::new()), &model);
+        let fit = Fit::to_nothing(Assumption::new(model, pattern()), free, NOISE_RAD_PER_S);
+        Rival { name: name.to_owned(), fit, hold: None, deviance: 0.0 }
     }
 
     pub fn contest(rivals: Vec<Rival>) -> Contest {
-        Contest { rivals, without: None, noise_rad_per_s: 1e-7, variance: 1.0 }
+        let air = rivals.first().map(|r| r.fit.clone());
+        Contest { rivals, without: None, air, noise_rad_per_s: NOISE_RAD_PER_S, variance: 1.0 }
     }
 
     #[test]
     fn a_parameter_with_a_default_is_free_only_where_it_left_it() {
-        let free = |values: &[f64]| rival("", model(vec![effect("spool_mass", values)])).free.len();
+        let free = |values: &[f64]| rival("", model(vec![effect("spool_mass", values)])).fit.free.len();
         assert_eq!(free(&[800.0, 200.0, 0.0]), 2);
         assert_eq!(free(&[800.0, 200.0, 3.0]), 3);
     }

@@ -13,6 +13,7 @@ use crate::diagnose::{
 use crate::effect::DeclaredEffect;
 use crate::units::deg_per_h_from_rad_per_s;
 
+use super::boundary::BoundaryJson;
 use super::comparison::CompareJson;
 use super::experiment::ExperimentJson;
 use super::inputs::InputsJson;
@@ -52,6 +53,8 @@ pub struct DiagnosisJson {
     /// Formulas for what no listed effect explains, best first.
     #[serde(default)]
     pub proposals: Vec<ProposalJson>,
+    /// What the extended model states as `[boundary]`.
+    pub boundary: BoundaryJson,
     pub inputs: InputsJson,
 }
 
@@ -248,6 +251,7 @@ impl DiagnosisJson {
             hypothesis: diagnosis.hypothesis.as_ref().map(HypothesisJson::new),
             noise: diagnosis.noise.iter().map(NoiseJson::new).collect(),
             proposals: diagnosis.proposals.iter().map(ProposalJson::new).collect(),
+            boundary: BoundaryJson::new(&diagnosis.boundary),
             inputs,
         };
         document.ladder_in_words = document.steps_in_words();
@@ -466,6 +470,8 @@ pub struct ExtendJson {
     /// The new model file.
     pub written: String,
     pub effect: FindingJson,
+    /// What the new model file states as `[boundary]`; null without a record to fit to.
+    pub boundary: Option<BoundaryJson>,
     /// Every record given, as `compare` shows it.
     pub before: CompareJson,
     pub after: CompareJson,

@@ -1,5 +1,6 @@
 //! JSON documents: mirror types of what commands answer, with the keys that scripts read.
 
+pub mod boundary;
 pub mod built_coils;
 pub mod campaign;
 pub mod comparison;

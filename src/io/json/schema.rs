@@ -143,6 +143,7 @@ pub fn model_schema() -> Value {
             "search": search,
             "production": production(),
             "tolerance": tolerance(),
+            "boundary": super::boundary::schema(),
         }),
     ))
 }
@@ -467,8 +468,18 @@ mod tests {
             keys
         };
         assert_eq!(keys(&schema), known(""));
-        for name in ["fibre", "winding", "thermal", "sensor", "record", "profiles", "search", "production", "tolerance"]
-        {
+        for name in [
+            "fibre",
+            "winding",
+            "thermal",
+            "sensor",
+            "record",
+            "profiles",
+            "search",
+            "production",
+            "tolerance",
+            "boundary",
+        ] {
             assert_eq!(keys(&schema["properties"][name]), known(&format!("[{name}]")), "{name}");
         }
         for spec in CATALOGUE {

@@ -16,6 +16,7 @@ use crate::search::cost::objective::Objective;
 use crate::thermal::{self, DEFAULT_CELLS_PER_LAYER, Extent, Location, Material};
 use crate::units::{m_from_mm, m_from_nm, m_from_um, um_from_m};
 
+use super::boundary_table::read_boundary;
 use super::effect_tables::read_effects;
 use super::pattern_file::{ResolveError, resolve_pattern};
 use super::production_table::read_production;
@@ -31,6 +32,14 @@ use super::toml_reader::{Limits, TableReader, TomlReader, nearest, parse};
 pub fn read_model(path: &Path) -> Result<ModelFile, Faults> {
     let source = read_text(path)?;
     parse_model(path, &source)
+}
+
+/// As [`read_model`], as a search sees it: behind the film that records showed.
+///
+/// # Errors
+/// As [`read_model`].
+pub fn read_design(path: &Path) -> Result<ModelFile, Faults> {
+    read_model(path).map(ModelFile::for_search)
 }
 
 /// As [`read_model`], of a text that was read already; `path` places relative pattern files and names the source.
@@ -54,6 +63,7 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
     let mut production_table = root.table(r, "production");
     let mut tolerance_table = root.table(r, "tolerance");
     let mut record_table = root.table(r, "record");
+    let mut boundary_table = root.table(r, "boundary");
     root.finish(r);
 
     let fibre = read_fibre(r, &mut fibre_table);
@@ -90,6 +100,8 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
 
     let record = read_format(r, &mut record_table);
     record_table.finish(r);
+    let learned = read_boundary(r, &mut boundary_table);
+    boundary_table.finish(r);
 
     let whole = (|| {
         let (extent, material) = thermal_parts?;
@@ -142,6 +154,7 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
             record,
             advice,
             stated_length_m,
+            learned,
         }
     });
     reader.finish(value)

@@ -123,7 +123,7 @@ pub fn read_run(folder: &Path) -> Result<Run, Faults> {
     // The model's own path places relative pattern files.
     let stated = run.get("model").and_then(|item| item.as_str()).unwrap_or("model.toml").to_owned();
     let source = read_text(&folder.join("model.toml"))?;
-    let file = parse_model(Path::new(&stated), &source)?;
+    let file = parse_model(Path::new(&stated), &source)?.for_search();
     let layers = file.model.coil.layers();
     for pattern in std::iter::once(&summary.best).chain(&summary.baselines) {
         if pattern.segments.len() != layers {

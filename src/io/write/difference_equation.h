@@ -24,6 +24,8 @@ typedef struct {
 typedef struct {
   coilwright_hypothesis h[COILWRIGHT_HYPOTHESES];
   coilwright_hypothesis next[COILWRIGHT_HYPOTHESES];
+  /* The first reading: the states count from it. */
+  double origin;
   int count;
   int missing;
 } coilwright_state;
@@ -41,6 +43,7 @@ static const double coilwright_factor[COILWRIGHT_AGES] = {@factors@};
 static const double coilwright_offset = @offset@;
 
 static void coilwright_start(coilwright_state *s) {
+  s->origin = 0.0;
   s->count = 0;
   s->missing = 0;
 }
@@ -63,7 +66,7 @@ static void coilwright_branch(coilwright_state *s, double temperature_c) {
   int age[2 * COILWRIGHT_HYPOTHESES];
   int i, j, kept = 0;
   for (i = 0; i < s->count; ++i) {
-    double e = temperature_c;
+    double e = temperature_c - s->origin;
     int older = s->h[i].age + 1 < COILWRIGHT_AGES ? s->h[i].age + 1 : COILWRIGHT_AGES - 1;
     for (j = 0; j < COILWRIGHT_STATES; ++j) e -= coilwright_reading[j] * s->h[i].v[j];
     error[i] = e;
@@ -103,7 +106,7 @@ static double coilwright_step(coilwright_state *s, double temperature_c, int val
   if (s->count == 0) {
     if (!valid) return coilwright_offset;
     for (i = 0; i < COILWRIGHT_VALUES; ++i) s->h[0].v[i] = 0.0;
-@starts@
+    s->origin = temperature_c;
     s->h[0].age = 0;
     s->h[0].log_weight = 0.0;
     s->count = 1;

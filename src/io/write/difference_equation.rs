@@ -3,7 +3,7 @@
 use super::formulas_in_c::FormulasInC;
 use serde::Serialize;
 
-use crate::compensate::filter::{BREAK_PROBABILITY, FORGOTTEN_ROWS, Filter, Gains, LEAST_LOG_WEIGHT};
+use crate::compensate::filter::{FORGOTTEN_ROWS, Filter, Gains, LEAST_LOG_WEIGHT};
 use crate::compensate::physical::Physical;
 use crate::text::sink::CComment;
 use crate::units::deg_per_h_from_rad_per_s;
@@ -23,7 +23,7 @@ pub struct DifferenceEquation {
     pub rate: Vec<f64>,
     /// h.
     pub reading: Vec<f64>,
-    /// States that start at the first reading; the others start at 0.
+    /// States that are temperatures, counted from the first reading; all start at 0.
     pub level_states: Vec<usize>,
     /// 1: one difference equation, whose gains are the only ones.
     pub most_hypotheses: usize,
@@ -64,9 +64,9 @@ fn shown(values: &[f64]) -> Vec<f64> {
 
 const PLAIN: [&str; 4] = [
     "x = F x_before; o[0] = rate . x_before; o[j] = o_before[j-1]",
-    "e = temperature_c - reading . x",
+    "e = temperature_c - first_reading - reading . x",
     "x = x + gain e; o[j] = o[j] + chain_gain[j] e (without a reading: neither)",
-    "rate error of the row delay_rows ago = o[delay_rows] + offset; first reading: level_states = reading",
+    "rate error of the row delay_rows ago = o[delay_rows] + offset; first reading: x = 0, o = 0",
 ];
 const BRANCHES: [&str; 4] = [
     "each hypothesis of age a branches: a + 1 with l += ln(1 - break_probability), 0 with l += ln(break_probability)",
@@ -81,7 +81,7 @@ impl DifferenceEquation {
         if !physical.is_linear() {
             return None;
         }
-        let Filter { transition, rate, reading, level_states, most_hypotheses, gains, .. } =
+        let Filter { transition, rate, reading, level_states, most_hypotheses, break_probability, gains, .. } =
             physical.filter(interval_s, delay_rows);
         let states = rate.len();
         let mut equations = PLAIN.to_vec();
@@ -102,7 +102,7 @@ impl DifferenceEquation {
             reading,
             level_states,
             most_hypotheses,
-            break_probability: BREAK_PROBABILITY,
+            break_probability,
             least_log_weight: LEAST_LOG_WEIGHT,
             forgotten_rows: FORGOTTEN_ROWS,
             gains: gains.iter().map(|g| GainsJson::new(g, states)).collect(),
@@ -117,8 +117,6 @@ impl DifferenceEquation {
             self.gains.iter().map(|g| format!("  {{{}, {}}}", list(&g.gain), list(&g.chain_gain))).collect();
         let variances: Vec<f64> = self.gains.iter().map(|g| g.variance).collect();
         let factors: Vec<f64> = variances.iter().map(|v| -0.5 * v.ln()).collect();
-        let starts: Vec<String> =
-            self.level_states.iter().map(|i| format!("    s->h[0].v[{i}] = temperature_c;")).collect();
         let header = filled(
             HEADER,
             &[
@@ -139,7 +137,6 @@ impl DifferenceEquation {
                 ("no_break", format!("{:.17e}", (-self.break_probability).ln_1p())),
                 ("break", format!("{:.17e}", self.break_probability.ln())),
                 ("least", format!("{:.17e}", self.least_log_weight)),
-                ("starts", starts.join("\n")),
             ],
         );
         match &self.formulas_in_c {

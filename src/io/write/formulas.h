@@ -105,7 +105,8 @@ static double coilwright_gyro_step(coilwright_gyro *g, double time_s, double tem
   }
   p->mean = p->mean_rate = 0.0;
   for (i = 0; p->known && i < COILWRIGHT_LAYERS; ++i) {
-    p->temperature[i] = p->rate[i] = 0.0;
+    p->temperature[i] = g->coil.origin;
+    p->rate[i] = 0.0;
     for (j = 0; j < COILWRIGHT_STATES; ++j) {
       p->temperature[i] += coilwright_layer[i][j] * state[j] / weights;
       p->rate[i] += coilwright_layer_rate[i][j] * state[j] / weights;
@@ -113,7 +114,7 @@ static double coilwright_gyro_step(coilwright_gyro *g, double time_s, double tem
     p->mean += coilwright_share[i] * p->temperature[i];
     p->mean_rate += coilwright_share[i] * p->rate[i];
   }
-  p->air = state[@air@] / (weights > 0.0 ? weights : 1.0);
+  p->air = g->coil.origin + state[@air@] / (weights > 0.0 ? weights : 1.0);
   p->air_rate = state[@slope@] / (weights > 0.0 ? weights : 1.0);
   for (i = 0; columns && i < COILWRIGHT_COLUMNS; ++i) p->column[i] = columns[i];
   return rate + coilwright_formulas(&g->memory, &g->pack[COILWRIGHT_DELAY], rate - coilwright_offset);

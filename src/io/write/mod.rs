@@ -2,6 +2,7 @@
 //!
 //! What only this program writes and reads again (a checkpoint, the parts of a front, the cells of a campaign) is read here too.
 
+pub mod boundary_edit;
 pub mod campaign_cells;
 pub mod campaign_tables;
 pub mod checkpoint;

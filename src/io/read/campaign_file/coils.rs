@@ -67,7 +67,7 @@ impl CoilStudy {
     pub(super) fn cells(&self) -> Result<Vec<Cell>, Faults> {
         let mut cells = Vec::new();
         for path in &self.models {
-            let file = parse_model(path, &model_text(path)?)?;
+            let file = parse_model(path, &model_text(path)?)?.for_search();
             let patterns = self.patterns_of(path, &file)?;
             let Some(declared) = &file.tolerance else {
                 let message = "has no [tolerance]: state how much what is built spreads";

@@ -112,9 +112,11 @@ impl SearchGrid {
         for path in &self.models {
             let source = model_text(path)?;
             let files = if self.layers.is_empty() {
-                vec![parse_model(path, &source)?]
+                vec![parse_model(path, &source)?.for_search()]
             } else {
-                let with = |&layers: &usize| parse_model(path, &with_layers(path, &source, layers)?);
+                let with = |&layers: &usize| {
+                    parse_model(path, &with_layers(path, &source, layers)?).map(ModelFile::for_search)
+                };
                 self.layers.iter().map(with).collect::<Result<_, _>>()?
             };
             for file in files {

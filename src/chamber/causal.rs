@@ -1,0 +1,141 @@
+//! The chamber as a filter meets it that sees one thermometer row by row: the same system, the gyro's own states left out.
+
+use super::fit::Fit;
+use super::learned::Learned;
+use super::parameter::Place;
+use super::prior::{PRIORS, Quantity};
+use super::system::{Gains, Layout, Numbers, Parts, driven_by_air, dynamics, places, response};
+use super::{Chamber, FEWEST_MODES, HALF_SPACE_MODES, MODES_PER_ROW, MOST_MODES};
+use crate::thermal::pack::Pack;
+use crate::thermal::reduced::Reduced;
+use crate::thermal::{Extent, HeatPath, Location, ThermalError};
+
+/// Chamber, sensor and film in numbers.
+#[derive(Debug, Clone)]
+pub struct Surroundings {
+    pub film_w_per_m2_k: f64,
+    numbers: Numbers,
+}
+
+impl Surroundings {
+    /// What is likely of any chamber.
+    pub fn usual() -> Self {
+        let mut numbers = Numbers([f64::NAN; PRIORS.len()]);
+        for prior in &PRIORS {
+            // The gyro's own numbers are relative to a noise that is not there.
+            numbers.set(prior.quantity, prior.median);
+        }
+        Self { film_w_per_m2_k: Quantity::Film.prior().median, numbers }
+    }
+
+    /// What a model file states of them.
+    pub fn learned(learned: &Learned) -> Self {
+        let mut usual = Self::usual();
+        if let Some(film) = learned.film_w_per_m2_k {
+            usual.film_w_per_m2_k = film.value;
+        }
+        learned.numbers.iter().for_each(|(quantity, estimate)| usual.numbers.set(*quantity, estimate.value));
+        usual
+    }
+
+    /// With this density of the noise of the air's slope between its breaks.
+    pub fn wandering(&self, rest_noise_k2_per_s3: f64) -> Self {
+        let mut other = self.clone();
+        other.numbers.set(Quantity::RestNoise, rest_noise_k2_per_s3);
+        other
+    }
+
+    /// Standard deviation of one reading besides the sensor's resolution \[K\].
+    pub fn reading_noise_k(&self) -> f64 {
+        self.numbers.get(Quantity::ReadingNoise)
+    }
+
+    /// Density of the noise of the air's slope between its breaks \[K²/s³\].
+    pub fn rest_noise_k2_per_s3(&self) -> f64 {
+        self.numbers.get(Quantity::RestNoise)
+    }
+}
+
+impl Chamber<'_> {
+    /// The surroundings of a fitted record.
+    pub fn surroundings(&self, fit: &Fit, record: usize) -> Surroundings {
+        let mut numbers = self.numbers_for(fit, record);
+        // Resolution is noise to a filter.
+        let noise = numbers.get(Quantity::ReadingNoise).hypot(self.resolution_k(record) / 12f64.sqrt());
+        numbers.set(Quantity::ReadingNoise, noise);
+        let film = fit.value(Place::Quantity { quantity: Quantity::Film, record: None });
+        Surroundings { film_w_per_m2_k: film.map_or(Quantity::Film.prior().median, |f| f.0), numbers }
+    }
+}
+
+/// Pack, film, air and sensor as x' = F x + noise.
+///
+/// # Shapes
+/// `dynamics` row-major states × states; `noise`, `functional` and `reading` one entry a state.
+#[derive(Debug, Clone)]
+pub struct Causal {
+    pub states: usize,
+    pub dynamics: Vec<f64>,
+    /// Densities of the white noises that drive the states, but for the slope's.
+    pub noise: Vec<f64>,
+    /// The integral of the rate error \[rad/K\].
+    pub functional: Vec<f64>,
+    pub reading: Vec<f64>,
+    /// Row-major layers × states: each layer's temperature.
+    pub layers: Vec<f64>,
+    /// The states that are a temperature: in equilibrium all show the air's.
+    pub level_states: Vec<usize>,
+    pub slope: usize,
+}
+
+/// The longest time that a half space's response is fitted to \[s\].
+const LONGEST_S: f64 = 1e5;
+
+impl Causal {
+    /// For rows `row_s` apart; `layer_gains` and `air_gain` are dΩ/dṪ_j and dΩ/dȧ.
+    ///
+    /// # Errors
+    /// A heat path that cannot be solved.
+    pub fn new(
+        path: &HeatPath,
+        layer_gains: &[f64],
+        air_gain: f64,
+        lag_s: f64,
+        surroundings: &Surroundings,
+        row_s: f64,
+    ) -> Result<Self, ThermalError> {
+        let shows_air = path.location == Location::Ambient;
+        let film = if shows_air { path.film_w_per_m2_k.unwrap_or(f64::INFINITY) } else { surroundings.film_w_per_m2_k };
+        let (driven, skin_s) = driven_by_air(path, film);
+        let modes = if path.extent == Extent::HalfSpace {
+            HALF_SPACE_MODES
+        } else {
+            let slow = Pack::new(&driven)?.decays_per_s().iter().filter(|l| *l * row_s < MODES_PER_ROW).count();
+            slow.clamp(FEWEST_MODES, MOST_MODES)
+        };
+        let reduced = Reduced::new(&driven, modes, row_s, LONGEST_S)?;
+        let mut outputs = layer_gains.to_vec();
+        outputs.resize(reduced.outputs, 0.0);
+        let gains = Gains { outputs, air: air_gain };
+        let parts = Parts { reduced: &reduced, gains: &gains, skin_s, shows_air, lag_s, drift: false, cycle: false };
+        let layout = Layout::with(&parts, false, false);
+        let mut numbers = surroundings.numbers;
+        // Only the gyro's own states hang on these.
+        [Quantity::RateNoise, Quantity::WanderShare, Quantity::WanderTime]
+            .into_iter()
+            .for_each(|q| numbers.set(q, 1.0));
+        let (f, noise, _) = dynamics(&parts, &layout, &numbers);
+        let (all, n) = (layout.size, layout.own());
+        let level = |row: &[f64]| row[..n].to_vec();
+        Ok(Self {
+            states: n,
+            dynamics: f.chunks_exact(all).take(n).flat_map(|row| row[..n].to_vec()).collect(),
+            noise: noise[..n].to_vec(),
+            functional: level(&response(&parts, &layout)),
+            reading: level(&places(&parts, &layout)[0]),
+            layers: (0..reduced.layers).flat_map(|layer| level(&layout.output(&reduced, layer))).collect(),
+            level_states: layout.levels().collect(),
+            slope: layout.trend + 1,
+        })
+    }
+}

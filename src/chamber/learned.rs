@@ -1,0 +1,195 @@
+//! What a fit says of film, offset and chamber, where the records determine it.
+
+use super::filter::{Move, Row, System, Trace};
+use super::fit::Fit;
+use super::parameter::Place;
+use super::point::{CoilSide, run_kept};
+use super::prior::{PRIORS, Quantity};
+use super::system::Layout;
+use super::{Chamber, ChamberError};
+
+/// A number with its standard error, both in SI.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    pub value: f64,
+    pub standard_error: f64,
+}
+
+/// What records say of what surrounds the coil, sensor and gyro included.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Learned {
+    /// Film between air and pack \[W/(m²K)\]; None where the model states it or the records don't determine it.
+    pub film_w_per_m2_k: Option<Estimate>,
+    /// Mean offset of the rates \[rad/s\]; its error counts how records differ.
+    pub offset_rad_per_s: Option<Estimate>,
+    /// Of the chamber, sensor and gyro: geometric mean over the records and its error.
+    pub numbers: Vec<(Quantity, Estimate)>,
+    /// How many records it was learned from.
+    pub records: usize,
+}
+
+/// Records determine a number whose error is at most this share of what was known of it before.
+const DETERMINED: f64 = 0.5;
+
+impl Chamber<'_> {
+    /// The pass over a record with everything kept, and what it was made with.
+    fn traced(&self, fit: &Fit, record: usize) -> Result<(CoilSide, System, Trace), ChamberError> {
+        let observed = &self.observed[record];
+        let numbers = self.numbers_for(fit, record);
+        let side = CoilSide::new(&fit.assumed, numbers.get(Quantity::Film), self.modes, observed)?;
+        let course = fit.courses[record].as_ref().filter(|c| side.needs_reference() && side.fits(c));
+        let values = side.values(&fit.assumed, observed, record, course)?;
+        let (system, trace) = run_kept(&side, &fit.assumed, &numbers, observed, &values);
+        Ok((side, system, trace))
+    }
+
+    /// What a fit's records say of what surrounds the coil.
+    ///
+    /// # Errors
+    /// A model that cannot be solved.
+    pub fn learned(&self, fit: &Fit) -> Result<Learned, ChamberError> {
+        let determined = |quantity: Quantity, relative: f64| relative < DETERMINED * quantity.prior().deviation;
+        let film = fit.value(Place::Quantity { quantity: Quantity::Film, record: None });
+        let film_w_per_m2_k = film
+            .filter(|(value, error)| determined(Quantity::Film, error / value))
+            .map(|(value, standard_error)| Estimate { value, standard_error });
+        let mut numbers = Vec::new();
+        for quantity in PRIORS.iter().map(|p| p.quantity).filter(|q| !q.is_shared()) {
+            let found: Vec<(f64, f64)> = fit
+                .records
+                .iter()
+                .filter_map(|&r| fit.value(Place::Quantity { quantity, record: Some(r) }))
+                .map(|(value, error)| (value.ln(), error / value))
+                .filter(|(_, relative)| determined(quantity, *relative))
+                .collect();
+            if found.len() == fit.records.len()
+                && let Some(mean) = combined(&found)
+            {
+                let value = mean.value.exp();
+                numbers.push((quantity, Estimate { value, standard_error: value * mean.standard_error }));
+            }
+        }
+        let offsets: Result<Vec<(f64, f64)>, ChamberError> =
+            fit.records.iter().map(|&r| self.offset(fit, r).map(|e| (e.value, e.standard_error))).collect();
+        let offset_rad_per_s = combined(&offsets?);
+        Ok(Learned { film_w_per_m2_k, offset_rad_per_s, numbers, records: fit.records.len() })
+    }
+
+    /// A record's offset.
+    ///
+    /// # Errors
+    /// A model that cannot be solved.
+    pub fn offset(&self, fit: &Fit, record: usize) -> Result<Estimate, ChamberError> {
+        let (side, system, trace) = self.traced(fit, record)?;
+        let series = &self.observed[record].series;
+        let place = Layout::new(&side.parts(&fit.assumed), series).offset();
+        let n = system.size;
+        let mut found = Estimate { value: f64::NAN, standard_error: f64::NAN };
+        backward(&system, &series.rows, &trace, |k, r, information| {
+            if k > 0 {
+                return;
+            }
+            let covariance = &trace.gains[trace.gains_of[0] as usize].covariance;
+            let own = &covariance[place * n..(place + 1) * n];
+            let correction: f64 = own.iter().zip(r).map(|(p, r)| p * r).sum();
+            let known: f64 = information
+                .chunks_exact(n)
+                .zip(own)
+                .map(|(line, p)| p * line.iter().zip(own).map(|(i, q)| i * q).sum::<f64>())
+                .sum();
+            found.value = trace.means[place] + correction;
+            found.standard_error = (own[place] - known).max(0.0).sqrt();
+        });
+        Ok(found)
+    }
+}
+
+/// Weighted mean; where values differ by more than their errors, the error counts that.
+fn combined(values: &[(f64, f64)]) -> Option<Estimate> {
+    let weights: Vec<f64> = values.iter().map(|(_, error)| error.powi(-2)).collect();
+    let whole: f64 = weights.iter().sum();
+    if !(whole > 0.0 && whole.is_finite()) {
+        return None;
+    }
+    let value = values.iter().zip(&weights).map(|((v, _), w)| w * v).sum::<f64>() / whole;
+    let spread = values.iter().zip(&weights).map(|((v, _), w)| w * (v - value).powi(2)).sum::<f64>();
+    let freedom = (values.len().saturating_sub(1)).max(1) as f64;
+    Some(Estimate { value, standard_error: ((spread / freedom).max(1.0) / whole).sqrt() })
+}
+
+/// Walks back over the rows; at each, `visit` is told its place, r and N (row-major) with the row's own measurements.
+fn backward(system: &System, rows: &[Row], trace: &Trace, mut visit: impl FnMut(usize, &[f64], &[f64])) {
+    let n = system.size;
+    let mut r = vec![0.0; n];
+    let mut information = vec![0.0; n * n];
+    let mut taken = trace.innovations.len();
+    let mut h = vec![0.0; n];
+    for (k, row) in rows.iter().enumerate().rev() {
+        let gains = &trace.gains[trace.gains_of[k] as usize];
+        let present: Vec<usize> = row.measured.iter().flatten().map(|&h| h as usize).collect();
+        for (place, &index) in present.iter().enumerate().rev() {
+            taken -= 1;
+            let innovation = trace.innovations[taken];
+            let gain = &gains.gain[place * (n + 1)..place * (n + 1) + n];
+            h.iter_mut().for_each(|v| *v = 0.0);
+            system.rows.add_to(index, 1.0, &mut h);
+            let along: f64 = gain.iter().zip(&r).map(|(g, r)| g * r).sum();
+            r.iter_mut().zip(&h).for_each(|(r, h)| *r += h * (innovation.value / innovation.variance - along));
+            let u: Vec<f64> = information.chunks_exact(n).map(|line| dot(line, gain)).collect();
+            let own = dot(&u, gain) + 1.0 / innovation.variance;
+            for i in 0..n {
+                for j in 0..n {
+                    information[i * n + j] += h[i] * h[j] * own - h[i] * u[j] - u[i] * h[j];
+                }
+            }
+        }
+        visit(k, &r, &information);
+        for &movement in row.moves.iter().rev() {
+            match movement {
+                Move::Step(step) => {
+                    let phi = &system.steps[step as usize].phi_turned;
+                    r = phi.times_matrix(&r, 1);
+                    let half = turned(&phi.times_matrix(&information, n), n);
+                    information = phi.times_matrix(&half, n);
+                }
+                Move::Keep(slot) => {
+                    for &(state, kept) in system.keeps[slot as usize].iter().rev() {
+                        let weight = std::mem::take(&mut r[state]);
+                        system.kept.add_to(kept, weight, &mut r);
+                        for _ in 0..2 {
+                            for line in information.chunks_exact_mut(n) {
+                                let weight = std::mem::take(&mut line[state]);
+                                system.kept.add_to(kept, weight, line);
+                            }
+                            information = turned(&information, n);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn turned(matrix: &[f64], n: usize) -> Vec<f64> {
+    (0..n * n).map(|i| matrix[i % n * n + i / n]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn records_that_differ_widen_the_error_of_their_mean() {
+        let same = combined(&[(1.0, 0.1), (1.1, 0.1)]).unwrap();
+        assert!((same.value - 1.05).abs() < 1e-12 && (same.standard_error - 0.1 / 2f64.sqrt()).abs() < 1e-12);
+        // Half the difference, which is the standard error of the mean of two.
+        let apart = combined(&[(1.0, 0.1), (3.0, 0.1)]).unwrap();
+        assert!((apart.standard_error - 1.0).abs() < 1e-12, "{apart:?}");
+        assert_eq!(combined(&[]), None);
+        assert_eq!(combined(&[(1.0, f64::NAN)]), None);
+    }
+}
