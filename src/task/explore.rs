@@ -66,7 +66,7 @@ impl Session {
         let path = Path::new(file);
         let stated = parse_model(path, source)?;
         let source = tuned(&stated, set)?;
-        let file = if source == stated.source { stated } else { parse_model(path, &source)? };
+        let file = if source == stated.source { stated } else { parse_model(path, &source)? }.for_search();
         let profiles = file.profiles.profiles();
         let solved = SolvedProfiles::new(&file.model, &profiles)?;
         let layers = file.model.coil.layers();
