@@ -53,7 +53,7 @@ pub struct DiagnosisJson {
     /// Formulas for what no listed effect explains, best first.
     #[serde(default)]
     pub proposals: Vec<ProposalJson>,
-    /// What the extended model states as `[boundary]`.
+    /// What the records showed of film, offset and chamber, with the accepted effects.
     pub boundary: BoundaryJson,
     pub inputs: InputsJson,
 }
