@@ -207,16 +207,7 @@ impl Record {
                 *keep = false;
             }
         }
-        let keep = |values: &[f64]| -> Vec<f64> {
-            values.iter().zip(&kept).filter(|(_, keep)| **keep).map(|(v, _)| *v).collect()
-        };
-        let mut record =
-            Self::new(self.name.clone(), keep(&self.times_s), keep(&self.temperature_k), keep(&self.rate_rad_per_s))?;
-        record.inner_k = self.inner_k.as_deref().map(keep);
-        record.ambient_k = self.ambient_k.as_deref().map(keep);
-        record.channels =
-            self.channels.iter().map(|c| Channel { name: c.name.clone(), values: keep(&c.values) }).collect();
-        Ok(record)
+        self.each_column(|values| values.iter().zip(&kept).filter(|(_, keep)| **keep).map(|(v, _)| *v).collect())
     }
 
     /// Some rows in a row.
@@ -224,11 +215,15 @@ impl Record {
     /// # Errors
     /// Too few rows left.
     pub fn stretch(&self, rows: std::ops::Range<usize>) -> Result<Self, RecordError> {
-        let keep = |values: &[f64]| values[rows.clone()].to_vec();
+        self.each_column(|values| values[rows.clone()].to_vec())
+    }
+
+    /// With every column cut in the same way.
+    fn each_column(&self, keep: impl Fn(&[f64]) -> Vec<f64>) -> Result<Self, RecordError> {
         let mut record =
             Self::new(self.name.clone(), keep(&self.times_s), keep(&self.temperature_k), keep(&self.rate_rad_per_s))?;
-        record.inner_k = self.inner_k.as_deref().map(keep);
-        record.ambient_k = self.ambient_k.as_deref().map(keep);
+        record.inner_k = self.inner_k.as_deref().map(&keep);
+        record.ambient_k = self.ambient_k.as_deref().map(&keep);
         record.channels =
             self.channels.iter().map(|c| Channel { name: c.name.clone(), values: keep(&c.values) }).collect();
         Ok(record)

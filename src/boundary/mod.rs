@@ -34,8 +34,9 @@
 mod air;
 mod filmed;
 mod kinks;
+#[cfg(test)]
+mod known_air;
 mod layout;
-mod planned;
 mod whitener;
 
 use thiserror::Error;
@@ -44,7 +45,6 @@ use crate::numeric::piecewise::PiecewiseLinear;
 use crate::thermal::{self, Drive, Extent, HeatPath, Location, ThermalError};
 use air::Scene;
 
-pub use planned::{Exposure, expose, planned_whitener, seen_by_another};
 pub use whitener::RateWhitener;
 
 /// Everything about a record and a model that the boundary depends on.

@@ -6,9 +6,9 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::experiment::fixtures::{effect, model, pattern};
 use super::*;
-use crate::diagnose::experiment::expose;
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::rate::RateModel;
+use crate::thermal::exposure::expose;
 use crate::thermal::solve;
 use crate::units::REFERENCE_TEMPERATURE_K;
 

@@ -6,6 +6,7 @@
 mod bending;
 mod driven;
 mod elements;
+pub mod exposure;
 pub mod half_space;
 mod half_space_memory;
 mod history;

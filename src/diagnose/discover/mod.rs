@@ -178,13 +178,13 @@ mod tests {
 
     use super::*;
     use crate::chamber::{Assumption, Chamber, Input};
-    use crate::diagnose::experiment::expose;
     use crate::diagnose::experiment::fixtures::{model, pattern};
     use crate::diagnose::{Request, Terms, Verdict, diagnose};
     use crate::numeric::piecewise::PiecewiseLinear;
     use crate::numeric::statistics::correlation;
     use crate::rate::RateModel;
     use crate::record::{Channel, Record};
+    use crate::thermal::exposure::expose;
     use crate::thermal::solve;
     use crate::units::{REFERENCE_TEMPERATURE_K, rad_per_s_from_deg_per_h};
 

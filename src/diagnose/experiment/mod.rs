@@ -25,7 +25,6 @@
 
 mod chamber;
 mod contest;
-mod exposure;
 mod plan;
 
 use rayon::prelude::*;
@@ -42,8 +41,6 @@ pub use plan::Refusal;
 
 #[cfg(test)]
 pub(super) use contest::tests as fixtures;
-#[cfg(test)]
-pub(super) use exposure::expose;
 
 /// Candidates that differ by less than this share of what they explain explain it equally well: no effect's equation is
 /// more accurate than that.

@@ -10,13 +10,13 @@
 use rayon::prelude::*;
 
 use super::contest::{Contest, Rival};
-use super::exposure::expose;
 use crate::chamber::{Bend, Chamber, Fit, Quantity};
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::numeric::statistics::standard_deviation;
 use crate::profile::Profile;
 use crate::rate::RateModel;
 use crate::record::Record;
+use crate::thermal::exposure::expose;
 use crate::thermal::solve;
 
 /// A profile as the chamber's air.

@@ -1,7 +1,7 @@
 //! A pack in a chamber whose air is known: what its layers do, and what the sensor shows.
 
+use super::{Drive, Extent, HeatPath, Instant, Location, Material, ThermalError};
 use crate::numeric::piecewise::PiecewiseLinear;
-use crate::thermal::{self, Drive, Extent, HeatPath, Instant, Location, Material, ThermalError};
 
 /// Where only K = k/ρc is known, the film is stated for this heat capacity [J/(m³ K)]; nothing else depends on it.
 const NOMINAL_HEAT_CAPACITY_J_PER_M3_K: f64 = 1.7e6;
@@ -58,7 +58,7 @@ pub fn expose(
     let fine_s: Vec<f64> = times_s.windows(2).flat_map(between).chain(times_s.last().copied()).collect();
     let layers = path.shape.layers;
     let instants: Vec<Instant> = fine_s.iter().map(|&t| Instant::after(t)).collect();
-    let field = thermal::solve(&in_air, &by_air)?.at(&instants);
+    let field = super::solve(&in_air, &by_air)?.at(&instants);
     let outer: Vec<f64> = (0..fine_s.len()).map(|row| field.temperatures_k(row)[layers - 1]).collect();
     let outer_k = PiecewiseLinear::new(fine_s, outer).expect("the times are in order");
     let shown_k = lagging(&outer_k, lag_s, times_s);
