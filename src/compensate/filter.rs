@@ -131,6 +131,40 @@ struct Hypothesis {
     weight: f64,
 }
 
+/// A matrix whose rows are multiplied side by side, so that no sum waits for the one before it.
+#[derive(Debug, Clone)]
+struct Rows {
+    count: usize,
+    /// So many rows at a time, of these column after column; rows that are not there are zero.
+    blocks: Vec<Vec<[f64; Rows::ABREAST]>>,
+}
+
+impl Rows {
+    const ABREAST: usize = 8;
+
+    /// Each row as long as the others.
+    fn new(rows: &[&[f64]]) -> Self {
+        let block = |rows: &[&[f64]]| {
+            let column = |j: usize| std::array::from_fn(|k| rows.get(k).map_or(0.0, |row| row[j]));
+            (0..rows[0].len()).map(column).collect()
+        };
+        Self { count: rows.len(), blocks: rows.chunks(Self::ABREAST).map(block).collect() }
+    }
+
+    /// Appends the products; each is summed from its first column to its last.
+    fn times(&self, vector: &[f64], products: &mut Vec<f64>) {
+        let end = products.len() + self.count;
+        for block in &self.blocks {
+            let mut sums = [0.0; Self::ABREAST];
+            for (column, value) in block.iter().zip(vector) {
+                sums.iter_mut().zip(column).for_each(|(sum, entry)| *sum += entry * value);
+            }
+            products.extend_from_slice(&sums);
+        }
+        products.truncate(end);
+    }
+}
+
 /// The bank of filters.
 #[derive(Debug, Clone)]
 pub struct Filter {
@@ -142,11 +176,17 @@ pub struct Filter {
     pub level_states: Vec<usize>,
     pub most_hypotheses: usize,
     pub break_probability: f64,
+    /// F, and below it ω.
+    forwards: Rows,
+    /// Logarithms of no break in a row and of a break.
+    log_priors: (f64, f64),
     /// By age; the last one is for long ago.
     pub gains: Vec<Gains>,
     /// −½ ln f by age.
     log_factors: Vec<f64>,
     hypotheses: Vec<Hypothesis>,
+    /// Those of the row before, whose memory is used again.
+    former: Vec<Hypothesis>,
     /// The first reading, from which all temperatures of the states count: what is the same everywhere makes no rate.
     origin_k: f64,
     /// Log-weight, index of the parent, age.
@@ -241,10 +281,15 @@ fn schedule(dynamics: &Dynamics, tuning: &Tuning) -> Vec<Gains> {
 impl Filter {
     pub fn new(dynamics: &Dynamics, tuning: &Tuning) -> Self {
         let gains = schedule(dynamics, tuning);
+        let n = dynamics.states();
+        let transition = dynamics.transition.transpose().as_slice().to_vec();
+        let rate = dynamics.rate.as_slice().to_vec();
         Self {
-            n: dynamics.states(),
-            transition: dynamics.transition.transpose().as_slice().to_vec(),
-            rate: dynamics.rate.as_slice().to_vec(),
+            n,
+            forwards: Rows::new(&transition.chunks_exact(n).chain([&rate[..]]).collect::<Vec<_>>()),
+            log_priors: ((-tuning.break_probability).ln_1p(), tuning.break_probability.ln()),
+            transition,
+            rate,
             reading: dynamics.reading.as_slice().to_vec(),
             level_states: dynamics.level_states.clone(),
             most_hypotheses: tuning.hypotheses.max(1),
@@ -252,6 +297,7 @@ impl Filter {
             log_factors: gains.iter().map(|g| -0.5 * g.variance.ln()).collect(),
             gains,
             hypotheses: Vec::new(),
+            former: Vec::new(),
             origin_k: 0.0,
             branches: Vec::new(),
             errors: Vec::new(),
@@ -304,8 +350,7 @@ impl Filter {
             let mut next = self.spare.pop().unwrap_or_default();
             next.clear();
             let (state, chain) = hypothesis.values.split_at(self.n);
-            next.extend(self.transition.chunks_exact(self.n).map(|row| dot(row, state)));
-            next.push(dot(&self.rate, state));
+            self.forwards.times(state, &mut next);
             next.extend_from_slice(&chain[..chain.len() - 1]);
             self.spare.push(std::mem::replace(&mut hypothesis.values, next));
         }
@@ -327,15 +372,15 @@ impl Filter {
                 let fit = self.log_factors[age] - 0.5 * error * error / self.gains[age].variance;
                 self.branches.push((hypothesis.log_weight + prior + fit, parent, age));
             };
-            add((hypothesis.age + 1).min(long_ago), (-self.break_probability).ln_1p());
+            add((hypothesis.age + 1).min(long_ago), self.log_priors.0);
             if has_breaks {
-                add(0, self.break_probability.ln());
+                add(0, self.log_priors.1);
             }
         }
         // Stable: of equals the one of the likelier parent comes first.
         self.branches.sort_by(|a, b| b.0.total_cmp(&a.0));
         let best = self.branches[0].0;
-        let mut kept: Vec<Hypothesis> = Vec::with_capacity(self.most_hypotheses);
+        let mut kept = std::mem::take(&mut self.former);
         for &(log_weight, parent, age) in &self.branches {
             if log_weight < best + LEAST_LOG_WEIGHT || kept.len() == self.most_hypotheses {
                 break;
@@ -348,13 +393,13 @@ impl Filter {
             let error = self.errors[parent];
             let before = &self.hypotheses[parent].values;
             values.extend(before.iter().zip(&self.gains[age].gain).map(|(v, gain)| v + gain * error));
-            kept.push(Hypothesis { log_weight: log_weight - best, age, values, weight: (log_weight - best).exp() });
+            let log_weight = log_weight - best;
+            kept.push(Hypothesis { log_weight, age, values, weight: log_weight.exp() });
         }
         let sum: f64 = kept.iter().map(|h| h.weight).sum();
         kept.iter_mut().for_each(|h| h.weight /= sum);
-        for old in std::mem::replace(&mut self.hypotheses, kept) {
-            self.spare.push(old.values);
-        }
+        self.former = std::mem::replace(&mut self.hypotheses, kept);
+        self.spare.extend(self.former.drain(..).map(|old| old.values));
     }
 }
 

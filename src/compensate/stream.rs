@@ -11,7 +11,7 @@ use super::empirical::Window;
 use super::filter::Filter;
 use super::formulas::{AtWork, Columns};
 use super::learned::Follower;
-use crate::numeric::statistics::median;
+use crate::numeric::statistics::{median, median_in_place};
 
 /// What one row holds; None is a drop-out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -390,8 +390,10 @@ impl<'c, T> Stream<'c, T> {
                 self.last_compensated
             }
             Some(rate) => {
-                let after: Vec<f64> = self.pending.iter().filter_map(|p| p.rate_rad_per_s).take(NEIGHBOURS).collect();
-                let kept = self.without_gross_error(rate, &after, &mut row.flags);
+                let mut after = [0.0; NEIGHBOURS];
+                let found = self.pending.iter().filter_map(|p| p.rate_rad_per_s);
+                let rows = after.iter_mut().zip(found).map(|(place, rate)| *place = rate).count();
+                let kept = self.without_gross_error(rate, &mut after[..rows], &mut row.flags);
                 row.bias_rad_per_s.map(|bias| kept - bias)
             }
         };
@@ -399,8 +401,10 @@ impl<'c, T> Stream<'c, T> {
         out(Compensated { tag: row.tag, rate_rad_per_s: compensated, flags: row.flags });
     }
 
-    fn without_gross_error(&mut self, rate: f64, after: &[f64], flags: &mut Vec<Flag>) -> f64 {
-        let (earlier, later) = (median(self.before.make_contiguous()), median(after));
+    fn without_gross_error(&mut self, rate: f64, after: &mut [f64], flags: &mut Vec<Flag>) -> f64 {
+        let mut before = [0.0; NEIGHBOURS];
+        let rows = before.iter_mut().zip(&self.before).map(|(place, rate)| *place = *rate).count();
+        let (earlier, later) = (median_in_place(&mut before[..rows]), median_in_place(after));
         let limit = (GROSS * self.usual_change).max(APART * (later - earlier).abs());
         let gross = self.rates_seen > SETTLING_ROWS && (rate - earlier).abs() > limit && (rate - later).abs() > limit;
         let kept = if gross {

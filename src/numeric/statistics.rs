@@ -54,7 +54,8 @@ pub fn median(values: &[f64]) -> f64 {
     median_in_place(&mut sorted)
 }
 
-fn median_in_place(values: &mut [f64]) -> f64 {
+/// As [`median`]; the values are then in another order.
+pub fn median_in_place(values: &mut [f64]) -> f64 {
     let n = values.len();
     if n == 0 {
         return f64::NAN;
