@@ -21,7 +21,7 @@ pub(super) fn of(kind: &str, gyros: &[GyroJson]) -> FleetJson {
     let diagnoses: Vec<(&str, &DiagnosisJson)> =
         gyros.iter().filter_map(|gyro| Some((gyro.gyro.as_str(), gyro.diagnosis.as_ref()?))).collect();
     fleet.verdicts = diagnoses.iter().map(|(gyro, diagnosis)| verdict(gyro, diagnosis)).collect();
-    fleet.effects = effects(&diagnoses);
+    fleet.effects = effects(&diagnoses.iter().map(|(gyro, d)| (*gyro, d.effects.as_slice())).collect::<Vec<_>>());
     fleet.sentences = sentences(&fleet);
     fleet
 }
@@ -35,8 +35,11 @@ fn verdict(gyro: &str, diagnosis: &DiagnosisJson) -> VerdictJson {
     }
 }
 
-fn effects(diagnoses: &[(&str, &DiagnosisJson)]) -> Vec<FleetEffectJson> {
-    let mut kinds: Vec<&str> = diagnoses.iter().flat_map(|(_, d)| &d.effects).map(|e| e.kind.as_str()).collect();
+/// Gyros and what each one's diagnosis found.
+type Found<'a> = [(&'a str, &'a [FindingJson])];
+
+fn effects(diagnoses: &Found) -> Vec<FleetEffectJson> {
+    let mut kinds: Vec<&str> = diagnoses.iter().flat_map(|(_, found)| *found).map(|e| e.kind.as_str()).collect();
     kinds.sort_unstable();
     kinds.dedup();
     let mut found: Vec<FleetEffectJson> = kinds.into_iter().map(|kind| effect(kind, diagnoses)).collect();
@@ -45,13 +48,13 @@ fn effects(diagnoses: &[(&str, &DiagnosisJson)]) -> Vec<FleetEffectJson> {
     found
 }
 
-fn effect(kind: &str, diagnoses: &[(&str, &DiagnosisJson)]) -> FleetEffectJson {
+fn effect(kind: &str, diagnoses: &Found) -> FleetEffectJson {
     let mut own: Vec<(&str, &FindingJson)> = Vec::new();
     let mut equivalent_in = Vec::new();
-    for (gyro, diagnosis) in diagnoses {
-        match diagnosis.effects.iter().find(|effect| effect.kind == kind) {
+    for (gyro, found) in diagnoses {
+        match found.iter().find(|effect| effect.kind == kind) {
             Some(finding) => own.push((gyro, finding)),
-            None if diagnosis.effects.iter().any(|e| e.equivalents.iter().any(|other| other == kind)) => {
+            None if found.iter().any(|e| e.equivalents.iter().any(|other| other == kind)) => {
                 equivalent_in.push((*gyro).to_owned());
             }
             None => {}
@@ -199,6 +202,43 @@ fn sentences(fleet: &FleetJson) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn finding(kind: &str, equivalents: &[&str], value: f64) -> FindingJson {
+        let document = serde_json::json!({
+            "kind": kind, "choices": {}, "equivalents": equivalents, "equivalents_in_detail": [], "chi_square_less": 100.0,
+            "confirmed_by": 10.0, "experiment": "",
+            "parameters": { "size": { "value": value, "standard_error": 0.1, "unit": "K", "fitted": true, "at_bound": false } },
+        });
+        serde_json::from_value(document).expect("a finding")
+    }
+
+    #[test]
+    fn an_effect_of_half_of_the_gyros_is_common_and_one_of_fewer_is_not() {
+        let film = |value: f64| vec![finding("film", &["lag", "gap"], value)];
+        let gap = vec![finding("gap", &["film"], 1.0)];
+        let (a, b) = (film(1.0), film(1.2));
+        let of = |batch: &Found| -> Vec<(String, bool, Vec<String>, Vec<String>)> {
+            effects(batch).into_iter().map(|e| (e.kind, e.common, e.found_in, e.equivalent_in)).collect()
+        };
+        let names = |names: &[&str]| names.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>();
+        let row = |kind: &str, common: bool, found: &[&str], equivalent: &[&str]| {
+            (kind.to_owned(), common, names(found), names(equivalent))
+        };
+        // Two of four have it: half is enough. One of four is not, even where it is all that this gyro has.
+        let half = of(&[("1", &a), ("2", &b), ("3", &[]), ("4", &[])]);
+        assert_eq!(half, [row("film", true, &["1", "2"], &[])]);
+        assert_eq!(of(&[("1", &a), ("2", &[]), ("3", &[])]), [row("film", false, &["1"], &[])]);
+        // An equal explanation counts as having it, for both kinds; what was found itself in more gyros stands first.
+        let mixed = of(&[("1", &a), ("2", &gap), ("3", &b), ("4", &[]), ("5", &[]), ("6", &[])]);
+        assert_eq!(mixed, [row("film", true, &["1", "3"], &["2"]), row("gap", true, &["2"], &["1", "3"])]);
+        // A kind that is only ever an equivalent is no row: nothing was found of it. One gyro has nothing in common with itself.
+        assert!(mixed.iter().all(|(kind, ..)| kind != "lag"));
+        assert_eq!(of(&[("1", &a)]), [row("film", false, &["1"], &[])]);
+        // Parameters are those of the gyros in which it was found, not of equal explanations.
+        let parameters = &effects(&[("1", &a), ("2", &gap), ("3", &b)])[0].parameters;
+        assert_eq!((parameters.len(), parameters[0].values.len()), (1, 2));
+        assert!((parameters[0].mean - 1.1).abs() < 1e-12);
+    }
 
     #[test]
     fn a_mean_over_gyros_knows_their_errors_and_their_spread() {
