@@ -148,6 +148,11 @@ class Model:
         """Of the text of a model file; ``path`` names it in faults and places relative pattern files."""
         return cls._of(_coilwright.ModelHandle.parsed(source, os.fspath(path)))
 
+    @classmethod
+    def template(cls, name: str) -> Model:
+        """The model that the command ``new`` writes to start from: ``source`` explains every key."""
+        return cls.parse(_coilwright.template(name), path=f"{name}.toml")
+
     def copy(self, **changes: Any) -> Model:
         """The same model with some keys changed, as keyword arguments of :class:`Model`; a key that is None goes.
 

@@ -9,6 +9,7 @@ mod compensation;
 mod custom;
 mod error;
 mod field;
+mod further;
 mod model;
 mod pattern;
 mod record;
@@ -38,6 +39,8 @@ mod _coilwright {
     use super::custom::{search_field, search_function, search_matrix, time_search_matrix};
     #[pymodule_export]
     use super::field::{FieldHandle, evaluate_field, field_of, sensitivities, temperatures};
+    #[pymodule_export]
+    use super::further::{bang_bang, campaign, campaign_workflow, explore, report, reproduce, schema, template};
     #[pymodule_export]
     use super::model::{ModelHandle, check_model, effects, read_model};
     #[pymodule_export]

@@ -23,8 +23,8 @@ def blocks() -> list[str]:
 def test_the_lines_of_the_page_work_one_after_the_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("pandas")
     pytest.importorskip("matplotlib").use("Agg")
-    for name in ("paper-200m.toml", "chamber-coil.toml", "chamber-day-1.csv", "chamber-day-2.csv"):
-        (tmp_path / "examples").mkdir(exist_ok=True)
+    (tmp_path / "examples" / "campaigns").mkdir(parents=True)
+    for name in ("paper-200m.toml", "chamber-coil.toml", "chamber-day-1.csv", "chamber-day-2.csv", "campaigns/layers.toml"):
         (tmp_path / "examples" / name).write_bytes((ROOT / "examples" / name).read_bytes())
     monkeypatch.chdir(tmp_path)
     space: dict[str, Any] = {}

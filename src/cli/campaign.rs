@@ -1,33 +1,24 @@
 //! `campaign`: searches, built coils or the gyros of a fleet, in parts and with interruptions, with one table at the end.
 
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use clap::ValueEnum;
 
 use super::budget::parse_duration;
-use super::progress::StopFlag;
+use super::progress::{Progress, StopFlag};
 use super::screen::{Screen, held, table};
 use super::watching::Watching;
 use super::{CliError, Ending};
-use crate::io::files::WriteError;
-use crate::io::json::campaign::{CampaignJson, CellJson, WorkflowJson};
-use crate::io::read::campaign_file::grid::{Search, SearchGrid};
-use crate::io::read::campaign_file::{Cell, Kind, Work, read_campaign};
-use crate::io::write::campaign_cells::{forget_unfinished, is_done, read_cell, state_folder, write_cell, write_table};
-use crate::io::write::checkpoint::{read_checkpoint, write_checkpoint};
+use crate::io::json::campaign::{CampaignJson, WorkflowJson};
+use crate::io::read::campaign_file::read_campaign;
 use crate::io::write::workflow::{self, Workflow};
-use crate::report::built_coils::{built_coils_page, built_coils_table};
-use crate::report::campaign::{campaign_page, charts, recommendations};
-use crate::report::fleet::fleet_page;
-use crate::search::Observer;
-use crate::search::anneal::rounds::Rounds;
-use crate::search::run::Halt;
-use crate::task::campaign::coils::judge_block;
-use crate::task::campaign::gyros::{diagnose_gyro, measure_gyro};
-use crate::task::campaign::search::search_cell;
-use crate::task::campaign::{Part, Table};
+use crate::report::built_coils::built_coils_table;
+use crate::report::campaign::recommendations;
+use crate::task::Observer;
+use crate::task::campaign::Part;
+use crate::task::campaign::carrying_out::{Face, compute, merge, missing_words};
 
 /// A grid of searches, a million built coils, or the gyros of a fleet, on one machine or many
 #[derive(Debug, clap::Args)]
@@ -130,7 +121,15 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     // Parts of one campaign may work in one folder at once; they write different files.
     let _held = if is_whole { Some(held(folder, "campaign")?) } else { None };
     let stop = StopFlag::listen();
-    let Some(searched) = compute(&part, folder, arguments.checkpoint_every, &stop, screen)? else {
+    let carrying = Carrying {
+        screen,
+        progress: screen.progress("campaign", Some(part.cells.len() as u64)),
+        cells: part.cells.len(),
+        stop: &stop,
+        every: arguments.checkpoint_every,
+        last: Mutex::new(Instant::now()),
+    };
+    let Some(searched) = compute(&part, folder, &carrying)? else {
         let answer = part.answer(Some(folder), 0);
         screen.note(&missing_words(&answer));
         screen.answer(answer, |answer| text(answer, false))?;
@@ -150,6 +149,14 @@ fn list(whole: &Part, folder: Option<&Path>, screen: &Screen) -> Result<Ending, 
     Ok(Ending::Done)
 }
 
+/// The program, as it was called where that is its place: called from Python, this process is another's.
+fn program_of(screen: &Screen) -> Result<PathBuf, CliError> {
+    if screen.program.is_absolute() && screen.program.is_file() {
+        return Ok(screen.program.clone());
+    }
+    std::env::current_exe().map_err(|error| CliError::Option { option: "--emit", message: error.to_string() })
+}
+
 fn emit(
     arguments: &Arguments,
     engine: Engine,
@@ -157,13 +164,12 @@ fn emit(
     folder: &Path,
     screen: &Screen,
 ) -> Result<Ending, CliError> {
-    let message = |error: std::io::Error| CliError::Option { option: "--emit", message: error.to_string() };
     let workflow = Workflow {
         engine: match engine {
             Engine::Snakemake => workflow::Engine::Snakemake,
             Engine::Slurm => workflow::Engine::Slurm,
         },
-        program: &std::env::current_exe().map_err(message)?,
+        program: &program_of(screen)?,
         campaign: &arguments.campaign,
         inputs: &whole.campaign.inputs(),
         ids: whole.cells.iter().map(|cell| cell.id.as_str()).collect(),
@@ -191,125 +197,47 @@ fn emit(
     Ok(Ending::Done)
 }
 
-/// Computes the cells of a part that are not done; how many that were, none if a signal came first.
-fn compute(
-    part: &Part,
-    folder: &Path,
-    checkpoint_every: Duration,
-    stop: &StopFlag,
-    screen: &Screen,
-) -> Result<Option<usize>, CliError> {
-    let progress = screen.progress("campaign", Some(part.cells.len() as u64));
-    let watching = Watching::quiet(screen);
-    let mut computed = 0;
-    for (place, cell) in part.cells.iter().enumerate() {
-        if !is_done(folder, cell) {
-            match (&cell.work, &part.campaign.kind) {
-                (Work::Search(search), Kind::Search(grid)) => {
-                    let watch = Watch::new(cell, folder, checkpoint_every, stop);
-                    if !searched(grid, cell, search, watch)? {
-                        return Ok(None);
-                    }
-                }
-                (Work::Search(_), _) => {}
-                _ if stop.is_set() => return Ok(None),
-                (Work::Tolerance(block), _) => write_cell(folder, &judge_block(&cell.id, block))?,
-                (Work::Metrics(gyro), _) => write_cell(folder, &measure_gyro(&cell.id, gyro, &watching)?)?,
-                (Work::Diagnose(gyro), _) => write_cell(folder, &diagnose_gyro(&cell.id, gyro, &watching)?)?,
-            }
-            computed += 1;
-        }
-        progress.at(place as u64 + 1, "");
-    }
-    Ok(Some(computed))
-}
-
-/// Searches one cell; false if a signal came first.
-fn searched(grid: &SearchGrid, cell: &Cell, search: &Search, mut watch: Watch) -> Result<bool, CliError> {
-    // A checkpoint that is damaged is none.
-    let saved = read_checkpoint(&watch.state_folder, &cell.id).unwrap_or(None);
-    let found = search_cell(grid, &cell.id, search, saved, &mut watch);
-    match (found, watch.fault) {
-        // Another process has the same cell and was faster.
-        _ if is_done(watch.folder, cell) => {}
-        (_, Some(fault)) => return Err(fault.into()),
-        (None, None) => return Ok(false),
-        (Some(found), None) => write_cell(watch.folder, &found)?,
-    }
-    Ok(true)
-}
-
 /// The table of a whole campaign, unless something is missing.
 fn merged(whole: &Part, folder: &Path, searched: usize, screen: &Screen) -> Result<Ending, CliError> {
-    let (answer, table) = whole.merged(folder, searched);
-    let is_complete = table.is_some();
-    if let Some(table) = table {
-        write_table(folder, &table.csv, &pages(&whole.campaign.kind, &answer, &table))?;
-        forget_unfinished(folder);
-        screen.note(&format!("wrote {}", folder.join("summary.csv").display()));
-    } else {
-        screen.note(&missing_words(&answer));
-    }
+    let answer = merge(whole, folder, searched, &Watching::quiet(screen))?;
+    let is_complete = answer.missing.is_empty();
     screen.answer(answer, |answer| text(answer, true))?;
     Ok(if is_complete { Ending::Done } else { Ending::No })
 }
 
-/// The page, and the pictures that stand beside it.
-fn pages(kind: &Kind, answer: &CampaignJson, table: &Table) -> Vec<(String, String)> {
-    let page = match (kind, &answer.fleet) {
-        (Kind::Search(_), _) => campaign_page(answer),
-        (_, Some(fleet)) => fleet_page(&answer.campaign, fleet, &table.gyros),
-        (_, None) => built_coils_page(answer),
-    };
-    let pictures = charts(&answer.results);
-    let pictures = pictures.into_iter().map(|(objective, svg)| (format!("summary-{objective}.svg"), svg));
-    std::iter::once(("report.html".to_owned(), page)).chain(pictures).collect()
-}
-
-/// More identifiers than these are in the JSON document only.
-const MOST_SHOWN: usize = 20;
-
-fn missing_words(answer: &CampaignJson) -> String {
-    let shown: Vec<&str> = answer.missing.iter().take(MOST_SHOWN).map(String::as_str).collect();
-    let further = answer.missing.len() - shown.len();
-    let further = if further > 0 { format!(" and {further} more") } else { String::new() };
-    let (missing, all) = (answer.missing.len(), answer.cells.len());
-    format!("{missing} of {all} cells are missing: {}{further}", shown.join(", "))
-}
-
-/// Ends a search as soon as a signal comes or another process has done it; keeps its state from time to time.
-struct Watch<'a> {
-    cell: &'a Cell,
-    folder: &'a Path,
-    state_folder: PathBuf,
-    every: Duration,
-    last: Instant,
+/// Shows how many cells are done, and lets the state of a long one be kept from time to time.
+struct Carrying<'a> {
+    screen: &'a Screen,
+    progress: Progress,
+    cells: usize,
     stop: &'a StopFlag,
-    fault: Option<WriteError>,
+    every: Duration,
+    last: Mutex<Instant>,
 }
 
-impl<'a> Watch<'a> {
-    fn new(cell: &'a Cell, folder: &'a Path, every: Duration, stop: &'a StopFlag) -> Self {
-        let state_folder = state_folder(folder, &cell.id);
-        Self { cell, folder, state_folder, every, last: Instant::now(), stop, fault: None }
+impl Observer for Carrying<'_> {
+    fn note(&self, words: &str) {
+        self.screen.note(words);
     }
-}
 
-impl Observer for Watch<'_> {
-    fn advanced(&mut self, search: &dyn Rounds) -> ControlFlow<Halt> {
-        let is_stopped = self.stop.is_set();
-        if is_stopped || self.last.elapsed() >= self.every {
-            if read_cell::<CellJson>(self.folder, &self.cell.id).is_some() {
-                return ControlFlow::Break(Halt::Signal);
-            }
-            self.last = Instant::now();
-            self.fault = write_checkpoint(&self.state_folder, &self.cell.id, search.state()).err();
-        }
-        if is_stopped || self.fault.is_some() { ControlFlow::Break(Halt::Signal) } else { ControlFlow::Continue(()) }
+    fn at(&self, share_done: f64, _words: &str) {
+        // What is done are whole cells; a rounding must not take one away.
+        self.progress.at((share_done * self.cells as f64 + 1e-6) as u64, "");
     }
 
     fn goes_on(&self) -> bool {
         !self.stop.is_set()
+    }
+}
+
+impl Face for Carrying<'_> {
+    fn keeps_state(&self) -> bool {
+        let Ok(mut last) = self.last.lock() else { return false };
+        let is_due = last.elapsed() >= self.every;
+        if is_due {
+            *last = Instant::now();
+        }
+        is_due
     }
 }
 

@@ -6,6 +6,7 @@ use super::screen::Screen;
 use super::{CliError, Ending};
 use crate::io::files::write_atomically;
 use crate::io::json::WrittenJson;
+use crate::io::write::model_template::template;
 
 /// Write a commented model file to start from
 #[derive(Debug, clap::Args)]
@@ -14,8 +15,6 @@ pub struct Arguments {
     /// The coil's name, or the file's (with .toml)
     name: String,
 }
-
-const TEMPLATE: &str = include_str!("new_template.toml");
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let mut path = PathBuf::from(&arguments.name);
@@ -26,8 +25,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         return Err(CliError::Exists { path: path.display().to_string() });
     }
     let coil = path.file_stem().map_or_else(|| "coil".to_owned(), |s| s.to_string_lossy().into_owned());
-    let name = toml_edit::Value::from(coil).to_string();
-    write_atomically(&path, TEMPLATE.replace("\"NAME\"", name.trim()).as_bytes())?;
+    write_atomically(&path, template(&coil).as_bytes())?;
     screen.note(&format!("wrote {}; next: coilwright check {0}", path.display()));
     screen.answer(WrittenJson { files: vec![path.display().to_string()] }, |_| String::new())?;
     Ok(Ending::Done)

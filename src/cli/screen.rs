@@ -1,7 +1,7 @@
 //! Where commands write: the answer to stdout, notes to stderr.
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 use serde::Serialize;
@@ -18,11 +18,13 @@ pub struct Screen {
     format: Format,
     quiet: bool,
     progress: ProgressMode,
+    /// The program's name or place, as it was called.
+    pub program: PathBuf,
 }
 
 impl Screen {
-    pub fn new(options: &OutputOptions) -> Self {
-        Self { format: options.format, quiet: options.quiet, progress: options.progress }
+    pub fn new(options: &OutputOptions, program: PathBuf) -> Self {
+        Self { format: options.format, quiet: options.quiet, progress: options.progress, program }
     }
 
     pub fn is_json(&self) -> bool {

@@ -11,6 +11,8 @@ use crate::rate::CoilModel;
 use super::TaskError;
 
 mod batch;
+#[cfg(feature = "report")]
+pub mod carrying_out;
 pub mod coils;
 pub mod gyros;
 mod measures;

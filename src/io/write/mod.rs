@@ -13,6 +13,7 @@ mod formulas_in_c;
 pub mod machine_program;
 pub mod measurement_folder;
 pub mod model_edit;
+pub mod model_template;
 pub mod model_tuning;
 pub mod pareto_parts;
 pub mod run_directory;
