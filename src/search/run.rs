@@ -234,8 +234,10 @@ fn anneal(
     let mut asked = false;
     let mut halt = ControlFlow::Continue(());
     let ended = loop {
-        // Before the next advance: a search that goes on from a checkpoint may stand right behind its first round.
-        if search.state().round == 1 && !std::mem::replace(&mut asked, true) {
+        // Before the next advance: a search that goes on from a checkpoint may stand right behind its first round. Where that was
+        // its last one too, it was not asked before the checkpoint either.
+        let is_over = matches!(search.state().stop, Some(Stop::Rounds | Stop::Moves | Stop::Patience));
+        if search.state().round == 1 && !is_over && !std::mem::replace(&mut asked, true) {
             concluded = conclusion(evaluator, class, baselines, search)?;
             if concluded.is_some() {
                 break Ended::Rule(search.state().stop);

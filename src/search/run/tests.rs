@@ -162,3 +162,36 @@ fn what_is_recommended_is_nowhere_far_behind_the_best_classic_on_profiles_that_n
         }
     }
 }
+
+/// Keeps the state behind every slice, as checkpoints do.
+#[derive(Default)]
+struct Kept(Vec<State>);
+
+impl Observer for Kept {
+    fn advanced(&mut self, search: &dyn Rounds) -> ControlFlow<Halt> {
+        self.0.push(search.state().clone());
+        ControlFlow::Continue(())
+    }
+}
+
+#[test]
+fn a_search_ends_as_it_would_have_wherever_it_was_interrupted() {
+    let (profiles, tolerance) = (spec(1), spread());
+    let model = model(8, LayerLength::Actual, &["surface_film"]);
+    for rounds in [1, 4] {
+        for class in [WindabilityClass::Standard, WindabilityClass::Any] {
+            let plain = request(&model, &profiles, &tolerance, Objective::WorstRate);
+            let mut plain = Request { class, recommend: false, ..plain };
+            plain.plan.rules.rounds = rounds;
+            let mut kept = Kept::default();
+            let whole = run(&plain, &mut kept).unwrap().unwrap();
+            // Behind the last slice too: of one round, it is the first that one could ask bounds about.
+            assert!(kept.0.iter().any(|state| state.round == 1));
+            for saved in kept.0 {
+                let again = run(&Request { saved: Some(saved), ..plain.clone() }, &mut Unobserved).unwrap().unwrap();
+                assert_eq!((again.ended, again.evaluations), (whole.ended, whole.evaluations), "{class} {rounds}");
+                assert_eq!(again.best.pattern, whole.best.pattern, "{class} {rounds}");
+            }
+        }
+    }
+}
