@@ -71,6 +71,8 @@ struct ConfigJson {
 
 /// A cell of 48 layers and 64 profiles takes a tenth of it.
 const MEMORY_MB: u32 = 1000;
+/// Every job knows all cells: a million of them take 1.2 GB (`results/campaigns`).
+const LISTED_CELL_MB: f64 = 0.0013;
 
 /// A part is tried so often again.
 const RETRIES: u32 = 3;
@@ -101,7 +103,7 @@ impl Workflow<'_> {
             address: format!("{}-{parts}", &sha256_hex(&self.ids.join("\n"))[..ID_DIGITS]),
             parts,
             threads: self.threads,
-            memory_mb: MEMORY_MB,
+            memory_mb: MEMORY_MB + (LISTED_CELL_MB * self.ids.len() as f64) as u32,
             limit_min: limit_min.ceil() as u64,
             retries: RETRIES,
         }
@@ -180,5 +182,8 @@ mod tests {
         assert_eq!(large.parts(), 1000);
         // Each part then takes 100 minutes and may take six times that.
         assert_eq!(large.config().limit_min, 600);
+        // And holds the list of all cells beside its own.
+        assert_eq!(large.config().memory_mb, 2300);
+        assert_eq!(workflow(100, 6e6, Engine::Slurm).config().memory_mb, 1000);
     }
 }
