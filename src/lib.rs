@@ -41,7 +41,6 @@ pub mod thermal;
 // Floor 3: the readable reference of the rate error.
 pub mod rate;
 // Floor 4: what is done with it.
-pub mod boundary;
 pub mod chamber;
 pub mod compare;
 pub mod compensate;

@@ -1,26 +1,28 @@
 //! What a model says a record should have shown.
 //!
 //! ```text
-//! Ω̂_k = Ω_model(boundary; (t_k − w, t_k]) + Ω_0,   Ω_0 = Σ (Ω_k − Ω_model)/v_k / Σ 1/v_k,   v_k = σ² + var_k
+//! Ω̂_k = Ω_model(course; (t_k − w, t_k]) + Ω_0,   Ω_0 = Σ (Ω_k − Ω_model)/v_k / Σ 1/v_k,   v_k = σ² + var_k
 //! ```
 //!
-//! The offset Ω_0 (earth rate and bias) is always fitted; w is the logger's averaging interval, σ the record's noise
-//! floor and var_k the variance that the boundary's estimate gives the prediction.
+//! Film and chamber are what readings and rates show together; the course of the layers is what the readings alone imply in
+//! that chamber ([`crate::chamber`]), and between the chamber's rows a cubic with their slopes. The offset Ω_0 (earth rate and bias) is always fitted; w is the logger's
+//! averaging interval, σ the record's noise floor and var_k the variance that what the readings leave open gives the
+//! prediction.
 //!
 //! # Source
 //! The noise floor as in [`crate::numeric::noise`].
 
+use std::ops::Range;
+
 use thiserror::Error;
 
-use crate::boundary::{self, Air, Boundary, BoundaryError, Observation, Start};
+use crate::chamber::{Assumption, Bend, Chamber, ChamberError, Effort, Fit, Place, Quantity, Told};
 use crate::coil::CoilError;
 use crate::numeric::noise::{WhiteNoise, white_noise};
-use crate::numeric::piecewise::PiecewiseLinear;
 use crate::pattern::Pattern;
 use crate::rate::{CoilModel, Past, RateError, RateModel};
-use crate::record::Record;
-use crate::thermal::{self, HeatPath, ThermalError, ThermalHistory};
-use crate::units::percent_from_fraction;
+use crate::record::{Record, RecordError};
+use crate::thermal::{ThermalError, ThermalHistory};
 
 /// A model's prediction of one record.
 ///
@@ -31,48 +33,60 @@ pub struct Prediction {
     /// With the offset.
     pub rate_rad_per_s: Vec<f64>,
     pub offset_rad_per_s: f64,
-    /// What the uncertainty of the boundary contributes [(rad/s)²].
+    /// What the readings leave open contributes [(rad/s)²].
     pub boundary_variance_rad2_per_s2: Vec<f64>,
     /// The record's white noise.
     pub noise_rad_per_s: f64,
     /// The pack over each averaging interval.
-    pub history: ThermalHistory,
+    pub pack: Vec<PackRow>,
 }
 
-/// How well a prediction agrees with its record.
+/// The pack over one averaging interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Agreement {
-    pub rmse_rad_per_s: f64,
-    /// 100 (1 − ‖y − ŷ‖/‖y − ȳ‖).
-    pub nrmse_fit_percent: f64,
-    /// Against noise and boundary, one degree of freedom for the offset.
-    pub reduced_chi_square: f64,
+pub struct PackRow {
+    /// Of the outermost layer.
+    pub outer_k: f64,
+    pub outer_rate_k_per_s: f64,
+    /// Over the fibre's length.
+    pub mean_k: f64,
+    pub mean_rate_k_per_s: f64,
+    /// Outermost less innermost layer.
+    pub gradient_k: f64,
+    pub gradient_rate_k_per_s: f64,
 }
 
-impl Prediction {
-    /// Compares with the record that was predicted.
-    pub fn agreement(&self, record: &Record) -> Agreement {
-        let measured = record.rate_rad_per_s();
-        let count = measured.len() as f64;
-        let mean = measured.iter().sum::<f64>() / count;
-        let (mut squares, mut spread, mut chi_square) = (0.0, 0.0, 0.0);
-        for ((m, p), variance) in measured.iter().zip(&self.rate_rad_per_s).zip(&self.boundary_variance_rad2_per_s2) {
-            squares += (m - p).powi(2);
-            spread += (m - mean).powi(2);
-            chi_square += (m - p).powi(2) / (self.noise_rad_per_s.powi(2) + variance);
-        }
-        Agreement {
-            rmse_rad_per_s: (squares / count).sqrt(),
-            nrmse_fit_percent: percent_from_fraction(1.0 - (squares / spread).sqrt()),
-            reduced_chi_square: chi_square / (count - 1.0),
-        }
-    }
+/// What drove a record, as its readings tell.
+#[derive(Debug, Clone)]
+pub struct Boundary {
+    /// Film between air and pack with its standard error [W/(m²K)]; None where the model's own counts.
+    pub film_w_per_m2_k: Option<(f64, f64)>,
+    /// Where the air's slope changed.
+    pub bends: Vec<Bend>,
+    course: Course,
+    /// One entry a row of the chamber.
+    rate_variance_rad2_per_s2: Vec<f64>,
+}
+
+/// Layers and air between the rows of a chamber.
+#[derive(Debug, Clone)]
+struct Course {
+    layers: usize,
+    /// Layers, axial moments, air.
+    columns: usize,
+    times_s: Vec<f64>,
+    /// Row-major rows × columns.
+    values: Vec<f64>,
+    slopes_per_s: Vec<f64>,
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum PredictError {
+    #[error("the course of the air needs at least {needed} readings of temperature, found {found}")]
+    TooFew { needed: usize, found: usize },
     #[error(transparent)]
-    Boundary(#[from] BoundaryError),
+    Record(#[from] RecordError),
+    #[error(transparent)]
+    Chamber(#[from] ChamberError),
     #[error(transparent)]
     Thermal(#[from] ThermalError),
     #[error(transparent)]
@@ -81,73 +95,183 @@ pub enum PredictError {
     Coil(#[from] CoilError),
 }
 
-/// Predicts a record, estimating its boundary first.
+/// Fewer readings than this hold no ramp.
+const LEAST_READINGS: usize = 16;
+/// Numbers of a chamber are fitted to at most so many of its rows: a day of half-minute rows, more than they need.
+const MOST_ROWS_FITTED: usize = 4000;
+/// Rows that are worked out at a time.
+const ROWS_AT_A_TIME: usize = 4096;
+
+/// A record, taken in.
+#[derive(Debug)]
+pub struct Read<'a> {
+    pub chamber: Chamber<'a>,
+    /// Film, chamber and noise, by readings and rates together.
+    pub fit: Fit,
+    pub boundary: Boundary,
+}
+
+/// Takes a record in: film and chamber are what readings and rates show together, whatever else the rate may do beside
+/// the model left to a wander; what drove the coil is then what the readings imply.
 ///
 /// # Errors
 /// A pattern of another layer count, a heat path that cannot be solved, a record whose temperature says nothing.
-pub fn predict(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<Prediction, PredictError> {
-    let boundary = estimate_boundary(model, pattern, record)?;
-    predict_from(model, pattern, record, &boundary)
+pub fn read<'a>(model: &CoilModel, pattern: &Pattern, record: &'a Record) -> Result<Read<'a>, PredictError> {
+    if record.rows() < LEAST_READINGS {
+        return Err(PredictError::TooFew { needed: LEAST_READINGS, found: record.rows() });
+    }
+    let mut chamber = whole(model, record)?;
+    let rows = chamber.busiest(0, MOST_ROWS_FITTED);
+    let fit;
+    if rows == (0..record.rows()) || chamber.times_s(0).len() <= MOST_ROWS_FITTED {
+        let assumed = assumed(model, pattern, &chamber);
+        (chamber, fit) = chamber.settled_in_time(&assumed)?;
+    } else {
+        let stretch = record.stretch(rows)?;
+        let part = whole(model, &stretch)?;
+        let assumed = assumed(model, pattern, &part);
+        let (part, found) = part.settled_in_time(&assumed)?;
+        fit = chamber.adopt(&part, &found)?;
+        chamber.time_kinks(&fit, 0)?;
+    }
+    let Told { course, slopes_k_per_s, rate_variance_rad2_per_s2, bends } = chamber.told(&fit, 0)?;
+    let film_w_per_m2_k = fit.value(Place::Quantity { quantity: Quantity::Film, record: None });
+    let reference_k = chamber.reference_k(0);
+    let columns = course.outputs + 1;
+    let mut values = Vec::with_capacity(course.air_k.len() * columns);
+    for (row, air_k) in course.air_k.iter().enumerate() {
+        let (layers, moments) = course.row(row).split_at(course.layers);
+        values.extend(layers.iter().map(|t| reference_k + t));
+        values.extend_from_slice(moments);
+        values.push(reference_k + air_k);
+    }
+    let times_s = chamber.times_s(0).to_vec();
+    let course = Course { layers: course.layers, columns, times_s, values, slopes_per_s: slopes_k_per_s };
+    let boundary = Boundary { film_w_per_m2_k, bends, course, rate_variance_rad2_per_s2 };
+    Ok(Read { chamber, fit, boundary })
+}
+
+/// All of a record. Rates without noise are those of a simulation: what they weigh beside readings cannot be told.
+fn whole<'a>(model: &CoilModel, record: &'a Record) -> Result<Chamber<'a>, ChamberError> {
+    match Chamber::new(model, &[record]) {
+        Err(ChamberError::NoNoise { .. }) => Chamber::of_readings(model, &[record]),
+        chamber => chamber,
+    }
+}
+
+/// What the model lacks is left to a wander, so that the air does not make up for it.
+fn assumed(model: &CoilModel, pattern: &Pattern, chamber: &Chamber) -> Assumption {
+    Assumption { drift: chamber.noise_floor_rad_per_s(0) > 0.0, ..Assumption::new(model.clone(), pattern.clone()) }
+}
+
+/// The white noise where a fit without the wander begins, in units of the floor: unresolved air may make most of the floor.
+const NOISE_STARTS: [f64; 2] = [1.0, 0.2];
+
+/// In log likelihood: a quick fit that is so far behind one with a wander does not catch up by more work.
+const HOPELESS: f64 = 50.0;
+
+impl Read<'_> {
+    /// What the declared model alone makes of readings and rates, and the same with a wander beside it; of a long record, of the
+    /// stretch that moves most.
+    ///
+    /// # Errors
+    /// Rates without noise, a model that cannot be solved.
+    pub fn declared<T>(
+        &self,
+        then: impl FnOnce(&Chamber, &Fit, &Fit) -> Result<T, PredictError>,
+    ) -> Result<T, PredictError> {
+        if self.chamber.times_s(0).len() <= MOST_ROWS_FITTED {
+            return then(&self.chamber, &without_wander(&self.chamber, &self.fit)?, &self.fit);
+        }
+        let stretch = self.chamber.record(0).stretch(self.chamber.busiest(0, MOST_ROWS_FITTED))?;
+        let mut part = Chamber::new(&self.fit.assumed.model, &[&stretch])?;
+        let wandering = part.adopt(&self.chamber, &self.fit)?;
+        let wandering = part.fit(&wandering.assumed.clone(), &[], &[0], Some(&wandering), Effort::QUICK)?;
+        let fit = without_wander(&part, &wandering)?;
+        then(&part, &fit, &wandering)
+    }
+}
+
+fn without_wander(chamber: &Chamber, with: &Fit) -> Result<Fit, ChamberError> {
+    let assumed = Assumption { drift: false, ..with.assumed.clone() };
+    let mut best: Option<Fit> = None;
+    for share in NOISE_STARTS {
+        let mut start = with.clone();
+        start.set_number(Quantity::RateNoise, share * chamber.noise_floor_rad_per_s(0));
+        let fit = chamber.fit(&assumed, &[], &[0], Some(&start), Effort::SHORT)?;
+        if best.as_ref().is_none_or(|b| fit.posterior() > b.posterior()) {
+            best = Some(fit);
+        }
+    }
+    let best = best.ok_or(ChamberError::Unsolvable)?;
+    let fit = chamber.fit(&assumed, &[], &[0], Some(&best), Effort::QUICK)?;
+    if with.posterior() - fit.posterior() > HOPELESS {
+        return Ok(fit);
+    }
+    chamber.fit(&assumed, &[], &[0], Some(&fit), Effort::FULL)
 }
 
 /// Estimates what drove a record, as far as the model says how the sensor is connected to it.
 ///
 /// # Errors
-/// As [`predict`].
+/// As [`read`].
 pub fn estimate_boundary(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<Boundary, PredictError> {
-    let (path, gains) = (model.heat_path()?, layer_gains_rad_per_k(model, pattern)?);
-    Ok(boundary::estimate(&observation(model, record, &path, &gains))?)
+    Ok(read(model, pattern, record)?.boundary)
 }
 
-/// As [`estimate_boundary`] for a sensor of another lag, beginning with what was found under another model.
+/// Predicts a record, estimating its boundary first.
 ///
 /// # Errors
-/// As [`predict`].
-pub fn refine_boundary(
-    model: &CoilModel,
-    pattern: &Pattern,
-    record: &Record,
-    lag_s: f64,
-    known: &Air,
-    start: Start,
-) -> Result<Boundary, PredictError> {
-    let (path, gains) = (model.heat_path()?, layer_gains_rad_per_k(model, pattern)?);
-    Ok(boundary::refine(&Observation { lag_s, ..observation(model, record, &path, &gains) }, known, start)?)
-}
-
-fn observation<'a>(model: &CoilModel, record: &'a Record, path: &'a HeatPath, gains: &'a [f64]) -> Observation<'a> {
-    Observation {
-        times_s: record.times_s(),
-        temperature_k: record.temperature_k(),
-        path,
-        lag_s: model.sensor_lag_s(),
-        layer_gain_rad_per_k: gains,
-        rate_mean_s: model.rate_mean_s,
-    }
+/// As [`read`].
+pub fn predict(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<Prediction, PredictError> {
+    predict_from(model, pattern, record, &estimate_boundary(model, pattern, record)?)
 }
 
 /// Predicts a record from a boundary that is known already.
 ///
 /// # Errors
-/// As [`predict`].
+/// As [`read`].
 pub fn predict_from(
     model: &CoilModel,
     pattern: &Pattern,
     record: &Record,
     boundary: &Boundary,
 ) -> Result<Prediction, PredictError> {
-    let (path, mut drive) = boundary.driving(&model.heat_path()?, 0.0);
-    if let Some(ambient_k) = measured_ambient(record) {
-        drive.ambient_k = Some(ambient_k);
+    let rows = record.rows();
+    let names: Vec<String> = record.channels().iter().map(|c| c.name.clone()).collect();
+    let rate = RateModel::new(model, pattern, &names)?;
+    let mut channels = vec![0.0; names.len()];
+    let mut past = Past::default();
+    let mut coil_rad_per_s = Vec::with_capacity(rows);
+    let mut pack = Vec::with_capacity(rows);
+    let mut from = 0;
+    while from < rows {
+        let to = (from + ROWS_AT_A_TIME).min(rows);
+        let history = boundary.history(record, from..to, model.rate_mean_s);
+        for row in 0..history.len() {
+            for (value, channel) in channels.iter_mut().zip(record.channels()) {
+                *value = channel.values[from + row];
+            }
+            let state = rate.state(&history, row, &channels);
+            coil_rad_per_s.push(rate.checked_after(&state, &mut past)?);
+            let last = history.layers - 1;
+            pack.push(PackRow {
+                outer_k: state.temperatures_k[last],
+                outer_rate_k_per_s: state.rates_k_per_s[last],
+                mean_k: state.mean_temperature_k,
+                mean_rate_k_per_s: state.mean_rate_k_per_s,
+                gradient_k: state.temperatures_k[last] - state.temperatures_k[0],
+                gradient_rate_k_per_s: state.gradient_rate_k_per_s(),
+            });
+        }
+        from = to;
     }
-    let history = thermal::solve(&path, &drive)?.means(record.times_s(), model.rate_mean_s);
-    let coil_rad_per_s = rates_rad_per_s(model, pattern, record, &history)?;
     let noise_rad_per_s = noise_floor_rad_per_s(record);
-    let boundary_variance = boundary.rate_variance_rad2_per_s2().to_vec();
+    let boundary_variance = boundary.rate_variances_rad2_per_s2(record.times_s());
     let (mut weights, mut sum) = (0.0, 0.0);
     for ((measured, predicted), variance) in record.rate_rad_per_s().iter().zip(&coil_rad_per_s).zip(&boundary_variance)
     {
-        let weight = 1.0 / (noise_rad_per_s * noise_rad_per_s + variance);
+        let weight = 1.0 / (noise_rad_per_s * noise_rad_per_s + variance).max(f64::MIN_POSITIVE);
         weights += weight;
         sum += weight * (measured - predicted);
     }
@@ -157,8 +281,82 @@ pub fn predict_from(
         offset_rad_per_s,
         boundary_variance_rad2_per_s2: boundary_variance,
         noise_rad_per_s,
-        history,
+        pack,
     })
+}
+
+impl Boundary {
+    /// The pack over the averaging intervals of some of a record's rows.
+    pub fn history(&self, record: &Record, rows: Range<usize>, rate_mean_s: f64) -> ThermalHistory {
+        let course = &self.course;
+        let count = rows.len();
+        let mut history = ThermalHistory::with_capacity(course.layers, count);
+        history.times_s.extend_from_slice(&record.times_s()[rows.clone()]);
+        let (mut end, mut start) = (vec![0.0; course.columns], vec![0.0; course.columns]);
+        let mut rates = vec![0.0; course.columns];
+        let air = course.columns - 1;
+        for row in rows {
+            let time_s = record.times_s()[row];
+            course.at(time_s, &mut end, Some(&mut rates));
+            if rate_mean_s > 0.0 {
+                course.at(time_s - rate_mean_s, &mut start, None);
+                for ((rate, end), start) in rates.iter_mut().zip(&mut end).zip(&start) {
+                    *rate = (*end - start) / rate_mean_s;
+                    *end = 0.5 * (*end + start);
+                }
+            }
+            history.temperature_k.extend_from_slice(&end[..course.layers]);
+            history.rate_k_per_s.extend_from_slice(&rates[..course.layers]);
+            history.axial_moment_k.extend_from_slice(&end[course.layers..air]);
+            history.axial_moment_k_per_s.extend_from_slice(&rates[course.layers..air]);
+            history.ambient_k.push(end[air]);
+            history.ambient_rate_k_per_s.push(rates[air]);
+        }
+        history
+    }
+
+    /// Variance that what the readings leave open gives the rates at some times [(rad/s)²].
+    fn rate_variances_rad2_per_s2(&self, times_s: &[f64]) -> Vec<f64> {
+        let last = self.course.times_s.len() - 1;
+        let row = |t: &f64| self.course.times_s.partition_point(|end| *end < t - SAME_S).clamp(1, last);
+        times_s.iter().map(|t| self.rate_variance_rad2_per_s2[row(t)]).collect()
+    }
+}
+
+/// Two times that differ by less are one [s].
+const SAME_S: f64 = 1e-6;
+
+impl Course {
+    /// Value and, if asked for, slope at a time; straight on before the first row and behind the last.
+    fn at(&self, time_s: f64, values: &mut [f64], slopes: Option<&mut [f64]>) {
+        let last = self.times_s.len() - 1;
+        let right = self.times_s.partition_point(|&t| t < time_s).clamp(1, last);
+        let (t0, t1) = (self.times_s[right - 1], self.times_s[right]);
+        let length_s = t1 - t0;
+        let x = (time_s - t0) / length_s;
+        let inside = x.clamp(0.0, 1.0);
+        let (beyond_s, out) = ((x - inside) * length_s, x != inside);
+        let mut slopes = slopes;
+        for (j, value) in values.iter_mut().enumerate() {
+            let (a, b) = (self.value(right - 1, j), self.value(right, j));
+            let (p, q) = (length_s * self.slope(right - 1, j), length_s * self.slope(right, j));
+            // Hermite's cubic.
+            let (c, d) = (3.0 * (b - a) - 2.0 * p - q, 2.0 * (a - b) + p + q);
+            let slope = (p + inside * (2.0 * c + 3.0 * d * inside)) / length_s;
+            *value = a + inside * (p + inside * (c + d * inside)) + if out { beyond_s * slope } else { 0.0 };
+            if let Some(slopes) = slopes.as_deref_mut() {
+                slopes[j] = slope;
+            }
+        }
+    }
+
+    fn value(&self, row: usize, column: usize) -> f64 {
+        self.values[row * self.columns + column]
+    }
+
+    fn slope(&self, row: usize, column: usize) -> f64 {
+        self.slopes_per_s[row * self.columns + column]
+    }
 }
 
 /// The model's rates over a history, without any offset, the record's channels included.
@@ -193,12 +391,6 @@ pub fn layer_gains_rad_per_k(model: &CoilModel, pattern: &Pattern) -> Result<Vec
     let rate = RateModel::new(model, pattern, &[])?;
     let scale = rate.scale_per_m2() * rate.coil().fibre().path_per_k();
     Ok(rate.weights().total_m2().iter().map(|w| w * scale).collect())
-}
-
-/// The measured ambient as a drive, if the record has a complete one.
-pub(crate) fn measured_ambient(record: &Record) -> Option<PiecewiseLinear> {
-    let values = record.ambient_k()?;
-    PiecewiseLinear::new(record.times_s().to_vec(), values.to_vec()).ok()
 }
 
 /// White noise of one rate, from the record alone: what quadratics leave in short windows, steep and spoilt ones left out.

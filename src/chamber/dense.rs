@@ -2,10 +2,11 @@
 //! measurements, the conditional mean in it, central differences.
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use nalgebra::{DMatrix, DVector};
 
     use crate::chamber::filter::{self, Move, System};
+    use crate::chamber::kinks::Bend;
     use crate::chamber::point::{CoilSide, Observed};
     use crate::chamber::prior::Quantity;
     use crate::chamber::series::{Origin, Series};
@@ -18,7 +19,7 @@ mod tests {
     use crate::record::Record;
     use crate::thermal::{Extent, Location, Material};
 
-    fn model(effects: Vec<DeclaredEffect>) -> CoilModel {
+    pub fn model(effects: Vec<DeclaredEffect>) -> CoilModel {
         let fibre = Fibre {
             refractive_index: 1.45,
             thermo_optic_per_k: 1.0e-5,
@@ -102,10 +103,13 @@ mod tests {
                 *noise = &phi * &*noise * phi.transpose() + own;
                 *map = &phi * &*map;
             };
-            noise[(system.slope, system.slope)] += row.kink;
+            if !row.is_kinked_within() {
+                noise[(system.slope, system.slope)] += row.kink;
+            }
             for movement in &row.moves {
                 match movement {
                     Move::Step(index) => step(*index, &mut map, &mut noise),
+                    Move::Kink => noise[(system.slope, system.slope)] += row.kink,
                     Move::Keep(slot) => {
                         let mut keep = DMatrix::identity(n, n);
                         for &(state, place) in &system.keeps[*slot as usize] {
@@ -177,6 +181,9 @@ mod tests {
     fn check_on(assumed: &Assumption, record: &Record, averaged: bool) {
         let (mut series, mean_k) = observed(&assumed.model, record);
         series.rows[9].kink = 1e-6;
+        let between = 0.7 * series.times_s[14] + 0.3 * series.times_s[13];
+        let series = series.with_kinks(&[Bend { time_s: between, slope_change_k_per_s: 2e-3 }]);
+        assert!(series.rows[14].is_kinked_within());
         assert_eq!(series.averaged > 1, averaged);
         let numbers = Numbers::medians(&series);
         let seen = Observed { record, series, channels: Vec::new(), mean_k, blind: false };

@@ -73,6 +73,8 @@ pub(super) enum Move {
     Step(u16),
     /// A window begins, which this slot remembers.
     Keep(u8),
+    /// The air's slope has its kink here, and not where the row's steps begin.
+    Kink,
 }
 
 /// What happens up to and at one row of a record.
@@ -82,12 +84,19 @@ pub(super) struct Row {
     pub moves: Vec<Move>,
     /// Of how much the readings bend here: 0 at rest to 1.
     pub bend: f64,
-    /// Variance of a kink of the air's slope where this row's steps begin [K²/s²].
+    /// Variance of a kink of the air's slope where this row's steps begin, or at [`Move::Kink`] [K²/s²].
     pub kink: f64,
     /// Rows of [`System::rows`] to measure with; None where there is no value.
     pub measured: [Option<u16>; MEASURED],
     /// Values that were averaged into this one: variances are divided by it.
     pub averaged: f64,
+}
+
+impl Row {
+    /// Whether its kink is between its steps, not where they begin.
+    pub fn is_kinked_within(&self) -> bool {
+        self.kink > 0.0 && self.moves.contains(&Move::Kink)
+    }
 }
 
 /// The values of a record's rows, known inputs already taken off.
@@ -281,6 +290,7 @@ fn advance<const N: usize>(system: &System, row: &Row, mean: &mut [f64; N]) {
                     mean[state] = system.kept.dot(kept, mean);
                 }
             }
+            Move::Kink => {}
         }
     }
 }
@@ -296,6 +306,7 @@ fn retreat<const N: usize>(system: &System, movement: Move, r: &mut [f64; N]) {
                 system.kept.add_to(kept, weight, r);
             }
         }
+        Move::Kink => {}
     }
 }
 
@@ -327,11 +338,14 @@ fn forward_of<const N: usize>(system: &System, rows: &[Row], values: &Values, ke
         if !frozen {
             trace.thawed += 1;
             let density = system.trend.0 + row.bend * (system.trend.1 - system.trend.0);
-            covariance[system.slope][system.slope] += row.kink;
+            if !row.is_kinked_within() {
+                covariance[system.slope][system.slope] += row.kink;
+            }
             for &movement in &row.moves {
                 match movement {
                     Move::Step(step) => predict(&steps[step as usize], density, &mut covariance),
                     Move::Keep(slot) => keep_window(system, slot, &mut covariance),
+                    Move::Kink => covariance[system.slope][system.slope] += row.kink,
                 }
             }
             if keep {
@@ -464,16 +478,20 @@ fn doubts_of<const N: usize>(system: &System, rows: &[Row], trace: &Trace) -> Do
                 }
             }
         }
+        let kink = |r: &[f64; N], spread: &Square<N>| {
+            let own = spread[system.slope][system.slope];
+            if own > 0.0 { (r[system.slope] / own.sqrt(), r[system.slope] / own) } else { (0.0, 0.0) }
+        };
         for &movement in row.moves.iter().rev() {
             retreat(system, movement, &mut r);
             match movement {
                 Move::Step(step) => spread = system.steps[step as usize].phi_turned.surround(&spread),
                 Move::Keep(slot) => forget_window(system, slot, &mut spread),
+                Move::Kink => found.kinks[k] = kink(&r, &spread),
             }
         }
-        let own = spread[system.slope][system.slope];
-        if own > 0.0 {
-            found.kinks[k] = (r[system.slope] / own.sqrt(), r[system.slope] / own);
+        if !row.is_kinked_within() {
+            found.kinks[k] = kink(&r, &spread);
         }
     }
     found

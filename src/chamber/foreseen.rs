@@ -4,10 +4,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::filter::Innovation;
 use super::fit::Fit;
+use super::kinks::Bend;
 use super::parameter::{Free, Parameter, Place, write};
 use super::point::{CoilSide, Rates, smoothed};
 use super::prior::{PRIORS, Quantity};
-use super::readings::Bend;
 use super::series::Origin;
 use super::system::Numbers;
 use super::{Assumption, Chamber, ChamberError};

@@ -1,10 +1,9 @@
 //! What a fit says of film, offset and chamber, where the records determine it.
 
-use super::filter::{Move, Row, System, Trace};
 use super::fit::Fit;
 use super::parameter::Place;
-use super::point::{CoilSide, run_kept};
 use super::prior::{PRIORS, Quantity};
+use super::readings::backward;
 use super::system::Layout;
 use super::{Chamber, ChamberError};
 
@@ -32,17 +31,6 @@ pub struct Learned {
 const DETERMINED: f64 = 0.5;
 
 impl Chamber<'_> {
-    /// The pass over a record with everything kept, and what it was made with.
-    fn traced(&self, fit: &Fit, record: usize) -> Result<(CoilSide, System, Trace), ChamberError> {
-        let observed = &self.observed[record];
-        let numbers = self.numbers_for(fit, record);
-        let side = CoilSide::new(&fit.assumed, numbers.get(Quantity::Film), self.modes, observed)?;
-        let course = fit.courses[record].as_ref().filter(|c| side.needs_reference() && side.fits(c));
-        let values = side.values(&fit.assumed, observed, record, course)?;
-        let (system, trace) = run_kept(&side, &fit.assumed, &numbers, observed, &values);
-        Ok((side, system, trace))
-    }
-
     /// What a fit's records say of what surrounds the coil.
     ///
     /// # Errors
@@ -115,67 +103,6 @@ fn combined(values: &[(f64, f64)]) -> Option<Estimate> {
     let spread = values.iter().zip(&weights).map(|((v, _), w)| w * (v - value).powi(2)).sum::<f64>();
     let freedom = (values.len().saturating_sub(1)).max(1) as f64;
     Some(Estimate { value, standard_error: ((spread / freedom).max(1.0) / whole).sqrt() })
-}
-
-/// Walks back over the rows; at each, `visit` is told its place, r and N (row-major) with the row's own measurements.
-fn backward(system: &System, rows: &[Row], trace: &Trace, mut visit: impl FnMut(usize, &[f64], &[f64])) {
-    let n = system.size;
-    let mut r = vec![0.0; n];
-    let mut information = vec![0.0; n * n];
-    let mut taken = trace.innovations.len();
-    let mut h = vec![0.0; n];
-    for (k, row) in rows.iter().enumerate().rev() {
-        let gains = &trace.gains[trace.gains_of[k] as usize];
-        let present: Vec<usize> = row.measured.iter().flatten().map(|&h| h as usize).collect();
-        for (place, &index) in present.iter().enumerate().rev() {
-            taken -= 1;
-            let innovation = trace.innovations[taken];
-            let gain = &gains.gain[place * (n + 1)..place * (n + 1) + n];
-            h.iter_mut().for_each(|v| *v = 0.0);
-            system.rows.add_to(index, 1.0, &mut h);
-            let along: f64 = gain.iter().zip(&r).map(|(g, r)| g * r).sum();
-            r.iter_mut().zip(&h).for_each(|(r, h)| *r += h * (innovation.value / innovation.variance - along));
-            let u: Vec<f64> = information.chunks_exact(n).map(|line| dot(line, gain)).collect();
-            let own = dot(&u, gain) + 1.0 / innovation.variance;
-            for i in 0..n {
-                for j in 0..n {
-                    information[i * n + j] += h[i] * h[j] * own - h[i] * u[j] - u[i] * h[j];
-                }
-            }
-        }
-        visit(k, &r, &information);
-        for &movement in row.moves.iter().rev() {
-            match movement {
-                Move::Step(step) => {
-                    let phi = &system.steps[step as usize].phi_turned;
-                    r = phi.times_matrix(&r, 1);
-                    let half = turned(&phi.times_matrix(&information, n), n);
-                    information = phi.times_matrix(&half, n);
-                }
-                Move::Keep(slot) => {
-                    for &(state, kept) in system.keeps[slot as usize].iter().rev() {
-                        let weight = std::mem::take(&mut r[state]);
-                        system.kept.add_to(kept, weight, &mut r);
-                        for _ in 0..2 {
-                            for line in information.chunks_exact_mut(n) {
-                                let weight = std::mem::take(&mut line[state]);
-                                system.kept.add_to(kept, weight, line);
-                            }
-                            information = turned(&information, n);
-                        }
-                    }
-                }
-            }
-        }
-    }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn turned(matrix: &[f64], n: usize) -> Vec<f64> {
-    (0..n * n).map(|i| matrix[i % n * n + i / n]).collect()
 }
 
 #[cfg(test)]

@@ -1,8 +1,10 @@
-//! Long records: the chamber's numbers are found on the stretch that moves most.
+//! Long records: the chamber's numbers are found on the stretch that moves most, and hold for the whole.
 
 use std::ops::Range;
 
-use super::Chamber;
+use super::fit::Fit;
+use super::settle::GROSS_ROUNDS;
+use super::{Chamber, ChamberError};
 
 /// A change of temperature is told from noise over so many rows.
 const APART: usize = 50;
@@ -32,5 +34,32 @@ impl Chamber<'_> {
         let sum = |from: usize| sums[(from + most - APART).min(sums.len() - 1)] - sums[from];
         let best = starts.reduce(|a, b| if sum(b) > sum(a) { b } else { a }).unwrap_or(0);
         whole(best, best + most)
+    }
+
+    /// Takes over numbers that were found on another stretch of the first record: what is a gross error under them is left out,
+    /// and kinks are found if that stretch had them; nothing is fitted.
+    ///
+    /// # Errors
+    /// A model that cannot be solved.
+    pub fn adopt(&mut self, stretch: &Chamber, found: &Fit) -> Result<Fit, ChamberError> {
+        let mut fit = found.of_record(found.records[0]);
+        let settle = |chamber: &Self, fit: &mut Fit| {
+            let (assumed, numbers) = (fit.assumed.clone(), fit.numbers.clone());
+            chamber.settle_courses(&assumed, &numbers, &[0], &mut fit.courses)
+        };
+        settle(self, &mut fit)?;
+        for _ in 0..GROSS_ROUNDS {
+            let gross = self.gross(&fit, 0)?;
+            if gross.is_empty() {
+                break;
+            }
+            gross.iter().for_each(|&(row, m)| self.observed[0].series.leave_out(row, m));
+        }
+        let has_kinks = stretch.observed[0].series.rows.iter().any(|row| row.kink > 0.0);
+        if has_kinks {
+            self.place_kinks(&fit, 0)?;
+        }
+        settle(self, &mut fit)?;
+        Ok(fit)
     }
 }

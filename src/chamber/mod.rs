@@ -38,6 +38,7 @@ mod filter;
 mod fit;
 mod fitted;
 mod foreseen;
+mod kinks;
 mod known;
 mod learned;
 mod long;
@@ -71,12 +72,13 @@ pub use filter::Innovation;
 pub use fit::{Effort, Fit};
 pub use fitted::{EffectEstimate, EffectEstimates};
 pub use foreseen::Hold;
+pub use kinks::Bend;
 pub use known::Reference;
 pub use learned::{Estimate, Learned};
 pub use noise::{Noise, Remedy};
 pub use parameter::{Free, Parameter, Place, Scale};
 pub use prior::{BREAK_K2_PER_S2, BREAKS_PER_S, PRIORS, Prior, Quantity};
-pub use readings::Bend;
+pub use readings::Told;
 pub use score::{Column, Direction, Scores};
 pub use scorer::{Scored, Scorer};
 pub use states::RowStates;
@@ -113,7 +115,7 @@ pub struct Input {
 }
 
 /// Records, ready to be explained.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Chamber<'a> {
     observed: Vec<Observed<'a>>,
     modes: usize,

@@ -28,7 +28,7 @@ pub(super) struct CoilSide {
 }
 
 /// A record as the chamber knows it.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Observed<'a> {
     pub record: &'a Record,
     pub series: Series,

@@ -1,20 +1,42 @@
-//! What the readings alone say of a record: nothing here has seen its rates.
+//! What the readings alone say of a record's layers, in a chamber whose numbers readings and rates have shown together.
+//!
+//! ```text
+//! r ← h v/S + (I − K h)ᵀ r,  N ← h hᵀ/S + (I − K h)ᵀ N (I − K h)         backwards over the readings
+//! Var(c·x | all readings) = c P cᵀ − c P N P cᵀ
+//! ```
+//!
+//! # Source
+//! de Jong, J. Am. Stat. Assoc. 84 (1989) 1085.
 
-use super::filter::RATE;
-use super::series::Origin;
+use super::filter::{self, Innovation, MEASURED, Move, RATE, Row, System, Trace, Values};
+use super::fit::Fit;
+use super::kinks::Bend;
+use super::known::Reference;
+use super::point::{CoilSide, run_kept};
+use super::prior::Quantity;
+use super::series::{Origin, Series};
+use super::system::{Layout, Numbers, system};
 use super::{Chamber, ChamberError};
 use crate::rate::CoilModel;
 use crate::record::Record;
 
-/// A change of the air's slope.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bend {
-    pub time_s: f64,
-    pub slope_change_k_per_s: f64,
+/// What readings imply.
+///
+/// # Shapes
+/// One entry a row of the chamber.
+#[derive(Debug, Clone)]
+pub struct Told {
+    /// Layers and air.
+    pub course: Reference,
+    /// Slopes of the layers, their axial moments and the air, row-major \[K/s\].
+    pub slopes_k_per_s: Vec<f64>,
+    /// Variance that what the readings leave open gives each row's rate \[(rad/s)²\].
+    pub rate_variance_rad2_per_s2: Vec<f64>,
+    pub bends: Vec<Bend>,
 }
 
 impl<'a> Chamber<'a> {
-    /// A chamber whose fits do not see the rates.
+    /// A chamber whose fits do not see the rates: those of a simulation, which have no noise.
     ///
     /// # Errors
     /// As [`Chamber::new`], but that rates may be without noise.
@@ -22,8 +44,209 @@ impl<'a> Chamber<'a> {
         let mut chamber = Self::made(model, records, Origin::Measured)?;
         for observed in &mut chamber.observed {
             observed.blind = true;
-            observed.series.rows.iter_mut().for_each(|row| row.measured[RATE] = None);
+            observed.series.rows = without_rates(&observed.series);
         }
         Ok(chamber)
     }
+
+    /// The pass over a record with everything kept, and what it was made with.
+    pub(super) fn traced(&self, fit: &Fit, record: usize) -> Result<(CoilSide, System, Trace), ChamberError> {
+        let numbers = self.numbers_for(fit, record);
+        let (side, values) = self.side_and_values(fit, record, &numbers)?;
+        let (system, trace) = run_kept(&side, &fit.assumed, &numbers, &self.observed[record], &values);
+        Ok((side, system, trace))
+    }
+
+    pub(super) fn side_and_values(
+        &self,
+        fit: &Fit,
+        record: usize,
+        numbers: &Numbers,
+    ) -> Result<(CoilSide, Values), ChamberError> {
+        let observed = &self.observed[record];
+        let side = CoilSide::new(&fit.assumed, numbers.get(Quantity::Film), self.modes, observed)?;
+        let course = fit.courses[record].as_ref().filter(|c| side.needs_reference() && side.fits(c));
+        let values = side.values(&fit.assumed, observed, record, course)?;
+        Ok((side, values))
+    }
+
+    /// What a record's readings imply in the chamber of a fit; which rates there are does not count.
+    ///
+    /// # Errors
+    /// A model that cannot be solved.
+    pub fn told(&self, fit: &Fit, record: usize) -> Result<Told, ChamberError> {
+        let observed = &self.observed[record];
+        let numbers = self.numbers_for(fit, record);
+        let (side, values) = self.side_and_values(fit, record, &numbers)?;
+        let system = system(&side.parts(&fit.assumed), &numbers, &observed.series);
+        let series = &observed.series;
+        let rows = without_rates(series);
+        let trace = filter::forward(&system, &rows, &values, true);
+        let layout = Layout::new(&side.parts(&fit.assumed), series);
+        let n = system.size;
+        let mut variance = vec![0.0; series.rows.len()];
+        let mut along = vec![0.0; n];
+        let mut row = vec![0.0; n];
+        backward(&system, &rows, &trace, |k, _, information| {
+            let covariance = &trace.gains[trace.gains_of[k] as usize].covariance;
+            row.iter_mut().for_each(|v| *v = 0.0);
+            system.rows.add_to(series.shape_of(k) * MEASURED + RATE, 1.0, &mut row);
+            // Offset and wander are the gyro's.
+            layout.gyro().for_each(|state| row[state] = 0.0);
+            for (a, line) in along.iter_mut().zip(covariance.chunks_exact(n)) {
+                *a = line.iter().zip(&row).map(|(p, h)| p * h).sum();
+            }
+            let before: f64 = row.iter().zip(&along).map(|(h, a)| h * a).sum();
+            let known: f64 = information
+                .chunks_exact(n)
+                .zip(&along)
+                .map(|(line, a)| a * line.iter().zip(&along).map(|(i, b)| i * b).sum::<f64>())
+                .sum();
+            variance[k] = (before - known).max(0.0);
+        });
+        let states = filter::smooth(&system, &rows, &trace);
+        let bends = self.bends(record, |k| states[k * n + layout.trend + 1]);
+        let before = fit.courses[record].as_ref().filter(|c| side.fits(c));
+        let course = side.reference(&fit.assumed, &self.observed[record], &states, before)?;
+        let slopes_k_per_s = slopes(&side, &layout, series, &states, &course);
+        Ok(Told { course, slopes_k_per_s, rate_variance_rad2_per_s2: variance, bends })
+    }
+}
+
+/// Slopes of a course at its rows: of the modes as they follow the air, of all else those of the parabola through a row and
+/// its neighbours.
+fn slopes(side: &CoilSide, layout: &Layout, series: &Series, states: &[f64], course: &Reference) -> Vec<f64> {
+    let (reduced, columns) = (&side.reduced, course.outputs + 1);
+    let times_s = &series.times_s;
+    let (mut rest, mut slopes) = (course.air_k.clone(), vec![0.0; course.air_k.len() * columns]);
+    add_parabolas(times_s, &rest, columns, course.outputs, &mut slopes);
+    for j in 0..course.outputs {
+        let shares = &reduced.row(j)[..layout.modes];
+        for (k, x) in states.chunks_exact(layout.size).enumerate() {
+            let drive = layout.drive(x);
+            rest[k] = course.row(k)[j];
+            for ((share, x), decay) in shares.iter().zip(x).zip(&reduced.decay_per_s) {
+                rest[k] -= share * x;
+                slopes[k * columns + j] += share * decay * (drive - x);
+            }
+        }
+        add_parabolas(times_s, &rest, columns, j, &mut slopes);
+    }
+    slopes
+}
+
+/// Adds the slope of the parabola through each row's value and its neighbours'; at the ends, that of the last piece.
+fn add_parabolas(times_s: &[f64], values: &[f64], columns: usize, column: usize, slopes: &mut [f64]) {
+    let last = values.len() - 1;
+    let secant = |right: usize| (values[right] - values[right - 1]) / (times_s[right] - times_s[right - 1]);
+    for k in 0..=last {
+        slopes[k * columns + column] += if k == 0 || k == last {
+            secant(k.max(1))
+        } else {
+            let (before_s, after_s) = (times_s[k] - times_s[k - 1], times_s[k + 1] - times_s[k]);
+            (after_s * secant(k) + before_s * secant(k + 1)) / (before_s + after_s)
+        };
+    }
+}
+
+impl Chamber<'_> {
+    /// χ² a rate of what the readings leave of the rates, their offset fitted: rᵀ C⁻¹ r/(n − 1), C the covariance of white
+    /// noise of this deviation and of what the readings leave open.
+    ///
+    /// # Errors
+    /// A model that cannot be solved.
+    pub fn chi_square_beyond_readings(
+        &self,
+        fit: &Fit,
+        record: usize,
+        noise_rad_per_s: f64,
+    ) -> Result<f64, ChamberError> {
+        let mut numbers = self.numbers_for(fit, record);
+        numbers.set(Quantity::RateNoise, noise_rad_per_s);
+        numbers.set(Quantity::WanderShare, NO_WANDER);
+        let (side, values) = self.side_and_values(fit, record, &numbers)?;
+        let series = &self.observed[record].series;
+        let system = system(&side.parts(&fit.assumed), &numbers, series);
+        // ln p(rates | readings) = ln p(both) − ln p(readings), squares and all.
+        let squares = |rows: &[Row]| {
+            let innovations = filter::forward(&system, rows, &values, false).innovations;
+            let sum = innovations.iter().map(|i: &Innovation| i.value * i.value / i.variance).sum::<f64>();
+            (sum, innovations.len())
+        };
+        let (both, all) = squares(&series.rows);
+        let (readings, some) = squares(&without_rates(series));
+        Ok((both - readings) / (all - some).saturating_sub(1).max(1) as f64)
+    }
+}
+
+/// The share of wander in a gyro that has none.
+const NO_WANDER: f64 = 1e-6;
+
+/// Its rows with readings alone.
+fn without_rates(series: &Series) -> Vec<Row> {
+    let mut rows = series.rows.clone();
+    rows.iter_mut().for_each(|row| row.measured[RATE] = None);
+    rows
+}
+
+/// Walks back over the rows; at each, `visit` is told its place, r and N (row-major) with the row's own measurements.
+pub(super) fn backward(system: &System, rows: &[Row], trace: &Trace, mut visit: impl FnMut(usize, &[f64], &[f64])) {
+    let n = system.size;
+    let mut r = vec![0.0; n];
+    let mut information = vec![0.0; n * n];
+    let mut taken = trace.innovations.len();
+    let mut h = vec![0.0; n];
+    for (k, row) in rows.iter().enumerate().rev() {
+        let gains = &trace.gains[trace.gains_of[k] as usize];
+        let present: Vec<usize> = row.measured.iter().flatten().map(|&h| h as usize).collect();
+        for (place, &index) in present.iter().enumerate().rev() {
+            taken -= 1;
+            let innovation = trace.innovations[taken];
+            let gain = &gains.gain[place * (n + 1)..place * (n + 1) + n];
+            h.iter_mut().for_each(|v| *v = 0.0);
+            system.rows.add_to(index, 1.0, &mut h);
+            let along: f64 = gain.iter().zip(&r).map(|(g, r)| g * r).sum();
+            r.iter_mut().zip(&h).for_each(|(r, h)| *r += h * (innovation.value / innovation.variance - along));
+            let u: Vec<f64> = information.chunks_exact(n).map(|line| dot(line, gain)).collect();
+            let own = dot(&u, gain) + 1.0 / innovation.variance;
+            for i in 0..n {
+                for j in 0..n {
+                    information[i * n + j] += h[i] * h[j] * own - h[i] * u[j] - u[i] * h[j];
+                }
+            }
+        }
+        visit(k, &r, &information);
+        for &movement in row.moves.iter().rev() {
+            match movement {
+                Move::Step(step) => {
+                    let phi = &system.steps[step as usize].phi_turned;
+                    r = phi.times_matrix(&r, 1);
+                    let half = turned(&phi.times_matrix(&information, n), n);
+                    information = phi.times_matrix(&half, n);
+                }
+                Move::Kink => {}
+                Move::Keep(slot) => {
+                    for &(state, kept) in system.keeps[slot as usize].iter().rev() {
+                        let weight = std::mem::take(&mut r[state]);
+                        system.kept.add_to(kept, weight, &mut r);
+                        for _ in 0..2 {
+                            for line in information.chunks_exact_mut(n) {
+                                let weight = std::mem::take(&mut line[state]);
+                                system.kept.add_to(kept, weight, line);
+                            }
+                            information = turned(&information, n);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn turned(matrix: &[f64], n: usize) -> Vec<f64> {
+    (0..n * n).map(|i| matrix[i % n * n + i / n]).collect()
 }

@@ -7,14 +7,14 @@ use rayon::prelude::*;
 
 use super::filter::{self, RATE};
 use super::fit::{Effort, Fit};
+use super::kinks::Bend;
 use super::point::{BLIND_RAD2_PER_S2, CoilSide, run_kept};
 use super::prior::{GROSS_FACTOR, GROSS_SHARE, KINKS_PER_ROW, Quantity};
-use super::readings::Bend;
 use super::system::system;
 use super::{Assumption, Chamber, ChamberError};
 
 /// Times that a record is looked through for gross errors, and for kinks.
-const GROSS_ROUNDS: usize = 5;
+pub(super) const GROSS_ROUNDS: usize = 5;
 const KINK_ROUNDS: usize = 3;
 const KINK_PASSES: usize = 3;
 /// A value so many rows beside a worse one waits for the next round: the worse one may be why it seems one.
@@ -50,7 +50,7 @@ impl<'a> Chamber<'a> {
         Ok((self, fit))
     }
 
-    fn looked_through(&mut self, mut fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
+    pub(super) fn looked_through(&mut self, mut fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
         fit = self.without_gross_errors(fit, records)?;
         for &r in records {
             // Either the air bends wherever readings do, or it is straight but for its kinks, which must be worth being
@@ -76,7 +76,7 @@ impl<'a> Chamber<'a> {
     ///
     /// # Errors
     /// As [`Chamber::fit`].
-    fn without_gross_errors(&mut self, mut fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
+    pub fn without_gross_errors(&mut self, mut fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
         for _ in 0..GROSS_ROUNDS {
             let mut found = 0;
             for &r in records {
@@ -93,7 +93,7 @@ impl<'a> Chamber<'a> {
     }
 
     /// Rows and measurements that are gross errors beside what all others say.
-    fn gross(&self, fit: &Fit, record: usize) -> Result<Vec<(usize, usize)>, ChamberError> {
+    pub(super) fn gross(&self, fit: &Fit, record: usize) -> Result<Vec<(usize, usize)>, ChamberError> {
         let place = self.place(fit.assumed.clone(), fit.numbers.clone(), &[record], &fit.courses)?;
         let (Some(side), Some(values)) = (&place.sides[record], &place.values[record]) else {
             return Err(ChamberError::Unsolvable);
@@ -149,6 +149,26 @@ impl<'a> Chamber<'a> {
         Ok(Some((day, count)))
     }
 
+    /// Places the kinks of a record's readings by numbers that are known, if it has any and is not all curves.
+    pub(super) fn place_kinks(&mut self, fit: &Fit, record: usize) -> Result<(), ChamberError> {
+        let before = self.observed[record].series.clone();
+        let rows = before.rows.len();
+        self.observed[record].series.rows.iter_mut().for_each(|row| row.bend = 0.0);
+        let mut count = 0;
+        for _ in 0..KINK_ROUNDS * KINK_PASSES {
+            let new = self.kinks(fit, record)?;
+            self.spread_kinks(&new, record);
+            count += new.len();
+            if new.is_empty() || count > rows / FEWEST_ROWS_A_KINK {
+                break;
+            }
+        }
+        if count == 0 || count > rows / FEWEST_ROWS_A_KINK {
+            self.observed[record].series = before;
+        }
+        Ok(())
+    }
+
     /// Straight but for these bends.
     pub(super) fn bend_at(&mut self, bends: &[Bend], record: usize) {
         let series = &mut self.observed[record].series;
@@ -187,7 +207,12 @@ impl<'a> Chamber<'a> {
     }
 
     /// The best of several starts, and what it has become.
-    fn best_start(&self, assumed: &Assumption, free: &[super::Free], records: &[usize]) -> Result<Fit, ChamberError> {
+    pub(super) fn best_start(
+        &self,
+        assumed: &Assumption,
+        free: &[super::Free],
+        records: &[usize],
+    ) -> Result<Fit, ChamberError> {
         let mut best: Option<Fit> = None;
         let base = self.fit(assumed, free, records, None, Effort { iterations: 0, tolerance: 0.0, rounds: 1 })?;
         let tried: Vec<Result<Fit, ChamberError>> = self

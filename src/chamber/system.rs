@@ -182,9 +182,23 @@ impl Layout {
         self.offset
     }
 
+    /// The states that are the gyro's own.
+    pub fn gyro(&self) -> impl Iterator<Item = usize> {
+        let cycle = self.cycle.into_iter().flat_map(|c| [c, c + 1]);
+        [self.wander, self.offset].into_iter().chain(self.drift).chain(cycle)
+    }
+
     /// The states whose sum is the air.
     pub fn air(&self) -> [usize; 3] {
         [self.trend, self.turbulence, self.ripple]
+    }
+
+    /// What the modes follow.
+    pub fn drive(&self, states: &[f64]) -> f64 {
+        match self.skin {
+            Some(skin) => states[skin],
+            None => self.air().into_iter().map(|i| states[i]).sum(),
+        }
     }
 
     /// An output's row over the states.

@@ -5,14 +5,17 @@
 //! fit = 100 (1 − ‖Ω − Ω̂‖/‖Ω − mean Ω‖) %            NRMSE fit
 //! R² = 1 − Σ r²/Σ (Ω − mean Ω)²
 //! χ²_red = Σ r²/σ²/(n − 1)                          against the noise floor alone
-//! χ²_b = Σ var_k/σ²/(n − 1)                         expected share of the boundary's uncertainty in it
-//! χ²_w = rᵀ C⁻¹ r/(n − 1),  C = σ² I + C_boundary   what neither of them explains shows as an excess over 1
+//! χ²_b = Σ var_k/σ²/(n − 1)                         expected share of what the readings leave open in it
+//! χ²_w = rᵀ C⁻¹ r/(n − 1),  C = σ² I + C_readings   what neither of them explains shows as an excess over 1
 //! ```
+//!
+//! The prediction has seen no rate. What is noise, and whether anything is missing, is asked of readings and rates
+//! together ([`crate::chamber`], [`crate::diagnose::standing`]).
 //!
 //! | symbol | meaning | in code |
 //! |---|---|---|
 //! | σ | the record's white noise, with its standard error: [`crate::numeric::noise`] | `noise_rad_per_s`, `noise_standard_error_rad_per_s` |
-//! | var_k, C_boundary | variance and covariance that the boundary's estimate gives the prediction | `boundary_chi_square`, `whitened_chi_square` |
+//! | var_k, C_readings | variance and covariance that what the readings leave open gives the prediction | `boundary_chi_square`, `whitened_chi_square` |
 //!
 //! Holds for records with more than a few dozen rows. The white noise of a record whose signal jumps from row to row is
 //! overestimated.
@@ -25,11 +28,11 @@ pub mod regimes;
 pub mod suspicion;
 pub mod verdict;
 
-use crate::boundary::{Boundary, BoundaryError};
+use crate::diagnose::{Standing, standing};
 use crate::numeric::statistics::{LjungBox, autocorrelation, autocorrelation_band_99, correlation, rms};
 use crate::pattern::Pattern;
-use crate::predict::{self, PredictError, Prediction};
-use crate::rate::{CoilModel, RateError, RateModel};
+use crate::predict::{self, Boundary, PredictError, Prediction};
+use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::units::percent_from_fraction;
 use regimes::{Part, Regime, Regimes};
@@ -65,8 +68,12 @@ pub struct Comparison {
     /// One entry a row.
     pub prediction: Prediction,
     pub residual_rad_per_s: Vec<f64>,
-    pub film_w_per_m2_k: Option<f64>,
-    pub kinks_s: Vec<f64>,
+    /// With its standard error; None where the model's own film counts.
+    pub film_w_per_m2_k: Option<(f64, f64)>,
+    /// Where the air's slope changed.
+    pub bends_s: Vec<f64>,
+    /// What readings and rates together say of model and noise; None where the rates have none.
+    pub standing: Option<Standing>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -119,21 +126,8 @@ const MAX_LAGS: usize = 60;
 /// # Errors
 /// A pattern of another layer count, a heat path that cannot be solved, a record whose temperature says nothing.
 pub fn compare(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<Comparison, PredictError> {
-    let boundary = predict::estimate_boundary(model, pattern, record)?;
-    compare_with(model, pattern, record, &boundary)
-}
-
-/// As [`compare`], with a boundary that is known already.
-///
-/// # Errors
-/// As [`compare`].
-pub fn compare_with(
-    model: &CoilModel,
-    pattern: &Pattern,
-    record: &Record,
-    boundary: &Boundary,
-) -> Result<Comparison, PredictError> {
-    let prediction = predict::predict_from(model, pattern, record, boundary)?;
+    let read = predict::read(model, pattern, record)?;
+    let prediction = predict::predict_from(model, pattern, record, &read.boundary)?;
     let measured = record.rate_rad_per_s();
     let residual: Vec<f64> = measured.iter().zip(&prediction.rate_rad_per_s).map(|(m, p)| m - p).collect();
     let rows = residual.len();
@@ -149,8 +143,16 @@ pub fn compare_with(
     let autocorrelation = autocorrelation(&scaled, MAX_LAGS.min(rows / 4));
     let (largest_row, _) =
         residual.iter().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).unwrap_or((0, &0.0));
-    let states = States::new(model, pattern, record, &prediction)?;
-    let cut = Regimes::new(model, record, boundary, &prediction)?;
+    let cut = Regimes::new(model, record, &read.boundary, &prediction)?;
+    let Boundary { film_w_per_m2_k, bends, .. } = read.boundary.clone();
+    let (mut whitened_chi_square, mut together) = (0.0, None);
+    if noise > 0.0 {
+        let declared = read.declared(|chamber, fit, wandering| {
+            let beyond = chamber.chi_square_beyond_readings(fit, 0, noise)?;
+            Ok((beyond, standing(model, pattern, chamber, fit, wandering, None)?))
+        })?;
+        (whitened_chi_square, together) = (declared.0, Some(declared.1));
+    }
     let mut found = Comparison {
         rows,
         offset_rad_per_s: prediction.offset_rad_per_s,
@@ -161,12 +163,12 @@ pub fn compare_with(
         r_squared: explained.map(|e| 1.0 - e),
         reduced_chi_square: square / (noise * noise) / freedom,
         boundary_chi_square: variances.iter().sum::<f64>() / (noise * noise) / freedom,
-        whitened_chi_square: whitened_chi_square(boundary, noise, &residual)?,
+        whitened_chi_square,
         largest: LargestError { time_s: record.times_s()[largest_row], residual_rad_per_s: residual[largest_row] },
         ljung_box: LjungBox::new(&autocorrelation, rows),
         autocorrelation_band: autocorrelation_band_99(rows),
         autocorrelation,
-        correlations: states.correlations(&residual, record, &prediction),
+        correlations: correlations(&residual, record, &prediction),
         regimes: cut.regimes(&residual, &scaled),
         regime_of_row: cut.regime_of_row(),
         temperature_bands: cut.temperature_bands(&residual, &scaled),
@@ -174,69 +176,31 @@ pub fn compare_with(
         findings: Vec::new(),
         verdict: Verdict::Adequate,
         residual_rad_per_s: residual,
-        film_w_per_m2_k: boundary.air().film_w_per_m2_k,
-        kinks_s: boundary.air().kinks.iter().map(|k| k.time_s).collect(),
+        film_w_per_m2_k,
+        bends_s: bends.iter().map(|b| b.time_s).collect(),
+        standing: together,
         prediction,
     };
     (found.verdict, found.findings) = verdict::judge(&found, cut.transient_s);
     Ok(found)
 }
 
-/// rᵀ C⁻¹ r/(n − 1), the offset fitted in the same metric.
-fn whitened_chi_square(boundary: &Boundary, noise: f64, residual: &[f64]) -> Result<f64, BoundaryError> {
-    let whitener = boundary.rate_whitener(noise)?;
-    let r = whitener.whiten(residual);
-    let one = whitener.whiten(&vec![noise; residual.len()]);
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let on_offset = dot(&r, &one).powi(2) / dot(&one, &one).max(f64::MIN_POSITIVE);
-    Ok((dot(&r, &r) - on_offset) / (residual.len() - 1) as f64)
-}
-
-/// The columns that the residual is correlated with.
-struct States {
-    temperature_k: Vec<f64>,
-    rate_k_per_s: Vec<f64>,
-    gradient_k: Vec<f64>,
-    gradient_rate_k_per_s: Vec<f64>,
-}
-
-impl States {
-    fn new(model: &CoilModel, pattern: &Pattern, record: &Record, prediction: &Prediction) -> Result<Self, RateError> {
-        let names: Vec<String> = record.channels().iter().map(|c| c.name.clone()).collect();
-        let rate = RateModel::new(model, pattern, &names)?;
-        let channels = vec![0.0; names.len()];
-        let history = &prediction.history;
-        let mut states = Self {
-            temperature_k: Vec::with_capacity(history.len()),
-            rate_k_per_s: Vec::with_capacity(history.len()),
-            gradient_k: Vec::with_capacity(history.len()),
-            gradient_rate_k_per_s: Vec::with_capacity(history.len()),
-        };
-        for row in 0..history.len() {
-            let state = rate.state(history, row, &channels);
-            states.temperature_k.push(state.mean_temperature_k);
-            states.rate_k_per_s.push(state.mean_rate_k_per_s);
-            states.gradient_k.push(state.temperatures_k[history.layers - 1] - state.temperatures_k[0]);
-            states.gradient_rate_k_per_s.push(state.gradient_rate_k_per_s());
-        }
-        Ok(states)
-    }
-
-    fn correlations(&self, residual: &[f64], record: &Record, prediction: &Prediction) -> Vec<Correlation> {
-        let coil: Vec<f64> = prediction.rate_rad_per_s.iter().map(|r| r - prediction.offset_rad_per_s).collect();
-        let directed: Vec<f64> = coil.iter().zip(&self.rate_k_per_s).map(|(c, r)| c * r.signum()).collect();
-        let own = [
-            (Quantity::Temperature, &self.temperature_k),
-            (Quantity::TemperatureRate, &self.rate_k_per_s),
-            (Quantity::Gradient, &self.gradient_k),
-            (Quantity::GradientRate, &self.gradient_rate_k_per_s),
-            (Quantity::Prediction, &coil),
-            (Quantity::PredictionByDirection, &directed),
-        ];
-        let channels = record.channels().iter().map(|c| (Quantity::Channel(c.name.clone()), &c.values));
-        own.into_iter()
-            .chain(channels)
-            .map(|(with, values)| Correlation { with, value: correlation(residual, values) })
-            .collect()
-    }
+fn correlations(residual: &[f64], record: &Record, prediction: &Prediction) -> Vec<Correlation> {
+    let of = |f: fn(&predict::PackRow) -> f64| prediction.pack.iter().map(f).collect::<Vec<f64>>();
+    let coil: Vec<f64> = prediction.rate_rad_per_s.iter().map(|r| r - prediction.offset_rad_per_s).collect();
+    let directed: Vec<f64> = coil.iter().zip(&prediction.pack).map(|(c, p)| c * p.mean_rate_k_per_s.signum()).collect();
+    let own = [
+        (Quantity::Temperature, of(|p| p.mean_k)),
+        (Quantity::TemperatureRate, of(|p| p.mean_rate_k_per_s)),
+        (Quantity::Gradient, of(|p| p.gradient_k)),
+        (Quantity::GradientRate, of(|p| p.gradient_rate_k_per_s)),
+        (Quantity::Prediction, coil),
+        (Quantity::PredictionByDirection, directed),
+    ];
+    let own = own.into_iter().map(|(with, values)| Correlation { with, value: correlation(residual, &values) });
+    let channels = record
+        .channels()
+        .iter()
+        .map(|c| Correlation { with: Quantity::Channel(c.name.clone()), value: correlation(residual, &c.values) });
+    own.chain(channels).collect()
 }

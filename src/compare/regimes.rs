@@ -5,8 +5,7 @@
 //! time constant behind the film); **soak**, the outer layer's rate within 5 % of the record's usual largest;
 //! **heating ramp** or **cooling ramp**.
 
-use crate::boundary::Boundary;
-use crate::predict::{PredictError, Prediction};
+use crate::predict::{Boundary, PredictError, Prediction};
 use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::thermal::pack::Pack;
@@ -19,8 +18,8 @@ const WARM_UP_SHARE: f64 = 0.1;
 const SETTLING: f64 = 1.5;
 /// Of the usual largest rate: what is slower is a soak.
 const STILL: f64 = 0.05;
-/// Of the largest kink: smaller changes of rate start no transient.
-const KINK_SHARE: f64 = 0.1;
+/// Of the largest bend of the air: smaller changes of its rate start no transient.
+const BEND_SHARE: f64 = 0.1;
 const TEMPERATURE_BANDS: usize = 6;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,8 +77,7 @@ impl Regimes {
         boundary: &Boundary,
         prediction: &Prediction,
     ) -> Result<Self, PredictError> {
-        let history = &prediction.history;
-        let outer: Vec<f64> = (0..history.len()).map(|row| history.rates_k_per_s(row)[history.layers - 1]).collect();
+        let outer: Vec<f64> = prediction.pack.iter().map(|p| p.outer_rate_k_per_s).collect();
         let mut sizes: Vec<f64> = outer.iter().map(|r| r.abs()).collect();
         sizes.sort_by(f64::total_cmp);
         let usual_largest = sizes[(sizes.len() - 1) * 95 / 100];
@@ -87,14 +85,19 @@ impl Regimes {
         let start_s = times_s[0];
         let warm_up_s = WARM_UP_S.min(WARM_UP_SHARE * (times_s[times_s.len() - 1] - start_s));
         let transient_s = settling_s(model, boundary)?;
-        let kinks = &boundary.air().kinks;
-        let largest_kink = kinks.iter().map(|k| k.slope_change_k_per_s.abs()).fold(0.0, f64::max);
-        let counts = |size: f64| size.abs() >= KINK_SHARE * largest_kink;
-        let kinks_s: Vec<f64> = kinks.iter().filter(|k| counts(k.slope_change_k_per_s)).map(|k| k.time_s).collect();
+        let bends = &boundary.bends;
+        let largest = bends.iter().map(|b| b.slope_change_k_per_s.abs()).fold(0.0, f64::max);
+        let counts = |size: f64| size.abs() >= BEND_SHARE * largest;
+        // In order of time.
+        let bends_s: Vec<f64> = bends.iter().filter(|b| counts(b.slope_change_k_per_s)).map(|b| b.time_s).collect();
+        let since_bend_s = |time_s: f64| {
+            let before = bends_s.partition_point(|bend| *bend < time_s);
+            before.checked_sub(1).map_or(f64::INFINITY, |last| time_s - bends_s[last])
+        };
         let regime = |time_s: f64, rate: f64| {
             if time_s - start_s < warm_up_s {
                 Regime::WarmUp
-            } else if kinks_s.iter().any(|k| time_s > *k && time_s <= k + transient_s) {
+            } else if since_bend_s(time_s) <= transient_s {
                 Regime::Transient
             } else if rate.abs() <= STILL * usual_largest {
                 Regime::Soak
@@ -105,8 +108,7 @@ impl Regimes {
             }
         };
         let of_row = times_s.iter().zip(&outer).map(|(&t, &r)| regime(t, r) as usize).collect();
-        let temperature: Vec<f64> =
-            (0..history.len()).map(|row| history.temperatures_k(row)[history.layers - 1]).collect();
+        let temperature: Vec<f64> = prediction.pack.iter().map(|p| p.outer_k).collect();
         let (temperature_band, temperature_names) = temperature_bands(&temperature);
         let (rate_band, rate_names) = rate_bands(&outer, usual_largest);
         Ok(Self { of_row, transient_s, temperature_band, temperature_names, rate_band, rate_names })
@@ -134,7 +136,7 @@ impl Regimes {
 fn settling_s(model: &CoilModel, boundary: &Boundary) -> Result<f64, PredictError> {
     let mut path = model.heat_path()?;
     path.extent = Extent::Pack;
-    if let (Some(film), Material::Conductivity { .. }) = (boundary.air().film_w_per_m2_k, path.material) {
+    if let (Some((film, _)), Material::Conductivity { .. }) = (boundary.film_w_per_m2_k, path.material) {
         path.location = Location::Ambient;
         path.film_w_per_m2_k = Some(film);
     }

@@ -40,6 +40,11 @@ pub enum Finding {
         quantity: Quantity,
         correlation: f64,
     },
+    /// Readings and rates together want something else.
+    Wanted {
+        gain: f64,
+    },
+    Wanders,
     Coloured {
         lag_one: f64,
         band: f64,
@@ -96,6 +101,13 @@ impl std::fmt::Display for Finding {
             Finding::Follows { quantity, correlation } => {
                 write!(f, "the residual follows {quantity} (correlation {correlation:.2})")
             }
+            Finding::Wanted { gain } => write!(
+                f,
+                "readings and rates together become e^{gain:.0} times as likely with an effect that the model lacks: diagnose tells which"
+            ),
+            Finding::Wanders => {
+                f.write_str("the rate wanders more than a gyro of this noise does: diagnose asks what it follows")
+            }
             Finding::Coloured { lag_one, band } => write!(
                 f,
                 "neighbouring residuals hang together (autocorrelation {lag_one:.2} at lag 1, white within {band:.2})"
@@ -117,7 +129,7 @@ impl std::fmt::Display for Finding {
     }
 }
 
-/// The whole χ² may exceed 1 by this, besides chance: what an estimated boundary and a discretised pack leave.
+/// The whole χ² may exceed 1 by this, besides chance: what an estimated course and a discretised pack leave.
 const TOLERATED_EXCESS: f64 = 0.15;
 /// A part's χ² a row may exceed 1 by this, besides chance.
 const TOLERATED_PART_EXCESS: f64 = 0.35;
@@ -173,7 +185,21 @@ pub(super) fn judge(found: &Comparison, transient_s: f64) -> (Verdict, Vec<Findi
         let (band, share, share_of_rows) = (part.name.clone(), part.share_of_squared_error, part.share_of_rows);
         findings.push(Finding::RateBand { band, share, share_of_rows });
     }
-    let verdict = if findings.is_empty() { Verdict::Adequate } else { Verdict::Missing };
+    let verdict = match &found.standing {
+        Some(standing) if standing.adequate => Verdict::Adequate,
+        Some(standing) => {
+            if standing.wanders {
+                findings.push(Finding::Wanders);
+            }
+            findings.extend(standing.wanted.map(|gain| Finding::Wanted { gain }));
+            Verdict::Missing
+        }
+        None if findings.is_empty() => Verdict::Adequate,
+        None => Verdict::Missing,
+    };
+    if verdict == Verdict::Adequate {
+        findings.clear();
+    }
     let lag_one = found.autocorrelation.get(1).copied().unwrap_or(0.0);
     if verdict == Verdict::Adequate {
         findings.push(Finding::NothingStandsOut { reduced_chi_square: found.reduced_chi_square });

@@ -430,8 +430,9 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
     };
     let chamber = question.chamber;
     progress(0.6);
-    let mut diagnosis = answer::answer(&question, &found, &records)?;
-    beyond(request, &question, &found, &mut diagnosis, &|share| progress(0.6 + 0.2 * share))?;
+    let timed = with_timed_kinks(&question, &found)?;
+    let mut diagnosis = answer::answer(&Question { chamber: &timed, ..question.clone() }, &found, &records)?;
+    beyond(request, &question, &timed, &found, &mut diagnosis, &|share| progress(0.6 + 0.2 * share))?;
     // Where what is to be fitted shows nothing, the other records may; the former then confirm it.
     if let (Verdict::Adequate, Some(declared), false) =
         (diagnosis.verdict, found.declared(), request.holdout.is_empty())
@@ -440,8 +441,9 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
         let day = chamber.fit(&declared.fit.assumed, &[], &other.fitted, Some(&declared.fit), Effort::FULL)?;
         if joint::promise(&other, &day)? > PROMISING {
             let found = joint::search(&other, day, &|share| progress(0.8 + 0.2 * share))?;
-            let mut elsewhere = answer::answer(&other, &found, &records)?;
-            beyond(request, &other, &found, &mut elsewhere, &|_| ())?;
+            let timed = with_timed_kinks(&other, &found)?;
+            let mut elsewhere = answer::answer(&Question { chamber: &timed, ..other.clone() }, &found, &records)?;
+            beyond(request, &other, &timed, &found, &mut elsewhere, &|_| ())?;
             if elsewhere.verdict != Verdict::Adequate {
                 diagnosis = elsewhere;
                 diagnosis.cautions.insert(0, Caution::FittedToHoldout);
@@ -452,10 +454,26 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
     Ok(diagnosis)
 }
 
-/// Formulas for what no listed effect explains.
+/// The chamber with every record's kinks at the times that the likeliest set has them at: what is said of predictions needs
+/// them sharper than the search does.
+fn with_timed_kinks<'a>(question: &Question<'a>, found: &joint::Found) -> Result<Chamber<'a>, DiagnoseError> {
+    let mut timed = question.chamber.clone();
+    let Some(best) = found.explanations.first() else { return Ok(timed) };
+    for &record in &question.fitted {
+        timed.time_kinks(&best.fit, record)?;
+    }
+    for &record in &question.held_out {
+        let day = question.chamber.held_out(&best.fit, record)?;
+        timed.time_kinks(&day, record)?;
+    }
+    Ok(timed)
+}
+
+/// Formulas for what no listed effect explains; what they leave of records is said by the `timed` chamber.
 fn beyond(
     request: &Request,
     question: &Question,
+    timed: &Chamber,
     found: &joint::Found,
     diagnosis: &mut Diagnosis,
     progress: &(dyn Fn(f64) + Sync),
@@ -466,7 +484,7 @@ fn beyond(
         Terms::None => return Ok(()),
     };
     if let Some(discovered) = discover::discover(question, found, &allowed, progress)? {
-        discover::amend(question, found, &discovered, diagnosis)?;
+        discover::amend(&Question { chamber: timed, ..question.clone() }, found, &discovered, diagnosis)?;
     }
     Ok(())
 }

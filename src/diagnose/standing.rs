@@ -4,12 +4,13 @@
 //! adequate ⇔ p(declared model | records) ≥ 0.95, and |ln σ/σ_declared| ≤ 2 se(ln σ) where a white noise is declared
 //! ```
 //!
-//! p is the declared model's share of the posterior mass among itself, it with any one effect of the catalogue, a refitted
-//! number, a step of the offset, and wander or a cycle that nothing explains ([`super::joint`]).
+//! p is the declared model's share of the posterior mass ([`super::joint`]). A diagnosis has it from its search over sets; a
+//! comparison from that search's first round: the effects for which the score test promises more than they cost, as they are
+//! fitted, and wander that nothing explains. What is better by less than 19 to 1 gives its mass to the declared model in both.
 
-use super::joint::{self, Found, Question};
-use super::{DiagnoseError, Share, answer, candidate};
-use crate::chamber::{Assumption, Chamber, Fit, Noise};
+use super::candidate;
+use super::joint::{self, Question};
+use crate::chamber::{Chamber, ChamberError, Fit, Noise};
 use crate::pattern::Pattern;
 use crate::rate::CoilModel;
 use crate::record::Record;
@@ -25,8 +26,11 @@ pub struct Standing {
     pub adequate: bool,
     /// Of the declared model.
     pub probability: f64,
-    /// Sets of explanations and what they hold, largest first.
-    pub posterior: Vec<Share>,
+    /// What the effect that is worth most gains in log likelihood, where no wander shows already that something is missing. Which
+    /// one that is takes a whole search.
+    pub wanted: Option<f64>,
+    /// Whether the rate wanders more than gyros do.
+    pub wanders: bool,
     /// Of each fitted record.
     pub noise: Vec<Noise>,
 }
@@ -42,8 +46,7 @@ pub fn is_adequate(probability: f64, noise: &[Noise], declared_white_rad_per_s: 
     probability >= CERTAIN && white
 }
 
-/// How the declared model stands, by a fit of it ([`Chamber::settled`]) to records of a chamber: one round of the search
-/// that a diagnosis goes on with.
+/// How the declared model stands, by a fit of it ([`Chamber::settled`]) to records of a chamber and one with a wander beside it.
 ///
 /// # Errors
 /// A model that cannot be solved.
@@ -52,36 +55,29 @@ pub fn standing(
     pattern: &Pattern,
     chamber: &Chamber,
     fit: &Fit,
+    wandering: &Fit,
     declared_white_rad_per_s: Option<f64>,
-) -> Result<Standing, DiagnoseError> {
-    let records: Vec<&Record> = (0..chamber.records()).map(|r| chamber.record(r)).collect();
+) -> Result<Standing, ChamberError> {
+    let records: Vec<&Record> = fit.records.iter().map(|&r| chamber.record(r)).collect();
     let candidates = candidate::candidates(model, &records);
-    let question = Question {
-        chamber,
-        model,
-        pattern,
-        candidates: &candidates,
-        fitted: fit.records.clone(),
-        held_out: Vec::new(),
-        depth: 1,
-    };
-    let declared = Assumption::new(model.clone(), pattern.clone());
-    let null = chamber.fit(&declared, &[], &question.fitted, Some(fit), crate::chamber::Effort::FULL)?;
-    let found = joint::search(&question, null, &|_| ())?;
-    let declared = found.declared().ok_or(DiagnoseError::Unsolvable)?;
-    let noise: Result<Vec<Noise>, _> = question.fitted.iter().map(|&r| chamber.noise(&declared.fit, r)).collect();
+    let fitted = fit.records.clone();
+    let question =
+        Question { chamber, model, pattern, candidates: &candidates, fitted, held_out: Vec::new(), depth: 1 };
+    let beside = joint::beside(&question, fit, wandering)?;
+    let most = beside.iter().map(|b| b.merit).fold(0.0, f64::max);
+    let mass: f64 = beside.iter().map(|b| (b.merit - most).exp()).sum();
+    let own = (-most).exp();
+    let probability = own / (own + mass);
+    let best = beside.iter().filter(|b| b.candidate.is_some()).max_by(|a, b| a.merit.total_cmp(&b.merit));
+    let noise: Result<Vec<Noise>, _> = question.fitted.iter().map(|&r| chamber.noise(fit, r)).collect();
     let noise = noise?;
-    let probability = share_of_declared(&found);
     Ok(Standing {
         adequate: is_adequate(probability, &noise, declared_white_rad_per_s),
         probability,
-        posterior: answer::posterior(&question, &found),
+        wanted: best.map(|b| b.gain),
+        wanders: beside.iter().any(|b| b.candidate.is_none()),
         noise,
     })
-}
-
-pub(super) fn share_of_declared(found: &Found) -> f64 {
-    found.declared().map_or(0.0, |e| e.probability)
 }
 
 #[cfg(test)]

@@ -20,7 +20,7 @@
 
 use super::{DiagnoseError, Finding, Request, extend};
 use crate::effect::{DeclaredEffect, OFFSET_OF_MIDDLE};
-use crate::predict::predict;
+use crate::predict::{estimate_boundary, predict_from};
 use crate::rate::CoilModel;
 
 /// Which end of the fibre.
@@ -57,10 +57,17 @@ pub fn trim(request: &Request) -> Result<Trim, DiagnoseError> {
     let place = OFFSET_OF_MIDDLE.parameter;
     let fitted = &extension.finding.parameters[place];
     let (offset_m, error_m) = (fitted.value, fitted.standard_error);
+    // Fibre more or less at an end moves no heat: what drove the coil is the same with it.
+    let mut driven = Vec::new();
+    for record in request.records {
+        let boundary = estimate_boundary(&extension.extended, request.pattern, record)
+            .map_err(|source| DiagnoseError::Record { record: record.name().to_owned(), source })?;
+        driven.push((record, boundary));
+    }
     let rates_of = |model: &CoilModel| -> Result<Vec<f64>, DiagnoseError> {
         let mut rates = Vec::new();
-        for record in request.records {
-            let found = predict(model, request.pattern, record)
+        for (record, boundary) in &driven {
+            let found = predict_from(model, request.pattern, record, boundary)
                 .map_err(|source| DiagnoseError::Record { record: record.name().to_owned(), source })?;
             let offset = found.offset_rad_per_s;
             rates.extend(found.rate_rad_per_s.iter().map(|rate| rate - offset));

@@ -12,6 +12,7 @@ use crate::io::json::inputs::InputsJson;
 use crate::io::json::schedule::{RATE_DECIMALS, rounded};
 use crate::io::model::{ModelFile, NamedPattern};
 use crate::io::read::profile_file::print_profile;
+use crate::io::write::boundary_edit::with_boundary;
 use crate::io::write::measurement_folder::{DIAGNOSIS_FILE, MeasurementFiles, PROPOSED_FILE, before_and_after_name};
 use crate::io::write::model_edit::{Remark, with_effect};
 use crate::pattern::Pattern;
@@ -140,12 +141,14 @@ impl Answer {
         self.diagnosis.verdict == Verdict::Adequate
     }
 
-    /// The model file with the effects that were found; none where there are none.
+    /// The model file with the effects that were found and with what the records showed of film, offset and chamber; none
+    /// where they showed neither.
     ///
     /// # Errors
     /// A text that is no model file.
     pub fn extended_source(&self, model: &ModelFile) -> Result<Option<String>, TaskError> {
-        if self.document.effects.is_empty() {
+        let learned = &self.diagnosis.boundary;
+        if self.document.effects.is_empty() && learned.film_w_per_m2_k.is_none() && learned.numbers.is_empty() {
             return Ok(None);
         }
         let mut source = model.source.clone();
@@ -153,7 +156,7 @@ impl Answer {
         for (finding, shown) in self.diagnosis.effects.iter().zip(&self.document.effects) {
             source = with_effect(&name, &source, &finding.effect, &remarks(shown))?;
         }
-        Ok(Some(source))
+        Ok(Some(with_boundary(&name, &source, learned)?))
     }
 
     /// The model file with the listed effects and the proposed terms; none where nothing is proposed.

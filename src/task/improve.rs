@@ -31,7 +31,6 @@ use crate::search::anneal::rounds::Rounds;
 use crate::search::prospect::predicted_gain;
 use crate::search::run::Halt;
 use crate::text::sink::TomlComment;
-use crate::thermal::Location;
 use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s};
 
 use super::measurement::{GrossErrors, Measurement};
@@ -95,8 +94,8 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Option<ImproveJ
     let source = with_sensor_and_pattern(&shown(&file.path), &source, None, "measured-pattern.toml")?;
     write_atomically(&extended_path, source.as_bytes())?;
     let extended = read_model(&extended_path)?;
-    let comparison = way.compared(&extended, &after)?;
-    let film = learned_film(&extended, &comparison);
+    way.compared(&extended, &after)?;
+    let film = learned_film(&extended);
     let design_path = folder.join("design.toml");
     let source = match &film {
         None => source,
@@ -207,7 +206,7 @@ impl Way<'_> {
     }
 
     /// The comparison as a document; its folder is written.
-    fn compared(&mut self, model: &ModelFile, folder: &Path) -> Result<Value, TaskError> {
+    fn compared(&mut self, model: &ModelFile, folder: &Path) -> Result<(), TaskError> {
         let made_of = self.of_records(model);
         if !self.is_done(folder, made_of.as_deref(), &[COMPARISON]) {
             check_free(folder)?;
@@ -221,7 +220,7 @@ impl Way<'_> {
             compare::run(&request, &Quietly(self.observer))?.write(folder, model)?;
             self.note_done(folder, made_of.as_deref())?;
         }
-        read_json(&folder.join(COMPARISON))
+        Ok(())
     }
 
     /// Writes the folder of the diagnosis, and the next experiment beside it.
@@ -358,7 +357,6 @@ impl search::Observer for Kept<'_> {
 /// The film that the records showed.
 struct LearnedFilm {
     value_w_per_m2_k: f64,
-    /// Of the mean, from how the records differ; none for a single record.
     standard_error: Option<f64>,
     records: usize,
 }
@@ -383,28 +381,13 @@ impl LearnedFilm {
     }
 }
 
-/// The film of the comparisons, where the model does not declare one and its sensor lies on the pack.
-fn learned_film(file: &ModelFile, comparison: &Value) -> Option<LearnedFilm> {
-    let has_film = file.model.heat_path().is_ok_and(|path| path.film_w_per_m2_k.is_some());
-    if has_film || file.model.location == Location::Ambient {
-        return None;
-    }
-    let records = comparison["records"].as_array()?;
-    if let Some((film, learned)) = file.learned_film().zip(file.learned.as_ref()) {
-        return Some(LearnedFilm {
-            value_w_per_m2_k: film.value,
-            standard_error: Some(film.standard_error).filter(|e| e.is_finite()),
-            records: learned.records,
-        });
-    }
-    let films: Vec<f64> = records.iter().filter_map(|r| r["estimated_film_w_per_m2_k"].as_f64()).collect();
-    let count = films.len();
-    let mean = films.iter().sum::<f64>() / count.max(1) as f64;
-    let square = films.iter().map(|f| (f - mean).powi(2)).sum::<f64>();
-    (count > 0 && mean.is_finite()).then(|| LearnedFilm {
-        value_w_per_m2_k: mean,
-        standard_error: (count > 1).then(|| (square / (count * (count - 1)) as f64).sqrt()),
-        records: count,
+/// The film that the diagnosis stated, where the model does not declare one and its sensor lies on the pack.
+fn learned_film(file: &ModelFile) -> Option<LearnedFilm> {
+    let (film, learned) = file.learned_film().zip(file.learned.as_ref())?;
+    Some(LearnedFilm {
+        value_w_per_m2_k: film.value,
+        standard_error: Some(film.standard_error).filter(|e| e.is_finite()),
+        records: learned.records,
     })
 }
 

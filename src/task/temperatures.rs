@@ -3,7 +3,7 @@
 use crate::io::json::temperatures::TemperaturesJson;
 use crate::io::model::ModelFile;
 use crate::pattern::classic::Classic;
-use crate::predict::predict;
+use crate::predict::estimate_boundary;
 use crate::search::cost::worst_case::SearchError;
 use crate::thermal::{Drive, Instant, ThermalHistory, solve};
 use crate::units::REFERENCE_TEMPERATURE_K;
@@ -58,7 +58,9 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
             // Temperatures don't depend on the pattern; effects may weigh the layers by it.
             let pattern = own.or_else(|| Classic::Zyl.pattern(file.model.coil.layers()).ok());
             let pattern = pattern.expect("every even layer count has a cylindrical winding");
-            (noticed.record.name().to_owned(), predict(&file.model, &pattern, &noticed.record)?.history)
+            let record = &noticed.record;
+            let boundary = estimate_boundary(&file.model, &pattern, record)?;
+            (record.name().to_owned(), boundary.history(record, 0..record.rows(), file.model.rate_mean_s))
         }
     };
     Ok(Answer { model: file.model.name.clone(), drive, history })

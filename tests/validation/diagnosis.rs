@@ -36,9 +36,8 @@ fn assert_found(name: &str, expected: &[(&str, &[(&str, f64)])]) {
     }
     let floor = coilwright::predict::noise_floor(&record(name, "validation.csv")).deviation;
     let left = found.ladder.last().unwrap().holdout_rmse_rad_per_s.unwrap();
-    // The day's air is known from its readings alone, and a cylindrical coil shows all that they do not: 1.57 floors.
-    let allowed = if name == "g-control-zyl" { 1.7 } else { 1.1 };
-    assert!(left < allowed * floor, "{name}: {}", left / floor);
+    println!("{name}: {:.3} floors on the hold-out", left / floor);
+    assert!(left < 1.1 * floor, "{name}: {}", left / floor);
     if expected.is_empty() {
         assert_eq!(found.verdict, Verdict::Adequate, "{name}");
     }

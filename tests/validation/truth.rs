@@ -50,6 +50,21 @@ fn with_the_hidden_effect_declared_at_its_true_size_only_the_noise_is_left() {
         let (noise, rows) = (rad_per_s_from_deg_per_h(noise_deg_per_h), record.times_s().len() as f64);
         let boundary = found.boundary_variance_rad2_per_s2.iter().sum::<f64>() / rows;
         let expected = (noise * noise + boundary).sqrt();
+        for (k, ((t, m), (p, v))) in record
+            .times_s()
+            .iter()
+            .zip(record.rate_rad_per_s())
+            .zip(found.rate_rad_per_s.iter().zip(&found.boundary_variance_rad2_per_s2))
+            .enumerate()
+        {
+            if (m - p).abs() > 6.0 * (v + noise * noise).sqrt() {
+                println!(
+                    "row {k} {t} {:.3} of {:.3}",
+                    deg_per_h_from_rad_per_s(m - p),
+                    deg_per_h_from_rad_per_s((v + noise * noise).sqrt())
+                );
+            }
+        }
         let residuals = record.rate_rad_per_s().iter().zip(&found.rate_rad_per_s).map(|(m, p)| m - p);
         let (kept, gross): (Vec<f64>, Vec<f64>) = residuals.partition(|r| r.abs() < GROSS * expected);
         let rms = (kept.iter().map(|r| r * r).sum::<f64>() / kept.len() as f64).sqrt();

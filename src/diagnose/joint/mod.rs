@@ -8,6 +8,7 @@
 //! # Source
 //! Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773; Madigan and Raftery, ibid. 89 (1994) 1535 (Occam's window).
 
+mod beside;
 mod explanation;
 mod judge;
 mod odds;
@@ -19,6 +20,7 @@ use crate::chamber::{Chamber, ChamberError, Fit};
 use crate::diagnose::candidate::Candidate;
 use crate::pattern::Pattern;
 
+pub use beside::beside;
 pub use explanation::{Explanation, Member};
 pub(in crate::diagnose) use explanation::{fitted, with, without};
 pub(in crate::diagnose) use odds::EFFECT;
@@ -27,7 +29,7 @@ pub use search::{again, promise, refit_without, search, settle_one};
 pub use winding::Winding;
 
 /// What is asked of the search.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Question<'a> {
     pub chamber: &'a Chamber<'a>,
     pub model: &'a crate::rate::CoilModel,

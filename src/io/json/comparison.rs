@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::chamber::Noise;
 use crate::compare::Comparison;
 use crate::compare::regimes::Part;
 use crate::compare::verdict::Verdict;
@@ -50,10 +51,40 @@ pub struct RecordComparisonJson {
     pub rate_bands: Vec<PartJson>,
     /// Where the model fails, in words.
     pub findings: Vec<String>,
+    /// Null where the rates have no noise.
+    pub noise: Option<NoisePartsJson>,
     pub estimated_film_w_per_m2_k: Option<f64>,
+    pub estimated_film_standard_error_w_per_m2_k: Option<f64>,
     pub estimated_kinks_s: Vec<f64>,
     pub gross_errors: Vec<GrossErrorJson>,
     pub gaps: usize,
+}
+
+/// What a record's rate consists of beside the coil.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NoisePartsJson {
+    /// Of one logged rate.
+    pub white_deg_per_h: f64,
+    /// Null where the record does not determine it.
+    pub white_standard_error_deg_per_h: Option<f64>,
+    pub wander_deg_per_h: f64,
+    /// What the air did and the sensor could not see.
+    pub unresolved_air_deg_per_h: f64,
+    /// What is beyond all that.
+    pub model_error_deg_per_h: f64,
+}
+
+impl NoisePartsJson {
+    fn new(noise: &Noise) -> Self {
+        let error = deg_per_h_from_rad_per_s(noise.white_standard_error_rad_per_s);
+        Self {
+            white_deg_per_h: deg_per_h_from_rad_per_s(noise.white_rad_per_s),
+            white_standard_error_deg_per_h: Some(error).filter(|e| e.is_finite()),
+            wander_deg_per_h: deg_per_h_from_rad_per_s(noise.wander_rad_per_s),
+            unresolved_air_deg_per_h: deg_per_h_from_rad_per_s(noise.unresolved_air_rad_per_s),
+            model_error_deg_per_h: deg_per_h_from_rad_per_s(noise.model_error_rad_per_s),
+        }
+    }
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -138,8 +169,10 @@ impl RecordComparisonJson {
             temperature_bands: parts(&found.temperature_bands),
             rate_bands: parts(&found.rate_bands),
             findings: found.findings.iter().map(ToString::to_string).collect(),
-            estimated_film_w_per_m2_k: found.film_w_per_m2_k,
-            estimated_kinks_s: found.kinks_s.clone(),
+            noise: found.standing.as_ref().and_then(|s| s.noise.first()).map(NoisePartsJson::new),
+            estimated_film_w_per_m2_k: found.film_w_per_m2_k.map(|f| f.0),
+            estimated_film_standard_error_w_per_m2_k: found.film_w_per_m2_k.map(|f| f.1).filter(|e| e.is_finite()),
+            estimated_kinks_s: found.bends_s.clone(),
             gross_errors,
             gaps,
         }

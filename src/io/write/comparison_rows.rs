@@ -28,15 +28,15 @@ fn rounded(value: f64) -> f64 {
 
 /// The whole table.
 pub fn comparison_rows(record: &Record, found: &Comparison) -> Vec<ComparisonRow> {
-    let history = &found.prediction.history;
+    let pack = &found.prediction.pack;
     (0..record.rows())
         .map(|row| ComparisonRow {
             time_s: record.times_s()[row],
             rate_deg_per_h: rounded(deg_per_h_from_rad_per_s(record.rate_rad_per_s()[row])),
             predicted_deg_per_h: rounded(deg_per_h_from_rad_per_s(found.prediction.rate_rad_per_s[row])),
             residual_deg_per_h: rounded(deg_per_h_from_rad_per_s(found.residual_rad_per_s[row])),
-            temperature_c: rounded(celsius_from_kelvin(history.temperatures_k(row)[history.layers - 1])),
-            temperature_rate_c_per_min: rounded(c_per_min_from_k_per_s(history.rates_k_per_s(row)[history.layers - 1])),
+            temperature_c: rounded(celsius_from_kelvin(pack[row].outer_k)),
+            temperature_rate_c_per_min: rounded(c_per_min_from_k_per_s(pack[row].outer_rate_k_per_s)),
             regime: found.regime_of_row[row].key().to_owned(),
         })
         .collect()
