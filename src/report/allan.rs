@@ -65,7 +65,7 @@ fn slope(value: f64) -> &'static str {
 pub(super) fn section(metrics: &MetricsJson) -> Markup {
     html! {
         h2 { "Measures of the gyro" }
-        (measures(metrics))
+        @if let Some(record) = metrics.records.first() { p.big { (in_a_sentence(record)) } }
         @for record in &metrics.records {
             @if record.allan.is_empty() {
                 p { (record.file) ": no stretch without a gap is long enough for an Allan deviation." }
@@ -73,7 +73,21 @@ pub(super) fn section(metrics: &MetricsJson) -> Markup {
                 (figure(&allan_chart(record).svg_to_read(), &caption(record)))
             }
         }
+        (measures(metrics))
     }
+}
+
+/// What a data sheet would say of a record.
+fn in_a_sentence(record: &RecordMetricsJson) -> String {
+    let said = [
+        record.angle_random_walk_deg_per_sqrt_h.map(|v| format!("angle random walk {} °/√h", digits(v))),
+        record.bias_instability_deg_per_h.map(|v| format!("bias instability {} °/h", digits(v))),
+        record.temperature_sensitivity_deg_per_h_per_c.map(|v| format!("temperature sensitivity {} °/h/°C", digits(v))),
+    ];
+    let said: Vec<String> = std::iter::once(format!("bias {} °/h", digits(record.bias_deg_per_h)))
+        .chain(said.into_iter().flatten())
+        .collect();
+    format!("{}: {}.", record.file, said.join(", "))
 }
 
 fn caption(record: &RecordMetricsJson) -> String {

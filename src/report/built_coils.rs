@@ -86,7 +86,7 @@ fn chart(model: &BuiltCoilsJson) -> String {
         let points = pattern.exceeded.iter().map(|(share, worst)| (*worst, *share)).collect();
         chart = chart.with(Series::line(&pattern.name, points));
     }
-    chart.svg()
+    chart.svg_to_read()
 }
 
 /// The whole page.
@@ -95,13 +95,12 @@ pub fn built_coils_page(answer: &CampaignJson) -> String {
     let (header, rows) = built_coils_table(models);
     let body = html! {
         h1 { (answer.campaign) }
-        (asked(answer))
-        h2 { "What to expect of what is built" }
-        @for sentence in models.iter().filter_map(recommendation) { p { (sentence) } }
-        @if models.is_empty() { p { "No block has a result." } }
+        @for sentence in models.iter().filter_map(recommendation) { p.big { (sentence) } }
+        @if models.is_empty() { p.big { "No block has a result." } }
         @for model in models {
             (figure(&chart(model), "The share of coils whose worst case is larger: the further to the left and the steeper, the better."))
         }
+        (asked(answer))
         div.scroll { table {
             thead { tr { @for (place, name) in header.iter().enumerate() { @if is_word(place) { th.word { (name) } } @else { th { (name) } } } } }
             @for row in &rows { tr { @for (place, cell) in row.iter().enumerate() { @if is_word(place) { td.word { (cell) } } @else { td { (cell) } } } } }

@@ -4,6 +4,7 @@ use maud::{Markup, html};
 
 use super::page::{figure, page};
 use super::plot::{Axis, Chart, Series};
+use super::words;
 use crate::io::json::campaign::{CampaignJson, CellJson};
 use crate::search::cost::objective::Objective;
 
@@ -156,7 +157,7 @@ fn chart(groups: &[Group], objective: &str) -> String {
         };
         chart = chart.with(Series::bars(class, &coils.iter().map(of).collect::<Vec<f64>>()));
     }
-    chart.svg()
+    chart.svg_to_read()
 }
 
 /// The whole page.
@@ -165,15 +166,15 @@ pub fn campaign_page(answer: &CampaignJson) -> String {
     let failed: Vec<&CellJson> = answer.results.iter().filter(|found| found.failure.is_some()).collect();
     let body = html! {
         h1 { (answer.campaign) }
-        (asked(answer))
-        h2 { "What to wind" }
-        @for sentence in recommendations(&answer.results) { p { (sentence) } }
-        @if groups.is_empty() { p { "No cell has a result." } }
-        h2 { "The grid" }
+        @for sentence in recommendations(&answer.results) { p.big { (sentence) } }
+        @if groups.is_empty() { p.big { "No cell has a result." } }
         @for (objective, svg) in charts(&answer.results) {
             (figure(&svg, &format!("The best of all seeds under the objective {objective}: the shorter the bar, the smaller the error.")))
         }
+        h2 { "The grid" }
+        (asked(answer))
         (table(&groups))
+        (words::of_windings())
         h2 { "What failed" }
         @if failed.is_empty() { p { "Nothing: every cell has a result." } } @else {
             p { (failed.len()) " of " (answer.results.len()) " cells have no result; their models permit none, and trying again would change nothing." }

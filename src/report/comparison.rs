@@ -13,6 +13,9 @@ use crate::units::{min_from_s, percent_from_fraction};
 const MAP_CELLS: (usize, usize) = (28, 18);
 const WIDTH_PX: u32 = 860;
 
+/// So many of the pictures, the first, are over time; they stand below one another with one time axis.
+const OVER_TIME: usize = 3;
+
 /// A picture with the name of its file.
 pub struct Picture {
     pub file: String,
@@ -193,9 +196,13 @@ pub(super) fn section(comparison: &CompareJson, tables: &[Vec<ComparisonRow>]) -
         h2 { "Model against measurement" }
         p.big { (verdict_words(comparison)) }
         @for (index, (record, rows)) in comparison.records.iter().zip(tables).enumerate() {
+            @let pictures = pictures(index + 1, record, rows);
+            @let (over_time, others) = pictures.split_at(OVER_TIME.min(pictures.len()));
             h2 { "Record " (record.file) }
+            @for picture in over_time.iter().take(1) { (figure(&picture.svg, &picture.caption)) }
             ul { @for finding in &record.findings { li { (finding) } } }
-            @for picture in pictures(index + 1, record, rows) { (figure(&picture.svg, &picture.caption)) }
+            @for picture in over_time.iter().skip(1) { (figure(&picture.svg, &picture.caption)) }
+            div.two { @for picture in others { (figure(&picture.svg, &picture.caption)) } }
             (measures(record))
             (parts(record))
             (correlations(record))

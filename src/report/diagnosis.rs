@@ -161,21 +161,29 @@ pub(super) fn section(body: &DiagnosisJson, tables: &[Vec<DiagnosisRow>]) -> Mar
     html! {
         h2 { "Diagnosis" }
         p.big { (verdict_in_words(body)) }
-        (figure(&ladder_chart(body).svg_to_read(), "The ladder: the error as declared and after each piece of physics that was found, on the records that were fitted and on those that were not. No model can get below the noise floor."))
-        ul { @for step in &body.ladder_in_words { li { (step) } } }
-        (ladder_table(body))
+        @let proof = record_of_proof(body).filter(|_| !body.effects.is_empty() || !body.proposals.is_empty());
+        @let ladder = "The error as declared and after each piece of physics that was found, on the records that were fitted and on those that were not. No model can get below the noise floor.";
+        @match proof {
+            Some(proof) => {
+                (before_and_after(body, tables, proof))
+                h2 { "Before, after, what changed" }
+                (ladder_table(body))
+                (figure(&ladder_chart(body).svg_to_read(), ladder))
+            }
+            None => {
+                (figure(&ladder_chart(body).svg_to_read(), ladder))
+                h2 { "Before, after, what changed" }
+                (ladder_table(body))
+            }
+        }
         @if !body.effects.is_empty() { h2 { "What is missing" } (effects(&body.effects)) }
         (super::proposal::section(body))
         @if body.unexplained.is_some() {
             h2 { "What is left over" }
             @for line in rest_in_words(body) { p { (line) } }
         }
-        @if !body.effects.is_empty() || !body.proposals.is_empty() {
-            @for (record, rows) in body.inputs.records.iter().zip(tables) {
-                @let noise = if record.role == "held out" { body.holdout_noise_floor_deg_per_h } else { None };
-                (figure(&before_and_after_chart(&format!("Residual of {}", record.file), rows, noise.unwrap_or(body.noise_floor_deg_per_h)).svg_to_read(),
-                    &format!("{}, {}: the residual of the declared model and what the effects found leave of it.", record.file, record.role)))
-            }
+        @if let Some(proof) = proof {
+            @for record in (0..tables.len()).filter(|record| *record != proof) { (before_and_after(body, tables, record)) }
         }
         @if !body.refitted.is_empty() {
             h2 { "Stated numbers that the records contradict" }
@@ -195,16 +203,45 @@ pub(super) fn section(body: &DiagnosisJson, tables: &[Vec<DiagnosisRow>]) -> Mar
     }
 }
 
+/// The record on which it shows best what was found: the first that was not fitted, else the first.
+fn record_of_proof(body: &DiagnosisJson) -> Option<usize> {
+    let records = &body.inputs.records;
+    records.iter().position(|r| r.role == "held out").or((!records.is_empty()).then_some(0))
+}
+
+fn before_and_after(body: &DiagnosisJson, tables: &[Vec<DiagnosisRow>], record: usize) -> Markup {
+    let (Some(of), Some(rows)) = (body.inputs.records.get(record), tables.get(record)) else { return html! {} };
+    let noise = if of.role == "held out" { body.holdout_noise_floor_deg_per_h } else { None };
+    let title = format!("Residual of {}", of.file);
+    let chart = before_and_after_chart(&title, rows, noise.unwrap_or(body.noise_floor_deg_per_h));
+    let caption =
+        format!("{}, {}: the residual of the declared model and what the effects found leave of it.", of.file, of.role);
+    figure(&chart.svg_to_read(), &caption)
+}
+
+/// What a step of the ladder put into the model: the effect with its numbers, what happens in the coil and what to do about it.
+fn change(body: &DiagnosisJson, added: &[&str]) -> Markup {
+    html! { @for kind in added {
+        p { b { (kind) }
+            @for effect in body.effects.iter().filter(|e| e.kind == *kind) {
+                @for (key, parameter) in effect.parameters.iter().filter(|(_, p)| p.fitted) { ", " (key) " = " (value_in_words(parameter)) }
+            }
+        }
+        @for (_, words) in explanations(&body.effects).iter().filter(|(known, _)| known == kind) { p { (words) } }
+    } }
+}
+
 fn ladder_table(body: &DiagnosisJson) -> Markup {
     let unseen = |value: Option<f64>, digits: usize| value.map_or("–".to_owned(), |v| format!("{v:.digits$}"));
     html! {
         div.scroll { table {
             thead { tr {
-                th.word { "Model" } th { "Error, fitted [°/h]" } th { "× noise" } th { "Error, hold-out [°/h]" } th { "× noise" }
+                th.word { "Model" } th.word.change { "What changed" } th { "Error, fitted [°/h]" } th { "× noise" } th { "Error, hold-out [°/h]" } th { "× noise" }
                 th { "Reduced χ²" } th { "BIC" }
             } }
-            tbody { @for rung in &body.ladder { tr {
-                td.word { (if rung.effects.is_empty() { "as declared".to_owned() } else { rung.effects.join(" + ") }) }
+            tbody { @for (rung, added) in body.ladder.iter().zip(body.steps()) { tr {
+                td.word { @if rung.effects.is_empty() { "before: as declared" } @else { "after: with " (rung.effects.join(", ")) } }
+                td.word.change { (change(body, &added)) }
                 td { (format!("{:.5}", rung.rmse_deg_per_h)) }
                 td { (format!("{:.2}", body.multiple_of_noise(rung.rmse_deg_per_h, false))) }
                 td { (unseen(rung.holdout_rmse_deg_per_h, 5)) }
@@ -245,7 +282,8 @@ fn effects(found: &[FindingJson]) -> Markup {
                 }
             } }
         } }
-        dl.facts { @for (kind, words) in explanations(found) { dt { (kind) } dd { (words) } } }
+        // What was accepted is explained where it entered the model.
+        dl.facts { @for (kind, words) in explanations(found).iter().filter(|(kind, _)| !found.iter().any(|f| f.kind == *kind)) { dt { (kind) } dd { (words) } } }
     }
 }
 

@@ -17,6 +17,7 @@ pub fn fleet_page(name: &str, fleet: &FleetJson, gyros: &[GyroJson]) -> String {
     let failed: Vec<&GyroJson> = gyros.iter().filter(|gyro| gyro.failure.is_some()).collect();
     let body = html! {
         h1 { (name) }
+        p.big { (verdict(fleet.sentences.first(), failed.len(), gyros.len())) }
         dl.facts {
             dt { "gyros" } dd { (gyros.len()) ", " (fleet.gyros) " of them with a result" }
             dt { "asked" } dd { (fleet.kind) }
@@ -35,7 +36,7 @@ pub fn fleet_page(name: &str, fleet: &FleetJson, gyros: &[GyroJson]) -> String {
             @let points = curve.points.iter().map(|p| (p.temperature_c, p.bias_deg_per_h)).collect();
             @let chart = Chart::new("The batch's bias over temperature").size(860, 240)
                 .x(Axis::linear("temperature [°C]")).y(Axis::linear("about each gyro's own mean [°/h]")).with(Series::points("batch", points));
-            (figure(&chart.svg(), &format!("Means over the gyros. The curve of the others takes {:.0} % of a gyro's own thermal mean square away.", 100.0 * curve.common_share)))
+            (figure(&chart.svg_to_read(), &format!("Means over the gyros. The curve of the others takes {:.0} % of a gyro's own thermal mean square away.", 100.0 * curve.common_share)))
         }
         @if !fleet.measures.is_empty() { (measures(&fleet.measures)) }
         h2 { "What failed" }
@@ -47,6 +48,17 @@ pub fn fleet_page(name: &str, fleet: &FleetJson, gyros: &[GyroJson]) -> String {
         }
     };
     page(name, &body)
+}
+
+/// What the batch shows first, in a sentence.
+fn verdict(first: Option<&String>, failed: usize, gyros: usize) -> String {
+    match first {
+        Some(sentence) => sentence.trim_start_matches("common: ").trim_start_matches("single: ").to_owned(),
+        None if failed > 0 => format!("Nothing in common was found; {failed} of {gyros} gyros have no result."),
+        None => {
+            "Nothing stands out: no gyro stands apart, and nothing that was looked for is common to all.".to_owned()
+        }
+    }
 }
 
 fn effects(effects: &[FleetEffectJson], gyros: usize) -> Markup {
@@ -123,5 +135,5 @@ fn values(title: &str, unit: &str, usual: f64, values: &[GyroValueJson]) -> Stri
     if drawn.iter().any(|v| v.single) {
         chart = chart.with(Series::bars("apart", &of(true)));
     }
-    chart.svg()
+    chart.svg_to_read()
 }

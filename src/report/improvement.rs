@@ -18,6 +18,7 @@ pub fn improvement_page(body: &ImproveJson, rows: &[PredictedRow]) -> String {
     let content = html! {
         h1 { "The next winding of " (body.model) }
         p.big { (words(&body.recommendation["sentence"])) }
+        (figure(&predicted_chart(rows), "What the new coil should show: the first record as it should be with the new winding; 95 % of the rows lie between the dashed lines."))
         ul { @for reason in list(&body.recommendation["reasons"]) { li { (words(&reason)) } } }
         h2 { "What the records said" }
         p { "Verdict: " (words(&body.verdict)) "." }
@@ -27,8 +28,6 @@ pub fn improvement_page(body: &ImproveJson, rows: &[PredictedRow]) -> String {
         }
         p { (words(&body.measured_pattern_under_new_model["statement"])) }
         p { (body.predicted_gain.words()) "." }
-        h2 { "What the new coil should show" }
-        (figure(&predicted_chart(rows), "The first record as it should be with the new winding; 95 % of the rows lie between the dashed lines."))
         h2 { "The next experiment" }
         p { (words(&body.suggested_experiment)) }
         h2 { "Step by step" }
@@ -45,7 +44,7 @@ fn predicted_chart(rows: &[PredictedRow]) -> String {
         rows.iter().step_by(stride).map(|row| (min_from_s(row.time_s), of(row))).collect()
     };
     Chart::new("Predicted record")
-        .size(720, 320)
+        .size(860, 320)
         .x(Axis::linear("time [min]"))
         .y(Axis::linear("rate [°/h]"))
         .with(Series::line("predicted", line(|row| row.rate_deg_per_h)))

@@ -57,11 +57,11 @@ pub fn assets() -> Assets {
     }
 }
 
-/// A picture that can be enlarged, with its caption.
+/// A picture with its caption; a page's script puts tools beside it.
 pub(super) fn figure(svg: &str, caption: &str) -> Markup {
     html! {
         figure {
-            div.zoom tabindex="0" role="button" aria-label="enlarge this picture" { (PreEscaped(svg)) }
+            div.zoom tabindex="0" role="group" aria-label="picture" { (PreEscaped(svg)) }
             figcaption { (caption) }
         }
     }
@@ -85,32 +85,37 @@ tr.best td{font-weight:700}
 dl.facts{display:grid;grid-template-columns:max-content 1fr;gap:.15rem 1rem;margin:.5rem 0}
 dl.facts dt{color:var(--ink);opacity:.75}dl.facts dd{margin:0;overflow-wrap:anywhere}
 .big{font-size:1.35rem;font-weight:700}
-figure{margin:1rem 0}figcaption{font-size:.86rem;opacity:.8;max-width:46rem}
-.pair{display:flex;flex-wrap:wrap;gap:1rem}.pair figure{flex:1 1 20rem;min-width:0;margin:0}
-.two{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,32rem),1fr));gap:1rem}.two figure{margin:0;min-width:0}
-figure svg{max-width:100%;height:auto;display:block}
-.zoom{cursor:zoom-in}
-.zoom.open{position:fixed;inset:0;z-index:9;background:var(--paper);overflow:hidden;cursor:grab;touch-action:none}
-.zoom.open svg{max-width:none;width:100%;height:100%;transform-origin:0 0}
-.read{font-size:.86rem;font-variant-numeric:tabular-nums;min-height:1.5em;margin:.2rem 0;max-width:none}
-.lines button{font:inherit;font-size:.82rem;color:var(--ink);background:var(--soft);border:1px solid var(--line);border-radius:3px;margin:0 .3rem .3rem 0;cursor:pointer}
-.lines [aria-pressed=false]{text-decoration:line-through}
-.fill{min-width:5rem}.long{min-width:10.5rem}.keep{white-space:nowrap}
-.a{color:var(--a)}.b{color:var(--b)}
+figure{margin:1rem 0;min-width:0}figcaption{font-size:.86rem;opacity:.85;max-width:46rem}
+.pair,.two{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,30rem),1fr));gap:.6rem 1.2rem;align-items:start}
+.pair figure,.two figure{margin:0}
+figure svg{max-width:100%;height:auto;display:block}figure svg[data-plot]{width:100%}
+.panel{font-size:.82rem;margin:.3rem 0}
+.tools,.keys{display:flex;flex-wrap:wrap;gap:.3rem .4rem;align-items:center}
+.panel button,.panel select{font:inherit;color:var(--ink);background:var(--soft);border:1px solid var(--line);border-radius:3px;min-height:1.7rem;cursor:pointer;max-width:100%}
+.panel button:disabled{opacity:.5;cursor:default}
+.tools [aria-pressed=true]{border-color:var(--ink);font-weight:600}
+.keys [aria-pressed=false]{text-decoration:line-through}
+.keys div{display:flex;gap:.5rem;align-items:center}
+.read{min-height:1.5em;margin:.3rem 0;max-width:none}.read,output{font-variant-numeric:tabular-nums}
+figure.open{position:fixed;inset:0;z-index:9;margin:0;padding:1rem;background:var(--paper);overflow:auto}
+figure.open .zoom svg{width:100%;max-height:78vh}
+@media screen and (min-width:64rem){main>figure{display:grid;grid-template-columns:minmax(0,54rem) minmax(12rem,1fr);grid-template-rows:auto 1fr;gap:0 1.2rem}main>figure>.zoom{grid-row:1/span 2}main>figure .keys{flex-direction:column;align-items:start}main>figure.open{display:block}}
+.change{min-width:14rem;max-width:34rem}.change p{margin:0 0 .3rem}.fill{min-width:5rem}.long{min-width:10.5rem}.keep{white-space:nowrap}
+.reel{border-left:.6em solid var(--line);padding-left:.35em}.r0{border-color:#2f7fd6}.r1{border-color:#d9730d}.r2{border-color:#1a9850}.r3{border-color:#9b5fc0}.r4{border-color:#d64550}.r5{border-color:#179aa2}.r6{border-color:#a5744a}.r7{border-color:#7d8590}
 td code{display:inline-block;min-width:12rem}
 code,pre{font-family:ui-monospace,'DejaVu Sans Mono',monospace;font-size:.86em;overflow-wrap:anywhere;white-space:pre-wrap}
-@media screen and (max-width:40rem){figure .zoom:not(.open){overflow-x:auto}figure .zoom:not(.open) svg{max-width:none;width:560px}body{font-size:15px}dl.facts{grid-template-columns:1fr}dl.facts dt{margin-top:.3rem}}
+@media screen and (max-width:40rem){.zoom{overflow-x:auto}figure svg,figure svg[data-plot]{max-width:none;width:560px}body{font-size:15px}dl.facts{grid-template-columns:1fr}dl.facts dt{margin-top:.3rem}}
 @page{margin:14mm 12mm 16mm;@bottom-right{content:'page ' counter(page) ' of ' counter(pages);font:9pt sans-serif}}
 @media print{
-.two{display:block}:root{--ink:#000;--paper:#fff;--soft:#eee;--line:#888}
+.two,.pair{display:block}:root{--ink:#000;--paper:#fff;--soft:#eee;--line:#888}
 body{font-size:10pt}main{max-width:none;padding:0}
 h1{font-size:15pt}h2{font-size:12pt;break-after:avoid}
 table{font-size:7.6pt;width:100%}th,td{padding:1.5pt 3pt}thead{display:table-header-group}tr{break-inside:avoid}
-figure{break-inside:avoid}figure svg{max-height:225mm}.scroll{overflow:visible;padding-right:1.5pt}.fill{min-width:0}.long{min-width:26mm}.screen,.read,.lines{display:none}td code{min-width:0}
+figure{break-inside:avoid}figure svg{max-height:225mm}.scroll{overflow:visible;padding-right:1.5pt}.fill{min-width:0}.long{min-width:26mm}.screen,.panel{display:none}td code{min-width:0}
 details::details-content{content-visibility:visible;block-size:auto}summary{list-style:none}
 }
 ";
 
-/// Opens a picture over the whole window; wheel and drag zoom and move it, Escape or a click closes it. Shows a chart's values
-/// under the pointer, in all charts over the same time at once, and switches its lines on and off.
+/// Shows a picture over the whole window, and a chart's values, parts, scales and differences, in all charts over the same time
+/// at once.
 const SCRIPT: &str = include_str!("page.js");

@@ -14,7 +14,7 @@ use crate::io::read::run_reader::{Run, RunPattern};
 use crate::pattern::{Pattern, PatternError};
 use crate::profile::Profile;
 use crate::rate::RateModel;
-use crate::search::cost::tolerance::{Measure, ToleranceError, ToleranceSpec, measure, study};
+use crate::search::cost::tolerance::{Coils, Measure, ToleranceError, ToleranceSpec, measure, study};
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
 use crate::units::{
     REFERENCE_TEMPERATURE_K, c_per_h_from_k_per_s, deg_per_h_from_rad_per_s, min_from_s, percent_from_fraction,
@@ -43,12 +43,11 @@ pub fn search_page(run: &Run, explorer: Option<&str>) -> Result<String, ReportEr
     let title = format!("Winding pattern for {}", summary.model);
     let body = html! {
         h1 { (title) }
+        @if let Some(recommendation) = &summary.recommendation { p.big { (recommendation.sentence) } } @else { p.big { (summary.statement) } }
+        (figure(&relative_bars(run), &about_bars(run)))
         @if let Some(recommendation) = &summary.recommendation {
-            p.big { (recommendation.sentence) }
             ul { @for reason in &recommendation.reasons { li { (reason) } } }
             p { (summary.statement) }
-        } @else {
-            p.big { (summary.statement) }
         }
         @if let Some(explorer) = explorer {
             p.screen { a href=(explorer) { "Try other windings by hand in the explorer" } ": move layers, and see at once what evaluate says of them." }
@@ -58,7 +57,6 @@ pub fn search_page(run: &Run, explorer: Option<&str>) -> Result<String, ReportEr
         h2 { "Patterns compared" }
         (baselines(run))
         (words::of_windings())
-        (figure(&relative_bars(run), "Worst rate error over all listed and sampled profiles, and, where it exists, the guaranteed worst over every profile within the model's largest ramp."))
         h2 { "Cross-sections" }
         div.pair {
             (figure(&cross_section(&format!("{}: {:.4} °/h", summary.best.name, summary.best.worst_rate_deg_per_h), &best), "The best pattern found."))
@@ -114,11 +112,17 @@ fn facts(run: &Run) -> Markup {
                 summary.best.worst_rate_deg_per_h, summary.best.worst_profile, summary.best.worst_time_s
             ),
         ),
+        ("95 % of built coils stay below", p95_words(&summary.best)),
         ("Guaranteed worst", guaranteed_words(&summary.best)),
         ("Better than QUA by", gain),
         ("Seed, moves judged", format!("{}, {}", summary.seed, summary.evaluations)),
     ];
-    html! { dl.facts { @for (name, value) in rows { dt { (name) } dd { (value) } } } }
+    html! { dl.facts { @for (name, value) in rows { @if !value.is_empty() { dt { (name) } dd { (value) } } } } }
+}
+
+/// Empty where the search was not over built coils.
+fn p95_words(pattern: &RunPattern) -> String {
+    pattern.p95_rate_deg_per_h.map_or_else(String::new, |p95| format!("{p95:.4} °/h"))
 }
 
 fn guaranteed_words(pattern: &RunPattern) -> String {
@@ -133,16 +137,20 @@ fn all(run: &Run) -> impl Iterator<Item = &RunPattern> {
 
 fn baselines(run: &Run) -> Markup {
     let qua = run.summary.baselines.iter().find(|p| p.name == "qua").map(|p| p.worst_rate_deg_per_h);
+    let is_over_coils = run.summary.best.p95_rate_deg_per_h.is_some();
     html! {
         div.scroll { table {
             thead { tr {
-                th.word { "Pattern" } th { "Worst [°/h]" } th { "Relative to QUA" } th { "Guaranteed worst [°/h]" } th.word { "Worst profile" }
+                th.word { "Pattern" } th { "Worst [°/h]" } th { "Relative to QUA" }
+                @if is_over_coils { th { "P95 of built coils [°/h]" } }
+                th { "Guaranteed worst [°/h]" } th.word { "Worst profile" }
                 th { "At [s]" } th.word { "Class" } th { "Reels" } th { "Largest climb [layers]" }
             } }
             tbody { @for pattern in all(run) { tr.best[pattern.name == run.summary.best.name] {
                 td.word { (pattern.name) }
                 td { (format!("{:.4}", pattern.worst_rate_deg_per_h)) }
                 td { (qua.filter(|q| *q > 0.0).map_or("–".to_owned(), |q| format!("{:.3}", pattern.worst_rate_deg_per_h / q))) }
+                @if is_over_coils { td { (pattern.p95_rate_deg_per_h.map_or("–".to_owned(), |p| format!("{p:.4}"))) } }
                 td { (pattern.guaranteed_worst_rate_deg_per_h.map_or("–".to_owned(), |g| format!("{g:.4}"))) }
                 td.word { (pattern.worst_profile) }
                 td { (format!("{:.1}", pattern.worst_time_s)) }
@@ -154,20 +162,45 @@ fn baselines(run: &Run) -> Markup {
     }
 }
 
+/// Bars that differ by more than this factor stand on a logarithmic axis, so that the shortest can be read.
+const LINEAR_UP_TO: f64 = 20.0;
+
 fn relative_bars(run: &Run) -> String {
-    let values: Vec<f64> = all(run).map(|p| p.worst_rate_deg_per_h).collect();
-    let guaranteed: Vec<f64> = all(run).map(|p| p.guaranteed_worst_rate_deg_per_h.unwrap_or(f64::NAN)).collect();
+    let of = |value: fn(&RunPattern) -> Option<f64>| -> Vec<f64> {
+        all(run).map(|p| value(p).unwrap_or(f64::NAN)).collect()
+    };
+    let bars = [
+        ("over the model's profiles", of(|p| Some(p.worst_rate_deg_per_h))),
+        ("95 % of built coils stay below", of(|p| p.p95_rate_deg_per_h)),
+        ("guaranteed, over all profiles", of(|p| p.guaranteed_worst_rate_deg_per_h)),
+    ];
+    let shown = bars.into_iter().filter(|(_, values)| values.iter().any(|v| v.is_finite()));
+    let shown: Vec<(&str, Vec<f64>)> = shown.collect();
+    let positive = || shown.iter().flat_map(|(_, values)| values).copied().filter(|v| *v > 0.0);
+    let is_wide = positive().fold(0.0, f64::max) > LINEAR_UP_TO * positive().fold(f64::INFINITY, f64::min);
+    let axis = if is_wide { Axis::log } else { Axis::linear };
     let mut chart = Chart::new("Worst rate error of each pattern")
-        .x(Axis::linear("worst |rate error| [°/h]"))
-        .categories(all(run).map(|p| p.name.clone()))
-        .with(Series::bars("over the model's profiles", &values));
-    if guaranteed.iter().any(|g| g.is_finite()) {
-        chart = chart.with(Series::bars("guaranteed, over all profiles", &guaranteed));
+        .size(860, 240)
+        .x(axis("worst |rate error| [°/h]".to_owned()))
+        .categories(all(run).map(|p| p.name.clone()));
+    for (name, values) in shown {
+        chart = chart.with(Series::bars(name, &values));
     }
     if let Some(qua) = run.summary.baselines.iter().find(|p| p.name == "qua") {
         chart = chart.mark(Mark::vertical("QUA", qua.worst_rate_deg_per_h));
     }
     chart.svg_to_read()
+}
+
+fn about_bars(run: &Run) -> String {
+    let mut words = "Worst rate error over all listed and sampled profiles".to_owned();
+    if run.summary.best.p95_rate_deg_per_h.is_some() {
+        words += "; what 95 % of coils as built stay below, which is what was searched";
+    }
+    if all(run).any(|p| p.guaranteed_worst_rate_deg_per_h.is_some()) {
+        words += "; the guaranteed worst over every profile within the model's largest ramp";
+    }
+    words + "."
 }
 
 /// For the profile that is worst for the best pattern and the first listed one: the profile, and every pattern's error.
@@ -222,12 +255,12 @@ const SHOWN_BELOW: f64 = 300.0;
 fn on_a_readable_scale(profile: &str, times_min: &[f64], series: &[(&str, Vec<f64>)]) -> (Chart, String) {
     let largest = |rates: &[f64]| rates.iter().fold(0.0, |most: f64, r| most.max(r.abs()));
     let tops = series.iter().map(|(_, rates)| largest(rates)).filter(|top| *top > 0.0);
-    let floor = tops.fold(f64::INFINITY, f64::min) / SHOWN_BELOW;
+    let floor = tops.fold(f64::INFINITY, f64::min).min(f64::MAX) / SHOWN_BELOW;
     let mut chart = Chart::new(format!("Size of the rate error under {profile}"))
         .x(Axis::linear("time [min]"))
-        .y(Axis::log("|rate error| [°/h]"));
+        .y(Axis::sizes("|rate error| [°/h]", floor));
     for (name, rates) in series {
-        let points = times_min.iter().zip(rates).map(|(t, rate)| (*t, rate.abs().max(floor)));
+        let points = times_min.iter().zip(rates).map(|(t, rate)| (*t, *rate));
         chart = chart.with(Series::line(*name, points.collect()));
     }
     (chart, format!(" What is below {floor:.1e} °/h is drawn there."))
@@ -261,6 +294,8 @@ fn declared_tolerance(run: &Run, best: &Pattern, declared: &ToleranceSpec) -> Re
     }
     let patterns: Vec<Pattern> = named.iter().map(|(_, pattern)| pattern.clone()).collect();
     let found = study(&run.file.model, &run.file.profiles, &spec, &patterns)?;
+    // Of all coils that are declared, as the search and `tolerance` have it, not of those that are drawn here.
+    let p95 = Coils::new(&run.file.model, &run.file.profiles, declared)?.p95_rad_per_s(&patterns)?;
     let (axis, over) = match measure(&run.file.model, run.file.profiles.max_rate_k_per_s)? {
         Measure::Guaranteed => {
             ("guaranteed worst |rate error| [°/h]", "over every profile within the model's largest ramp (guaranteed)")
@@ -269,31 +304,32 @@ fn declared_tolerance(run: &Run, best: &Pattern, declared: &ToleranceSpec) -> Re
     };
     let all: Vec<f64> = found.iter().flat_map(|d| &d.worst_rad_per_s).map(|r| deg_per_h_from_rad_per_s(*r)).collect();
     let edges = bin_edges(&all);
-    let mut chart = Chart::new("Worst rate error of coils as built")
-        .size(720, 320)
-        .x(Axis::linear(axis))
-        .y(Axis::linear("coils [1]"));
+    let mut chart =
+        Chart::new("Worst rate error of coils as built").size(720, 320).x(Axis::linear(axis)).y(Axis::whole("coils"));
     let mut words = Vec::new();
-    for ((name, _), distribution) in named.iter().zip(&found) {
+    for (((name, _), distribution), p95) in named.iter().zip(&found).zip(p95) {
+        let p95_deg_per_h = deg_per_h_from_rad_per_s(p95);
         let values: Vec<f64> = distribution.worst_rad_per_s.iter().map(|r| deg_per_h_from_rad_per_s(*r)).collect();
-        chart = chart.with(Series::histogram(*name, &edges, &binned(&values, &edges)));
+        chart = chart
+            .with(Series::histogram(*name, &edges, &binned(&values, &edges)))
+            .mark(Mark::vertical(format!("P95 of {name}"), p95_deg_per_h));
         let shares: Vec<String> = distribution
             .variance_shares
             .iter()
             .map(|(spread, share)| format!("{} {:.0} %", spread.key(), percent_from_fraction(*share)))
             .collect();
         words.push(format!(
-            "{name}: as designed {:.4}, median {:.4}, 95 % below {:.4} °/h; of its variance {}",
+            "{name}: as designed {:.4}, median {:.4}, 95 % below {p95_deg_per_h:.4} °/h; of its variance {}",
             deg_per_h_from_rad_per_s(distribution.nominal_rad_per_s),
             deg_per_h_from_rad_per_s(distribution.median_rad_per_s()),
-            deg_per_h_from_rad_per_s(distribution.p95_rad_per_s()),
             shares.join(", ")
         ));
     }
     let caption = format!(
-        "Worst rate error {over} of {} coils with every spread of the model file's [tolerance] (seed {}). {}.",
+        "Worst rate error {over} of {} coils with every spread of the model file's [tolerance] (seed {}); P95 is that of all {} declared. {}.",
         spec.samples,
         spec.seed,
+        declared.samples,
         words.join(". ")
     );
     Ok((chart.svg_to_read(), caption))
@@ -337,7 +373,7 @@ fn turn_tolerance(run: &Run, best: &Pattern) -> Result<String, ReportError> {
     Ok(Chart::new("Worst rate error of coils as wound")
         .size(720, 280)
         .x(Axis::linear("worst |rate error| [°/h]"))
-        .y(Axis::linear("coils [1]"))
+        .y(Axis::whole("coils"))
         .with(Series::histogram("", &edges, &counts))
         .mark(Mark::vertical("as designed", run.summary.best.worst_rate_deg_per_h))
         .svg_to_read())
@@ -359,7 +395,7 @@ fn profile_chart(profile: &Profile) -> String {
 /// The searched front where there is one, else the patterns of this search.
 fn trade_off(run: &Run) -> (String, String) {
     let chart = Chart::new("Rate error against the largest crossover")
-        .x(Axis::linear("largest climb of a crossover [layers]").reaching(0.0))
+        .x(Axis::whole("largest climb of a crossover [layers]").reaching(0.0))
         .y(Axis::log("worst |rate error| [°/h]"));
     let compared = |name: &str| {
         let points = all(run).map(|p| (p.windability.max_climb as f64, p.worst_rate_deg_per_h)).collect();

@@ -2,7 +2,7 @@
 
 use maud::{Markup, PreEscaped, html};
 
-use super::cross_section::cross_section;
+use super::cross_section::{Groups, cross_section_in_groups};
 use super::page::{figure, page};
 use crate::io::json::schedule::{ScheduleJson, StepJson};
 use crate::io::read::schedule_reader::DATA_ELEMENT;
@@ -15,6 +15,9 @@ pub fn traveller_page(document: &ScheduleJson, pattern: &Pattern) -> String {
     let data = JsonText::embedded(&serde_json::to_string(document).unwrap_or_default());
     let body = html! {
         h1 { (title) }
+        p.big { (summary(document)) }
+        (figure(&cross_section_in_groups(&format!("{}, {} layers", document.pattern, pattern.layers()), pattern, &by_reel(document)),
+            "The pack from the spool outwards, coloured by reel; numbers at the left count layers, at the right segments of the fibre."))
         (head(document))
         h2 { "Supply reels" }
         (reels(document))
@@ -29,14 +32,40 @@ pub fn traveller_page(document: &ScheduleJson, pattern: &Pattern) -> String {
         }
         h2 { "Steps" }
         (steps(document))
-        h2 { "Cross-section" }
-        (figure(&cross_section(&format!("{}, {} layers", document.pattern, pattern.layers()), pattern),
-            "The pack from the spool outwards; numbers at the left count layers, at the right segments of the fibre."))
         h2 { "Release" }
         (signatures())
         (PreEscaped(DATA_ELEMENT)) (PreEscaped(data.as_str())) (PreEscaped("</script>"))
     };
     page(&title, &body)
+}
+
+/// What is to be wound, in a sentence.
+fn summary(document: &ScheduleJson) -> String {
+    let reels = document.reels.len();
+    format!(
+        "Wind {} of fibre in {} layers as {} from {reels} reel{}, from the spool outwards.",
+        metres(document.length_m),
+        document.segments.len(),
+        document.pattern,
+        if reels == 1 { "" } else { "s" }
+    )
+}
+
+fn by_reel(document: &ScheduleJson) -> Groups {
+    Groups {
+        names: document.reels.iter().map(|reel| format!("reel {}", reel.name)).collect(),
+        of_layer: document.steps.iter().map(|step| reel_of(document, step)).collect(),
+    }
+}
+
+/// Its place in the list of reels, which chooses its colour.
+fn reel_of(document: &ScheduleJson, step: &StepJson) -> usize {
+    document.reels.iter().position(|reel| reel.name == step.supply_reel).unwrap_or(0)
+}
+
+/// Marks a reel with its colour; there are as many as `page::STYLE` has.
+fn mark(reel: usize) -> String {
+    format!("reel r{}", reel % 8)
 }
 
 fn metres(value_m: f64) -> String {
@@ -88,8 +117,8 @@ fn reels(document: &ScheduleJson) -> Markup {
     html! {
         div.scroll { table {
             thead { tr { th.word { "Reel" } th { "Load" } th { "To be wound" } th { "Fibre from" } th { "Fibre to" } th.word { "Prepare" } th { "Loaded, measured" } } }
-            tbody { @for reel in &document.reels { tr {
-                td.word { b { (reel.name) } @if reel.captive { " (captive)" } }
+            tbody { @for (place, reel) in document.reels.iter().enumerate() { tr {
+                td.word { b class=(mark(place)) { (reel.name) } @if reel.captive { " (captive)" } }
                 td.keep { b { (metres(reel.load_m.unwrap_or(reel.to_m - reel.from_m))) } }
                 td.keep { (metres(reel.to_m - reel.from_m)) }
                 td.keep { (metres(reel.from_m)) } td.keep { (metres(reel.to_m)) }
@@ -113,7 +142,7 @@ fn steps(document: &ScheduleJson) -> Markup {
             } }
             tbody { @for row in &document.steps { tr {
                 td { (row.layer) }
-                td.word { b class=(if row.half == "A" { "a" } else { "b" }) { (row.supply_reel) } @if row.reel_change == Some(true) { " (change)" } }
+                td.word { b class=(mark(reel_of(document, row))) { (row.supply_reel) } @if row.reel_change == Some(true) { " (change)" } }
                 td.word { (row.half) " " (row.segment) }
                 td.word.keep { (row.direction.replace("-to-", " → ")) }
                 td.word { (row.rotation.as_deref().unwrap_or("")) }

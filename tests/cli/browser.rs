@@ -5,6 +5,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use super::remote::Page;
 use super::ways::Bench;
 
 const MODEL: &str = "examples/paper-200m.toml";
@@ -97,6 +98,79 @@ fn pages_hold_everything_themselves_and_open_without_a_script_error_on_desktop_p
             &["--no-pdf-header-footer", &format!("--print-to-pdf={}", pdf.display()), &address],
         );
         assert!(std::fs::metadata(&pdf).is_ok_and(|found| found.len() > 10_000), "{log}");
+    }
+    let report = folder.path().join("run/report.html");
+    assert!(std::fs::metadata(&report).unwrap().len() < 3_000_000, "a search's report stays a small file");
+    let mut page = Page::open(browser, folder.path(), &report, folder.path());
+    charts_can_be_touched(&mut page);
+    let everything: Vec<PathBuf> = pages.into_iter().chain([folder.path().join("run/explorer.html")]).collect();
+    nothing_shuts_out(&mut page, &everything);
+    assert_eq!(page.complaints(), Vec::<String>::new());
+    page.close();
+}
+
+/// Values, zoom, scale, differences and lines of the rate errors over time, and that the chart comes back as printed.
+fn charts_can_be_touched(page: &mut Page) {
+    page.value(
+        "var all = [...document.querySelectorAll('figure')]; \
+         var chart = all.find((f) => /Size of the rate error/.test(f.textContent)); \
+         var tool = (words) => [...chart.querySelectorAll('.tools button')].find((b) => b.textContent === words); \
+         var is = (what) => getComputedStyle(chart.querySelector('.plot')).display === what; 0",
+    );
+    assert_eq!(page.value("all.length > 5 && all.every((f) => f.querySelector('.tools'))"), true);
+    assert_eq!(page.value("is('inline') && tool('log scale').getAttribute('aria-pressed')"), "true");
+    let second = "all.filter((f) => /time .min./.test(f.textContent)).map((f) => f.querySelector('.read').textContent)";
+    let key = |key: &str| {
+        format!(
+            "chart.querySelector('.zoom').dispatchEvent(new KeyboardEvent('keydown', {{ key: '{key}', bubbles: true }})); 0"
+        )
+    };
+    page.value(&key("ArrowRight"));
+    let shown = page.value(second);
+    let shown = shown.as_array().unwrap();
+    assert!(shown.len() > 1 && shown.iter().all(|said| said.as_str().unwrap().starts_with("time [min]")), "{shown:?}");
+    assert_eq!(
+        page.value("[...chart.querySelectorAll('output')].every((o) => /^−?[0-9.e−-]+$/.test(o.textContent))"),
+        true
+    );
+    for touch in [
+        "tool('log scale').click()",
+        "{ const less = chart.querySelector('select'); less.value = 'qua'; less.onchange(); }",
+        "chart.querySelector('.keys button').click()",
+        "tool('zoom in').click()",
+    ] {
+        page.value(&format!("{touch}; 0"));
+        let redrawn = "is('none') && chart.querySelectorAll('svg svg path').length > 0";
+        assert_eq!(page.value(redrawn), true, "{touch}");
+        page.value("tool('as printed').click(); 0");
+        assert_eq!(page.value("is('inline') && !chart.querySelector('svg svg')"), true, "{touch}");
+    }
+}
+
+/// Where the rules of accessibility are looked for: npm's `axe-core` (MPL 2.0), which `.ci/run` fetches and nothing commits.
+const AXE: &str = "target/axe/package/axe.min.js";
+
+/// Axe finds no serious fault in any kind of page, on a desk and on a phone.
+fn nothing_shuts_out(page: &mut Page, files: &[PathBuf]) {
+    let Ok(axe) = std::fs::read_to_string(AXE) else {
+        println!("skipped: no {AXE}: npm pack axe-core, unpacked there, brings it");
+        return;
+    };
+    for file in files {
+        page.go(file);
+        page.until(
+            "!document.getElementById('layers') || (!document.body.dataset.busy && !!document.body.dataset.shown)",
+        );
+        page.value(&format!("{axe}; 0"));
+        for width in [1280, 390] {
+            page.resize(width);
+            let found = page.value(
+                "axe.run({ resultTypes: ['violations'] }).then((found) => found.violations \
+                 .filter((fault) => ['serious', 'critical'].includes(fault.impact)) \
+                 .map((fault) => `${fault.id}: ${fault.nodes.map((node) => node.html.slice(0, 200)).slice(0, 3).join(' ')}`))",
+            );
+            assert_eq!(found, serde_json::json!([]), "{} at {width} px", file.display());
+        }
     }
 }
 

@@ -63,9 +63,20 @@ impl Page {
         page.call("Runtime.enable", json!({}));
         page.call("Log.enable", json!({}));
         page.call("Page.enable", json!({}));
-        page.call("Page.navigate", json!({ "url": format!("file://{}", file.display()) }));
-        page.until("document.readyState === 'complete'");
+        page.go(file);
         page
+    }
+
+    /// Opens another file in the same place.
+    pub fn go(&mut self, file: &Path) {
+        self.call("Page.navigate", json!({ "url": format!("file://{}", file.display()) }));
+        self.until("document.readyState === 'complete'");
+    }
+
+    /// Makes the window so wide.
+    pub fn resize(&mut self, width: u32) {
+        let size = json!({ "width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600 });
+        self.call("Emulation.setDeviceMetricsOverride", size);
     }
 
     /// Calls a method; its result.

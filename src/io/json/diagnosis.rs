@@ -285,7 +285,9 @@ impl DiagnosisJson {
                 };
                 let model = match i {
                     0 => "as declared".to_owned(),
-                    _ => format!("with {}", added.join(" and ")),
+                    _ if added.len() == rung.effects.len() => format!("with {}", added.join(" and ")),
+                    // All that is in the model, and what of it is new.
+                    _ => format!("with {} ({} added)", rung.effects.join(", "), added.join(" and ")),
                 };
                 let unseen = rung
                     .holdout_rmse_deg_per_h

@@ -61,6 +61,9 @@ pub struct RunPattern {
     pub worst_profile: String,
     pub worst_time_s: f64,
     pub guaranteed_worst_rate_deg_per_h: Option<f64>,
+    /// Of the coils as built, where the search was over them.
+    #[serde(default)]
+    pub p95_rate_deg_per_h: Option<f64>,
     pub windability: RunWindability,
 }
 

@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn the_module_names_no_path_of_the_machine_that_built_it() {
+    fn the_module_is_compressed_without_a_time_stamp() {
         assert_eq!(MODULE[..2], [0x1f, 0x8b], "it is compressed by gzip");
         assert_eq!(MODULE[4..8], [0; 4], "it bears no time stamp");
     }

@@ -1,11 +1,17 @@
 //! Where an axis begins and ends, and which numbers stand along it.
 
 /// How an axis spaces its numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum Scale {
     Linear,
+    /// As linear, but only whole numbers stand along it.
+    Whole,
     /// Decades; values that are not positive are left out.
     Log,
+    /// Decades of the values' sizes; what is smaller than the floor is drawn there.
+    Size {
+        floor: f64,
+    },
 }
 
 /// One axis: its label, which names the unit in square brackets, and its scale.
@@ -26,6 +32,16 @@ impl Axis {
         Self { label: label.into(), scale: Scale::Log, include: Vec::new() }
     }
 
+    /// Of counts.
+    pub fn whole(label: impl Into<String>) -> Self {
+        Self { label: label.into(), scale: Scale::Whole, include: Vec::new() }
+    }
+
+    /// Logarithmic, of the sizes of values that may have either sign; `floor` is positive.
+    pub fn sizes(label: impl Into<String>, floor: f64) -> Self {
+        Self { label: label.into(), scale: Scale::Size { floor }, include: Vec::new() }
+    }
+
     /// The axis reaches `value` even where no data do.
     pub fn reaching(mut self, value: f64) -> Self {
         self.include.push(value);
@@ -33,18 +49,24 @@ impl Axis {
     }
 
     pub(super) fn is_log(&self) -> bool {
-        self.scale == Scale::Log
+        matches!(self.scale, Scale::Log | Scale::Size { .. })
+    }
+
+    /// What smaller sizes are drawn at.
+    pub(super) fn floor(&self) -> Option<f64> {
+        if let Scale::Size { floor } = self.scale { Some(floor) } else { None }
     }
 
     pub(super) fn admits(&self, value: f64) -> bool {
-        value.is_finite() && (self.scale == Scale::Linear || value > 0.0)
+        value.is_finite() && (self.scale != Scale::Log || value > 0.0)
     }
 
     /// Position on a straight ruler: the value itself or its decade.
     pub(super) fn position(&self, value: f64) -> f64 {
         match self.scale {
-            Scale::Linear => value,
+            Scale::Linear | Scale::Whole => value,
             Scale::Log => value.log10(),
+            Scale::Size { floor } => value.abs().max(floor).log10(),
         }
     }
 
@@ -59,8 +81,9 @@ impl Axis {
             (low, high) = (0.0, 1.0);
         }
         match self.scale {
-            Scale::Linear => linear_ruler(low, high, wanted, margin),
-            Scale::Log => log_ruler(low, high, wanted),
+            Scale::Linear => linear_ruler(low, high, wanted, margin, 0.0),
+            Scale::Whole => linear_ruler(low, high, wanted, margin, 1.0),
+            Scale::Log | Scale::Size { .. } => log_ruler(low, high, wanted),
         }
     }
 }
@@ -90,7 +113,8 @@ impl Ruler {
     }
 }
 
-fn linear_ruler(low: f64, high: f64, wanted: usize, margin: f64) -> Ruler {
+/// Ticks are no less than `least_step` apart.
+fn linear_ruler(low: f64, high: f64, wanted: usize, margin: f64, least_step: f64) -> Ruler {
     let (low, high) = if high - low > 1e-12 * low.abs().max(high.abs()) && high > low {
         (low - margin * (high - low), high + margin * (high - low))
     } else if low == 0.0 {
@@ -100,7 +124,8 @@ fn linear_ruler(low: f64, high: f64, wanted: usize, margin: f64) -> Ruler {
     };
     let raw = (high - low) / wanted.max(2) as f64;
     let decade = 10f64.powf(raw.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * decade).find(|s| *s >= raw * 0.7).unwrap_or(raw);
+    let step =
+        [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * decade).find(|s| *s >= raw * 0.7).unwrap_or(raw).max(least_step);
     let largest = low.abs().max(high.abs());
     let exponent = if (1e-3..1e5).contains(&largest) { 0 } else { largest.log10().floor() as i32 };
     let shown_step = step / 10f64.powi(exponent);

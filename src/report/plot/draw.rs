@@ -8,15 +8,16 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::axis::three_digits;
 use super::layout::{Layout, LegendShape, MARK_ROW_PX, ROW_PX, TEXT_PX, text_width_px};
 use super::{Along, Chart, Series, Shape};
-use crate::text::sink::{JsonText, Markup};
+use super::{data, labels};
+use crate::text::sink::Markup;
 
 /// The backend counts whole pixels; drawing on a finer grid and shrinking the picture keeps slopes smooth.
-const FINE: i32 = 4;
+pub(super) const FINE: i32 = 4;
 /// Stands for the reader's own text colour until the picture is done.
 const INK: RGBColor = RGBColor(1, 2, 3);
 const INK_CODE: &str = "#010203";
 /// Legible on white and on near-black.
-const PALETTE: [RGBColor; 8] = [
+pub(super) const PALETTE: [RGBColor; 8] = [
     RGBColor(0x2f, 0x7f, 0xd6),
     RGBColor(0xd9, 0x73, 0x0d),
     RGBColor(0x1a, 0x98, 0x50),
@@ -30,7 +31,7 @@ const PALETTE: [RGBColor; 8] = [
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 
-fn colour(index: usize) -> RGBColor {
+pub(super) fn colour(index: usize) -> RGBColor {
     PALETTE[index % PALETTE.len()]
 }
 
@@ -58,39 +59,29 @@ fn text<'a>(words: &'a str, x_px: i32, y_px: i32, h: HPos, v: VPos) -> Text<'a, 
 pub(super) fn svg(chart: &Chart, to_read: bool) -> String {
     let layout = Layout::new(chart);
     let (width, height) = (chart.width_px, layout.height as u32);
-    let mut out = String::new();
-    {
-        let root = SVGBackend::with_string(&mut out, (width * FINE as u32, height * FINE as u32)).into_drawing_area();
-        // Writing to a string cannot fail.
-        let _ = draw(chart, &layout, &root);
-        let _ = root.present();
-    }
-    let read = if to_read { axes(chart, &layout) } else { String::new() };
-    finish(&out, chart, width, height, &read)
-}
-
-/// An attribute that says where the axes are, in the picture's own units, and which colour each line has.
-fn axes(chart: &Chart, layout: &Layout) -> String {
-    let series = chart.series.iter().enumerate().filter(|(_, s)| matches!(s.shape, Shape::Line | Shape::Step));
-    let series = series.map(|(index, s)| {
-        let RGBColor(red, green, blue) = colour(index);
-        serde_json::json!({ "name": s.name, "colour": format!("#{red:02X}{green:02X}{blue:02X}") })
-    });
-    let frame = [layout.left, layout.top, layout.right, layout.bottom].map(|px| px * FINE);
-    let plot = serde_json::json!({
-        "frame": frame,
-        "x": (layout.x.low, layout.x.high, chart.x.is_log()),
-        "y": (layout.y.low, layout.y.high, chart.y.is_log()),
-        "x_label": chart.x.label,
-        "y_label": chart.y.label,
-        "series": series.collect::<Vec<_>>(),
-    });
-    format!(" data-plot='{}'", JsonText::embedded(&plot.to_string()))
+    let drawn = |what: &dyn Fn(&Area) -> Drawn| {
+        let mut out = String::new();
+        {
+            let root =
+                SVGBackend::with_string(&mut out, (width * FINE as u32, height * FINE as u32)).into_drawing_area();
+            // Writing to a string cannot fail.
+            let _ = what(&root);
+            let _ = root.present();
+        }
+        let inner = out.split_once('>').map_or("", |(_, rest)| rest);
+        inner.trim_end().strip_suffix("</svg>").unwrap_or(inner).to_owned()
+    };
+    let body = format!(
+        "<g>{}</g>\n<g class=\"plot\">{}</g>\n</svg>\n",
+        drawn(&|root| draw_words(chart, &layout, root)),
+        drawn(&|root| draw(chart, &layout, root))
+    );
+    let read = if to_read { data::attribute(chart, &layout) } else { String::new() };
+    finish(&body, chart, width, height, &read)
 }
 
 /// Gives the picture its natural size, a title for screen readers, and the reader's colours.
-fn finish(drawn: &str, chart: &Chart, width: u32, height: u32, read: &str) -> String {
-    let body = drawn.split_once('>').map_or("", |(_, rest)| rest);
+fn finish(body: &str, chart: &Chart, width: u32, height: u32, read: &str) -> String {
     let title = if chart.title.is_empty() { &chart.y.label } else { &chart.title };
     let title = title.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
     let picture = format!(
@@ -105,12 +96,12 @@ fn finish(drawn: &str, chart: &Chart, width: u32, height: u32, read: &str) -> St
 
 /// The same in every picture, so that several in one page do not quarrel.
 pub(in crate::report) const STYLE: &str = "svg.chart{color:#1b1f24;background:#fff;font-family:system-ui,'DejaVu Sans',\
-    Arial,sans-serif}@media(prefers-color-scheme:dark){svg.chart{color:#e3e6ea;background:#15181c}}\
-    @media print{svg.chart{color:#000;background:#fff}}";
+    Arial,sans-serif}svg.chart text{paint-order:stroke;stroke:#fff;stroke-width:.25em;stroke-linejoin:round}\
+    @media(prefers-color-scheme:dark){svg.chart{color:#e3e6ea;background:#15181c}svg.chart text{stroke:#15181c}}\
+    @media print{svg.chart{color:#000;background:#fff}svg.chart text{stroke:#fff}}";
 
 fn draw(chart: &Chart, layout: &Layout, root: &Area) -> Drawn {
     let lying = !chart.categories.is_empty();
-    draw_words(chart, layout, root)?;
     for band in &chart.bands {
         draw_band(chart, layout, root, band, lying)?;
     }
@@ -119,6 +110,7 @@ fn draw(chart: &Chart, layout: &Layout, root: &Area) -> Drawn {
     for (index, series) in chart.series.iter().enumerate() {
         any |= draw_series(chart, layout, root, series, index)?;
     }
+    draw_labels(chart, layout, root)?;
     if !any {
         let (x, y) = ((layout.left + layout.right) / 2, (layout.top + layout.bottom) / 2);
         root.draw(&text("no data", x, y, HPos::Center, VPos::Center))?;
@@ -126,7 +118,7 @@ fn draw(chart: &Chart, layout: &Layout, root: &Area) -> Drawn {
     draw_marks(chart, layout, root, lying)
 }
 
-/// Title, legend and the axes' labels.
+/// Title and legend.
 fn draw_words(chart: &Chart, layout: &Layout, root: &Area) -> Drawn {
     if !chart.title.is_empty() {
         let style = TextStyle::from(("sans-serif", f64::from(15 * FINE) * 1.24, FontStyle::Bold).into_font())
@@ -162,14 +154,7 @@ fn draw_words(chart: &Chart, layout: &Layout, root: &Area) -> Drawn {
         }
         root.draw(&text(&entry.text, entry.left + 26, y as i32, HPos::Left, VPos::Center))?;
     }
-    let x_label = format!("{}{}", chart.x.label, layout.x.suffix);
-    root.draw(&text(&x_label, (layout.left + layout.right) / 2, layout.bottom + ROW_PX + 6, HPos::Center, VPos::Top))?;
-    let y_label = format!("{}{}", chart.y.label, layout.y.suffix);
-    let style = TextStyle::from(("sans-serif", f64::from(TEXT_PX * FINE) * 1.24).into_font())
-        .transform(FontTransform::Rotate270)
-        .color(&INK)
-        .pos(Pos::new(HPos::Center, VPos::Top));
-    root.draw(&Text::new(y_label, (6 * FINE, (layout.top + layout.bottom) / 2 * FINE), style))
+    Ok(())
 }
 
 fn draw_frame(chart: &Chart, layout: &Layout, root: &Area) -> Drawn {
@@ -192,7 +177,15 @@ fn draw_frame(chart: &Chart, layout: &Layout, root: &Area) -> Drawn {
         root.draw(&text(name, layout.left - 6, y, HPos::Right, VPos::Center))?;
     }
     let frame = INK.mix(0.7).stroke_width(FINE as u32);
-    root.draw(&PathElement::new([at(left, top), at(left, bottom), at(right, bottom)], frame))
+    root.draw(&PathElement::new([at(left, top), at(left, bottom), at(right, bottom)], frame))?;
+    let x_label = format!("{}{}", chart.x.label, layout.x.suffix);
+    root.draw(&text(&x_label, (layout.left + layout.right) / 2, layout.bottom + ROW_PX + 6, HPos::Center, VPos::Top))?;
+    let y_label = format!("{}{}", chart.y.label, layout.y.suffix);
+    let style = TextStyle::from(("sans-serif", f64::from(TEXT_PX * FINE) * 1.24).into_font())
+        .transform(FontTransform::Rotate270)
+        .color(&INK)
+        .pos(Pos::new(HPos::Center, VPos::Top));
+    root.draw(&Text::new(y_label, (6 * FINE, (layout.top + layout.bottom) / 2 * FINE), style))
 }
 
 fn draw_band(chart: &Chart, layout: &Layout, root: &Area, band: &super::Band, lying: bool) -> Drawn {
@@ -289,18 +282,9 @@ fn draw_series(
                 root.draw(&PathElement::new(bar, hue.stroke_width(FINE as u32)))?;
             }
             let radius = if series.points.len() > 300 { 2 } else { 4 };
-            for (i, (x, y)) in series.points.iter().enumerate().filter_map(|(i, p)| place(p).map(|p| (i, p))) {
+            for (x, y) in series.points.iter().filter_map(place) {
                 any = true;
                 root.draw(&Circle::new(at(x, y), radius * FINE, hue.mix(0.85).filled()))?;
-                if let Some(label) = series.labels.get(i) {
-                    let wide = text_width_px(label);
-                    let fits = x as i32 + 7 + wide < layout.right;
-                    let (x, h) = if fits { (x as i32 + 7, HPos::Left) } else { (x as i32 - 7, HPos::Right) };
-                    // Below the point where there is no room above it.
-                    let above = y as i32 - 18 >= layout.top;
-                    let (y, v) = if above { (y as i32 - 3, VPos::Bottom) } else { (y as i32 + 5, VPos::Top) };
-                    root.draw(&text(label, x, y, h, v))?;
-                }
             }
         }
         Shape::Histogram => {
@@ -335,6 +319,22 @@ fn draw_series(
         }
     }
     Ok(any)
+}
+
+/// The words beside points.
+fn draw_labels(chart: &Chart, layout: &Layout, root: &Area) -> Drawn {
+    for (series, places) in chart.series.iter().zip(labels::places(chart, layout)) {
+        for ((word, point), place) in series.labels.iter().zip(&series.points).zip(places) {
+            let Some(place) = place else { continue };
+            if place.is_far {
+                let (x, y) = (layout.x_px(chart.x.position(point.0)), layout.y_px(chart.y.position(point.1), false));
+                let to = place.left + if place.left < x { f64::from(text_width_px(word)) } else { 0.0 };
+                root.draw(&PathElement::new([at(x, y), at(to, place.middle)], INK.mix(0.4).stroke_width(FINE as u32)))?;
+            }
+            root.draw(&text(word, place.left as i32, place.middle as i32, HPos::Left, VPos::Center))?;
+        }
+    }
+    Ok(())
 }
 
 /// Splits at the gaps.

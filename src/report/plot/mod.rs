@@ -20,7 +20,9 @@
 //! Numbers that are not finite (or, on a logarithmic axis, not positive) leave a gap.
 
 mod axis;
+mod data;
 mod draw;
+mod labels;
 mod layout;
 
 pub(super) use axis::three_digits;
@@ -29,7 +31,7 @@ pub(super) use draw::STYLE;
 pub use axis::Axis;
 
 /// What a series looks like.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum Shape {
     Line,
     Dashed,
@@ -267,7 +269,8 @@ impl Chart {
         draw::svg(self, false)
     }
 
-    /// The same with its axes and names beside it, from which a page's script reads values under the pointer.
+    /// The same with its data beside it, from which a page's script shows values under the pointer and draws it again, zoomed, on
+    /// another scale, or as differences.
     pub fn svg_to_read(&self) -> String {
         draw::svg(self, true)
     }
@@ -293,9 +296,8 @@ mod tests {
         let held = drawn.split("data-plot='").nth(1).and_then(|rest| rest.split('\'').next()).unwrap();
         let held: serde_json::Value = serde_json::from_str(held).unwrap();
         assert_eq!(held["series"][0]["name"], hostile);
-        assert_eq!(held["y"], serde_json::json!([0.0, 2.0, true]));
-        let colour = held["series"][0]["colour"].as_str().unwrap();
-        assert!(drawn.contains(&format!("stroke=\"{colour}\"")), "the script finds lines by their colour");
+        assert_eq!(held["y"], serde_json::json!({ "label": "y", "low": 0.0, "high": 2.0, "log": true, "floor": null }));
+        assert_eq!(held["series"][0]["y"], serde_json::json!([1, 100]));
         assert!(!chart.svg().contains("data-plot"));
     }
 
@@ -303,6 +305,13 @@ mod tests {
     fn a_line_of_a_million_points_stays_a_small_file() {
         let points = (0..1_000_000).map(|i| (f64::from(i), (f64::from(i) * 0.01).sin())).collect();
         assert!(Chart::new("").with(Series::line("x", points)).svg().len() < 200_000);
+    }
+
+    #[test]
+    fn errors_of_either_sign_stand_on_one_logarithmic_scale_by_their_size() {
+        let series = Series::line("x", vec![(0.0, -10.0), (1.0, 0.0), (2.0, 0.1)]);
+        let drawn = Chart::new("x").y(Axis::sizes("|y|", 0.01)).with(series).svg_to_read();
+        assert!(drawn.contains("\"floor\":0.01") && drawn.contains("\"y\":[-10,0,0.1]"), "{drawn}");
     }
 
     #[test]

@@ -8,10 +8,12 @@ const ROW: f64 = 17.0;
 const TOP: f64 = 58.0;
 /// Where the pack lies between the flanges.
 const PACK: [f64; 2] = [150.0, 410.0];
-const OF_HALF: [&str; 2] = ["#2f7fd6", "#d9730d"];
+/// In the order in which the reels are listed.
+const OF_REEL: [&str; 8] = ["#2f7fd6", "#d9730d", "#1a9850", "#9b5fc0", "#d64550", "#179aa2", "#a5744a", "#7d8590"];
 const INK: &str = "currentColor";
 
-pub(super) fn draw(page: &mut Expected, title: &str, segments: &[usize]) {
+/// `reels` are the names as listed, `of_layer` the place in that list of each layer's.
+pub(super) fn draw(page: &mut Expected, title: &str, segments: &[usize], reels: &[String], of_layer: &[usize]) {
     let count = segments.len();
     let height = TOP + ROW * count as f64 + 44.0;
     page.tags(&format!(
@@ -30,10 +32,13 @@ pub(super) fn draw(page: &mut Expected, title: &str, segments: &[usize]) {
         &format!("<text x=\"12\" y=\"20\" font-size=\"14\" font-weight=\"bold\" fill=\"{INK}\">"),
         title,
     );
-    for (i, name) in ["half A", "half B"].into_iter().enumerate() {
-        let x = PACK[0] + 80.0 * i as f64;
-        page.tags(&format!("<rect x=\"{x}\" y=\"31\" width=\"14\" height=\"11\" fill=\"{}\"></rect>", OF_HALF[i]));
-        page.element(None, "a heading", &word(x + 20.0, 41.0, 12.0, ""), name);
+    let apart = (80.0_f64).min((WIDTH - 24.0) / reels.len().max(1) as f64);
+    let colour = |reel: usize| OF_REEL[reel % OF_REEL.len()];
+    let of_layer = |layer: usize| colour(of_layer.get(layer).copied().unwrap_or(0));
+    for (i, name) in reels.iter().enumerate() {
+        let x = 12.0 + apart * i as f64;
+        page.tags(&format!("<rect x=\"{x}\" y=\"28\" width=\"14\" height=\"11\" fill=\"{}\"></rect>", colour(i)));
+        page.element(None, "a reel's name", &word(32.0 + apart * i as f64, 38.0, 12.0, ""), &format!("reel {name}"));
     }
     page.element(None, "a heading", &word(12.0, TOP - 6.0, 11.0, ""), "layer");
     page.element(None, "a heading", &word(WIDTH - 12.0, TOP - 6.0, 11.0, "end"), "segment");
@@ -48,7 +53,7 @@ pub(super) fn draw(page: &mut Expected, title: &str, segments: &[usize]) {
             y - ROW / 2.0 + 1.0,
             PACK[1] - PACK[0],
             ROW - 2.0,
-            OF_HALF[half]
+            of_layer(layer)
         ));
         let way = if outbound[layer] { 1.0 } else { -1.0 };
         let (from, to, barb) = (centre - 45.0 * way, centre + 45.0 * way, -7.0 * way);
@@ -70,7 +75,7 @@ pub(super) fn draw(page: &mut Expected, title: &str, segments: &[usize]) {
         let bulge = (8.0 + 5.0 * from.abs_diff(to) as f64).min(90.0) * 4.0 / 3.0 * side;
         let x = if outbound[from] { PACK[1] + 2.0 } else { PACK[0] - 2.0 };
         let at_middle = 2 * segment == count;
-        let stroke = if at_middle { INK } else { OF_HALF[usize::from(2 * segment > count)] };
+        let stroke = if at_middle { INK } else { of_layer(from) };
         page.tags(&format!(
             "<path d=\"M{x} {0}C{2} {0} {2} {1} {x} {1}\" fill=\"none\" stroke=\"{stroke}\" stroke-width=\"{3}\"></path>",
             middle(from),

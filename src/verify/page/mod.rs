@@ -215,21 +215,14 @@ impl Expected<'_> {
         self.asset("the style", &sha256);
         self.tags("</style></head><body><main>");
         self.element(None, "the title", "<h1>", &title);
+        self.element(None, "what is to be wound", "<p class=\"big\">", &summary(claim));
+        self.cross_section(claim, segments);
         self.facts(claim);
         self.element(None, "a heading", "<h2>", "Supply reels");
         self.reels(claim);
         self.start(claim);
         self.element(None, "a heading", "<h2>", "Steps");
         self.steps(claim);
-        self.element(None, "a heading", "<h2>", "Cross-section");
-        self.tags("<figure><div class=\"zoom\" tabindex=\"0\" role=\"button\" aria-label=\"enlarge this picture\">");
-        let title = format!("{}, {} layers", claim.pattern.as_deref().unwrap_or_default(), segments.len());
-        drawing::draw(self, &title, segments);
-        self.tags("</div>");
-        let caption =
-            "The pack from the spool outwards; numbers at the left count layers, at the right segments of the fibre.";
-        self.element(None, "a heading", "<figcaption>", caption);
-        self.tags("</figure>");
         self.element(None, "a heading", "<h2>", "Release");
         self.signatures();
         self.tags("<script type=\"application/json\" id=\"coilwright-data\">");
@@ -238,6 +231,18 @@ impl Expected<'_> {
         let sha256 = self.assets.script_sha256.clone();
         self.asset("the script", &sha256);
         self.tags("</script></body></html>");
+    }
+
+    fn cross_section(&mut self, claim: &Claim, segments: &[usize]) {
+        self.tags("<figure><div class=\"zoom\" tabindex=\"0\" role=\"group\" aria-label=\"picture\">");
+        let title = format!("{}, {} layers", claim.pattern.as_deref().unwrap_or_default(), segments.len());
+        let reels = listed_reels(claim);
+        let of_layer: Vec<usize> = claim.rows.iter().map(|row| reel_of(&reels, row)).collect();
+        drawing::draw(self, &title, segments, &reels, &of_layer);
+        self.tags("</div>");
+        let caption = "The pack from the spool outwards, coloured by reel; numbers at the left count layers, at the right segments of the fibre.";
+        self.element(None, "a heading", "<figcaption>", caption);
+        self.tags("</figure>");
     }
 
     fn facts(&mut self, claim: &Claim) {
@@ -267,9 +272,9 @@ impl Expected<'_> {
             ("word", "Prepare"),
             ("", "Loaded, measured"),
         ]);
-        for reel in claim.supply.iter().flatten() {
+        for (place, reel) in claim.supply.iter().flatten().enumerate() {
             self.tags("<tr><td class=\"word\">");
-            self.element(None, "a reel's name", "<b>", &reel.name);
+            self.element(None, "a reel's name", &format!("<b class=\"reel r{}\">", place % 8), &reel.name);
             self.text(None, "a reel's name", if reel.captive { " (captive)" } else { "" });
             self.tags("</td><td class=\"keep\">");
             self.element(None, "a reel's load", "<b>", &metres(reel.load_m.unwrap_or(reel.to_m - reel.from_m)));
@@ -328,23 +333,19 @@ impl Expected<'_> {
             ("", "Measured [m]"),
             ("", "✓"),
         ]);
+        let reels = listed_reels(claim);
         for (i, row) in claim.rows.iter().enumerate() {
-            self.step(i + 1, row);
+            self.step(i + 1, row, reel_of(&reels, row));
         }
         self.tags("</tbody></table></div>");
     }
 
-    fn step(&mut self, number: usize, row: &Row) {
+    fn step(&mut self, number: usize, row: &Row, reel: usize) {
         let here = Some(number);
         self.tags("<tr>");
         self.element(here, "layer", "<td>", &row.layer.to_string());
         self.tags("<td class=\"word\">");
-        self.element(
-            here,
-            "supply_reel",
-            if row.half == "A" { "<b class=\"a\">" } else { "<b class=\"b\">" },
-            &row.supply_reel,
-        );
+        self.element(here, "supply_reel", &format!("<b class=\"reel r{}\">", reel % 8), &row.supply_reel);
         self.text(here, "supply_reel", if row.reel_change == Some(true) { " (change)" } else { "" });
         self.tags("</td>");
         let limits = match (row.tension_min_n, row.tension_max_n) {
@@ -384,6 +385,25 @@ impl Expected<'_> {
 
 fn cell(element: &str, class: &str) -> String {
     if class.is_empty() { format!("<{element}>") } else { format!("<{element} class=\"{class}\">") }
+}
+
+fn listed_reels(claim: &Claim) -> Vec<String> {
+    claim.supply.iter().flatten().map(|reel| reel.name.clone()).collect()
+}
+
+fn reel_of(listed: &[String], row: &Row) -> usize {
+    listed.iter().position(|name| *name == row.supply_reel).unwrap_or(0)
+}
+
+/// What is to be wound, in a sentence.
+fn summary(claim: &Claim) -> String {
+    let layers = claim.segments.as_ref().map_or(0, Vec::len);
+    let reels = claim.supply.as_ref().map_or(0, Vec::len);
+    let (s, length) = (if reels == 1 { "" } else { "s" }, metres(claim.length_m.unwrap_or(0.0)));
+    format!(
+        "Wind {length} of fibre in {layers} layers as {} from {reels} reel{s}, from the spool outwards.",
+        claim.pattern.as_deref().unwrap_or_default()
+    )
 }
 
 fn metres(value_m: f64) -> String {

@@ -1,0 +1,96 @@
+//! Words beside points: where they go so that none lies on another, on a point, or outside the frame.
+
+use super::layout::{Layout, TEXT_PX, text_width_px};
+use super::{Chart, Shape};
+
+/// Free space between a point and its word [px].
+const GAP_PX: f64 = 7.0;
+/// Half the side of the square that a point takes [px].
+const POINT_PX: f64 = 5.0;
+/// A word that finds no place beside its point goes up or down by so many of its heights at most.
+const MOST_ROWS: i32 = 12;
+
+/// A box [px]: left, top, right, bottom.
+type Area = [f64; 4];
+
+/// Where a word stands [px]: left edge, middle; whether it is so far from its point that a line should lead to it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Place {
+    pub(super) left: f64,
+    pub(super) middle: f64,
+    pub(super) is_far: bool,
+}
+
+fn overlap(a: &Area, b: &Area) -> bool {
+    a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
+}
+
+/// For each series, for each of its points, where the word goes; none where there is no word or no point to see.
+pub(super) fn places(chart: &Chart, layout: &Layout) -> Vec<Vec<Option<Place>>> {
+    let at = |p: &(f64, f64)| {
+        (chart.x.admits(p.0) && chart.y.admits(p.1))
+            .then(|| (layout.x_px(chart.x.position(p.0)), layout.y_px(chart.y.position(p.1), false)))
+    };
+    let points = chart.series.iter().filter(|s| s.shape == Shape::Points).flat_map(|s| s.points.iter().filter_map(at));
+    let mut taken: Vec<Area> = points.map(|(x, y)| [x - POINT_PX, y - POINT_PX, x + POINT_PX, y + POINT_PX]).collect();
+    let frame = [layout.left, layout.top, layout.right, layout.bottom].map(f64::from);
+    let mut place = |x: f64, y: f64, word: &str| -> Place {
+        let (wide, high) = (f64::from(text_width_px(word)), f64::from(TEXT_PX) + 2.0);
+        let area = |left: f64, middle: f64| [left, middle - high / 2.0, left + wide, middle + high / 2.0];
+        let sides = [x + GAP_PX, x - GAP_PX - wide, x - wide / 2.0];
+        let near = [-0.6, 0.6, 0.0].into_iter().flat_map(|row| [(sides[0], row), (sides[1], row)]);
+        let over = [(sides[2], -1.2), (sides[2], 1.2)];
+        let far = (2..=MOST_ROWS).flat_map(|row| {
+            let row = f64::from(row) * 0.9;
+            [(sides[0], -row), (sides[0], row), (sides[1], -row), (sides[1], row)]
+        });
+        let fits = |of: &Area| {
+            of[0] >= frame[0]
+                && of[2] <= frame[2]
+                && of[1] >= frame[1]
+                && of[3] <= frame[3]
+                && !taken.iter().any(|other| overlap(of, other))
+        };
+        let all = near.chain(over).chain(far);
+        let found = all.map(|(left, row)| (left, y + row * high, row)).find(|(left, y, _)| fits(&area(*left, *y)));
+        let (left, middle, row) = found.unwrap_or((sides[0], y, 0.0));
+        taken.push(area(left, middle));
+        Place { left, middle, is_far: row.abs() > 1.3 }
+    };
+    let of = |series: &super::Series, place: &mut dyn FnMut(f64, f64, &str) -> Place| -> Vec<Option<Place>> {
+        let words = series.labels.iter().zip(&series.points);
+        words.map(|(word, point)| at(point).map(|(x, y)| place(x, y, word))).collect()
+    };
+    chart
+        .series
+        .iter()
+        .map(|series| if series.shape == Shape::Points { of(series, &mut place) } else { Vec::new() })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Axis, Series};
+    use super::*;
+
+    #[test]
+    fn words_of_points_that_lie_together_lie_apart_and_inside_the_frame() {
+        let names = ["qua", "oct", "hex", "captive-1", "captive-2", "zyl"];
+        let mut points = vec![(3.0, 4.3); 5];
+        points.push((3.02, 4.31));
+        let chart = Chart::new("x")
+            .x(Axis::linear("climb").reaching(0.0))
+            .y(Axis::log("rate"))
+            .with(Series::points("", points).labelled(names.map(str::to_owned).to_vec()));
+        let layout = Layout::new(&chart);
+        let found: Vec<Place> = places(&chart, &layout)[0].iter().map(|p| p.unwrap()).collect();
+        let area = |i: usize| {
+            let Place { left, middle, .. } = found[i];
+            [left, middle - 6.0, left + f64::from(text_width_px(names[i])), middle + 6.0]
+        };
+        for i in 0..names.len() {
+            assert!(area(i)[0] >= f64::from(layout.left) && area(i)[2] <= f64::from(layout.right), "{}", names[i]);
+            assert!((0..i).all(|j| !overlap(&area(i), &area(j))), "{}", names[i]);
+        }
+    }
+}
