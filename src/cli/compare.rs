@@ -6,8 +6,8 @@ use super::pattern_asked::pattern_asked;
 use super::records::{GrossErrors, RecordArguments};
 use super::screen::{Screen, held, table};
 use super::watching::Watching;
-use super::{CliError, Ending};
-use crate::io::json::comparison::{CompareJson, NoisePartsJson, PartJson};
+use super::{CliError, Ending, offered};
+use crate::io::json::comparison::{CompareJson, NoisePartsJson, PartJson, RecordComparisonJson};
 use crate::io::read::model_file::read_model;
 use crate::io::write::measurement_folder::check_free;
 use crate::task::compare::{Request, run as compare};
@@ -26,7 +26,7 @@ pub struct Arguments {
     #[arg(required = true)]
     records: Vec<PathBuf>,
     /// A winding's name or a pattern file; without it, the model's own
-    #[arg(long, short, value_name = "PATTERN")]
+    #[arg(long, short, value_name = "PATTERN", value_parser = offered::patterns(), hide_possible_values = true)]
     pattern: Option<String>,
     /// What to do with values that stand alone
     #[arg(long, value_enum, default_value_t = GrossErrors::Keep)]
@@ -65,9 +65,12 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
 }
 
 fn text(body: &CompareJson) -> String {
-    let mut text = format!("{} with {}: {}\n", body.model, body.pattern, body.verdict);
+    let lacks = |verdict: &str| {
+        if verdict == "missing" { "the model lacks something" } else { "the model lacks nothing that these show" }
+    };
+    let mut text = format!("{} with {}: {} — {}\n", body.model, body.pattern, body.verdict, lacks(&body.verdict));
     for record in &body.records {
-        text += &format!("\n{}: {} rows, {}\n", Line::of(&record.file), record.rows, record.verdict);
+        text += &format!("\n{}: {} rows, {}\n", Line::of(&record.file), record.rows, what_lacks(record));
         for finding in &record.findings {
             text += &format!("  {finding}\n");
         }
@@ -120,6 +123,26 @@ fn text(body: &CompareJson) -> String {
         );
     }
     text
+}
+
+/// What goes with less than this share of the residual is not named.
+const NAMED_CORRELATION: f64 = 0.3;
+
+/// Whether the model lacks something in a record, and what that goes with most.
+fn what_lacks(record: &RecordComparisonJson) -> String {
+    if record.verdict == "adequate" {
+        return "the model lacks nothing that they show".to_owned();
+    }
+    let named = record.correlations.iter().filter_map(|c| Some((c.with.as_str(), c.correlation?)));
+    let strongest = named.filter(|c| c.1.abs() >= NAMED_CORRELATION).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+    match strongest {
+        Some((with, correlation)) => {
+            format!(
+                "the model lacks something that goes with {with} (correlation {correlation:+.2}); `coilwright diagnose` finds what"
+            )
+        }
+        None => "the model lacks something; `coilwright diagnose` finds what".to_owned(),
+    }
 }
 
 fn part_row(part: &PartJson) -> Vec<String> {

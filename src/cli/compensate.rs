@@ -10,7 +10,7 @@ use super::pattern_asked::pattern_asked;
 use super::records::RecordArguments;
 use super::screen::{Screen, table};
 use super::watching::Watching;
-use super::{CliError, Ending};
+use super::{CliError, Ending, offered};
 use crate::compensate::{Compensator, Method};
 use crate::io::fault::Faults;
 use crate::io::files::{NewFile, write_atomically};
@@ -42,7 +42,7 @@ pub struct Arguments {
     #[arg(long, requires = "fit")]
     all_methods: bool,
     /// A winding's name or a pattern file; without it, the model's own
-    #[arg(long, short, value_name = "PATTERN")]
+    #[arg(long, short, value_name = "PATTERN", value_parser = offered::patterns(), hide_possible_values = true)]
     pattern: Option<String>,
     /// Writes the lines here instead of to stdout; with --all-methods the picture of all (SVG)
     #[arg(long, short, value_name = "FILE")]

@@ -6,7 +6,7 @@ use super::pattern_asked::pattern_asked;
 use super::records::RecordArguments;
 use super::screen::{Screen, held, table};
 use super::watching::Watching;
-use super::{CliError, Ending};
+use super::{CliError, Ending, offered};
 use crate::diagnose::Terms;
 use crate::io::files::write_atomically;
 use crate::io::json::diagnosis::{DiagnosisJson, FindingJson};
@@ -35,7 +35,7 @@ pub struct Arguments {
     #[arg(long, value_name = "RECORD")]
     holdout: Vec<PathBuf>,
     /// A winding's name or a pattern file; without it, the model's own
-    #[arg(long, short, value_name = "PATTERN")]
+    #[arg(long, short, value_name = "PATTERN", value_parser = offered::patterns(), hide_possible_values = true)]
     pattern: Option<String>,
     /// Ends with exit code 1 unless the model is adequate
     #[arg(long)]

@@ -1,7 +1,7 @@
 //! `effects`: the physics that a model file can add.
 
 use super::screen::Screen;
-use super::{CliError, Ending};
+use super::{CliError, Ending, offered};
 use crate::effect::{CATALOGUE, CHANNEL, CUSTOM};
 use crate::io::json::effects::{EffectJson, EffectsJson, ParameterJson};
 use crate::task::extend::unknown_effect;
@@ -11,7 +11,7 @@ use crate::task::extend::unknown_effect;
 #[command(after_help = "Examples:\n  coilwright effects\n  coilwright effects spool_mass surface_film --format json")]
 pub struct Arguments {
     /// Only these, by the name used in files; all of them without it
-    #[arg(value_name = "KIND")]
+    #[arg(value_name = "KIND", value_parser = offered::effects(), hide_possible_values = true)]
     kinds: Vec<String>,
 }
 

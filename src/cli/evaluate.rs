@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::pattern_asked::patterns_asked;
 use super::screen::{Screen, table};
 use super::watching::Watching;
-use super::{CliError, Ending};
+use super::{CliError, Ending, offered};
 use crate::io::files::write_atomically;
 use crate::io::read::model_file::read_design;
 use crate::io::read::profile_file::read_profile_file;
@@ -22,7 +22,7 @@ pub struct Arguments {
     model: PathBuf,
     /// A winding's name (zyl, sym, sym-text, dip, qua, oct, hex) or a pattern file; may be repeated. Without it: the
     /// model's own and all classics that fit
-    #[arg(long, short, value_name = "PATTERN")]
+    #[arg(long, short, value_name = "PATTERN", value_parser = offered::patterns(), hide_possible_values = true)]
     pattern: Vec<String>,
     /// A file with a [profiles] table, used instead of the model's
     #[arg(long, value_name = "FILE")]

@@ -4,12 +4,11 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use super::budget::parse_duration;
-use super::optimise::{parse_class, parse_objective};
 use super::pattern_asked::patterns_asked;
 use super::progress::StopFlag;
 use super::screen::Screen;
 use super::watching::Watching;
-use super::{CliError, Ending};
+use super::{CliError, Ending, offered};
 use crate::io::files::write_atomically;
 use crate::io::json::ExactJson;
 use crate::io::model::NamedPattern;
@@ -32,17 +31,17 @@ pub struct Arguments {
     /// The model file
     model: PathBuf,
     /// What can be wound: standard, captive:K or any; without it, the model's own
-    #[arg(long, value_name = "CLASS", value_parser = parse_class)]
+    #[arg(long, value_name = "CLASS", value_parser = offered::classes(), hide_possible_values = true)]
     windability: Option<WindabilityClass>,
     /// What is proved to be small: worst-rate, rms or guaranteed-rate; without it, the model's own
-    #[arg(long, value_name = "WHAT", value_parser = parse_objective)]
+    #[arg(long, value_name = "WHAT", value_parser = offered::objectives(), hide_possible_values = true)]
     objective: Option<Objective>,
     /// Gives up after this time, e.g. 30s or 5m, with the lower bound reached until then
     #[arg(long, value_name = "TIME", default_value = "60s", value_parser = parse_duration)]
     budget: Duration,
     /// A winding's name or a pattern file to begin with, besides the classics and what a short search finds; may be
     /// repeated
-    #[arg(long, short, value_name = "PATTERN")]
+    #[arg(long, short, value_name = "PATTERN", value_parser = offered::patterns(), hide_possible_values = true)]
     pattern: Vec<String>,
     /// Seed of the short search; without it, the model's own
     #[arg(long, value_name = "N")]

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::pattern_asked::patterns_asked;
 use super::screen::Screen;
-use super::{CliError, Ending};
+use super::{CliError, Ending, offered};
 use crate::io::read::model_file::read_model;
 use crate::task::explore_page::{EXPLORER_FILE, write};
 use crate::text::sink::Line;
@@ -18,7 +18,7 @@ pub struct Arguments {
     /// The model file
     model: PathBuf,
     /// Windings to begin with, the first of them shown: names such as qua, or pattern files; the model's own comes after them
-    #[arg(value_name = "PATTERN")]
+    #[arg(value_name = "PATTERN", value_parser = offered::patterns(), hide_possible_values = true)]
     patterns: Vec<String>,
     /// Where the page goes
     #[arg(long, short, value_name = "FILE", default_value = EXPLORER_FILE)]

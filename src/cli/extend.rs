@@ -6,7 +6,7 @@ use super::pattern_asked::pattern_asked;
 use super::records::RecordArguments;
 use super::screen::{Screen, table};
 use super::watching::Watching;
-use super::{CliError, Ending};
+use super::{CliError, Ending, offered};
 use crate::io::json::comparison::{PartJson, RecordComparisonJson};
 use crate::io::json::diagnosis::ExtendJson;
 use crate::io::json::proposals::ProposalExtendJson;
@@ -25,7 +25,7 @@ pub struct Arguments {
     /// The model file
     model: PathBuf,
     /// The effect's name in files, such as strain_mismatch or channel:supply_v; `custom` takes --formula
-    #[arg(long, value_name = "KIND", required_unless_present = "proposal")]
+    #[arg(long, value_name = "KIND", value_parser = offered::effects(), hide_possible_values = true, required_unless_present = "proposal")]
     effect: Option<String>,
     /// A diagnosis (JSON) whose listed effects and proposed terms are added, the latter as custom effects; with --fit they
     /// are fitted anew
@@ -47,7 +47,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME=VALUE", value_parser = named_value)]
     parameter: Vec<(String, f64)>,
     /// A winding's name or a pattern file; without it, the model's own
-    #[arg(long, short, value_name = "PATTERN")]
+    #[arg(long, short, value_name = "PATTERN", value_parser = offered::patterns(), hide_possible_values = true)]
     pattern: Option<String>,
     #[command(flatten)]
     reading: RecordArguments,

@@ -8,7 +8,7 @@ use super::pattern_asked::pattern_asked;
 use super::progress::StopFlag;
 use super::screen::{Screen, held};
 use super::watching::Watching;
-use super::{CliError, Ending};
+use super::{CliError, Ending, offered};
 use crate::io::json::improve::ImproveJson;
 use crate::io::read::model_file::read_model;
 use crate::task::improve::{Request, run as improve};
@@ -33,7 +33,7 @@ pub struct Arguments {
     #[arg(long, value_name = "RECORD")]
     holdout: Vec<PathBuf>,
     /// The winding that was measured: a winding's name or a pattern file; without it, the model's own
-    #[arg(long, short, value_name = "PATTERN")]
+    #[arg(long, short, value_name = "PATTERN", value_parser = offered::patterns(), hide_possible_values = true)]
     pattern: Option<String>,
     /// Everything goes into this folder
     #[arg(long, short, value_name = "DIR")]

@@ -17,6 +17,7 @@ mod improve;
 mod man;
 mod metrics;
 mod new;
+mod offered;
 mod optimise;
 mod pareto;
 mod pattern_asked;
@@ -218,7 +219,7 @@ pub fn run_with(words: impl IntoIterator<Item = impl Into<OsString>>) -> u8 {
         // A reader that has seen enough (`| head`) is no failure.
         Err(CliError::Stdout(error)) if error.kind() == std::io::ErrorKind::BrokenPipe => 0,
         Err(error) => {
-            eprintln!("{}", error.shown().as_str().trim_end());
+            screen::complain(&error.shown());
             2
         }
     }

@@ -9,7 +9,7 @@ use super::pattern_asked::pattern_asked;
 use super::progress::StopFlag;
 use super::screen::{Screen, held, table};
 use super::watch::Watch;
-use super::{CliError, Ending};
+use super::{CliError, Ending, offered};
 use crate::io::fault::Faults;
 use crate::io::files::read_text;
 use crate::io::json::diagnosis::DiagnosisJson;
@@ -57,7 +57,7 @@ pub struct Arguments {
     fresh: bool,
     /// Says whether the best pattern differs from a former one and what that costs under this model: a winding's name, a
     /// pattern file, or the folder of a search; without it, the pattern of --init
-    #[arg(long, value_name = "PATTERN")]
+    #[arg(long, value_name = "PATTERN", value_parser = offered::patterns(), hide_possible_values = true)]
     compare_with: Option<String>,
     /// Lets the worst admissible profiles of what is found join the searched ones until sampled and guaranteed worst rate
     /// agree; for the objectives worst-rate and worst-phase
@@ -85,11 +85,11 @@ pub struct SearchOptions {
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
     /// What can be wound: standard, captive:K or any; without it, the model's own
-    #[arg(long, value_name = "CLASS", value_parser = parse_class)]
+    #[arg(long, value_name = "CLASS", value_parser = offered::classes(), hide_possible_values = true)]
     pub windability: Option<WindabilityClass>,
     /// What is made small: worst-rate, worst-phase, rms, guaranteed-rate or p95 (the 95 % quantile of the worst rate over
     /// coils built with the model's [tolerance]); without it, the model's own
-    #[arg(long, value_name = "WHAT", value_parser = parse_objective)]
+    #[arg(long, value_name = "WHAT", value_parser = offered::objectives(), hide_possible_values = true)]
     pub objective: Option<Objective>,
     /// Ends after this time, e.g. 30s or 5m (the result then depends on the machine)
     #[arg(long, value_name = "TIME")]
@@ -113,7 +113,7 @@ pub struct SearchOptions {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub moves_per_restart: Option<u64>,
     /// The pattern to begin with: a winding's name or a pattern file
-    #[arg(long, value_name = "PATTERN")]
+    #[arg(long, value_name = "PATTERN", value_parser = offered::patterns(), hide_possible_values = true)]
     pub init: Option<String>,
 }
 
@@ -238,7 +238,7 @@ fn saved_state(
     }
     let found = read_checkpoint(folder, &request.fingerprint());
     if arguments.resume {
-        let state = found?;
+        let state = found.map_err(|faults| with_note(faults, &request.differences(folder)))?;
         screen.note(&match &state {
             Some(state) => format!("resuming after {} rounds", state.round),
             None => format!("nothing to resume in {}: beginning a new run", folder.display()),
@@ -259,6 +259,14 @@ fn saved_state(
         .into());
     }
     Ok(None)
+}
+
+/// What of the request is another one than the folder's.
+fn with_note(mut faults: Faults, differences: &[String]) -> Faults {
+    if let (Some(fault), false) = (faults.faults.first_mut(), differences.is_empty()) {
+        fault.note = Some(differences.join("; "));
+    }
+    faults
 }
 
 fn read_diagnosis(path: &Path) -> Result<DiagnosisJson, CliError> {

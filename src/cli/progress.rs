@@ -8,7 +8,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use clap::ValueEnum;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde::Serialize;
 
 use crate::text::sink::{JsonText, Line};
@@ -92,8 +92,25 @@ impl Drop for Progress {
     }
 }
 
-const BOUNDED: &str = "{prefix} {bar:30} {percent:>3} % {elapsed_precise} {per_sec} {msg}";
-const UNBOUNDED: &str = "{prefix} {spinner} {pos} {elapsed_precise} {per_sec} {msg}";
+const BOUNDED: &str = "{prefix} {bar:20} {percent:>3} % {elapsed}, {eta} to go {msg}";
+const UNBOUNDED: &str = "{prefix} {spinner} {elapsed} {rate} {msg}";
+
+/// Three digits and a thousands' letter: nobody reads more of a rate that flickers.
+fn rate_in_words(per_s: f64) -> String {
+    let (value, letter) = match per_s {
+        v if v >= 1e6 => (v / 1e6, " M"),
+        v if v >= 1e3 => (v / 1e3, " k"),
+        v => (v, ""),
+    };
+    let decimals = if value >= 100.0 {
+        0
+    } else if value >= 10.0 {
+        1
+    } else {
+        2
+    };
+    format!("{value:.decimals$}{letter}/s")
+}
 
 fn bar(task: &str, total: Option<u64>) -> ProgressBar {
     let bar = match total {
@@ -103,7 +120,11 @@ fn bar(task: &str, total: Option<u64>) -> ProgressBar {
     let template = if total.is_some() { BOUNDED } else { UNBOUNDED };
     bar.set_draw_target(ProgressDrawTarget::stderr_with_hz(8));
     // The templates are constants that a test parses.
-    bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    bar.set_style(style.with_key("rate", |state: &ProgressState, out: &mut dyn std::fmt::Write| {
+        // A bar that cannot be drawn is no reason to stop the work.
+        let _ = out.write_str(&rate_in_words(state.per_sec()));
+    }));
     bar.set_prefix(task.to_owned());
     bar.enable_steady_tick(Duration::from_millis(250));
     bar
@@ -144,6 +165,12 @@ impl StopFlag {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_rate_has_three_digits() {
+        let said = [0.5, 12.34, 987.6, 12_345.0, 1.5e6].map(rate_in_words);
+        assert_eq!(said, ["0.50/s", "12.3/s", "988/s", "12.3 k/s", "1.50 M/s"]);
+    }
 
     #[test]
     fn both_templates_of_the_bar_are_understood() {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::pattern_asked::pattern_asked;
 use super::screen::{Screen, held, table};
-use super::{CliError, Ending};
+use super::{CliError, Ending, offered};
 use crate::io::folder::Replacement;
 use crate::io::json::schedule::{ScheduleJson, crossover_words};
 use crate::io::read::model_file::read_design;
@@ -20,7 +20,7 @@ pub struct Arguments {
     /// The model file
     model: PathBuf,
     /// A winding's name or a pattern file; without it, the model's own
-    #[arg(long, short, value_name = "PATTERN")]
+    #[arg(long, short, value_name = "PATTERN", value_parser = offered::patterns(), hide_possible_values = true)]
     pattern: Option<String>,
     /// Writes the schedule (CSV, JSON), the traveller (HTML, CSV, JSON), the winder's program (G-code, CSV) and the
     /// cross-section (SVG) into this folder

@@ -1,6 +1,6 @@
 //! Where commands write: the answer to stdout, notes to stderr.
 
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
@@ -66,7 +66,14 @@ impl Screen {
     /// # Errors
     /// A stdout that cannot be written.
     pub fn write(&self, text: &str) -> Result<(), CliError> {
-        self.own(Block::of(text).as_str())
+        let has_colours = may_colour(&std::io::stdout());
+        let block = Block::of(text);
+        let lines = block.as_str().split_inclusive('\n').map(|line| match line.strip_prefix(HEAD) {
+            Some(head) if has_colours => format!("{BOLD}{}{PLAIN}\n", head.trim_end()),
+            Some(head) => head.to_owned(),
+            None => line.to_owned(),
+        });
+        self.own(&lines.collect::<String>())
     }
 
     /// Writes to stdout, as it is, what holds nothing from outside: scripts for a shell, manual pages.
@@ -99,16 +106,66 @@ pub fn held(folder: &Path, command: &str) -> Result<HeldFolder, CliError> {
     Ok(HeldFolder::take(folder, &format!("coilwright {command} (process {})", std::process::id()))?)
 }
 
-/// A plain table: first column to the left, the others to the right.
+/// Begins the head of a table until it is written: a character of private use, which no font and no keyboard has.
+const HEAD: char = '\u{f8ff}';
+const BOLD: &str = "\u{1b}[1m";
+const RED: &str = "\u{1b}[1;31m";
+const PLAIN: &str = "\u{1b}[0m";
+/// Lines of an error are not made shorter than this.
+const LEAST_WIDTH: usize = 24;
+
+/// Whether colours are wanted where `outlet` goes: on a terminal that has some, unless NO_COLOR says otherwise.
+fn may_colour(outlet: &impl IsTerminal) -> bool {
+    let is_set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    outlet.is_terminal() && !is_set("NO_COLOR") && std::env::var_os("TERM").is_none_or(|term| term != "dumb")
+}
+
+/// Writes an error to stderr; on a terminal its first word is coloured, and what is one line is broken between words.
+pub fn complain(words: &Block) {
+    let words = words.as_str().trim_end();
+    let width = Table::new().use_stderr().width().map(usize::from);
+    let shown = match width {
+        Some(width) if !words.contains('\n') => broken(words, width.max(LEAST_WIDTH)),
+        _ => words.to_owned(),
+    };
+    if may_colour(&std::io::stderr()) {
+        let coloured = |line: &str| match line.strip_prefix("error") {
+            Some(rest) => format!("{RED}error{PLAIN}{rest}"),
+            None => line.to_owned(),
+        };
+        eprintln!("{}", shown.lines().map(coloured).collect::<Vec<_>>().join("\n"));
+    } else {
+        eprintln!("{shown}");
+    }
+}
+
+/// The words in lines that are no longer than `width`, as far as words are not.
+fn broken(words: &str, width: usize) -> String {
+    let mut lines = vec![String::new()];
+    for word in words.split(' ') {
+        let last = lines.last_mut().expect("there is a first line");
+        if !last.is_empty() && last.chars().count() + 1 + word.chars().count() > width {
+            lines.push(word.to_owned());
+        } else {
+            if !last.is_empty() {
+                last.push(' ');
+            }
+            last.push_str(word);
+        }
+    }
+    lines.join("\n")
+}
+
+/// A plain table: first column to the left, the others to the right. In a window that is narrower, each row is a list.
 pub fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    // A cell's own line break would look like a row of its own.
+    let shown = |cell: &dyn std::fmt::Display| Line::of(cell).into_string();
+    let header: Vec<String> = header.iter().map(|cell| shown(cell)).collect();
+    let rows: Vec<Vec<String>> = rows.into_iter().map(|row| row.iter().map(|cell| shown(cell)).collect()).collect();
     let mut table = Table::new();
-    table
-        .load_style(presets::NOTHING)
-        .set_content_arrangement(ContentArrangement::Disabled)
-        .set_header(header.iter().map(|cell| Line::of(cell).into_string()));
-    for row in rows {
-        // A cell's own line break would look like a row of its own.
-        table.add_row(row.iter().map(|cell| Line::of(cell).into_string()));
+    table.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Disabled).set_header(header.clone());
+    for row in &rows {
+        table.add_row(row.clone());
     }
     for (i, column) in table.column_iter_mut().enumerate() {
         column.set_padding((0, 2));
@@ -116,5 +173,39 @@ pub fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> St
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
-    table.lines().map(|line| line.trim_end().to_owned() + "\n").collect()
+    let lines: Vec<String> = table.lines().map(|line| line.trim_end().to_owned() + "\n").collect();
+    let widest = lines.iter().map(|line| line.chars().count() - 1).max().unwrap_or(0);
+    if table.width().is_some_and(|width| usize::from(width) < widest) {
+        return as_lists(&header, &rows);
+    }
+    format!("{HEAD}{}", lines.concat())
+}
+
+/// The first cell of each row, and below it the others with the names of their columns.
+fn as_lists(header: &[String], rows: &[Vec<String>]) -> String {
+    let widest = header.iter().skip(1).map(|name| name.chars().count()).max().unwrap_or(0);
+    let list = |row: &Vec<String>| {
+        let cells = header.iter().zip(row).skip(1).map(|(name, cell)| format!("  {name:<widest$}  {cell}\n"));
+        format!("{HEAD}{}\n{}", row.first().map_or("", String::as_str), cells.collect::<String>())
+    };
+    rows.iter().map(list).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_in_a_narrow_window_is_a_list_of_its_cells() {
+        let words = |of: &[&str]| of.iter().map(|word| (*word).to_owned()).collect::<Vec<String>>();
+        let header = words(&["pattern", "worst °/h", "class"]);
+        let shown = as_lists(&header, &[words(&["qua", "4.3366", "standard"])]);
+        assert_eq!(shown, format!("{HEAD}qua\n  worst °/h  4.3366\n  class      standard\n"));
+    }
+
+    #[test]
+    fn an_error_is_broken_between_words_and_words_stay_whole() {
+        let said = broken("error: a/very/long/name/of/a/file cannot be read", 24);
+        assert_eq!(said, "error:\na/very/long/name/of/a/file\ncannot be read");
+    }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::pattern_asked::patterns_asked;
 use super::screen::{Screen, table};
 use super::watching::Watching;
-use super::{CliError, Ending};
+use super::{CliError, Ending, offered};
 use crate::io::json::tolerance::ToleranceJson;
 use crate::io::read::model_file::read_design;
 use crate::task::tolerance::{Request, run as study};
@@ -22,7 +22,7 @@ pub struct Arguments {
     model: PathBuf,
     /// A winding's name (zyl, sym, sym-text, dip, qua, oct, hex) or a pattern file; may be repeated. Without it: the
     /// model's own and all classics that fit
-    #[arg(long, short, value_name = "PATTERN")]
+    #[arg(long, short, value_name = "PATTERN", value_parser = offered::patterns(), hide_possible_values = true)]
     pattern: Vec<String>,
     /// Coils to draw; without it, the model's own number
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]

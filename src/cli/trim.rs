@@ -6,7 +6,7 @@ use super::pattern_asked::pattern_asked;
 use super::records::RecordArguments;
 use super::screen::Screen;
 use super::watching::Watching;
-use super::{CliError, Ending};
+use super::{CliError, Ending, offered};
 use crate::io::json::trim::TrimJson;
 use crate::io::read::model_file::read_model;
 use crate::task::trim::{Request, run as trim};
@@ -21,7 +21,7 @@ pub struct Arguments {
     #[arg(required = true)]
     records: Vec<PathBuf>,
     /// A winding's name or a pattern file; without it, the model's own
-    #[arg(long, short, value_name = "PATTERN")]
+    #[arg(long, short, value_name = "PATTERN", value_parser = offered::patterns(), hide_possible_values = true)]
     pattern: Option<String>,
     #[command(flatten)]
     reading: RecordArguments,

@@ -13,7 +13,7 @@ use crate::io::files::WriteError;
 use crate::io::write::checkpoint::write_checkpoint;
 use crate::io::write::run_directory::{Request, write_request};
 use crate::search::Observer;
-use crate::search::anneal::rounds::Rounds;
+use crate::search::anneal::rounds::{Plan, Rounds};
 use crate::search::proof;
 use crate::search::run::Halt;
 use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
@@ -91,9 +91,16 @@ impl<'a> Watch<'a> {
     }
 }
 
+/// How many moves a search judges at most, where its rules say; it may end before.
+fn expected_moves(plan: &Plan) -> Option<u64> {
+    let of_a_round = plan.moves_per_restart.saturating_mul(plan.restarts_per_round as u64);
+    let by_rounds = plan.rules.rounds.checked_mul(of_a_round);
+    plan.rules.moves.into_iter().chain(by_rounds).min()
+}
+
 impl Observer for Watch<'_> {
     fn begun(&mut self, search: &dyn Rounds) {
-        self.progress = Some(self.screen.progress("optimise", search.plan().rules.moves));
+        self.progress = Some(self.screen.progress("optimise", expected_moves(search.plan())));
         let written = self.checkpoints.as_ref().filter(|c| !c.is_taken_up).map(|c| {
             write_request(c.folder, c.request).and_then(|()| write_checkpoint(c.folder, &c.fingerprint, search.state()))
         });
@@ -110,7 +117,10 @@ impl Observer for Watch<'_> {
         });
         self.keep(written);
         let message = search.best().map_or_else(String::new, |best| {
-            format!("round {}, best {:.4} °/h", search.state().round + 1, deg_per_h_from_rad_per_s(best.cost))
+            let left = self.budget.map_or_else(String::new, |budget| {
+                format!(", ends in {} s at the latest", budget.saturating_sub(self.started.elapsed()).as_secs())
+            });
+            format!("round {}, best {:.4} °/h{left}", search.state().round + 1, deg_per_h_from_rad_per_s(best.cost))
         });
         if let Some(progress) = &self.progress {
             progress.at(search.evaluations(), &message);

@@ -14,6 +14,7 @@ mod conductivity_temperature;
 pub mod custom;
 mod declared;
 mod diffusivity;
+mod elsewhere;
 mod finite_pack;
 mod glass_transition;
 mod heating_cooling_asymmetry;
@@ -32,6 +33,7 @@ mod turn_mismatch;
 
 pub use crate::numeric::expression::Memory;
 pub use declared::{DeclaredEffect, DeclaredParameter, EffectError};
+pub use elsewhere::set_elsewhere;
 
 use crate::coil::Coil;
 use crate::numeric::expression::{Degree, EvaluationError};

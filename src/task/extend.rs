@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::compare::compare;
 use crate::diagnose::{self, Finding};
 use crate::effect::custom::{Formula, FormulaError};
-use crate::effect::{CATALOGUE, CHANNEL, CUSTOM, DeclaredEffect};
+use crate::effect::{CATALOGUE, CHANNEL, CUSTOM, DeclaredEffect, set_elsewhere};
 use crate::io::fault::{Fault, Faults};
 use crate::io::files::write_atomically;
 use crate::io::json::boundary::BoundaryJson;
@@ -152,7 +152,11 @@ pub fn effect_of(
 }
 
 /// The complaint about an effect that does not exist, with the nearest that does.
+/// As an error: where it is stated if it is known, else the effect that was probably meant.
 pub fn unknown_effect(stated: &str) -> TaskError {
+    if let Some(place) = set_elsewhere(stated) {
+        return TaskError::SetElsewhere { stated: stated.to_owned(), place };
+    }
     let nearest = CATALOGUE
         .iter()
         .copied()

@@ -125,6 +125,8 @@ pub enum TaskError {
     UnknownProfile { stated: String, known: String },
     #[error("there is no effect {stated}: did you mean {nearest}? `coilwright effects` lists all")]
     UnknownEffect { stated: String, nearest: &'static str },
+    #[error("{stated} is no effect: {place}")]
+    SetElsewhere { stated: String, place: &'static str },
     #[error("--effect custom needs --formula: give a formula in t, T, dT_dt, T_inner, mean rate or further columns")]
     FormulaMissing,
     #[error("{file}: the model's effects read {}, which the record lacks: add the columns or leave the effects out", .columns.join(", "))]

@@ -116,7 +116,7 @@ fn errors_of_a_formula_point_at_the_character() {
 fn effects_and_columns_that_are_not_there_are_refused() {
     let cases: [(&[&str], &str); 5] = [
         (&["--effect", "strain_mismach"], "did you mean strain_mismatch?"),
-        (&["--effect", "film"], "did you mean surface_film?"),
+        (&["--effect", "film"], "the effect surface_film puts one between air and coil"),
         (&["--effect", "custom"], "needs --formula"),
         (&["--effect", "channel:pressure_pa", "--fit", RECORD], "pressure_pa"),
         (&["--effect", "finite_pack", "--fit", "absent.csv"], "absent.csv"),

@@ -120,6 +120,73 @@ fn a_terminal_shows_colours_and_no_color_switches_them_off() {
 }
 
 #[test]
+fn a_table_in_a_narrow_terminal_is_a_list_and_its_heads_and_errors_are_coloured_unless_no_color_says_otherwise() {
+    let program = env!("CARGO_BIN_EXE_coilwright");
+    let seen = |columns: usize, request: &str, no_color: bool| {
+        let words = format!("stty cols {columns}; {program} {request}");
+        let mut command = Command::new("script");
+        command.current_dir(root()).args(["-qec", &words, "/dev/null"]).env("TERM", "xterm-256color");
+        command.env_remove("NO_COLOR").env_remove("CI").stdin(std::process::Stdio::null());
+        if no_color {
+            command.env("NO_COLOR", "1");
+        }
+        command.output().ok().map(|out| String::from_utf8_lossy(&out.stdout).replace('\r', ""))
+    };
+    let Some(wide) = seen(150, "patterns --layers 12", true).filter(|text| text.contains("qua")) else {
+        println!("skipped: script cannot run the program here");
+        return;
+    };
+    let narrow = seen(30, "patterns --layers 12", true).unwrap();
+    assert_eq!(wide, stdout(&run(&["patterns", "--layers", "12"])));
+    assert!(narrow.lines().count() > 3 * wide.lines().count() && narrow.lines().any(|line| line == "qua"), "{narrow}");
+    assert!(!narrow.contains('\u{1b}'));
+    assert!(seen(150, "patterns --layers 12", false).unwrap().starts_with("\u{1b}[1m"));
+    let error = seen(40, "evaluate examples/paper-200m.toml --pattern quo", false).unwrap();
+    assert!(error.contains("\u{1b}[1;31merror\u{1b}[0m"), "{error:?}");
+}
+
+#[test]
+fn completions_offer_the_values_of_patterns_objectives_and_effects() {
+    for shell in ["bash", "zsh", "fish"] {
+        let script = run(&["completions", shell]);
+        for value in ["guaranteed-rate", "captive:1", "surface_film", "sym-text"] {
+            assert!(stdout(&script).replace('\\', "").contains(value), "{shell} does not offer {value}");
+        }
+    }
+    // What is offered is not all that may be said.
+    assert!(!stdout(&run(&["evaluate", "--help"])).contains("possible values: zyl"));
+}
+
+#[test]
+fn arguments_that_changed_places_and_words_that_are_no_effects_are_answered_with_what_to_do() {
+    let record = "examples/chamber-day-1.csv";
+    let swapped = run(&["compare", record, COIL]);
+    assert!(
+        code(&swapped) == 2 && stderr(&swapped).contains("is a table of rows, no model file"),
+        "{}",
+        stderr(&swapped)
+    );
+    let model = run(&["metrics", COIL]);
+    assert!(code(&model) == 2 && stderr(&model).contains("is a model file, no record"), "{}", stderr(&model));
+    let film = run(&["effects", "film"]);
+    assert!(
+        code(&film) == 2 && stderr(&film).contains("film is no effect: the effect surface_film"),
+        "{}",
+        stderr(&film)
+    );
+}
+
+#[test]
+fn a_run_that_is_taken_up_with_other_options_names_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run").display().to_string();
+    let request = [&["optimise", COIL, "-q", "-o", &out][..], &SHORT].concat();
+    assert_eq!(code(&run(&[&request[..], &["--fresh"]].concat())), 0);
+    let other = run(&[&request[..], &["--resume", "--seed", "7"]].concat());
+    assert!(code(&other) == 2 && stderr(&other).contains("seed was 1 and is 7"), "{}", stderr(&other));
+}
+
+#[test]
 fn quiet_leaves_only_errors_on_stderr_and_verbose_adds_version_threads_and_time() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out").display().to_string();

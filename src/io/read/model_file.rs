@@ -42,13 +42,22 @@ pub fn read_design(path: &Path) -> Result<ModelFile, Faults> {
     read_model(path).map(ModelFile::for_search)
 }
 
+/// Whether the first line that is no comment is a row of several names, as in a CSV file.
+fn looks_like_a_record(source: &str) -> bool {
+    let first = source.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with('#'));
+    first.is_some_and(|line| line.contains([',', ';', '\t']) && !line.contains(['=', '[', '{']))
+}
+
 /// As [`read_model`], of a text that was read already; `path` places relative pattern files and names the source.
 ///
 /// # Errors
 /// All faults of the text at once.
 pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
     let file = path.display().to_string();
-    let document = parse(&file, source)?;
+    let document = parse(&file, source).map_err(|faults| match looks_like_a_record(source) {
+        true => Faults::of_file(&file, "is a table of rows, no model file: the model comes first, then the records"),
+        false => faults,
+    })?;
     let mut reader = TomlReader::new(&file, source);
     let r = &mut reader;
     let mut root = r.root(&document);

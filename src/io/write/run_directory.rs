@@ -84,6 +84,31 @@ impl Request<'_> {
     }
 }
 
+impl Request<'_> {
+    /// What differs between the request of the run that a folder holds and this one: each option with its old and its new value.
+    /// Empty where the folder does not say.
+    pub fn differences(&self, folder: &Path) -> Vec<String> {
+        let read = |name: &str| std::fs::read_to_string(folder.join(name)).ok();
+        let old = read("run.toml").and_then(|text| text.parse::<toml_edit::DocumentMut>().ok());
+        let Some(old) = old.as_ref().and_then(|document| document["search"].as_table()) else { return Vec::new() };
+        let new = self.settings();
+        let shown = |table: &toml_edit::Table, key: &str| {
+            table.get(key).map_or_else(|| "not set".to_owned(), |item| item.to_string().trim().to_owned())
+        };
+        let keys =
+            old.iter().chain(new.iter().filter(|(key, _)| !old.contains_key(key))).map(|(key, _)| key.to_owned());
+        let mut found: Vec<String> = keys
+            .map(|key| (shown(old, &key), shown(&new, &key), key))
+            .filter(|(then, now, _)| then != now)
+            .map(|(then, now, key)| format!("{key} was {then} and is {now}"))
+            .collect();
+        if read("model.toml").is_some_and(|source| source != self.file.source) {
+            found.push("the model file is another one than the folder's model.toml".to_owned());
+        }
+        found
+    }
+}
+
 /// Writes what is known when a run begins, and takes away what another run left; its checkpoint comes after it.
 ///
 /// # Errors
