@@ -132,15 +132,15 @@ fn a_table_in_a_narrow_terminal_is_a_list_and_its_heads_and_errors_are_coloured_
         }
         command.output().ok().map(|out| String::from_utf8_lossy(&out.stdout).replace('\r', ""))
     };
-    let Some(wide) = seen(150, "patterns --layers 12", true).filter(|text| text.contains("qua")) else {
+    let Some(wide) = seen(150, "patterns --layers 12 -q", true).filter(|text| text.contains("qua")) else {
         println!("skipped: script cannot run the program here");
         return;
     };
-    let narrow = seen(30, "patterns --layers 12", true).unwrap();
+    let narrow = seen(30, "patterns --layers 12 -q", true).unwrap();
     assert_eq!(wide, stdout(&run(&["patterns", "--layers", "12"])));
     assert!(narrow.lines().count() > 3 * wide.lines().count() && narrow.lines().any(|line| line == "qua"), "{narrow}");
     assert!(!narrow.contains('\u{1b}'));
-    assert!(seen(150, "patterns --layers 12", false).unwrap().starts_with("\u{1b}[1m"));
+    assert!(seen(150, "patterns --layers 12 -q", false).unwrap().starts_with("\u{1b}[1m"));
     let error = seen(40, "evaluate examples/paper-200m.toml --pattern quo", false).unwrap();
     assert!(error.contains("\u{1b}[1;31merror\u{1b}[0m"), "{error:?}");
 }

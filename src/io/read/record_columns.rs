@@ -207,6 +207,23 @@ pub fn read_header(
     format: &RecordFormat,
     division: Division,
 ) -> Result<Vec<Column>, Vec<(String, Option<String>)>> {
+    columns_of(fields, format, division)
+        .map_err(|faults| if is_toml(fields) { vec![(MODEL_GIVEN.to_owned(), None)] } else { faults })
+}
+
+const MODEL_GIVEN: &str = "this is a model file, no record: the model comes first, then the records (CSV)";
+
+/// Whether what stands in a header's place begins a TOML file: a table, or a key with its value.
+fn is_toml(fields: &[&str]) -> bool {
+    let first = fields.first().map_or("", |field| field.trim());
+    first.starts_with('[') || first.split_once('=').is_some_and(|(key, value)| !key.is_empty() && !value.is_empty())
+}
+
+fn columns_of(
+    fields: &[&str],
+    format: &RecordFormat,
+    division: Division,
+) -> Result<Vec<Column>, Vec<(String, Option<String>)>> {
     let mut faults = Vec::new();
     let mut columns: Vec<Column> = Vec::with_capacity(fields.len());
     for field in fields {

@@ -63,15 +63,6 @@ pub fn parse_record(file: &str, source: &str) -> Result<Record, Faults> {
     Ok(parse_record_as(file, source, &RecordFormat::default())?.record)
 }
 
-/// A table that every model file has and no CSV file.
-const TABLE_OF_MODELS: &str = "[fibre]";
-/// It stands no further down than this.
-const HEAD_LINES: usize = 400;
-
-fn is_a_model(source: &str) -> bool {
-    source.lines().take(HEAD_LINES).any(|line| line.trim_end().starts_with(TABLE_OF_MODELS))
-}
-
 struct Reading<'s> {
     file: &'s str,
     source: &'s str,
@@ -95,10 +86,6 @@ impl<'s> Reading<'s> {
     }
 
     fn record(mut self) -> Result<ReadRecord, Faults> {
-        if is_a_model(self.source) {
-            self.fault(Fault::new("is a model file, no record: the model comes first, then the records (CSV)", None));
-            return self.end(None, "");
-        }
         let mut rows = CsvRows::new(self.source.as_bytes());
         // A text in memory does not fail.
         let Ok(Some((piece, division))) = rows.header(|_| {}) else {

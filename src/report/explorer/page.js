@@ -295,7 +295,7 @@ function showTable() {
     });
     line.append(element("td", { textContent: String(row.judged.pattern.windability.captive) }));
     const last = element("td", {});
-    if (!row.now) last.append(element("button", { type: "button", textContent: "take", ariaLabel: `go on from ${row.name}`, onclick: () => set(row.segments, row.name) }));
+    if (!row.now) last.append(element("button", { type: "button", textContent: "take", ariaLabel: `take ${row.name}`, onclick: () => set(row.segments, row.name) }));
     line.append(last);
     return line;
   }));
