@@ -23,6 +23,7 @@
 
 use pulp::{Arch, NullaryFnOnce};
 
+pub(super) use super::row::{Move, Row};
 use super::sparse::{Sparse, Square};
 
 /// Thermometers that a record may have: the sensor, one at the bore, one in the air.
@@ -64,39 +65,6 @@ pub(super) struct System {
     pub kept: Sparse,
     pub mean: Vec<f64>,
     pub covariance: Vec<f64>,
-}
-
-/// What happens between two rows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Move {
-    /// One of [`System::steps`] passes.
-    Step(u16),
-    /// A window begins, which this slot remembers.
-    Keep(u8),
-    /// The air's slope has its kink here, and not where the row's steps begin.
-    Kink,
-}
-
-/// What happens up to and at one row of a record.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Row {
-    /// From the row before to this one.
-    pub moves: Vec<Move>,
-    /// Of how much the readings bend here: 0 at rest to 1.
-    pub bend: f64,
-    /// Variance of a kink of the air's slope where this row's steps begin, or at [`Move::Kink`] [K²/s²].
-    pub kink: f64,
-    /// Rows of [`System::rows`] to measure with; None where there is no value.
-    pub measured: [Option<u16>; MEASURED],
-    /// Values that were averaged into this one: variances are divided by it.
-    pub averaged: f64,
-}
-
-impl Row {
-    /// Whether its kink is between its steps, not where they begin.
-    pub fn is_kinked_within(&self) -> bool {
-        self.kink > 0.0 && self.moves.contains(&Move::Kink)
-    }
 }
 
 /// The values of a record's rows, known inputs already taken off.

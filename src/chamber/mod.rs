@@ -47,6 +47,7 @@ mod parameter;
 mod point;
 pub mod prior;
 mod readings;
+mod row;
 mod score;
 mod scorer;
 mod series;

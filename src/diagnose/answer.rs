@@ -31,6 +31,21 @@ impl<'e> Settled<'e> {
     }
 }
 
+/// The chamber with every record's kinks at the times that the likeliest set has them at: what is said of predictions needs
+/// them sharper than the search does.
+pub(super) fn with_timed_kinks<'a>(question: &Question<'a>, found: &Found) -> Result<Chamber<'a>, DiagnoseError> {
+    let mut timed = question.chamber.clone();
+    let Some(best) = found.explanations.first() else { return Ok(timed) };
+    for &record in &question.fitted {
+        timed.time_kinks(&best.fit, record)?;
+    }
+    for &record in &question.held_out {
+        let day = question.chamber.held_out(&best.fit, record)?;
+        timed.time_kinks(&day, record)?;
+    }
+    Ok(timed)
+}
+
 /// The whole answer.
 ///
 /// # Errors

@@ -292,7 +292,7 @@ pub enum DiagnoseError {
     #[error("a diagnosis needs at least one record")]
     NoRecord,
     #[error("{record}: {source}")]
-    Record { record: String, source: PredictError },
+    Record { record: String, source: Box<PredictError> },
     #[error(transparent)]
     Coil(#[from] CoilError),
     #[error(transparent)]
@@ -430,7 +430,7 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
     };
     let chamber = question.chamber;
     progress(0.6);
-    let timed = with_timed_kinks(&question, &found)?;
+    let timed = answer::with_timed_kinks(&question, &found)?;
     let mut diagnosis = answer::answer(&Question { chamber: &timed, ..question.clone() }, &found, &records)?;
     beyond(request, &question, &timed, &found, &mut diagnosis, &|share| progress(0.6 + 0.2 * share))?;
     // Where what is to be fitted shows nothing, the other records may; the former then confirm it.
@@ -441,7 +441,7 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
         let day = chamber.fit(&declared.fit.assumed, &[], &other.fitted, Some(&declared.fit), Effort::FULL)?;
         if joint::promise(&other, &day)? > PROMISING {
             let found = joint::search(&other, day, &|share| progress(0.8 + 0.2 * share))?;
-            let timed = with_timed_kinks(&other, &found)?;
+            let timed = answer::with_timed_kinks(&other, &found)?;
             let mut elsewhere = answer::answer(&Question { chamber: &timed, ..other.clone() }, &found, &records)?;
             beyond(request, &other, &timed, &found, &mut elsewhere, &|_| ())?;
             if elsewhere.verdict != Verdict::Adequate {
@@ -452,21 +452,6 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
     }
     progress(1.0);
     Ok(diagnosis)
-}
-
-/// The chamber with every record's kinks at the times that the likeliest set has them at: what is said of predictions needs
-/// them sharper than the search does.
-fn with_timed_kinks<'a>(question: &Question<'a>, found: &joint::Found) -> Result<Chamber<'a>, DiagnoseError> {
-    let mut timed = question.chamber.clone();
-    let Some(best) = found.explanations.first() else { return Ok(timed) };
-    for &record in &question.fitted {
-        timed.time_kinks(&best.fit, record)?;
-    }
-    for &record in &question.held_out {
-        let day = question.chamber.held_out(&best.fit, record)?;
-        timed.time_kinks(&day, record)?;
-    }
-    Ok(timed)
 }
 
 /// Formulas for what no listed effect explains; what they leave of records is said by the `timed` chamber.

@@ -20,8 +20,9 @@
 
 use super::{DiagnoseError, Finding, Request, extend};
 use crate::effect::{DeclaredEffect, OFFSET_OF_MIDDLE};
-use crate::predict::{estimate_boundary, predict_from};
+use crate::predict::{PredictError, estimate_boundary, predict_from};
 use crate::rate::CoilModel;
+use crate::record::Record;
 
 /// Which end of the fibre.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,6 +49,10 @@ pub struct Trim {
     pub uncertain_rad_per_s: Option<f64>,
 }
 
+fn in_record(record: &Record, error: PredictError) -> DiagnoseError {
+    DiagnoseError::Record { record: record.name().to_owned(), source: Box::new(error) }
+}
+
 /// Fits the surplus fibre to the records; what its temperature follows is what fits better.
 ///
 /// # Errors
@@ -61,14 +66,14 @@ pub fn trim(request: &Request) -> Result<Trim, DiagnoseError> {
     let mut driven = Vec::new();
     for record in request.records {
         let boundary = estimate_boundary(&extension.extended, request.pattern, record)
-            .map_err(|source| DiagnoseError::Record { record: record.name().to_owned(), source })?;
+            .map_err(|error| in_record(record, error))?;
         driven.push((record, boundary));
     }
     let rates_of = |model: &CoilModel| -> Result<Vec<f64>, DiagnoseError> {
         let mut rates = Vec::new();
         for (record, boundary) in &driven {
-            let found = predict_from(model, request.pattern, record, boundary)
-                .map_err(|source| DiagnoseError::Record { record: record.name().to_owned(), source })?;
+            let found =
+                predict_from(model, request.pattern, record, boundary).map_err(|error| in_record(record, error))?;
             let offset = found.offset_rad_per_s;
             rates.extend(found.rate_rad_per_s.iter().map(|rate| rate - offset));
         }

@@ -88,7 +88,7 @@ function makeChart(figure, svg) {
   function axes() {
     const shown = visible(), floorOf = (lists) => {
       const tops = lists.map((list) => Math.max(...list.map(Math.abs))).filter((t) => t > 0);
-      return lists.some((list) => list.some((v) => v <= 0)) ? Math.min(...tops, Infinity) / SHOWN_BELOW : 0;
+      return lists.some((list) => list.some((v) => v <= 0)) ? Math.min(...tops, Number.MAX_VALUE) / SHOWN_BELOW : 0;
     };
     const axis = (name, lists) => {
       const own = plot[name], log = name === scaled ? state.log : own.log;
@@ -104,7 +104,7 @@ function makeChart(figure, svg) {
     const xs = shown.map((s) => s.x), ys = shown.map((s) => lying ? [] : values(s));
     const x = axis("x", xs), y = axis("y", ys);
     const ends = (a, lists, margin) => {
-      let low = Infinity, high = -Infinity;
+      let low = Number.MAX_VALUE, high = -Number.MAX_VALUE;
       for (const v of lists.flat()) { const p = a.place(v); if (p !== null && Number.isFinite(p)) { low = Math.min(low, p); high = Math.max(high, p); } }
       if (low > high) [low, high] = [0, 1];
       if (high - low < 1e-12 * Math.max(Math.abs(low), Math.abs(high), 1e-12)) [low, high] = [low - 0.5, high + 0.5];

@@ -88,9 +88,9 @@ mod tests {
             let Place { left, middle, .. } = found[i];
             [left, middle - 6.0, left + f64::from(text_width_px(names[i])), middle + 6.0]
         };
-        for i in 0..names.len() {
-            assert!(area(i)[0] >= f64::from(layout.left) && area(i)[2] <= f64::from(layout.right), "{}", names[i]);
-            assert!((0..i).all(|j| !overlap(&area(i), &area(j))), "{}", names[i]);
+        for (i, name) in names.iter().enumerate() {
+            assert!(area(i)[0] >= f64::from(layout.left) && area(i)[2] <= f64::from(layout.right), "{name}");
+            assert!((0..i).all(|j| !overlap(&area(i), &area(j))), "{name}");
         }
     }
 }

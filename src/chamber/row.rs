@@ -1,0 +1,36 @@
+//! What happens up to and at one row of a record.
+
+use super::filter::MEASURED;
+
+/// What happens between two rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Move {
+    /// One of [`super::filter::System::steps`] passes.
+    Step(u16),
+    /// A window begins, which this slot remembers.
+    Keep(u8),
+    /// The air's slope has its kink here, and not where the row's steps begin.
+    Kink,
+}
+
+/// What happens up to and at one row of a record.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Row {
+    /// From the row before to this one.
+    pub moves: Vec<Move>,
+    /// Of how much the readings bend here: 0 at rest to 1.
+    pub bend: f64,
+    /// Variance of a kink of the air's slope where this row's steps begin, or at [`Move::Kink`] [K²/s²].
+    pub kink: f64,
+    /// Rows of [`super::filter::System::rows`] to measure with; None where there is no value.
+    pub measured: [Option<u16>; MEASURED],
+    /// Values that were averaged into this one: variances are divided by it.
+    pub averaged: f64,
+}
+
+impl Row {
+    /// Whether its kink is between its steps, not where they begin.
+    pub fn is_kinked_within(&self) -> bool {
+        self.kink > 0.0 && self.moves.contains(&Move::Kink)
+    }
+}
