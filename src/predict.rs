@@ -16,7 +16,7 @@ use std::ops::Range;
 
 use thiserror::Error;
 
-use crate::chamber::{Assumption, Bend, Chamber, ChamberError, Effort, Fit, Place, Quantity, Told};
+use crate::chamber::{Assumption, Bend, Chamber, ChamberError, Effort, Fit, MOST_ROWS_FITTED, Place, Quantity, Told};
 use crate::coil::CoilError;
 use crate::numeric::noise::{WhiteNoise, white_noise};
 use crate::pattern::Pattern;
@@ -97,8 +97,6 @@ pub enum PredictError {
 
 /// Fewer readings than this hold no ramp.
 const LEAST_READINGS: usize = 16;
-/// Numbers of a chamber are fitted to at most so many of its rows: a day of half-minute rows, more than they need.
-const MOST_ROWS_FITTED: usize = 4000;
 /// Rows that are worked out at a time.
 const ROWS_AT_A_TIME: usize = 4096;
 
@@ -120,7 +118,7 @@ pub fn read<'a>(model: &CoilModel, pattern: &Pattern, record: &'a Record) -> Res
     if record.rows() < LEAST_READINGS {
         return Err(PredictError::TooFew { needed: LEAST_READINGS, found: record.rows() });
     }
-    let mut chamber = whole(model, record)?;
+    let mut chamber = Chamber::of_any(model, &[record])?;
     let rows = chamber.busiest(0, MOST_ROWS_FITTED);
     let fit;
     if rows == (0..record.rows()) || chamber.times_s(0).len() <= MOST_ROWS_FITTED {
@@ -128,7 +126,7 @@ pub fn read<'a>(model: &CoilModel, pattern: &Pattern, record: &'a Record) -> Res
         (chamber, fit) = chamber.settled_in_time(&assumed)?;
     } else {
         let stretch = record.stretch(rows)?;
-        let part = whole(model, &stretch)?;
+        let part = Chamber::of_any(model, &[&stretch])?;
         let assumed = assumed(model, pattern, &part);
         let (part, found) = part.settled_in_time(&assumed)?;
         fit = chamber.adopt(&part, &found)?;
@@ -149,14 +147,6 @@ pub fn read<'a>(model: &CoilModel, pattern: &Pattern, record: &'a Record) -> Res
     let course = Course { layers: course.layers, columns, times_s, values, slopes_per_s: slopes_k_per_s };
     let boundary = Boundary { film_w_per_m2_k, bends, course, rate_variance_rad2_per_s2 };
     Ok(Read { chamber, fit, boundary })
-}
-
-/// All of a record. Rates without noise are those of a simulation: what they weigh beside readings cannot be told.
-fn whole<'a>(model: &CoilModel, record: &'a Record) -> Result<Chamber<'a>, ChamberError> {
-    match Chamber::new(model, &[record]) {
-        Err(ChamberError::NoNoise { .. }) => Chamber::of_readings(model, &[record]),
-        chamber => chamber,
-    }
 }
 
 /// What the model lacks is left to a wander, so that the air does not make up for it.

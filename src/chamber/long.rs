@@ -6,6 +6,8 @@ use super::fit::Fit;
 use super::settle::GROSS_ROUNDS;
 use super::{Chamber, ChamberError};
 
+/// Numbers of a chamber are fitted to at most so many of its rows: a day of half-minute rows, more than they need.
+pub const MOST_ROWS_FITTED: usize = 4000;
 /// A change of temperature is told from noise over so many rows.
 const APART: usize = 50;
 /// Stretches that are compared overlap by all but this share of their length.

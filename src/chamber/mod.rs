@@ -76,6 +76,7 @@ pub use foreseen::Hold;
 pub use kinks::Bend;
 pub use known::Reference;
 pub use learned::{Estimate, Learned};
+pub use long::MOST_ROWS_FITTED;
 pub use noise::{Noise, Remedy};
 pub use parameter::{Free, Parameter, Place, Scale};
 pub use prior::{BREAK_K2_PER_S2, BREAKS_PER_S, PRIORS, Prior, Quantity};

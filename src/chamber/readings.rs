@@ -36,11 +36,20 @@ pub struct Told {
 }
 
 impl<'a> Chamber<'a> {
-    /// A chamber whose fits do not see the rates: those of a simulation, which have no noise.
+    /// As [`Chamber::new`]; fits do not see rates without noise. Those are a simulation's: what they weigh beside readings cannot
+    /// be told.
     ///
     /// # Errors
-    /// As [`Chamber::new`], but that rates may be without noise.
-    pub fn of_readings(model: &CoilModel, records: &[&'a Record]) -> Result<Self, ChamberError> {
+    /// A model that cannot be solved; records whose temperature does not change.
+    pub fn of_any(model: &CoilModel, records: &[&'a Record]) -> Result<Self, ChamberError> {
+        match Self::new(model, records) {
+            Err(ChamberError::NoNoise { .. }) => Self::of_readings(model, records),
+            chamber => chamber,
+        }
+    }
+
+    /// A chamber whose fits do not see the rates.
+    fn of_readings(model: &CoilModel, records: &[&'a Record]) -> Result<Self, ChamberError> {
         let mut chamber = Self::made(model, records, Origin::Measured)?;
         for observed in &mut chamber.observed {
             observed.blind = true;

@@ -16,7 +16,7 @@ pub mod stream;
 
 use thiserror::Error;
 
-use crate::chamber::{self, Assumption, Chamber, ChamberError, Surroundings};
+use crate::chamber::{self, Assumption, Chamber, ChamberError, MOST_ROWS_FITTED, Surroundings};
 use crate::coil::CoilError;
 use crate::pattern::Pattern;
 use crate::predict::PredictError;
@@ -90,8 +90,6 @@ pub enum CompensateError {
 
 /// Fewer rows than this hold no ramp.
 const LEAST_ROWS: usize = 16;
-/// Surroundings are fitted to at most so many rows of the chamber: a day of half-minute rows, more than they need.
-const MOST_ROWS_FITTED: usize = 4000;
 
 /// What readings and rates of a record say of chamber, film and sensor; of a long one, those of the stretch that moves most.
 fn surroundings(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<Surroundings, CompensateError> {
@@ -99,14 +97,9 @@ fn surroundings(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result
         return Err(CompensateError::TooFew { needed: LEAST_ROWS, found: record.rows() });
     }
     let assumed = Assumption::new(model.clone(), pattern.clone());
-    let busiest = Chamber::of_readings(model, &[record])?.busiest(0, MOST_ROWS_FITTED);
+    let busiest = Chamber::of_any(model, &[record])?.busiest(0, MOST_ROWS_FITTED);
     let stretch = record.stretch(busiest)?;
-    // Rates without noise are those of a simulation: what they weigh beside readings cannot be told.
-    let chamber = match Chamber::new(model, &[&stretch]) {
-        Err(ChamberError::NoNoise { .. }) => Chamber::of_readings(model, &[&stretch])?,
-        chamber => chamber?,
-    };
-    let (chamber, fit) = chamber.settled(&assumed, &[0])?;
+    let (chamber, fit) = Chamber::of_any(model, &[&stretch])?.settled(&assumed, &[0])?;
     Ok(chamber.surroundings(&fit, 0))
 }
 
