@@ -29,6 +29,18 @@ impl Effort {
     pub const QUICK: Self = Self { iterations: 10, tolerance: 0.7, rounds: 1 };
     /// Enough to rank starts.
     pub const SHORT: Self = Self { iterations: 3, tolerance: 3.0, rounds: 1 };
+    /// Whether what is fitted so far is only compared.
+    fn is_for_ranking(self) -> bool {
+        self.tolerance > Self::QUICK.tolerance
+    }
+}
+
+/// Which courses are smoothed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Wanted {
+    /// Those that the model is linear about.
+    WhereNeeded,
+    Everywhere,
 }
 
 /// A model fitted to records.
@@ -49,6 +61,8 @@ pub struct Fit {
     pub evidence: f64,
     /// Information of data and prior.
     pub(super) information: DMatrix<f64>,
+    /// Whether it was taken as far as [`Effort::FULL`] asks.
+    pub(super) is_full: bool,
     /// Of every record of the chamber.
     pub(super) numbers: Vec<Numbers>,
     /// The smoothed course of every fitted record; None elsewhere.
@@ -85,30 +99,38 @@ impl Chamber<'_> {
         let mut courses = from.map_or_else(|| vec![None; self.records()], |f| f.courses.clone());
         courses.resize(self.records(), None);
         let parameters = self.parameters(assumed, free, records)?;
-        self.settle_courses(assumed, &numbers, records, &mut courses)?;
+        self.settle_courses(assumed, &numbers, records, &mut courses, Wanted::WhereNeeded)?;
         let mut state = self.scored(assumed, &parameters, &numbers, records, &courses, effort)?;
         let curved = records.iter().any(|&r| state.place.sides[r].as_ref().is_some_and(CoilSide::needs_reference));
         for _ in 1..if curved { effort.rounds.max(1) } else { 1 } {
             let (assumed, numbers) = (state.place.assumed.clone(), state.place.numbers.clone());
-            self.settle_courses(&assumed, &numbers, records, &mut courses)?;
+            self.settle_courses(&assumed, &numbers, records, &mut courses, Wanted::WhereNeeded)?;
             state = self.scored(&assumed, &parameters, &numbers, records, &courses, effort)?;
         }
         let (assumed, numbers) = (state.place.assumed.clone(), state.place.numbers.clone());
         let (coordinates, log_likelihood, information) = (state.coordinates, state.log_likelihood, state.information);
-        self.settle_courses(&assumed, &numbers, records, &mut courses)?;
-        Ok(finished(assumed, free, records, parameters, coordinates, log_likelihood, information, numbers, courses))
+        let wanted = if effort.is_for_ranking() { Wanted::WhereNeeded } else { Wanted::Everywhere };
+        self.settle_courses(&assumed, &numbers, records, &mut courses, wanted)?;
+        let is_full = effort == Effort::FULL;
+        let fit =
+            finished(assumed, free, records, parameters, coordinates, log_likelihood, information, numbers, courses);
+        Ok(Fit { is_full, ..fit })
     }
 
-    /// Numbers for all records: those that were not fitted take the first fitted one's, each relative to its own noise.
+    /// Numbers for all records: those that were not fitted take the first fitted one's, their air as it was found to be where
+    /// it was looked at, because an ascent from another day's air is long.
     fn completed(&self, fit: &Fit, records: &[usize]) -> Vec<Numbers> {
         let first = fit.records.first().copied().unwrap_or(0);
         (0..self.records())
             .map(|r| {
                 if fit.records.contains(&r) || !records.contains(&r) || fit.records.is_empty() {
-                    fit.numbers.get(r).copied().unwrap_or(fit.numbers[first])
-                } else {
-                    fit.numbers[first]
+                    return fit.numbers.get(r).copied().unwrap_or(fit.numbers[first]);
                 }
+                let mut numbers = fit.numbers[first];
+                if let Some(day) = &self.observed[r].day {
+                    Quantity::AIR.iter().for_each(|&quantity| numbers.set(quantity, day.get(quantity)));
+                }
+                numbers
             })
             .collect()
     }
@@ -136,33 +158,33 @@ impl Chamber<'_> {
         Ok(all)
     }
 
-    /// Smooths the courses of records for which the model needs one, or that have none.
+    /// Smooths the courses of records; only of those for which the model needs one, if no other is wanted.
     pub(super) fn settle_courses(
         &self,
         assumed: &Assumption,
         numbers: &[Numbers],
         records: &[usize],
         courses: &mut [Option<Reference>],
+        wanted: Wanted,
     ) -> Result<(), ChamberError> {
-        let found: Vec<(usize, Result<Reference, ChamberError>)> = records
-            .par_iter()
-            .map(|&r| {
-                let observed = &self.observed[r];
-                let found =
-                    CoilSide::new(assumed, numbers[r].get(Quantity::Film), self.modes, observed).and_then(|side| {
-                        // A course of another number of outputs (a heated flange) is no beginning for this one.
-                        let before = courses[r].as_ref().filter(|c| c.outputs == side.reduced.outputs);
-                        let first = match before {
-                            Some(_) => None,
-                            None => Some(smoothed(&side, assumed, &numbers[r], observed, r, None, Rates::Seen)?),
-                        };
-                        smoothed(&side, assumed, &numbers[r], observed, r, before.or(first.as_ref()), Rates::Seen)
-                    });
-                (r, found)
-            })
-            .collect();
+        let of = |r: usize| -> Result<Option<Reference>, ChamberError> {
+            let observed = &self.observed[r];
+            let side = CoilSide::new(assumed, numbers[r].get(Quantity::Film), self.modes, observed)?;
+            let course = |before| smoothed(&side, assumed, &numbers[r], observed, r, before, Rates::Seen);
+            if !side.needs_reference() {
+                return if wanted == Wanted::Everywhere { course(None).map(Some) } else { Ok(None) };
+            }
+            // A course of another number of outputs (a heated flange) is no beginning for this one.
+            match courses[r].as_ref().filter(|c| c.outputs == side.reduced.outputs) {
+                Some(before) => course(Some(before)),
+                None => course(Some(&course(None)?)),
+            }
+            .map(Some)
+        };
+        let found: Vec<(usize, Result<Option<Reference>, ChamberError>)> =
+            records.par_iter().map(|&r| (r, of(r))).collect();
         for (r, course) in found {
-            courses[r] = Some(course?);
+            courses[r] = course?.or(courses[r].take());
         }
         Ok(())
     }
@@ -435,6 +457,7 @@ fn finished(
         log_prior,
         evidence,
         information,
+        is_full: false,
         numbers,
         courses,
     }

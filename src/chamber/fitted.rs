@@ -122,6 +122,11 @@ impl Fit {
         merit
     }
 
+    /// Whether a fit with [`super::Effort::FULL`] would end where it is.
+    pub fn is_full(&self) -> bool {
+        self.is_full
+    }
+
     /// Logarithm of likelihood times prior.
     pub fn posterior(&self) -> f64 {
         self.log_likelihood + self.log_prior

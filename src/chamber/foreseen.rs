@@ -54,6 +54,7 @@ impl Fit {
             log_prior: 0.0,
             evidence: 0.0,
             information: DMatrix::zeros(0, 0),
+            is_full: false,
             numbers: vec![numbers],
             courses: vec![None],
         }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::fit::Fit;
+use super::fit::{Fit, Wanted};
 use super::settle::GROSS_ROUNDS;
 use super::{Chamber, ChamberError};
 
@@ -47,7 +47,7 @@ impl Chamber<'_> {
         let mut fit = found.of_record(found.records[0]);
         let settle = |chamber: &Self, fit: &mut Fit| {
             let (assumed, numbers) = (fit.assumed.clone(), fit.numbers.clone());
-            chamber.settle_courses(&assumed, &numbers, &[0], &mut fit.courses)
+            chamber.settle_courses(&assumed, &numbers, &[0], &mut fit.courses, Wanted::Everywhere)
         };
         settle(self, &mut fit)?;
         for _ in 0..GROSS_ROUNDS {

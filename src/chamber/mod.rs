@@ -182,7 +182,7 @@ impl<'a> Chamber<'a> {
             }
             let series = Series::new(record, model.rate_mean_s, pack_s, origin);
             let channels = record.channels().iter().map(|c| c.name.clone()).collect();
-            observed.push(Observed { record, mean_k: 0.5 * (low + high), series, channels, blind: false });
+            observed.push(Observed { record, mean_k: 0.5 * (low + high), series, channels, blind: false, day: None });
         }
         let modes = if path.extent == crate::thermal::Extent::HalfSpace {
             HALF_SPACE_MODES

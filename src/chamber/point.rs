@@ -36,6 +36,8 @@ pub(super) struct Observed<'a> {
     pub mean_k: f64,
     /// Its rates are not measurements.
     pub blind: bool,
+    /// What its own air was found to be, by itself.
+    pub day: Option<Numbers>,
 }
 
 impl CoilSide {

@@ -121,6 +121,18 @@ impl Quantity {
         }
     }
 
+    /// What the air of one day is.
+    pub(super) const AIR: [Self; 8] = [
+        Self::RestNoise,
+        Self::BendNoise,
+        Self::TurbulenceSize,
+        Self::TurbulenceTime,
+        Self::RippleSize,
+        Self::RipplePeriod,
+        Self::RippleCoherence,
+        Self::StartSlope,
+    ];
+
     /// Whether it is an angular rate, in SI rad/s.
     pub fn is_rate(self) -> bool {
         matches!(self, Self::RateNoise | Self::DriftSize | Self::CycleSize)

@@ -44,7 +44,8 @@ impl<'a> Chamber<'a> {
         let fit = self.looked_through(fit, records)?;
         for other in (0..self.records()).filter(|r| !records.contains(r)) {
             let day = self.fit(&fit.assumed, &[], &[other], Some(&fit), Effort::SHORT)?;
-            self.looked_through(day, &[other])?;
+            let day = self.looked_through(day, &[other])?;
+            self.observed[other].day = Some(day.numbers[other]);
         }
         let fit = self.fit(&fit.assumed.clone(), &fit.free.clone(), records, Some(&fit), Effort::FULL)?;
         Ok((self, fit))

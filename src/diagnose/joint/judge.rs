@@ -48,7 +48,8 @@ pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mu
     explanations.par_iter_mut().for_each(|e| {
         // What was only ranked is fitted in full before it is judged.
         let begin = (e.fit.assumed.clone(), e.fit.free.clone());
-        if let Some(again) = fitted(question, windings, e.members.clone(), &begin, &e.fit, Effort::FULL)
+        if !e.fit.is_full()
+            && let Some(again) = fitted(question, windings, e.members.clone(), &begin, &e.fit, Effort::FULL)
             && again.merit > e.merit
         {
             *e = again;

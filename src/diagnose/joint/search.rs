@@ -18,6 +18,8 @@ const WORTH_A_FIT: f64 = 3.0;
 const WORTH_BESIDE: f64 = 0.08;
 /// An effect that gains so much needs no comparison with a mere wander yet.
 const PLAIN: f64 = 25.0;
+/// Another winding that promises less than this share of the most is not fitted from several chambers.
+const MAY_WIN: f64 = 1.0 / 3.0;
 /// A set must be better by so much to go on from.
 const WORTH_A_STEP: f64 = 1.0;
 /// Periods of a cycle and times of an offset step, as shares of the record.
@@ -97,7 +99,7 @@ pub fn again(question: &Question, found: Found) -> Outcome<Found> {
         .into_par_iter()
         .filter_map(|e| {
             let begin = (e.fit.assumed.clone(), e.fit.free.clone());
-            fitted(question, &windings, e.members, &begin, &e.fit, Effort::QUICK)
+            fitted(question, &windings, e.members, &begin, &e.fit, Effort::FULL)
         })
         .collect();
     judge(question, &windings, &mut explanations);
@@ -191,6 +193,7 @@ fn choose(mut proposals: Vec<Proposal>) -> Vec<Proposal> {
 fn fit_all(question: &Question, windings: &[Winding], best: &Explanation, tried: Vec<Proposal>) -> Vec<Explanation> {
     let mut calm = best.fit.clone();
     calm.calm(&question.fitted);
+    let most = tried.iter().map(|p| p.gain).filter(|g| g.is_finite()).fold(0.0, f64::max);
     tried
         .into_par_iter()
         .filter_map(|proposal| {
@@ -209,7 +212,8 @@ fn fit_all(question: &Question, windings: &[Winding], best: &Explanation, tried:
                 .into_par_iter()
                 .filter_map(|from| fitted(question, windings, members.clone(), &begin, from, Effort::QUICK))
                 .max_by(|a, b| a.merit.total_cmp(&b.merit));
-            if !matches!(proposal.member, Member::Winding(_)) {
+            let is_better = known.as_ref().is_some_and(|k| k.merit > best.merit);
+            if !matches!(proposal.member, Member::Winding(_)) || !is_better || proposal.gain < MAY_WIN * most {
                 return known;
             }
             // The chamber that made the best of the declared winding is far from that of the right one.
