@@ -194,6 +194,18 @@ pub(super) fn ladder(
     (0..=effects.len()).map(rung).collect()
 }
 
+impl Rung {
+    /// The fitted records' errors for the held-out ones', where there are any.
+    pub(super) fn exchange(&mut self) {
+        if let Some(other) = &mut self.holdout_rmse_rad_per_s {
+            std::mem::swap(&mut self.rmse_rad_per_s, other);
+        }
+        if let Some(other) = &mut self.holdout_reduced_chi_square {
+            std::mem::swap(&mut self.reduced_chi_square, other);
+        }
+    }
+}
+
 fn rows(question: &Question) -> usize {
     question.fitted.iter().map(|&r| question.chamber.times_s(r).len()).sum::<usize>().max(2)
 }

@@ -445,6 +445,8 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
             let mut elsewhere = answer::answer(&Question { chamber: &timed, ..other.clone() }, &found, &records)?;
             beyond(request, &other, &timed, &found, &mut elsewhere, &|_| ())?;
             if elsewhere.verdict != Verdict::Adequate {
+                // Columns stay those of the records as they were given.
+                elsewhere.ladder.iter_mut().for_each(Rung::exchange);
                 diagnosis = elsewhere;
                 diagnosis.cautions.insert(0, Caution::FittedToHoldout);
             }
