@@ -247,7 +247,9 @@ impl Running {
             Some(Allan { points, minimum, rows: running.values(), interval_s: self.interval_s })
         });
         let levels = self.pyramid.finish();
-        let noises = allan.as_ref().and_then(|_| noise_strengths(&levels, self.interval_s, &GROUPS));
+        // A rate that is the same in every row differs from its mean by rounding, which is no noise of the gyro.
+        let varies = self.rates.width() > 0.0;
+        let noises = allan.as_ref().filter(|_| varies).and_then(|_| noise_strengths(&levels, self.interval_s, &GROUPS));
         Metrics {
             rows: self.rows,
             duration_s: self.last.map_or(0.0, |last| last.time_s - self.first_s),

@@ -165,6 +165,17 @@ mod tests {
     }
 
     #[test]
+    fn a_rate_that_is_the_same_in_every_row_has_no_noise_whatever_gap_the_record_has() {
+        for (rate, gap_s) in [(1.7e-6, 1e4), (0.3, 1e9), (1e-308, 4e-11), (-7.123_456_7e-3, 1e-3)] {
+            let times_s: Vec<f64> = (0..160).map(|i| 10.0 * f64::from(i) + if i > 33 { gap_s } else { 0.0 }).collect();
+            let temperature_k = (0..160).map(|i| 293.0 + 0.05 * f64::from(i)).collect();
+            let metrics =
+                Metrics::of(&Record::new("x", times_s, temperature_k, vec![rate; 160]).unwrap(), 10.0).unwrap();
+            assert_eq!(metrics.noises, None, "{rate} {gap_s}");
+        }
+    }
+
+    #[test]
     fn repeatability_is_the_deviation_of_the_biases_with_one_less() {
         let record = |rate: f64| Record::new("x", vec![0.0, 1.0, 2.0], vec![300.0; 3], vec![rate; 3]).unwrap();
         let metrics: Vec<Metrics> = [1.0, 2.0, 4.0].map(|r| Metrics::of(&record(r), 10.0).unwrap()).into();

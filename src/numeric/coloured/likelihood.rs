@@ -26,7 +26,7 @@ const HOSKING: [f64; 8] = [
 const FLICKER_CORRELATION: [f64; 8] = [1.0364, 0.1275, 0.1654, 0.1139, 0.0659, 0.0352, 0.0181, 0.0091];
 /// The ramp may be anything: this many of its usual sizes.
 const LOOSE: f64 = 1e6;
-/// A column whose square sum is less than this part of the largest does not vary.
+/// A column whose square sum is less than this part of the largest does not vary; nor does an octave of y.
 const STILL: f64 = 1e-20;
 /// Variances set out from no less than this part of the largest that an octave allows.
 const FAINT: f64 = 1e-3;
@@ -135,10 +135,12 @@ impl Likelihood {
         Point { variances, group_variances: vec![1.0; self.group_count], minus_two_log_likelihood: f64::INFINITY }
     }
 
-    /// A variance so small that no octave shows it.
+    /// A variance so small that no octave shows it. Octaves in which nothing varies but rounding would show any.
     pub(super) fn least_visible(&self, parts: &[usize]) -> f64 {
+        let largest = self.octaves.iter().map(|o| o.yy / o.n).fold(0.0, f64::max);
+        let varies = self.octaves.iter().filter(|o| o.yy / o.n > STILL * largest);
         let most = |o: &Octave| o.yy / o.n / parts.iter().map(|p| o.units[*p]).fold(0.0, f64::max);
-        FAINT * self.octaves.iter().map(most).fold(f64::INFINITY, f64::min).max(f64::MIN_POSITIVE)
+        FAINT * varies.map(most).fold(f64::INFINITY, f64::min)
     }
 
     fn model(&self, variances: &[f64; COMPONENTS]) -> Vec<f64> {

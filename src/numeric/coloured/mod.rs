@@ -118,7 +118,7 @@ fn interval(likelihood: &Likelihood, best: &Point, parts: &[usize]) -> Interval 
     } else {
         let (mut outside, mut inside, mut from) = (value * 1e-6, value, best.clone());
         while outside < inside * (1.0 - FINE) {
-            let middle = (outside * inside).sqrt();
+            let middle = between(outside, inside);
             let (height, at) = above(&from, middle);
             if height > LIKELIHOOD_RATIO {
                 outside = middle;
@@ -139,7 +139,7 @@ fn interval(likelihood: &Likelihood, best: &Point, parts: &[usize]) -> Interval 
         outside *= 2.0;
     }
     while inside < outside * (1.0 - FINE) {
-        let middle = (outside * inside).sqrt();
+        let middle = between(inside, outside);
         let (height, at) = above(&from, middle);
         if height > LIKELIHOOD_RATIO {
             outside = middle;
@@ -148,6 +148,11 @@ fn interval(likelihood: &Likelihood, best: &Point, parts: &[usize]) -> Interval 
         }
     }
     Interval { value, low, high: outside }
+}
+
+/// The geometric mean: also of variances whose product is no number, or none but zero.
+fn between(low: f64, high: f64) -> f64 {
+    low.sqrt() * high.sqrt()
 }
 
 /// The fit with the noises that cannot be absent, where that is as good as the data can tell.
@@ -238,6 +243,19 @@ mod tests {
         assert!(holds(strengths.quantisation, 3.0) && strengths.quantisation.low > 2.5);
         assert!(holds(strengths.ramp, 2e-3) && strengths.ramp.low > 1e-3);
         assert!(holds(strengths.white, 1.0));
+    }
+
+    #[test]
+    fn values_that_do_not_vary_but_for_one_step_have_intervals_that_end() {
+        // Nothing varies in the finest octaves: no variance is too small to show there.
+        for (at, step) in [(64, 1.0), (64, 1e-100), (96, 1e100)] {
+            let y: Vec<f64> = (0..160).map(|i| if i < at { 0.0 } else { step }).collect();
+            let strengths = found(&y, 10.0);
+            for interval in [strengths.quantisation, strengths.white, strengths.flicker, strengths.random_walk] {
+                assert!(interval.low <= interval.value && interval.value <= interval.high, "{strengths:?}");
+                assert!(interval.high > 0.0 && interval.high.is_finite(), "{strengths:?}");
+            }
+        }
     }
 
     #[test]
