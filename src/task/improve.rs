@@ -10,6 +10,7 @@ use serde_json::Value;
 use crate::effect::{DeclaredEffect, FILM};
 use crate::io::fault::Faults;
 use crate::io::files::{WriteError, read_text, write_atomically};
+use crate::io::folder::{Replacement, remove_kinds};
 use crate::io::json::diagnosis::{DiagnosisJson, RefittedJson};
 use crate::io::json::improve::{ImproveJson, PredictedRow, StepJson};
 use crate::io::json::search::{GainJson, OptimiseJson};
@@ -18,7 +19,7 @@ use crate::io::read::model_file::read_model;
 use crate::io::read::pattern_file::print_pattern;
 use crate::io::read::posterior::drawn_models;
 use crate::io::write::checkpoint::{read_checkpoint, write_checkpoint};
-use crate::io::write::measurement_folder::{check_free, write_table};
+use crate::io::write::measurement_folder::{self, check_free, write_table};
 use crate::io::write::model_edit::{Remark, with_effect, with_sensor_and_pattern};
 use crate::io::write::run_directory::{self, write_request};
 use crate::pattern::Pattern;
@@ -75,9 +76,12 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Option<ImproveJ
     let old_path = folder.join("measured-pattern.toml");
     let comment = TomlComment::of("the winding that was measured");
     let old_source = print_pattern(&old, &[comment]);
-    write_atomically(&old_path, old_source.as_bytes())?;
     let mut way = Way { request, old: &old, old_source: &old_source, steps: Steps::of(folder), observer };
     let (before, after) = (folder.join("before"), folder.join("after"));
+    if !way.of_records(file).is_some_and(|made_of| way.steps.is_taken(&before, &made_of, &[COMPARISON])) {
+        clear(folder)?;
+    }
+    write_atomically(&old_path, old_source.as_bytes())?;
     way.compared(file, &before)?;
     observer.at(0.1, "compared; now diagnosing");
     let diagnosis = folder.join("diagnosis");
@@ -157,6 +161,23 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Option<ImproveJ
     Ok(Some(body))
 }
 
+/// Takes away what another request left, before the first file of this one comes: a folder holds one run's. The page goes first:
+/// while it is there, the rest is of its run.
+fn clear(folder: &Path) -> Result<(), WriteError> {
+    clear_behind_search(folder)?;
+    run_directory::clear(&folder.join("search"))?;
+    for step in ["after", "diagnosis", "before"] {
+        measurement_folder::clear(&folder.join(step))?;
+    }
+    remove_kinds(folder, &["design.toml", "extended.toml", EXPERIMENT, "measured-pattern.toml"])
+}
+
+/// What follows from the search.
+fn clear_behind_search(folder: &Path) -> Result<(), WriteError> {
+    remove_kinds(folder, &["index.html", PREDICTED, "recommended.toml"])?;
+    remove_kinds(&folder.join("schedule"), &schedule::FILES)
+}
+
 /// What the steps have in common.
 struct Way<'a> {
     request: &'a Request<'a>,
@@ -193,9 +214,7 @@ impl Way<'_> {
         let files = wound.files(design)?;
         let names: Vec<&str> = files.iter().map(|(name, _)| name.as_ref()).collect();
         if !self.is_done(folder, made_of.as_deref(), &names) {
-            for (name, text) in &files {
-                write_atomically(&folder.join(name), text.as_bytes())?;
-            }
+            Replacement::all(folder, &files)?;
             self.note_done(folder, made_of.as_deref())?;
         }
         Ok(())
@@ -265,6 +284,7 @@ impl Way<'_> {
         if self.is_done(folder, made_of.as_deref(), &[SUMMARY]) {
             return read_json(&folder.join(SUMMARY)).map(Some);
         }
+        clear_behind_search(self.request.folder)?;
         let wishes = Wishes { seed, ..Wishes::default() };
         let mut request = wishes.request(design, false, Some(self.old.clone()))?;
         request.uncertain = drawn;

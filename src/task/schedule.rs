@@ -7,6 +7,18 @@ use crate::search::cost::worst_case::SolvedProfiles;
 
 use super::{TaskError, pattern_or_own};
 
+/// What leaves for the shop floor.
+pub const FILES: [&str; 8] = [
+    "schedule.csv",
+    "schedule.json",
+    "traveller.html",
+    "traveller.csv",
+    "traveller.json",
+    "program.gcode",
+    "program.csv",
+    "cross-section.svg",
+];
+
 /// What is to be wound.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {

@@ -1,6 +1,6 @@
 //! `improve` from records to the next coil, its steps taken once, and searches against the worst admissible profiles.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
@@ -53,6 +53,24 @@ fn the_example_of_improve_runs_from_records_to_a_schedule_and_takes_no_step_twic
     let notes = stderr(&again);
     for step in ["before", "diagnosis", "after", "search", "schedule"] {
         assert!(notes.contains(&format!("{step}: done before")), "{step}: {notes}");
+    }
+
+    // Another request takes all of this away before its own first file comes; here it gets no further.
+    std::fs::write(written.join("notes.txt"), "mine").unwrap();
+    std::fs::write(written.join("before/run.toml"), "").unwrap();
+    let coil = std::fs::read_to_string(folder.path().join("coil.toml")).unwrap();
+    std::fs::write(folder.path().join("coil.toml"), coil + "\n# another\n").unwrap();
+    assert_eq!(code(&run_in(folder.path(), &words)), 2);
+    let mut left = Vec::new();
+    files_below(&written, &mut left);
+    left.sort();
+    let left: Vec<&Path> = left.iter().map(|path| path.strip_prefix(&written).unwrap()).collect();
+    assert_eq!(left, ["before/run.toml", "measured-pattern.toml", "notes.txt", "steps.json"].map(Path::new));
+}
+
+fn files_below(folder: &Path, found: &mut Vec<PathBuf>) {
+    for path in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        if path.is_dir() { files_below(&path, found) } else { found.push(path) }
     }
 }
 

@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 
 use crate::io::fault::{Fault, Faults};
 use crate::io::files::{WriteError, read_text, read_text_up_to, write_atomically};
-use crate::io::folder::Replacement;
+use crate::io::folder::{Replacement, remove_kinds};
 use crate::io::json::Document;
 use crate::io::json::comparison::CompareJson;
 use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow};
@@ -181,6 +181,15 @@ impl<'a> MeasurementFiles<'a> {
         let kinds: Vec<&str> = replaced.chain(of_all).copied().collect();
         self.files.commit(&kinds)
     }
+}
+
+/// Takes away what commands on records left in a folder.
+///
+/// # Errors
+/// A file that cannot be removed.
+pub fn clear(folder: &Path) -> Result<(), WriteError> {
+    let kinds: Vec<&str> = KINDS.iter().copied().flatten().chain(&OF_ALL).copied().collect();
+    remove_kinds(folder, &kinds)
 }
 
 /// Writes rows as CSV under a name.

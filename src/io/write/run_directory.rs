@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use crate::io::files::{WriteError, sha256_hex, write_atomically};
-use crate::io::folder::Replacement;
+use crate::io::folder::{Replacement, remove_kinds};
 use crate::io::json::search::{BestFoundJson, OptimiseJson};
 use crate::io::json::{Document, PatternJson};
 use crate::io::model::{ModelFile, NamedPattern};
@@ -134,6 +134,14 @@ const KINDS: [&str; 11] = [
     "run.toml",
     "model.toml",
 ];
+
+/// Takes away what a search left in a folder.
+///
+/// # Errors
+/// A file that cannot be removed.
+pub fn clear(folder: &Path) -> Result<(), WriteError> {
+    remove_kinds(folder, &KINDS)
+}
 
 /// Writes what a run has found; the summary last, so that where it is, the rest is.
 ///
