@@ -133,12 +133,18 @@ pub enum ChamberError {
     Coil(#[from] CoilError),
     #[error("{record}: the temperature moves by {range_k:.3} K only: the record says nothing about the model")]
     Constant { record: String, range_k: f64 },
+    #[error(
+        "{record}: averaged over {row_s} s, as the pack and the record's length ask for, {found} rows are left, expected at least {LEAST_ROWS}: the record is too short, or its rows come in bursts with gaps between"
+    )]
+    TooFew { record: String, row_s: f64, found: usize },
     #[error("{record}: the rate has no noise at all: is this a measurement?")]
     NoNoise { record: String },
     #[error("the model's likelihood cannot be computed for these records")]
     Unsolvable,
 }
 
+/// Fewer rows hold less than there is to find: the film, the lag, the noises and the air's course.
+const LEAST_ROWS: usize = 8;
 /// Modes of the pack that are states: those that are slower than so many per row, within these counts.
 const MODES_PER_ROW: f64 = 8.0;
 const FEWEST_MODES: usize = 3;
@@ -181,6 +187,10 @@ impl<'a> Chamber<'a> {
                 return Err(ChamberError::Constant { record: record.name().to_owned(), range_k: high - low });
             }
             let series = Series::new(record, model.rate_mean_s, pack_s, origin);
+            if series.rows.len() < LEAST_ROWS {
+                let (row_s, found) = (series.averaged as f64 * record.interval_s(), series.rows.len());
+                return Err(ChamberError::TooFew { record: record.name().to_owned(), row_s, found });
+            }
             let channels = record.channels().iter().map(|c| c.name.clone()).collect();
             observed.push(Observed { record, mean_k: 0.5 * (low + high), series, channels, blind: false, day: None });
         }

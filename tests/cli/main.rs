@@ -19,6 +19,7 @@ mod improve;
 mod mangled;
 mod metrics;
 mod names;
+mod once_broken;
 mod readme;
 mod remote;
 mod reproduce;

@@ -35,7 +35,9 @@ fn bounds() -> Bounds {
 }
 
 fn program() -> PathBuf {
-    std::env::var_os("COILWRIGHT_PROGRAM").map_or_else(|| env!("CARGO_BIN_EXE_coilwright").into(), PathBuf::from)
+    let named = std::env::var_os("COILWRIGHT_PROGRAM");
+    // It is started in other folders.
+    named.map_or_else(|| env!("CARGO_BIN_EXE_coilwright").into(), |path| std::fs::canonicalize(path).unwrap())
 }
 
 /// A file that is damaged, and a command that reads it, run in a folder of its own.
@@ -153,7 +155,7 @@ bad_rows = "refuse"
 "#;
 
 /// Files of every kind that is read, most of them written by the program itself.
-fn bench(folder: &Path) {
+pub(super) fn bench(folder: &Path) {
     let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
     write("model.toml", MODEL);
     write("pattern.toml", "name = \"p\"\nlayers = 4\nsegments = [2, 3, 4, 1]\n");
@@ -223,7 +225,7 @@ fn has_no_number(text: &str) -> bool {
 }
 
 /// What is wrong with a run, if anything is.
-fn fault(ran: &Ran, given: &str, out: &Path) -> Option<String> {
+pub(super) fn fault(ran: &Ran, given: &str, out: &Path) -> Option<String> {
     let bounds = bounds();
     if ran.said.contains("panicked") {
         return Some("a panic".to_owned());
@@ -327,16 +329,16 @@ fn changes(whole: &Path, damaged: &str) -> String {
     format!("{} lines of {}, new:\n{}", damaged.lines().count(), whole.lines().count(), shown.join("\n"))
 }
 
-struct Ran {
-    code: Option<i32>,
-    said: String,
+pub(super) struct Ran {
+    pub code: Option<i32>,
+    pub said: String,
     processor_s: f64,
     memory_kib: u64,
     was_ended: bool,
 }
 
 /// Runs the program within bounds; processor time and memory are looked up as it runs, where the system has /proc.
-fn bounded(folder: &Path, arguments: &[&str]) -> Ran {
+pub(super) fn bounded(folder: &Path, arguments: &[&str]) -> Ran {
     let (started, bounds) = (Instant::now(), bounds());
     let mut child = Command::new(program())
         .args(arguments)
