@@ -72,7 +72,17 @@ fn an_unfinished_run_is_not_written_over_unasked_and_a_spoilt_checkpoint_is_refu
         optimise(&folder, OTHER_SEED, &[&UNPROVED[..], &["--resume"]].concat()).status().unwrap().code(),
         Some(2)
     );
-    for spoilt in ["", "{", "{\"schema_version\": 1}", "\u{0}\u{1}"] {
+    // A number that a search could have, too: the search would go on from it and end elsewhere.
+    let whole = std::fs::read_to_string(folder.join("checkpoint.json")).unwrap();
+    let changed = |pointer: &str| {
+        let mut document: serde_json::Value = serde_json::from_str(&whole).unwrap();
+        let number = document.pointer_mut(pointer).unwrap();
+        *number = (number.as_u64().unwrap() + 1).into();
+        document.to_string()
+    };
+    let changed = ["/round", "/work/moves", "/restarts/0/moves", "/restarts/0/generator/stream"].map(changed);
+    let spoilt = changed.iter().map(String::as_str).chain(["", "{", "{\"schema_version\": 1}", "\u{0}\u{1}"]);
+    for spoilt in spoilt {
         std::fs::write(folder.join("checkpoint.json"), spoilt).unwrap();
         assert_eq!(
             optimise(&folder, SHORT, &[&UNPROVED[..], &["--resume"]].concat()).status().unwrap().code(),
@@ -81,4 +91,5 @@ fn an_unfinished_run_is_not_written_over_unasked_and_a_spoilt_checkpoint_is_refu
         );
     }
     assert!(optimise(&folder, SHORT, &[&UNPROVED[..], &["--fresh"]].concat()).status().unwrap().success());
+    assert_eq!(std::fs::read_to_string(folder.join("checkpoint.broken.json")).unwrap(), "\u{0}\u{1}");
 }
