@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Two runs at once in one folder, of different models, killed with SIGKILL: at a random moment, or before or after a rename that is
-# drawn. After each kill every finished file must be of one run only; at the end the folder must hold what an unbroken run leaves.
+# Two runs at once in one folder, of different models, killed with SIGKILL: at a random moment of their whole duration, or before or
+# after a rename that is drawn. After each kill every finished file must be of one run only; at the end the folder must hold what an
+# unbroken run leaves (a campaign's folder keeps the other one's cells beside its own).
 # Usage: benches/kill_shared.sh COILWRIGHT [KILLS]; needs a C compiler (the rename is caught by a preloaded library). COMMANDS names
 # those to be tried.
 set -euo pipefail
@@ -10,17 +11,18 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cc -shared -fPIC -O1 -Wall -Wextra -o "$work/kill.so" "$here/kill_at_rename.c" -ldl
 cd "$work"
-for name in A B; do
-  index=$([ $name = A ] && echo 1.45 || echo 1.46)
-  cat > $name.toml <<END
-name = "coil $name"
+# name layers
+model() {
+  index=$([ "${1:0:1}" = A ] && echo 1.45 || echo 1.46)
+  cat > "$1.toml" <<END
+name = "coil $1"
 [fibre]
 refractive_index = $index
 thermo_optic_per_k = 1e-5
 wavelength_nm = 1550.0
 outer_diameter_um = 165.0
 [winding]
-layers = 12
+layers = $2
 turns_per_layer = 20
 inner_diameter_mm = 60.0
 layer_length = "actual"
@@ -34,31 +36,53 @@ max_rate_c_per_h = 60.0
 count = 4
 segments = 3
 END
+}
+for name in A B; do
+  model $name 12
+  # What diagnoses is slower.
+  model $name-small 4
+  printf 'name = "c"\nmodels = ["%s"]\nseeds = [1, 2, 3]\nrounds = 2\nmoves_per_restart = 300\n' "$work/$name.toml" > $name-grid.toml
   # The second record is shorter, and there is one more of the first: other files, and more of them.
   rows=$([ $name = A ] && echo 300 || echo 200)
   awk -v rows=$rows -v a=$index 'BEGIN { srand(1); print "time_s,temperature_c,rate_deg_per_h"
     for (i = 0; i < rows; i++) printf "%d,%.3f,%.4f\n", 10 * i, 20 + 0.004 * i, a * sin(i / 20) + 0.05 * rand() }' > $name.csv
 done
-read -ra commands <<< "${COMMANDS:-schedule optimise pareto compare metrics temperatures}"
-# command model folder
+read -ra commands <<< "${COMMANDS:-schedule optimise pareto compare metrics temperatures diagnose improve campaign}"
+# command model; each is run where its folder is to be, so that no path differs
 request() {
+  local m=$work/$2
   case $1 in
-    schedule) echo "schedule $2.toml -o $3" ;;
-    optimise) echo "optimise $2.toml --rounds 3 --patience 3 --moves-per-restart 300 --checkpoint-every 5ms --fresh -o $3" ;;
-    pareto) echo "pareto $2.toml --rounds 1 --most-captive 0 -o $3" ;;
-    compare) if [ "$2" = A ]; then echo "compare A.toml A.csv B.csv -o $3"; else echo "compare B.toml B.csv -o $3"; fi ;;
-    metrics) if [ "$2" = A ]; then echo "metrics A.csv B.csv -o $3"; else echo "metrics B.csv -o $3"; fi ;;
-    temperatures) echo "temperatures $2.toml --rows 40 -o $3" ;;
+    schedule) echo "schedule $m.toml -o out" ;;
+    optimise) echo "optimise $m.toml --rounds 3 --patience 3 --moves-per-restart 300 --checkpoint-every 5ms --fresh -o out" ;;
+    pareto) echo "pareto $m.toml --rounds 1 --most-captive 0 -o out" ;;
+    compare) if [ "$2" = A ]; then echo "compare $m.toml $work/A.csv $work/B.csv -o out"; else echo "compare $m.toml $m.csv -o out"; fi ;;
+    metrics) if [ "$2" = A ]; then echo "metrics $work/A.csv $work/B.csv -o out"; else echo "metrics $m.csv -o out"; fi ;;
+    temperatures) echo "temperatures $m.toml --rows 40 -o out" ;;
+    diagnose) if [ "$2" = A ]; then echo "diagnose $m-small.toml $work/A.csv $work/B.csv -o out"; else echo "diagnose $m-small.toml $m.csv -o out"; fi ;;
+    improve) if [ "$2" = A ]; then echo "improve $m-small.toml $work/A.csv $work/B.csv -o out"; else echo "improve $m-small.toml $m.csv -o out"; fi ;;
+    campaign) echo "campaign $m-grid.toml --checkpoint-every 5ms -o out" ;;
+    *) echo "no such command: $1" >&2; exit 2 ;;
   esac
 }
-declare -A renames
+# place command model
+run() {
+  # shellcheck disable=SC2046
+  cd "$1" && exec "$program" $(request "$2" "$3") -q > /dev/null
+}
+# Files that are of one run; what is on its way, and what tells how far it is, is not.
+finished() { (cd "$1" && find . -type f ! -name '.*' ! -name checkpoint.json ! -name steps.json ! -path '*/parts/*' ! -path './unfinished/*' -printf '%P\n'); }
+declare -A renames took_ms
 for command in "${commands[@]}"; do
   for name in A B; do
-    # shellcheck disable=SC2046
-    "$program" $(request $command $name "whole/$command/$name") -q > /dev/null
+    place=whole/$command/$name
+    mkdir -p "$place"
+    began=$(date +%s%N)
+    (RENAMES=$work/counted LD_PRELOAD="$work/kill.so" run "$place" "$command" $name)
+    took_ms[$command]=$((($(date +%s%N) - began) / 1000000 + 1))
+    counted=$(stat -c %s counted)
+    rm counted
+    [ "$counted" -lt "${renames[$command]:-1}" ] || renames[$command]=$counted
   done
-  # Every finished file was renamed once; checkpoints more often.
-  renames[$command]=$(($(find "whole/$command/A" -type f | wc -l) + 3))
 done
 RANDOM=7
 kills=0 refused=0 trials=0
@@ -66,20 +90,22 @@ declare -A of_command
 while [ $kills -lt "$wanted" ]; do
   command=${commands[$((trials % ${#commands[@]}))]}
   trials=$((trials + 1))
-  folder=shared/$command
-  mkdir -p "$folder"
+  place=shared/$command
+  folder=$place/out
+  mkdir -p "$place"
   processes=()
   for name in $([ $((RANDOM % 2)) = 0 ] && echo A B || echo B A); do
-    # shellcheck disable=SC2046
     case $((RANDOM % 3)) in
-      0) "$program" $(request "$command" $name "$folder") -q > /dev/null 2> "said-$name" & ;;
-      *) KILL_AT=$((RANDOM % renames[$command] + 1)) KILL_WHEN=$([ $((RANDOM % 2)) = 0 ] && echo before || echo after) \
-           LD_PRELOAD="$work/kill.so" "$program" $(request "$command" $name "$folder") -q > /dev/null 2> "said-$name" & ;;
+      0) (run "$place" "$command" $name) 2> "said-$name" & ;;
+      *) (KILL_AT=$((RANDOM % renames[$command] + 1)) KILL_WHEN=$([ $((RANDOM % 2)) = 0 ] && echo before || echo after) \
+           LD_PRELOAD="$work/kill.so" run "$place" "$command" $name) 2> "said-$name" & ;;
     esac
     processes+=($!)
   done
   if [ $((RANDOM % 3)) = 0 ]; then
-    sleep "0.$(printf %03d $((RANDOM % 120)))"
+    # Two at once take longer than one.
+    after_ms=$((RANDOM * 2 * took_ms[$command] / 32768))
+    sleep "$((after_ms / 1000)).$(printf %03d $((after_ms % 1000)))"
     kill -9 "${processes[$((RANDOM % 2))]}" 2> /dev/null || true
   fi
   for process in "${processes[@]}"; do
@@ -97,9 +123,13 @@ while [ $kills -lt "$wanted" ]; do
   for name in A B; do
     declare "foreign_$name="
     while IFS= read -r file; do
-      [ "$file" = checkpoint.json ] && continue
-      cmp -s "$folder/$file" "whole/$command/$name/$file" || declare "foreign_$name=$file"
-    done < <(cd "$folder" && find . -type f ! -name '.*' ! -path './parts/*' -printf '%P\n')
+      case $file in
+        # Cells stand beside those of another campaign.
+        cells/*) cmp -s "$folder/$file" "whole/$command/A/out/$file" || cmp -s "$folder/$file" "whole/$command/B/out/$file" \
+          || declare "foreign_$name=$file" ;;
+        *) cmp -s "$folder/$file" "whole/$command/$name/out/$file" || declare "foreign_$name=$file" ;;
+      esac
+    done < <(finished "$folder")
   done
   if [ -n "$foreign_A" ] && [ -n "$foreign_B" ]; then
     echo "$command: mixed or torn: not of A: $foreign_A, not of B: $foreign_B"
@@ -107,9 +137,9 @@ while [ $kills -lt "$wanted" ]; do
   fi
 done
 for command in "${commands[@]}"; do
-  # shellcheck disable=SC2046
-  "$program" $(request "$command" A "shared/$command") -q > /dev/null
-  diff -r "whole/$command/A" "shared/$command" || { echo "$command: something is left or lost"; exit 1; }
+  (run "shared/$command" "$command" A)
+  difference=$(diff -r "whole/$command/A/out" "shared/$command/out" | grep -v "^Only in shared/campaign/out/cells" || true)
+  [ -z "$difference" ] || { echo "$command: something is left or lost: $difference"; exit 1; }
 done
 echo "$kills kills in $trials pairs of runs ($refused runs were told who holds the folder): every file whole, no folder mixed, nothing left behind"
 for command in "${commands[@]}"; do echo "  $command: ${of_command[$command]:-0} kills"; done
