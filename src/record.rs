@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use crate::numeric::statistics::{gross_errors, robust_deviation};
+use crate::units::rad_per_s_from_deg_per_h;
 
 /// A further column of a record, by its name.
 #[derive(Debug, Clone, PartialEq)]
@@ -11,12 +12,17 @@ pub struct Channel {
     pub values: Vec<f64>,
 }
 
+/// The channel of the table's rate, which a record's rates are without [°/h].
+pub const TABLE_RATE: &str = "table_rate_deg_per_h";
+
 /// One row of what every record has.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
     pub time_s: f64,
     pub temperature_k: f64,
+    /// Beside the table's, where the gyro stood on one.
     pub rate_rad_per_s: f64,
+    pub table_rad_per_s: Option<f64>,
 }
 
 /// A value that stands alone.
@@ -189,10 +195,12 @@ impl Record {
 
     /// Row by row what every record has.
     pub fn each_row(&self) -> impl Iterator<Item = Row> {
-        (0..self.rows()).map(|i| Row {
+        let table = self.channels.iter().find(|c| c.name == TABLE_RATE).map(|c| c.values.as_slice());
+        (0..self.rows()).map(move |i| Row {
             time_s: self.times_s[i],
             temperature_k: self.temperature_k[i],
             rate_rad_per_s: self.rate_rad_per_s[i],
+            table_rad_per_s: table.map(|t| rad_per_s_from_deg_per_h(t[i])),
         })
     }
 

@@ -169,6 +169,18 @@ pub fn percent_from_fraction(fraction: f64) -> f64 {
     fraction * 100.0
 }
 
+pub fn ppm_from_fraction(fraction: f64) -> f64 {
+    fraction * 1e6
+}
+
+pub fn fraction_from_ppm(ppm: f64) -> f64 {
+    ppm / 1e6
+}
+
+pub fn rad_from_deg(angle_deg: f64) -> f64 {
+    angle_deg / DEGREES_PER_RADIAN
+}
+
 pub fn fraction_from_percent(percent: f64) -> f64 {
     percent / 100.0
 }

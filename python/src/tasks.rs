@@ -302,7 +302,7 @@ pub fn metrics(
         Held(Box<task::measurement::Measurement>),
         File(PathBuf),
     }
-    let settings = Settings { average_s, gross_errors: gross_errors(py, gross)? };
+    let settings = Settings { average_s, gross_errors: gross_errors(py, gross)?, attitude: None };
     let sources: Vec<Source> = records
         .iter()
         .map(|record| match record {

@@ -11,16 +11,19 @@ use super::{CliError, Ending};
 use crate::io::fault::Faults;
 use crate::io::json::inputs::RecordInputJson;
 use crate::io::json::metrics::{MetricsJson, NoiseJson, RecordMetricsJson};
+use crate::io::json::scale_factor::{EstimateJson, ScaleFactorJson};
 use crate::io::read::record_columns::RecordFormat;
 use crate::io::write::measurement_folder::check_free;
+use crate::metrics::earth::Attitude;
 use crate::task::Observer;
 use crate::task::metrics::{self, DEFAULT_AVERAGE_S, Measured, Settings, measure_stream};
 use crate::task::page::REPORT_FILE;
+use crate::units::rad_from_deg;
 
 /// Bias, stability, Allan deviation and temperature sensitivity of records
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  coilwright metrics day-1.csv day-2.csv --average 100\n  coilwright metrics rest.csv -o results/rest\n  coilwright compensate coil.toml day-2.csv --fit day-1.csv | coilwright metrics -"
+    after_help = "Examples:\n  coilwright metrics day-1.csv day-2.csv --average 100\n  coilwright metrics rest.csv -o results/rest\n  coilwright metrics table.csv --columns time=t,temperature=T,rate=F:counts,scale=12.5,table=Table:deg_per_s\n  coilwright metrics up.csv down.csv --latitude 48.1 --elevation 90,-90\n  coilwright compensate coil.toml day-2.csv --fit day-1.csv | coilwright metrics -"
 )]
 pub struct Arguments {
     /// Records (CSV), or - for standard input; what compensate writes is measured by its compensated rate
@@ -29,6 +32,15 @@ pub struct Arguments {
     /// Averaging time of the bias stability [s]
     #[arg(long, value_name = "SECONDS", default_value_t = DEFAULT_AVERAGE_S)]
     average: f64,
+    /// Where the gyro stood [° north]; with the axis' elevation its bias is given without the earth's rate too
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true, requires = "elevation")]
+    latitude: Option<f64>,
+    /// The sensitive axis' elevation above the horizon [°]: one for all records, or one for each
+    #[arg(long, value_name = "DEG,…", allow_hyphen_values = true, value_delimiter = ',', requires = "latitude")]
+    elevation: Vec<f64>,
+    /// Its azimuth from true north, clockwise [°]; not needed where it is upright
+    #[arg(long, value_name = "DEG,…", allow_hyphen_values = true, value_delimiter = ',', requires = "elevation")]
+    azimuth: Vec<f64>,
     /// What to do with values that stand alone
     #[arg(long, value_enum, default_value_t = GrossErrors::Keep)]
     gross_errors: GrossErrors,
@@ -45,9 +57,13 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         check_free(folder)?;
     }
     let format = arguments.reading.format(None)?;
-    let settings = Settings { average_s: arguments.average, gross_errors: arguments.gross_errors.into() };
+    let usual = Settings { average_s: arguments.average, gross_errors: arguments.gross_errors.into(), attitude: None };
     let watching = Watching::new(screen, "metrics");
-    let measured = arguments.records.iter().map(|path| measure(path, &format, &settings, &watching));
+    let measured = arguments
+        .records
+        .iter()
+        .zip(attitudes(arguments)?)
+        .map(|(path, attitude)| measure(path, &format, &Settings { attitude, ..usual }, &watching));
     let body = metrics::document(measured.collect::<Result<_, _>>()?)?;
     watching.finish();
     if let Some(folder) = &arguments.output {
@@ -56,6 +72,47 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     }
     screen.answer(body, text)?;
     Ok(Ending::Done)
+}
+
+/// Of each record; none where it is not stated.
+fn attitudes(arguments: &Arguments) -> Result<Vec<Option<Attitude>>, CliError> {
+    let count = arguments.records.len();
+    let Some(latitude) = arguments.latitude else { return Ok(vec![None; count]) };
+    let fault = |option: &'static str, message: String| Err(CliError::Option { option, message });
+    if !(-90.0..=90.0).contains(&latitude) {
+        return fault("--latitude", format!("expected -90 to 90 °, found {latitude}"));
+    }
+    let each = |option: &'static str, stated: &[f64], most: f64| -> Result<Vec<f64>, CliError> {
+        if let Some(beyond) = stated.iter().find(|v| !(v.abs() <= most)) {
+            return Err(CliError::Option { option, message: format!("expected -{most} to {most} °, found {beyond}") });
+        }
+        match stated {
+            [one] => Ok(vec![*one; count]),
+            all if all.len() == count => Ok(all.to_vec()),
+            all => {
+                let message =
+                    format!("expected one for all records or one for each of the {count}, found {}", all.len());
+                Err(CliError::Option { option, message })
+            }
+        }
+    };
+    let elevations = each("--elevation", &arguments.elevation, 90.0)?;
+    let is_upright = elevations.iter().all(|e| e.abs() == 90.0);
+    let azimuths = match (arguments.azimuth.as_slice(), is_upright) {
+        ([], true) => vec![0.0; count],
+        ([], false) => {
+            return fault("--azimuth", "is needed where the axis is not upright: 0 is north, 90 east".to_owned());
+        }
+        (stated, _) => each("--azimuth", stated, 360.0)?,
+    };
+    let attitude = |(elevation, azimuth): (f64, f64)| {
+        Some(Attitude {
+            latitude_rad: rad_from_deg(latitude),
+            elevation_rad: rad_from_deg(elevation),
+            azimuth_rad: rad_from_deg(azimuth),
+        })
+    };
+    Ok(elevations.into_iter().zip(azimuths).map(attitude).collect())
 }
 
 /// Says how much of a file has been read.
@@ -140,7 +197,55 @@ fn text(body: &MetricsJson) -> String {
         text += &table(&["kind", "value", "interval", "unit"], record.noise.iter().map(row));
     }
     for record in &body.records {
+        if let Some(scale) = &record.scale_factor {
+            text += &format!(
+                "\nscale factor of {}, {} even stretches of the table in {} runs\n",
+                record.file,
+                scale.stretches.len(),
+                scale.runs
+            );
+            text += &table(&["measure", "value", "± standard error", "unit"], scale_rows(scale));
+        }
+    }
+    let known = body.records.iter().filter_map(|r| Some((r, r.earth_rate_deg_per_h?, r.bias_without_earth_deg_per_h?)));
+    let rows: Vec<Vec<String>> =
+        known.map(|(r, earth, bias)| vec![r.file.clone(), format!("{earth:.6}"), format!("{bias:.6}")]).collect();
+    if !rows.is_empty() {
+        text.push('\n');
+        text += &table(&["record", "earth's rate °/h", "bias without it °/h"], rows);
+    }
+    if let Some(found) = &body.positions {
+        let error = found.scale_error_ppm.standard_error.map_or(String::new(), |e| format!(" ± {e:.1}"));
+        text += &format!(
+            "\nsteps of the offset between attitudes: scale factor off by {:.1}{error} ppm, bias of the gyro itself {:.6} °/h\n",
+            found.scale_error_ppm.value, found.bias_deg_per_h
+        );
+    }
+    for record in &body.records {
         text.extend(record.cautions.iter().map(|caution| format!("\ncaution: {}: {caution}\n", record.file)));
     }
     text
+}
+
+fn scale_rows(scale: &ScaleFactorJson) -> Vec<Vec<String>> {
+    let row = |name: String, value: Option<f64>, error: Option<f64>, unit: &str| {
+        let shown = |v: Option<f64>| v.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
+        vec![name, shown(value), shown(error), unit.to_owned()]
+    };
+    let estimate = |name: &str, of: Option<&EstimateJson>, unit: &str| {
+        row(name.to_owned(), of.map(|e| e.value), of.and_then(|e| e.standard_error), unit)
+    };
+    let mut rows = vec![
+        estimate(&format!("error at {:.1} °C", scale.at_temperature_c), Some(&scale.error_ppm), "ppm"),
+        estimate("temperature coefficient", scale.temperature_coefficient_ppm_per_k.as_ref(), "ppm/K"),
+        estimate("hysteresis, warming less cooling", scale.hysteresis_ppm.as_ref(), "ppm"),
+        row("nonlinearity".to_owned(), Some(scale.nonlinearity_ppm), None, "ppm"),
+        estimate("asymmetry, forwards less backwards", scale.asymmetry_ppm.as_ref(), "ppm"),
+        row("repeatability over runs".to_owned(), scale.repeatability_ppm, None, "ppm"),
+        row("offset".to_owned(), Some(scale.offset_deg_per_h), None, "°/h"),
+    ];
+    if let Some(raw) = scale.raw_units_per_deg_per_h {
+        rows.push(vec!["scale factor".to_owned(), format!("{raw:.9}"), "-".to_owned(), "raw units per °/h".to_owned()]);
+    }
+    rows
 }

@@ -147,7 +147,7 @@ pub(super) struct Follower {
 
 impl Follower {
     fn columns(&mut self, time_s: f64, temperature_k: f64, interval_s: f64) -> DVector<f64> {
-        let row = Row { time_s, temperature_k, rate_rad_per_s: 0.0 };
+        let row = Row { time_s, temperature_k, rate_rad_per_s: 0.0, table_rad_per_s: None };
         if time_s - self.last_s > LONGEST_GAP * interval_s {
             self.columns = None;
         }

@@ -13,27 +13,31 @@ pub enum Quantity {
     Rate,
     InnerTemperature,
     AmbientTemperature,
+    /// What a table turned the gyro by, about its sensitive axis.
+    Table,
     /// Anything else, by its name.
     Channel,
 }
 
 impl Quantity {
     /// As a mapping names it.
-    pub(in crate::io) const ROLES: [(&'static str, Quantity); 5] = [
+    pub(in crate::io) const ROLES: [(&'static str, Quantity); 6] = [
         ("time", Quantity::Time),
         ("temperature", Quantity::Temperature),
         ("rate", Quantity::Rate),
         ("inner", Quantity::InnerTemperature),
         ("ambient", Quantity::AmbientTemperature),
+        ("table", Quantity::Table),
     ];
 
     /// The names before the unit that a header may have without a mapping.
-    pub(in crate::io) const STEMS: [(&'static str, Quantity); 5] = [
+    pub(in crate::io) const STEMS: [(&'static str, Quantity); 6] = [
         ("time", Quantity::Time),
         ("temperature", Quantity::Temperature),
         ("rate", Quantity::Rate),
         ("temperature_inner", Quantity::InnerTemperature),
         ("temperature_ambient", Quantity::AmbientTemperature),
+        ("table_rate", Quantity::Table),
     ];
 
     pub(in crate::io) fn is_temperature(self) -> bool {
@@ -44,6 +48,7 @@ impl Quantity {
         match self {
             Quantity::Time => "s",
             Quantity::Rate => "deg_per_h",
+            Quantity::Table => "deg_per_s",
             Quantity::Channel => "",
             _ => "c",
         }
@@ -129,7 +134,7 @@ impl Kind {
     pub(in crate::io) fn of(quantity: Quantity) -> Option<Self> {
         match quantity {
             Quantity::Time => Some(Kind::Time),
-            Quantity::Rate => Some(Kind::Rate),
+            Quantity::Rate | Quantity::Table => Some(Kind::Rate),
             Quantity::Channel => None,
             _ => Some(Kind::Temperature),
         }
@@ -232,6 +237,11 @@ impl RecordFormat {
             self.map(role, target)?;
         }
         Ok(())
+    }
+
+    /// Raw outputs that are a degree an hour, where the rate is raw.
+    pub fn scale(&self) -> Option<f64> {
+        self.scale
     }
 
     /// Whether columns that are not mapped may hold words.

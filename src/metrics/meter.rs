@@ -5,6 +5,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use super::scale_factor::Stretches;
 use super::thermal::{COLUMNS, GROUPS, ThermalColumns};
 use super::{Allan, Metrics, MetricsError, POINT_SHARE, POINT_WIDTH_K, TemperaturePoint, temperature_sensitivity};
 use crate::numeric::allan::RunningAllan;
@@ -139,6 +140,7 @@ struct Running {
     waiting: VecDeque<(u64, f64, f64)>,
     thermal: ThermalColumns,
     pyramid: Pyramid,
+    stretches: Stretches,
 }
 
 impl Running {
@@ -169,6 +171,7 @@ impl Running {
             waiting: VecDeque::new(),
             thermal: ThermalColumns::new(first, interval_s),
             pyramid: Pyramid::new(2 + COLUMNS, bottom),
+            stretches: Stretches::default(),
         }
     }
 
@@ -203,6 +206,7 @@ impl Running {
         let sums = self.bands.entry(band).or_default();
         *sums = (sums.0 + row.temperature_k, sums.1 + from_level, sums.2 + 1);
         self.allan.push(row.rate_rad_per_s);
+        self.stretches.push(row);
         if self.last.is_some() {
             self.place += (step_s / self.interval_s).round().clamp(1.0, 1e15) as u64;
         }
@@ -267,6 +271,7 @@ impl Running {
             temperature_points,
             allan,
             noises,
+            scale_factor: self.stretches.finish(),
         }
     }
 }

@@ -18,13 +18,16 @@
 //! noise. The bias instability is the Allan deviation's minimum as it is, not divided by 0.664. The Allan deviation needs regular
 //! sampling: it is that of the longest stretch without a gap; the noises are of all rows.
 //!
-//! Leaves out scale-factor errors and everything that needs a turntable.
+//! Where a table turned the gyro, its rate is taken off, and the scale factor is had from its even stretches ([`scale_factor`]).
+//! The earth's rate is a known part of the bias where latitude and attitude are stated ([`earth`]).
 //!
 //! # Source
 //! Thesis chapter on FOG drift compensation (2021), Eqs. (3-1) to (3-7), which leave open which test point m is: the
 //! standards for gyros (GJB 2426A, IEEE Std 952) take room temperature. Bs there is the deviation of the output itself.
 
+pub mod earth;
 mod meter;
+pub mod scale_factor;
 pub mod thermal;
 
 use thiserror::Error;
@@ -36,6 +39,7 @@ use crate::numeric::coloured::NoiseStrengths;
 use crate::numeric::statistics::standard_deviation;
 use crate::record::Record;
 use crate::units::REFERENCE_TEMPERATURE_K;
+use scale_factor::ScaleFactor;
 
 /// The measures of one record.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,6 +68,8 @@ pub struct Metrics {
     pub allan: Option<Allan>,
     /// None for a record too short to tell noises apart.
     pub noises: Option<NoiseStrengths>,
+    /// None where no table turned the gyro at several rates.
+    pub scale_factor: Option<ScaleFactor>,
 }
 
 /// Mean rate over a band of temperature.
@@ -101,6 +107,11 @@ const POINT_WIDTH_K: f64 = 5.0;
 const POINT_SHARE: f64 = 0.02;
 
 impl Metrics {
+    /// Of a gyro on a table what it shows beside the turning; of one at rest its bias.
+    pub fn offset_rad_per_s(&self) -> f64 {
+        self.scale_factor.as_ref().map_or(self.bias_rad_per_s, |scale| scale.offset_rad_per_s)
+    }
+
     /// # Errors
     /// An averaging time that is not positive.
     pub fn of(record: &Record, average_s: f64) -> Result<Self, MetricsError> {

@@ -104,7 +104,8 @@ mod tests {
 
     #[test]
     fn a_step_leaves_each_lag_behind_by_its_own_exponential_and_rest_leaves_nothing() {
-        let row = |time_s: f64, temperature_k: f64| Row { time_s, temperature_k, rate_rad_per_s: 0.0 };
+        let row =
+            |time_s: f64, temperature_k: f64| Row { time_s, temperature_k, rate_rad_per_s: 0.0, table_rad_per_s: None };
         let mut columns = ThermalColumns::new(row(0.0, 300.0), 10.0);
         let mut found = vec![f64::NAN; COLUMNS];
         columns.write(&mut found);

@@ -4,8 +4,10 @@ use std::io::Read;
 
 use crate::io::json::inputs::{InputsJson, RecordInputJson};
 use crate::io::json::metrics::{GrossErrorJson, GrossErrors as Found, MetricsJson, RecordMetricsJson};
+use crate::io::json::scale_factor::PositionsJson;
 use crate::io::read::record_columns::RecordFormat;
 use crate::io::read::record_rows::{CHUNK, stream_rows};
+use crate::metrics::earth::{Attitude, positions};
 use crate::metrics::{Meter, Metrics, repeatability_rad_per_s};
 use crate::record::{Row, gross_errors_of};
 
@@ -20,11 +22,13 @@ pub const DEFAULT_AVERAGE_S: f64 = 10.0;
 pub struct Settings {
     pub average_s: f64,
     pub gross_errors: GrossErrors,
+    /// Where the gyro stood and how its axis pointed, where that is known.
+    pub attitude: Option<Attitude>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { average_s: DEFAULT_AVERAGE_S, gross_errors: GrossErrors::Keep }
+        Self { average_s: DEFAULT_AVERAGE_S, gross_errors: GrossErrors::Keep, attitude: None }
     }
 }
 
@@ -34,6 +38,7 @@ pub struct Measured {
     metrics: Metrics,
     shown: RecordMetricsJson,
     input: RecordInputJson,
+    earth_rad_per_s: Option<f64>,
 }
 
 /// Takes rows as they come.
@@ -41,12 +46,16 @@ struct Metering {
     meter: Meter,
     dropped: bool,
     found: Found,
+    scale: Option<f64>,
+    earth_rad_per_s: Option<f64>,
 }
 
 impl Metering {
-    fn new(settings: &Settings) -> Result<Self, TaskError> {
+    fn new(settings: &Settings, scale: Option<f64>) -> Result<Self, TaskError> {
         let meter = Meter::new(settings.average_s)?;
-        Ok(Self { meter, dropped: settings.gross_errors == GrossErrors::Drop, found: Found::default() })
+        let dropped = settings.gross_errors == GrossErrors::Drop;
+        let earth_rad_per_s = settings.attitude.map(|attitude| attitude.earth_rad_per_s());
+        Ok(Self { meter, dropped, found: Found::default(), scale, earth_rad_per_s })
     }
 
     fn take(&mut self, rows: &[Row]) {
@@ -69,7 +78,8 @@ impl Metering {
     fn finish(self, input: RecordInputJson) -> Result<Measured, TaskError> {
         let metrics = self.meter.finish()?;
         let shown = RecordMetricsJson::new(&input.file, &metrics, self.found, metrics.gaps);
-        Ok(Measured { metrics, shown, input })
+        let shown = shown.taken(&metrics, self.scale, self.earth_rad_per_s);
+        Ok(Measured { metrics, shown, input, earth_rad_per_s: self.earth_rad_per_s })
     }
 }
 
@@ -87,7 +97,7 @@ pub fn measure_stream(
 ) -> Result<Measured, TaskError> {
     let mut format = format.clone();
     format.compensated = true;
-    let mut metering = Metering::new(settings)?;
+    let mut metering = Metering::new(settings, format.scale())?;
     let noticed = stream_rows(shown_as, source, &format, |rows: &[Row]| metering.take(rows))?;
     say_read(&input.file, noticed.skipped_rows, &noticed.remarks, observer);
     say_gross(&input.file, metering.found.count, metering.found.first.first(), metering.dropped, observer);
@@ -99,7 +109,7 @@ pub fn measure_stream(
 /// # Errors
 /// A record that is too short.
 pub fn measure(measurement: &Measurement, settings: &Settings, observer: &dyn Observer) -> Result<Measured, TaskError> {
-    let mut metering = Metering::new(settings)?;
+    let mut metering = Metering::new(settings, None)?;
     // As a stream hands them on, so that both say the same.
     for rows in measurement.record.each_row().collect::<Vec<Row>>().chunks(CHUNK) {
         metering.take(rows);
@@ -116,8 +126,12 @@ pub fn measure(measurement: &Measurement, settings: &Settings, observer: &dyn Ob
 pub fn document(measured: Vec<Measured>) -> Result<MetricsJson, TaskError> {
     let all: Vec<Metrics> = measured.iter().map(|m| m.metrics.clone()).collect();
     let repeatability = repeatability_rad_per_s(&all)?;
+    let attitudes: Option<Vec<f64>> = measured.iter().map(|m| m.earth_rad_per_s).collect();
+    let offsets: Vec<f64> = all.iter().map(Metrics::offset_rad_per_s).collect();
+    let found = attitudes.and_then(|earth| positions(&earth, &offsets));
     let (shown, inputs) = measured.into_iter().map(|m| (m.shown, m.input)).unzip();
-    Ok(MetricsJson::new(shown, repeatability, InputsJson::new(None, inputs)))
+    let document = MetricsJson::new(shown, repeatability, InputsJson::new(None, inputs));
+    Ok(MetricsJson { positions: found.as_ref().map(PositionsJson::new), ..document })
 }
 
 #[cfg(feature = "report")]

@@ -1,5 +1,7 @@
 //! `metrics`: what it says, writes and refuses.
 
+use serde_json::Value;
+
 use super::{code, folder_with, json, run, run_in, stderr, stdout};
 
 const RECORD: &str = "tests/data/records/a-control/calibration.csv";
@@ -153,4 +155,81 @@ fn a_mapped_file_with_semicolons_decimal_commas_and_bad_rows_gives_the_plain_fil
     }
     let wrong = run(&["metrics", &path, "--columns", "time=Zeit:fortnights"]);
     assert!(stderr(&wrong).contains("expected a unit of s, ms"), "{}", stderr(&wrong));
+}
+
+/// A gyro on a table at latitude 30°, its axis upright: counts, with an error of 500 ppm that grows by 10 ppm a kelvin.
+fn on_a_table(temperatures_c: &[f64], sign: f64) -> String {
+    let mut text = "t;T1;F;Table\n".to_owned();
+    let mut time_s = 0;
+    for temperature_c in temperatures_c {
+        for rate_deg_per_s in [-50.0, -20.0, 0.0, 20.0, 50.0] {
+            for row in 0..30 {
+                let table = rate_deg_per_s * (0.25 * f64::from(row + 1)).min(1.0);
+                let error = 500e-6 + 10e-6 * (temperature_c - 20.0);
+                // Twelve and a half counts are a degree an hour; the earth adds 7.520534, the gyro itself 0.3.
+                let rate_deg_per_h = (1.0 + error) * (table * 3600.0 + sign * 7.520_534) + 0.3;
+                let wiggle = 0.02 * f64::from((7 * row) % 5 - 2);
+                let cells =
+                    [temperature_c.to_string(), (12.5 * (rate_deg_per_h + wiggle)).to_string(), table.to_string()];
+                text += &format!("{time_s};{}\n", cells.join(";").replace('.', ","));
+                time_s += 1;
+            }
+        }
+    }
+    text
+}
+
+#[test]
+fn a_record_on_a_rate_table_gives_the_scale_factor_from_raw_counts() {
+    let warm: Vec<f64> = vec![10.0, 30.0, 50.0, 30.0, 10.0];
+    let (_folder, path) = folder_with("table.csv", on_a_table(&warm, 1.0));
+    let columns = "--columns=time=t:s,temperature=T1:c,rate=F:counts,scale=12.5,table=Table:deg_per_s";
+    let file = path.display().to_string();
+    let found = json(&["metrics", &file, columns, "--latitude", "30", "--elevation", "90"]);
+    let scale = &found["records"][0]["scale_factor"];
+    let number = |value: &Value| value.as_f64().unwrap();
+    let at_c = number(&scale["at_temperature_c"]);
+    assert!((number(&scale["error_ppm"]["value"]) - 500.0 - 10.0 * (at_c - 20.0)).abs() < 0.5, "{scale}");
+    assert!((number(&scale["temperature_coefficient_ppm_per_k"]["value"]) - 10.0).abs() < 0.05, "{scale}");
+    assert!(
+        number(&scale["hysteresis_ppm"]["value"]).abs() < 1.0 && number(&scale["nonlinearity_ppm"]) < 1.0,
+        "{scale}"
+    );
+    assert!(
+        (number(&scale["raw_units_per_deg_per_h"]) / 12.5 / (1.0 + 1e-6 * number(&scale["error_ppm"]["value"])) - 1.0)
+            .abs()
+            < 1e-12
+    );
+    assert_eq!((scale["runs"].as_u64(), scale["stretches"].as_array().map(Vec::len)), (Some(5), Some(25)));
+    assert_eq!(found["scale_factor"], *scale);
+    assert!((number(&found["records"][0]["earth_rate_deg_per_h"]) - 7.520_534).abs() < 1e-5);
+    assert!((number(&found["records"][0]["bias_without_earth_deg_per_h"]) - 0.3).abs() < 0.02, "{found}");
+    let words = run(&["metrics", &file, columns]);
+    let said = stdout(&words);
+    assert!(said.contains("25 even stretches of the table in 5 runs") && said.contains("ppm/K"), "{said}");
+    assert!(stderr(&words).contains("is the table's rate and is taken off"), "{}", stderr(&words));
+}
+
+#[test]
+fn steps_of_the_offset_between_attitudes_give_the_gyros_own_bias() {
+    let record = |offset: f64| {
+        let rows = (0..400).map(|i| format!("{i},20,{}\n", offset + 0.01 * f64::from((7 * i) % 5 - 2)));
+        "time_s,temperature_c,rate_deg_per_h\n".to_owned() + &rows.collect::<String>()
+    };
+    let (folder, up) = folder_with("up.csv", record(1.01 * 7.520_534 + 0.3));
+    let down = folder.path().join("down.csv");
+    std::fs::write(&down, record(-1.01 * 7.520_534 + 0.3)).unwrap();
+    let (up, down) = (up.display().to_string(), down.display().to_string());
+    let found = json(&["metrics", &up, &down, "--latitude", "30", "--elevation", "90,-90"]);
+    let positions = &found["positions"];
+    assert!((positions["scale_error_ppm"]["value"].as_f64().unwrap() - 10_000.0).abs() < 1.0, "{positions}");
+    assert!((positions["bias_deg_per_h"].as_f64().unwrap() - 0.3).abs() < 1e-6, "{positions}");
+    for (arguments, wanted) in [
+        (["--latitude", "100", "--elevation", "90"], "--latitude: expected -90 to 90 °, found 100"),
+        (["--latitude", "30", "--elevation", "0"], "--azimuth: is needed where the axis is not upright"),
+        (["--latitude", "30", "--elevation", "1,2,3"], "one for each of the 2, found 3"),
+    ] {
+        let refused = run(&[&["metrics", &up, &down][..], &arguments[..]].concat());
+        assert!(code(&refused) == 2 && stderr(&refused).contains(wanted), "{}", stderr(&refused));
+    }
 }

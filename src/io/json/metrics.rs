@@ -11,6 +11,7 @@ use crate::units::{
 };
 
 use super::inputs::InputsJson;
+use super::scale_factor::{PositionsJson, ScaleFactorJson};
 
 /// The measures under the keys that scripts read. Over several records: the mean bias and the worst of the others.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -28,6 +29,12 @@ pub struct MetricsJson {
     pub drift_angle_deg: f64,
     /// Of several records, for each kind the largest.
     pub noise: Vec<NoiseJson>,
+    /// Null where no rate table turned the gyro.
+    #[serde(default)]
+    pub scale_factor: Option<ScaleFactorJson>,
+    /// Null where the attitude is not stated, or is the same in all records.
+    #[serde(default)]
+    pub positions: Option<PositionsJson>,
     pub records: Vec<RecordMetricsJson>,
     pub inputs: InputsJson,
 }
@@ -56,6 +63,15 @@ pub struct RecordMetricsJson {
     pub drift_angle_deg: f64,
     /// Five kinds, each with an interval; all five hold together with 95 %. Empty where the record is too short.
     pub noise: Vec<NoiseJson>,
+    /// Null where no rate table turned the gyro. Bias, noise and drift are of the rate without the table's.
+    #[serde(default)]
+    pub scale_factor: Option<ScaleFactorJson>,
+    /// About the sensitive axis; null where latitude and attitude are not stated.
+    #[serde(default)]
+    pub earth_rate_deg_per_h: Option<f64>,
+    /// The bias (on a table: its offset) without the earth's rate.
+    #[serde(default)]
+    pub bias_without_earth_deg_per_h: Option<f64>,
     pub temperature_range_c: f64,
     /// Root mean square of what follows the temperature, which was not taken for noise.
     pub thermal_deg_per_h: Option<f64>,
@@ -169,6 +185,9 @@ impl RecordMetricsJson {
             averaged_peak_to_peak_deg_per_h: deg_per_h_from_rad_per_s(metrics.averaged_peak_to_peak_rad_per_s),
             drift_angle_deg: deg_from_rad(metrics.drift_angle_rad),
             noise: noises.map_or_else(Vec::new, strengths),
+            scale_factor: metrics.scale_factor.as_ref().map(|found| ScaleFactorJson::new(found, None)),
+            earth_rate_deg_per_h: None,
+            bias_without_earth_deg_per_h: None,
             temperature_range_c: metrics.temperature_range_k,
             thermal_deg_per_h: of_noise(|n| deg_per_h_from_rad_per_s(n.explained)),
             cautions: cautions(metrics, gross_errors.count),
@@ -200,6 +219,17 @@ impl RecordMetricsJson {
     }
 }
 
+impl RecordMetricsJson {
+    /// With what is known of how the record was taken: the scale factor it was read by, and the earth's rate about the axis.
+    pub fn taken(mut self, metrics: &Metrics, raw_per_deg_per_h: Option<f64>, earth_rad_per_s: Option<f64>) -> Self {
+        self.scale_factor = metrics.scale_factor.as_ref().map(|found| ScaleFactorJson::new(found, raw_per_deg_per_h));
+        self.earth_rate_deg_per_h = earth_rad_per_s.map(deg_per_h_from_rad_per_s);
+        self.bias_without_earth_deg_per_h =
+            earth_rad_per_s.map(|earth| deg_per_h_from_rad_per_s(metrics.offset_rad_per_s() - earth));
+        self
+    }
+}
+
 /// The five kinds with their intervals.
 fn strengths(found: &NoiseStrengths) -> Vec<NoiseJson> {
     let noise = |kind: &str, interval: Interval, convert: fn(f64) -> f64, unit: &str| NoiseJson {
@@ -221,6 +251,15 @@ fn strengths(found: &NoiseStrengths) -> Vec<NoiseJson> {
 /// What a reader must know beside the numbers.
 fn cautions(metrics: &Metrics, gross_errors: usize) -> Vec<String> {
     let mut said = Vec::new();
+    if let Some(scale) = &metrics.scale_factor {
+        said.push("a table turned the gyro: bias, stability, noise and drift are of the rate without the table's, its starts and stops included".to_owned());
+        if scale.error.value.abs() > 1.0 {
+            said.push("the rate goes against the table's, or in another unit: give the column its unit, or turn the sign of scale".to_owned());
+        }
+        if scale.left_out > 0 {
+            said.push(format!("{} further even stretches of the table are left out", scale.left_out));
+        }
+    }
     let Some(noises) = &metrics.noises else {
         said.push("too short or too irregular to tell noises apart: no noise coefficients".to_owned());
         return said;
@@ -331,6 +370,10 @@ impl MetricsJson {
                 .max_by(|a, b| a.abs().total_cmp(&b.abs()))
                 .unwrap_or(0.0),
             noise: loudest(&records),
+            scale_factor: ScaleFactorJson::of_all(
+                &records.iter().filter_map(|r| r.scale_factor.as_ref()).collect::<Vec<_>>(),
+            ),
+            positions: None,
             records,
             inputs,
         }

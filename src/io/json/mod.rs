@@ -16,6 +16,7 @@ pub mod metrics;
 pub mod noise;
 pub mod pareto;
 pub mod proposals;
+pub mod scale_factor;
 pub mod schedule;
 pub mod schema;
 pub mod search;

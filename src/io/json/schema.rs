@@ -112,6 +112,7 @@ pub fn model_schema() -> Value {
             "rate": mapped("deg_per_h, mdeg_per_h, deg_per_s, rad_per_s, arcsec_per_s, counts, mv, v"),
             "inner": mapped("temperature of the bore: c, k, f"),
             "ambient": mapped("temperature of the air: c, k, f"),
+            "table": mapped("what a rate table turned the gyro by: deg_per_s, deg_per_h, mdeg_per_h, rad_per_s, arcsec_per_s"),
             "scale": described("number", "raw units (counts, mv, v) that are one degree an hour"),
             "bad_rows": { "enum": ["refuse", "skip"], "default": "refuse",
                 "description": "rows that lack a number, or whose stamp repeats or jumps back" },
@@ -400,12 +401,14 @@ pub fn record_schema() -> Value {
             "rate_deg_per_h": described("number", "what the gyro showed, at rest; also rate_mdeg_per_h, _deg_per_s, _rad_per_s, _arcsec_per_s; mapped with a scale: counts, mv, v"),
             "temperature_inner_c": described("number", "at the bore; also _k, _f"),
             "temperature_ambient_c": described("number", "of the air; also _k, _f"),
+            "table_rate_deg_per_s": described("number", "what a rate table turned the gyro by, which is taken off the rate; also _deg_per_h, _mdeg_per_h, _rad_per_s, _arcsec_per_s"),
         },
         "patternProperties": {
             "^time_(ms|us|ns|min|h|d)$": { "type": "number" },
             "^time_iso$": { "type": "string" },
             "^temperature_((inner|ambient)_)?[kf]$": { "type": "number" },
             "^rate_(mdeg_per_h|deg_per_s|rad_per_s|arcsec_per_s)$": { "type": "number" },
+            "^table_rate_(deg_per_h|mdeg_per_h|rad_per_s|arcsec_per_s)$": { "type": "number" },
         },
         "additionalProperties": { "type": "number", "description": "a further channel by its name" },
     }))

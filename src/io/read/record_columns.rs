@@ -57,7 +57,7 @@ impl Quantity {
             Quantity::Temperature | Quantity::InnerTemperature | Quantity::AmbientTemperature => {
                 (1e9, "any temperature")
             }
-            Quantity::Rate => (1e6, "any rate: 1e6 rad/s, 2e11 °/h"),
+            Quantity::Rate | Quantity::Table => (1e6, "any rate: 1e6 rad/s, 2e11 °/h"),
             _ => (1e30, "any reading: 1e30"),
         }
     }
@@ -97,6 +97,11 @@ impl Column {
                     .map_or(Conversion::By(|value| value), |u| u.conversion)
             }
         };
+        if quantity == Quantity::Table && conversion.is_raw() {
+            return Err(format!(
+                "column {name} is the table's rate: expected deg_per_s, deg_per_h, rad_per_s or arcsec_per_s"
+            ));
+        }
         let scale = match (conversion, format.scale) {
             (Conversion::Raw, None) => {
                 return Err(format!(

@@ -9,8 +9,8 @@ use std::path::Path;
 use crate::io::fault::{Fault, Faults};
 use crate::io::files::read_text_up_to;
 use crate::numeric::statistics::median;
-use crate::record::{Channel, MIN_ROWS, Record, RecordError};
-use crate::units::celsius_from_kelvin;
+use crate::record::{Channel, MIN_ROWS, Record, RecordError, TABLE_RATE};
+use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s};
 
 use super::csv_rows::{CsvRows, Piece};
 use super::record_columns::{Column, FLAGS, Quantity, RecordFormat, read_header};
@@ -217,13 +217,21 @@ fn build(
     };
     let needed = [Quantity::Time, Quantity::Temperature, Quantity::Rate].map(|q| take(q).unwrap_or_default());
     let (inner, ambient) = (take(Quantity::InnerTemperature), take(Quantity::AmbientTemperature));
-    let [times_s, temperature_k, rate_rad_per_s] = needed;
+    let table = take(Quantity::Table);
+    let [times_s, temperature_k, mut rate_rad_per_s] = needed;
+    if let Some(table) = &table {
+        rate_rad_per_s.iter_mut().zip(table).for_each(|(rate, table)| *rate -= table);
+    }
     let mut record = Record::new(file, times_s, temperature_k, rate_rad_per_s)?;
     if let Some(inner_k) = inner {
         record = record.with_inner_k(inner_k)?;
     }
     if let Some(ambient_k) = ambient {
         record = record.with_ambient_k(ambient_k)?;
+    }
+    if let Some(table) = table {
+        let values = table.into_iter().map(deg_per_h_from_rad_per_s).collect();
+        record = record.with_channel(Channel { name: TABLE_RATE.to_owned(), values })?;
     }
     for (column, values) in columns.iter().zip(values) {
         let holds_words = (format.has_mapping() || column.name == FLAGS) && values.iter().all(|v| !v.is_finite());

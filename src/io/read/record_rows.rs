@@ -173,6 +173,12 @@ pub(super) fn assumptions(columns: &[Column], division: Division) -> Vec<String>
         let name = if division.separator == b';' { "semicolons" } else { "tabs" };
         said.push(format!("{name} between columns; a comma inside a number is a decimal comma"));
     }
+    if let Some(table) = columns.iter().find(|c| c.quantity == Quantity::Table) {
+        said.push(format!(
+            "column {} is the table's rate and is taken off: what is left is the gyro's error",
+            table.name
+        ));
+    }
     for column in columns {
         if let Some(unit) = column.assumed_unit() {
             said.push(format!("column {} states no unit: taken as {unit}", column.name));
@@ -239,6 +245,7 @@ pub fn stream_rows(
     rows.expect(columns.iter().map(|c| c.quantity == Quantity::Channel));
     let place = |quantity: Quantity| columns.iter().position(|c| c.quantity == quantity).unwrap_or(0);
     let (time, temperature, rate) = (place(Quantity::Time), place(Quantity::Temperature), place(Quantity::Rate));
+    let table = columns.iter().position(|c| c.quantity == Quantity::Table);
     let mut cells = Cells::new(&columns, format);
     let mut noticed = StreamNoticed { remarks: assumptions(&columns, division), ..StreamNoticed::default() };
     let (mut faults, mut uncounted) = (Vec::new(), 0);
@@ -252,10 +259,12 @@ pub fn stream_rows(
         match cells.read(piece, &rows) {
             CellsRead::Row if faults.is_empty() => {
                 let numbers = cells.numbers();
+                let table_rad_per_s = table.map(|place| numbers[place]);
                 chunk.push(Row {
                     time_s: numbers[time],
                     temperature_k: numbers[temperature],
-                    rate_rad_per_s: numbers[rate],
+                    rate_rad_per_s: numbers[rate] - table_rad_per_s.unwrap_or(0.0),
+                    table_rad_per_s,
                 });
                 noticed.rows += 1;
                 if chunk.len() == CHUNK {

@@ -155,7 +155,7 @@ fn places(
     let needed = |c: &Column| match c.quantity {
         Quantity::Time | Quantity::Temperature | Quantity::Rate | Quantity::InnerTemperature => true,
         Quantity::Channel => names.contains(&c.name.as_str()),
-        Quantity::AmbientTemperature => false,
+        Quantity::AmbientTemperature | Quantity::Table => false,
     };
     let columns: Vec<(usize, Column)> = columns.into_iter().enumerate().filter(|(_, c)| needed(c)).collect();
     let place = |wanted: &&str| {
@@ -194,7 +194,7 @@ fn reading<'r>(
                 Quantity::Rate => found.rate_rad_per_s = value,
                 Quantity::InnerTemperature => found.inner_k = value,
                 Quantity::Channel => channels[next] = value,
-                Quantity::AmbientTemperature => {}
+                Quantity::AmbientTemperature | Quantity::Table => {}
             }
             next += 1;
         }

@@ -32,7 +32,7 @@ fn nothing(id: &str, kind: &str, gyro: &Gyro) -> GyroJson {
 /// # Errors
 /// A record that cannot be opened.
 pub fn measure_gyro(id: &str, gyro: &Gyro, observer: &dyn Observer) -> Result<GyroJson, TaskError> {
-    let settings = Settings { average_s: gyro.settings.average_s, gross_errors: GrossErrors::Keep };
+    let settings = Settings { average_s: gyro.settings.average_s, gross_errors: GrossErrors::Keep, attitude: None };
     let mut measured = Vec::with_capacity(gyro.records.len());
     for file in &gyro.records {
         let unreadable = |e| Faults::of_file(file.path.display().to_string(), format!("cannot be read: {e}"));
