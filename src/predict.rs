@@ -22,7 +22,7 @@ use crate::numeric::noise::{WhiteNoise, white_noise};
 use crate::pattern::Pattern;
 use crate::rate::{CoilModel, Past, RateError, RateModel};
 use crate::record::{Record, RecordError};
-use crate::thermal::{ThermalError, ThermalHistory};
+use crate::thermal::{GivenField, ThermalError, ThermalHistory};
 
 /// A model's prediction of one record.
 ///
@@ -76,6 +76,7 @@ struct Course {
     times_s: Vec<f64>,
     /// Row-major rows × columns.
     values: Vec<f64>,
+    /// Empty where values count as straight between the times.
     slopes_per_s: Vec<f64>,
 }
 
@@ -83,6 +84,8 @@ struct Course {
 pub enum PredictError {
     #[error("the course of the air needs at least {needed} readings of temperature, found {found}")]
     TooFew { needed: usize, found: usize },
+    #[error("the temperature field does not fit: {message}")]
+    Field { message: String },
     #[error(transparent)]
     Record(#[from] RecordError),
     #[error(transparent)]
@@ -276,6 +279,52 @@ pub fn predict_from(
 }
 
 impl Boundary {
+    /// Of layers' temperatures that are known; nothing is left open then.
+    ///
+    /// # Errors
+    /// A field of other layers than the coil's, or that does not span the record's averaging intervals.
+    pub fn given(model: &CoilModel, field: &GivenField, record: &Record) -> Result<Self, PredictError> {
+        let fault = |message: String| Err(PredictError::Field { message });
+        let (history, layers) = (&field.history, model.coil.layers());
+        if history.layers != layers {
+            return fault(format!("expected the coil's {layers} layers, found {}", history.layers));
+        }
+        let (from_s, to_s) = (record.times_s()[0] - model.rate_mean_s, record.times_s()[record.rows() - 1]);
+        let (first_s, last_s) = field.span_s();
+        if from_s < first_s - SAME_S || to_s > last_s + SAME_S {
+            return fault(format!(
+                "the record's averaging intervals go from {from_s} to {to_s} s, the field from {first_s} to {last_s} s: it must span them"
+            ));
+        }
+        let has_moments = !(history.axial_moment_k.is_empty() && history.axial_moment_k_per_s.is_empty());
+        // Of moments only the changes count: where they are not given, their rates' integral stands for them.
+        let moments_k = match has_moments && history.axial_moment_k.is_empty() {
+            true => integral(&history.times_s, &history.axial_moment_k_per_s),
+            false => history.axial_moment_k.clone(),
+        };
+        if history.len() < 2 {
+            return fault("expected at least two times, found one".to_owned());
+        }
+        let columns = if has_moments { 2 * layers + 1 } else { layers + 1 };
+        let gathered = |of_layers: &[f64], moments: &[f64], air: &[f64]| -> Vec<f64> {
+            let rows = (0..history.len()).flat_map(|row| {
+                let here = row * layers..(row + 1) * layers;
+                let moments = if has_moments { &moments[here.clone()] } else { &[] };
+                of_layers[here].iter().chain(moments).chain(&air[row..=row])
+            });
+            rows.copied().collect()
+        };
+        let slopes_per_s = match field.has_rates {
+            true => gathered(&history.rate_k_per_s, &history.axial_moment_k_per_s, &history.ambient_rate_k_per_s),
+            false => Vec::new(),
+        };
+        let values = gathered(&history.temperature_k, &moments_k, &history.ambient_k);
+        let times_s = history.times_s.clone();
+        let rate_variance_rad2_per_s2 = vec![0.0; times_s.len()];
+        let course = Course { layers, columns, times_s, values, slopes_per_s };
+        Ok(Self { film_w_per_m2_k: None, bends: Vec::new(), course, rate_variance_rad2_per_s2 })
+    }
+
     /// The pack over the averaging intervals of some of a record's rows.
     pub fn history(&self, record: &Record, rows: Range<usize>, rate_mean_s: f64) -> ThermalHistory {
         let course = &self.course;
@@ -313,6 +362,19 @@ impl Boundary {
     }
 }
 
+/// Of rates that are straight between times, row-major as they are.
+fn integral(times_s: &[f64], rates: &[f64]) -> Vec<f64> {
+    let columns = rates.len() / times_s.len().max(1);
+    let mut sums = vec![0.0; rates.len()];
+    for row in 1..times_s.len() {
+        let step_s = times_s[row] - times_s[row - 1];
+        for j in row * columns..(row + 1) * columns {
+            sums[j] = sums[j - columns] + 0.5 * step_s * (rates[j - columns] + rates[j]);
+        }
+    }
+    sums
+}
+
 /// Two times that differ by less are one [s].
 const SAME_S: f64 = 1e-6;
 
@@ -329,6 +391,13 @@ impl Course {
         let mut slopes = slopes;
         for (j, value) in values.iter_mut().enumerate() {
             let (a, b) = (self.value(right - 1, j), self.value(right, j));
+            if self.slopes_per_s.is_empty() {
+                *value = a + x * (b - a);
+                if let Some(slopes) = slopes.as_deref_mut() {
+                    slopes[j] = (b - a) / length_s;
+                }
+                continue;
+            }
             let (p, q) = (length_s * self.slope(right - 1, j), length_s * self.slope(right, j));
             // Hermite's cubic.
             let (c, d) = (3.0 * (b - a) - 2.0 * p - q, 2.0 * (a - b) + p + q);

@@ -12,12 +12,13 @@ use crate::io::read::model_file::read_model;
 use crate::io::write::measurement_folder::check_free;
 use crate::task::compare::{Request, run as compare};
 use crate::task::page::REPORT_FILE;
+use crate::task::under_fields::FieldFile;
 use crate::text::sink::Line;
 
 /// A model's prediction beside measured records, and where it fails
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  coilwright compare coil.toml calibration.csv validation.csv\n  coilwright compare coil.toml day-1.csv --strict --format json\n  coilwright compare coil.toml day-1.csv -o results/day-1"
+    after_help = "Examples:\n  coilwright compare coil.toml calibration.csv validation.csv\n  coilwright compare coil.toml day-1.csv --strict --format json\n  coilwright compare coil.toml day-1.csv -o results/day-1\n  coilwright compare coil.toml day-1.csv --field layers.csv"
 )]
 pub struct Arguments {
     /// The model file
@@ -28,6 +29,10 @@ pub struct Arguments {
     /// A winding's name or a pattern file; without it, the model's own
     #[arg(long, short, value_name = "PATTERN", value_parser = offered::patterns(), hide_possible_values = true)]
     pattern: Option<String>,
+    /// The layers' temperatures under a record that were computed or measured (CSV: time_s, layer_1_c, …, or time_s, layer,
+    /// temperature_c), in place of what its sensor implies; one for each record, in their order
+    #[arg(long, value_name = "FILE")]
+    field: Vec<PathBuf>,
     /// What to do with values that stand alone
     #[arg(long, value_enum, default_value_t = GrossErrors::Keep)]
     gross_errors: GrossErrors,
@@ -49,7 +54,9 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     }
     let pattern = pattern_asked(&file, arguments.pattern.as_deref())?;
     let measurements = arguments.reading.read(&arguments.records, Some(&file))?;
+    let fields = arguments.field.iter().map(|path| FieldFile::read(path)).collect::<Result<Vec<_>, _>>()?;
     let request = Request {
+        fields: &fields,
         pattern: pattern.as_ref(),
         gross_errors: arguments.gross_errors.into(),
         ..Request::new(&file, &measurements)

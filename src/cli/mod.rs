@@ -19,6 +19,7 @@ mod metrics;
 mod new;
 mod offered;
 mod optimise;
+mod optimise_field;
 mod pareto;
 mod pattern_asked;
 mod patterns;

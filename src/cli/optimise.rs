@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::budget::parse_duration;
 use super::former::former_pattern;
+use super::optimise_field;
 use super::pattern_asked::pattern_asked;
 use super::progress::StopFlag;
 use super::screen::{Screen, held, table};
@@ -39,7 +40,8 @@ use crate::task::optimise::{self, DRAWN_MODELS, Wishes};
     coilwright optimise my-coil.toml --objective p95       the winding that is best when it is built imperfectly\n  \
     coilwright optimise my-coil.toml --cutting-planes      the worst admissible profiles join the searched ones\n  \
     coilwright optimise examples/paper-200m.toml -o results/paper-200m --resume\n  \
-    coilwright optimise extended.toml --compare-with results/paper-200m"
+    coilwright optimise extended.toml --compare-with results/paper-200m\n  \
+    coilwright optimise my-coil.toml --field warm-up.csv   temperatures from a finite-element program"
 )]
 pub struct Arguments {
     /// The model file
@@ -67,6 +69,10 @@ pub struct Arguments {
     /// every parameter with its error, and the recommended winding is the one that is best over all of them
     #[arg(long, value_name = "FILE")]
     diagnosis: Option<PathBuf>,
+    /// Temperatures of the layers that were computed elsewhere (CSV: time_s, layer_1_c, …, or time_s, layer, temperature_c), used
+    /// instead of the profiles; may be repeated, each file is a case
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["resume", "fresh", "compare_with", "cutting_planes", "diagnosis", "prove"])]
+    pub(super) field: Vec<PathBuf>,
     /// Tries for so long to prove that the best pattern is the best of its class
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     pub(super) prove: Option<Duration>,
@@ -162,6 +168,9 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     }
     let stop = StopFlag::listen();
     let file = read_design(&arguments.model)?;
+    if !arguments.field.is_empty() {
+        return optimise_field::run(arguments, &file, &stop, screen);
+    }
     for advice in &file.advice {
         screen.note(&format!("note: {advice}"));
     }

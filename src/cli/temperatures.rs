@@ -7,9 +7,9 @@ use super::screen::{Screen, held};
 use super::watching::Watching;
 use super::{CliError, Ending};
 use crate::io::folder::Replacement;
-use crate::io::json::temperatures::TemperaturesJson;
 use crate::io::read::model_file::read_model;
 use crate::io::read::profile_file::read_profile_file;
+use crate::io::write::field_table::field_table;
 use crate::report::temperatures::{rate_chart, temperature_chart};
 use crate::task::measurement::Measurement;
 use crate::task::temperatures::{Driver, Request, run as solve};
@@ -17,7 +17,9 @@ use crate::task::temperatures::{Driver, Request, run as solve};
 /// Temperature and rate of every layer, as CSV and pictures
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  coilwright temperatures my-coil.toml --profile warm-up > layers.csv\n  \
-    coilwright temperatures my-coil.toml record.csv -o results/layers")]
+    coilwright temperatures my-coil.toml record.csv -o results/layers\n  \
+    coilwright temperatures my-coil.toml --as-judged > field.csv\n  \
+    coilwright evaluate my-coil.toml --field field.csv     the same worst case")]
 pub struct Arguments {
     /// The model file
     model: PathBuf,
@@ -32,6 +34,10 @@ pub struct Arguments {
     /// Rows of the table for a profile, evenly spaced; a record's rows are its own
     #[arg(long, value_name = "N", default_value_t = 601, value_parser = clap::value_parser!(u32).range(2..=1_000_000), conflicts_with = "record")]
     rows: u32,
+    /// At the instants at which windings are judged instead, both sides of every kink among them, in K and K/s with every digit:
+    /// `evaluate --field` finds the same worst case in it
+    #[arg(long, conflicts_with_all = ["record", "rows"])]
+    as_judged: bool,
     /// Writes temperatures.csv, temperatures.svg and rates.svg into this folder, instead of CSV to stdout
     #[arg(long, short, value_name = "DIR")]
     output: Option<PathBuf>,
@@ -48,14 +54,17 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let measurement = arguments.record.as_ref().map(|path| Measurement::read(path, &format)).transpose()?;
     let driver = match &measurement {
         Some(measurement) => Driver::Measurement(measurement),
+        None if arguments.as_judged => Driver::Judged { name: arguments.profile.as_deref() },
         None => Driver::Profile { name: arguments.profile.as_deref(), rows: arguments.rows },
     };
-    let body = solve(&Request { model: &file, driver }, &Watching::quiet(screen))?.document();
+    let answer = solve(&Request { model: &file, driver }, &Watching::quiet(screen))?;
+    let body = answer.document();
+    let csv = if arguments.as_judged { field_table(&answer.history) } else { body.csv() };
     if let Some(folder) = &arguments.output {
         let _held = held(folder, "temperatures")?;
         let mut files = Replacement::of(folder);
         let names = ["temperatures.csv", "temperatures.svg", "rates.svg"];
-        let contents = [body.csv(), temperature_chart(&body).svg(), rate_chart(&body).svg()];
+        let contents = [csv.clone(), temperature_chart(&body).svg(), rate_chart(&body).svg()];
         names.iter().zip(&contents).try_for_each(|(name, content)| files.add(name, content.as_bytes()))?;
         files.commit(&names)?;
         screen.note(&format!("wrote temperatures.csv, temperatures.svg and rates.svg into {}", folder.display()));
@@ -63,6 +72,6 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
             return Ok(Ending::Done);
         }
     }
-    screen.answer(body, TemperaturesJson::csv)?;
+    screen.answer(body, |_| csv)?;
     Ok(Ending::Done)
 }

@@ -34,6 +34,7 @@ use crate::pattern::Pattern;
 use crate::predict::{self, Boundary, PredictError, Prediction};
 use crate::rate::CoilModel;
 use crate::record::Record;
+use crate::thermal::GivenField;
 use crate::units::percent_from_fraction;
 use regimes::{Part, Regime, Regimes};
 use verdict::{Finding, Verdict};
@@ -127,7 +128,41 @@ const MAX_LAGS: usize = 60;
 /// A pattern of another layer count, a heat path that cannot be solved, a record whose temperature says nothing.
 pub fn compare(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<Comparison, PredictError> {
     let read = predict::read(model, pattern, record)?;
-    let prediction = predict::predict_from(model, pattern, record, &read.boundary)?;
+    let (mut whitened, mut together) = (Some(0.0), None);
+    let noise = predict::noise_floor_rad_per_s(record);
+    if noise > 0.0 {
+        let declared = read.declared(|chamber, fit, wandering| {
+            let beyond = chamber.chi_square_beyond_readings(fit, 0, noise)?;
+            Ok((beyond, standing(model, pattern, chamber, fit, wandering, None)?))
+        })?;
+        (whitened, together) = (Some(declared.0), Some(declared.1));
+    }
+    judged(model, pattern, record, &read.boundary, whitened, together)
+}
+
+/// Compares a model with a record whose layers' temperatures are known.
+///
+/// # Errors
+/// A pattern of another layer count, a field that does not fit coil or record.
+pub fn compare_under(
+    model: &CoilModel,
+    pattern: &Pattern,
+    record: &Record,
+    field: &GivenField,
+) -> Result<Comparison, PredictError> {
+    judged(model, pattern, record, &Boundary::given(model, field, record)?, None, None)
+}
+
+/// `whitened_chi_square` is that against noise and boundary; none where the noise is all that there is.
+fn judged(
+    model: &CoilModel,
+    pattern: &Pattern,
+    record: &Record,
+    boundary: &Boundary,
+    whitened_chi_square: Option<f64>,
+    standing: Option<Standing>,
+) -> Result<Comparison, PredictError> {
+    let prediction = predict::predict_from(model, pattern, record, boundary)?;
     let measured = record.rate_rad_per_s();
     let residual: Vec<f64> = measured.iter().zip(&prediction.rate_rad_per_s).map(|(m, p)| m - p).collect();
     let rows = residual.len();
@@ -143,16 +178,9 @@ pub fn compare(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<
     let autocorrelation = autocorrelation(&scaled, MAX_LAGS.min(rows / 4));
     let (largest_row, _) =
         residual.iter().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).unwrap_or((0, &0.0));
-    let cut = Regimes::new(model, record, &read.boundary, &prediction)?;
-    let Boundary { film_w_per_m2_k, bends, .. } = read.boundary.clone();
-    let (mut whitened_chi_square, mut together) = (0.0, None);
-    if noise > 0.0 {
-        let declared = read.declared(|chamber, fit, wandering| {
-            let beyond = chamber.chi_square_beyond_readings(fit, 0, noise)?;
-            Ok((beyond, standing(model, pattern, chamber, fit, wandering, None)?))
-        })?;
-        (whitened_chi_square, together) = (declared.0, Some(declared.1));
-    }
+    let cut = Regimes::new(model, record, boundary, &prediction)?;
+    let Boundary { film_w_per_m2_k, bends, .. } = boundary.clone();
+    let reduced_chi_square = square / (noise * noise) / freedom;
     let mut found = Comparison {
         rows,
         offset_rad_per_s: prediction.offset_rad_per_s,
@@ -161,9 +189,9 @@ pub fn compare(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<
         rmse_rad_per_s: rms(&residual),
         nrmse_fit_percent: explained.map_or(f64::NEG_INFINITY, |e| percent_from_fraction(1.0 - e.sqrt())),
         r_squared: explained.map(|e| 1.0 - e),
-        reduced_chi_square: square / (noise * noise) / freedom,
+        reduced_chi_square,
         boundary_chi_square: variances.iter().sum::<f64>() / (noise * noise) / freedom,
-        whitened_chi_square,
+        whitened_chi_square: whitened_chi_square.unwrap_or(reduced_chi_square),
         largest: LargestError { time_s: record.times_s()[largest_row], residual_rad_per_s: residual[largest_row] },
         ljung_box: LjungBox::new(&autocorrelation, rows),
         autocorrelation_band: autocorrelation_band_99(rows),
@@ -178,7 +206,7 @@ pub fn compare(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<
         residual_rad_per_s: residual,
         film_w_per_m2_k,
         bends_s: bends.iter().map(|b| b.time_s).collect(),
-        standing: together,
+        standing,
         prediction,
     };
     (found.verdict, found.findings) = verdict::judge(&found, cut.transient_s);

@@ -1,12 +1,13 @@
 //! A model's prediction beside measured records, and where it fails.
 
-use crate::compare::{Comparison, compare, suspicion};
+use crate::compare::{Comparison, compare, compare_under, suspicion};
 use crate::io::json::comparison::{CompareJson, RecordComparisonJson};
 use crate::io::json::inputs::InputsJson;
 use crate::io::model::{ModelFile, NamedPattern};
 use crate::record::Record;
 
 use super::measurement::{GrossErrors, Measurement, Noticed};
+use super::under_fields::FieldFile;
 use super::{Observer, TaskError, pattern_or_own};
 
 /// What is to be compared.
@@ -17,12 +18,14 @@ pub struct Request<'a> {
     pub pattern: Option<&'a NamedPattern>,
     pub measurements: &'a [Measurement],
     pub gross_errors: GrossErrors,
+    /// The layers' temperatures of each record in turn; empty where the records' own sensors tell.
+    pub fields: &'a [FieldFile],
 }
 
 impl<'a> Request<'a> {
     /// With the model's own pattern, gross errors kept.
     pub fn new(model: &'a ModelFile, measurements: &'a [Measurement]) -> Self {
-        Self { model, pattern: None, measurements, gross_errors: GrossErrors::Keep }
+        Self { model, pattern: None, measurements, gross_errors: GrossErrors::Keep, fields: &[] }
     }
 }
 
@@ -43,21 +46,33 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
     let file = request.model;
     let named = pattern_or_own(file, request.pattern)?;
     let count = request.measurements.len();
+    if !request.fields.is_empty() && request.fields.len() != count {
+        let message =
+            format!("expected one for each of the {count} records, in their order, found {}", request.fields.len());
+        return Err(TaskError::Option { option: "--field", message });
+    }
+    request.fields.iter().for_each(|field| field.say(observer));
     let (mut records, mut comparisons) = (Vec::with_capacity(count), Vec::with_capacity(count));
     let mut shown = Vec::with_capacity(count);
     for (index, measurement) in request.measurements.iter().enumerate() {
         observer.at(index as f64 / count as f64, &measurement.file);
         let Noticed { record, gross_errors, gaps } = measurement.noticed(request.gross_errors, Some(file), observer)?;
         check_columns(file, &measurement.file, &record, &[])?;
-        let found = compare(&file.model, &named.pattern, &record)?;
+        let field = request.fields.get(index);
+        let found = match field {
+            Some(given) => compare_under(&file.model, &named.pattern, &record, &given.field)?,
+            None => compare(&file.model, &named.pattern, &record)?,
+        };
         let mut compared = RecordComparisonJson::new(&measurement.file, &found, gross_errors, gaps);
+        compared.field = field.map(|given| given.file.clone());
         let suspected = suspicion::of_record(&record, file.model.rate_mean_s);
         compared.findings.extend(suspected.iter().map(ToString::to_string));
         shown.push(compared);
         records.push(record);
         comparisons.push(found);
     }
-    let inputs = request.measurements.iter().map(|m| m.input("compared")).collect();
+    let fields = request.fields.iter().map(FieldFile::input);
+    let inputs = request.measurements.iter().map(|m| m.input("compared")).chain(fields).collect();
     let document = CompareJson::new(&file.model.name, &named.name, shown, InputsJson::new(Some(file), inputs));
     Ok(Answer { document, records, comparisons })
 }

@@ -130,7 +130,8 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
     }
     let other_boundary = other.as_ref().map(OtherBoundaryJson::of);
     let Groundwork { step, guaranteed_beside, .. } = groundwork;
-    let document = EvaluateJson { model: file.model.name.clone(), patterns, other_boundary, guaranteed_beside };
+    let fields = Vec::new();
+    let document = EvaluateJson { model: file.model.name.clone(), patterns, other_boundary, guaranteed_beside, fields };
     Ok(Answer { document, extremes: step.map(|_| extremes) })
 }
 

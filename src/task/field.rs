@@ -2,7 +2,7 @@
 
 use crate::io::json::WindabilityJson;
 use crate::io::model::{ModelFile, NamedPattern};
-use crate::rate::{RateModel, WeightResponse};
+use crate::rate::{Past, RateModel, WeightResponse};
 use crate::search::cost::samples::{SampleMatrix, any_rate_model};
 use crate::thermal::ThermalHistory;
 use crate::units::deg_per_h_from_rad_per_s;
@@ -56,8 +56,15 @@ pub fn check(model: &ModelFile, field: &ThermalHistory) -> Result<(), TaskError>
             "expected temperatures and rates of {rows} times {layers} layers, found {values} values"
         ));
     }
-    if let Some(row) = (1..rows).find(|&i| field.times_s[i] <= field.times_s[i - 1]) {
-        return fault(format!("times must increase strictly, row {row} ({} s) does not", field.times_s[row]));
+    // Both sides of a kink share a time.
+    let is_behind = |i: usize| field.times_s[i] > field.times_s[i - 1];
+    let is_kink = |i: usize| field.times_s[i] == field.times_s[i - 1] && (i < 2 || is_behind(i - 1));
+    if let Some(row) = (1..rows).find(|&i| !is_behind(i) && !is_kink(i)) {
+        return fault(format!("times must increase, row {row} ({} s) does not", field.times_s[row]));
+    }
+    let moments = [field.axial_moment_k.len(), field.axial_moment_k_per_s.len()];
+    if let Some(found) = moments.into_iter().find(|count| *count != 0 && *count != values) {
+        return fault(format!("expected axial moments of {rows} times {layers} layers, found {found} values"));
     }
     let columns =
         [&field.times_s, &field.temperature_k, &field.rate_k_per_s, &field.ambient_k, &field.ambient_rate_k_per_s];
@@ -79,7 +86,7 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Vec<PatternUnde
     let mut found = Vec::with_capacity(all.len());
     for named in all {
         let rate_model = RateModel::new(&file.model, &named.pattern, &[])?;
-        let rate_rad_per_s = rate_model.series_rad_per_s(request.field);
+        let rate_rad_per_s = series_rad_per_s(&rate_model, request.field)?;
         let mut worst_row = 0;
         for (row, rate) in rate_rad_per_s.iter().enumerate() {
             if rate.abs() > rate_rad_per_s[worst_row].abs() {
@@ -103,10 +110,30 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Vec<PatternUnde
 /// A field that does not fit; effects that leave a layer no turns.
 pub fn matrix(model: &ModelFile, field: &ThermalHistory) -> Result<SampleMatrix, TaskError> {
     check(model, field)?;
+    matrix_of(model, [field])
+}
+
+/// The same of several fields, each of which begins at rest.
+pub(super) fn matrix_of<'f>(
+    model: &ModelFile,
+    fields: impl IntoIterator<Item = &'f ThermalHistory>,
+) -> Result<SampleMatrix, TaskError> {
     let rate_model = any_rate_model(&model.model)?;
-    let response = |row: usize| rate_model.weight_response(&rate_model.state(field, row, &[]));
-    let responses: Vec<WeightResponse> = (0..field.len()).map(response).collect();
+    let mut responses: Vec<WeightResponse> = Vec::new();
+    for field in fields {
+        series_rad_per_s(&rate_model, field)?;
+        let mut past = Past::default();
+        let state = |row: usize| rate_model.state(field, row, &[]);
+        responses.extend((0..field.len()).map(|row| rate_model.weight_response_after(&state(row), &mut past)));
+    }
     Ok(SampleMatrix::new(&model.model, &responses)?)
+}
+
+/// The rate error at every row, what remembers included.
+pub(super) fn series_rad_per_s(rate_model: &RateModel, field: &ThermalHistory) -> Result<Vec<f64>, TaskError> {
+    let mut past = Past::default();
+    let rate = |row: usize| rate_model.checked_after(&rate_model.state(field, row, &[]), &mut past);
+    Ok((0..field.len()).map(rate).collect::<Result<_, _>>()?)
 }
 
 /// Ω = c_s + Σ_j a_sj (2 P(j) − 1 − N).

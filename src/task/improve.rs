@@ -235,6 +235,7 @@ impl Way<'_> {
                 pattern: Some(self.old),
                 measurements: &measurements,
                 gross_errors: GrossErrors::Keep,
+                fields: &[],
             };
             compare::run(&request, &Quietly(self.observer))?.write(folder, model)?;
             self.note_done(folder, made_of.as_deref())?;

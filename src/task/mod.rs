@@ -18,6 +18,7 @@ pub mod schedule;
 pub mod temperatures;
 pub mod tolerance;
 pub mod trim;
+pub mod under_fields;
 
 // They leave pages, pictures and words that pages share.
 #[cfg(feature = "report")]

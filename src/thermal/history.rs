@@ -72,6 +72,20 @@ impl ThermalHistory {
         add(&mut self.ambient_rate_k_per_s, &other.ambient_rate_k_per_s);
     }
 
+    /// A row of a history of the same layers behind the last.
+    pub fn push_row_of(&mut self, other: &Self, row: usize) {
+        let here = row * other.layers..(row + 1) * other.layers;
+        self.times_s.push(other.times_s[row]);
+        self.temperature_k.extend_from_slice(other.temperatures_k(row));
+        self.rate_k_per_s.extend_from_slice(other.rates_k_per_s(row));
+        self.axial_moment_k_per_s.extend_from_slice(other.axial_moments_k_per_s(row));
+        if !other.axial_moment_k.is_empty() {
+            self.axial_moment_k.extend_from_slice(&other.axial_moment_k[here]);
+        }
+        self.ambient_k.push(other.ambient_k[row]);
+        self.ambient_rate_k_per_s.push(other.ambient_rate_k_per_s[row]);
+    }
+
     pub fn is_empty(&self) -> bool {
         self.times_s.is_empty()
     }

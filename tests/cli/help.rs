@@ -76,6 +76,27 @@ fn prepare(folder: &Path) {
     for name in ["validation", "day-2", "tuesday"] {
         write(folder, &format!("{name}.csv"), &record("validation"));
     }
+    for name in ["up", "down"] {
+        write(folder, &format!("{name}.csv"), &record("calibration"));
+    }
+    let field = |layers: usize| -> String {
+        let names: String = (1..=layers).map(|j| format!(",layer_{j}_c")).collect();
+        let row = |i: i32| {
+            let cells: String = (1..=layers).map(|j| format!(",{}", 20.0 + 1e-4 * j as f64 * f64::from(i))).collect();
+            format!("{}{cells}\n", 10 * i - 10)
+        };
+        format!("time_s{names}\n") + &(0..402).map(row).collect::<String>()
+    };
+    for name in ["warm-up", "sun-side"] {
+        write(folder, &format!("{name}.csv"), &field(12));
+    }
+    let layers = coilwright::io::read::model_file::read_model(&folder.join("coil.toml")).unwrap().model.coil.layers();
+    write(folder, "layers.csv", &field(layers));
+    let turned = (0..200).map(|i| {
+        let table = [0.0, 30.0, -30.0][i / 20 % 3];
+        format!("{i},25,{},{table}\n", 12.5 * 3600.0 * table * 1.0001 + (i % 7) as f64)
+    });
+    write(folder, "table.csv", &("t,T,F,Table\n".to_owned() + &turned.collect::<String>()));
     for made in [".local/share/bash-completion/completions", "embedded"] {
         std::fs::create_dir_all(folder.join(made)).unwrap();
     }

@@ -14,6 +14,7 @@ mod examples;
 mod experiment;
 mod explorer;
 mod extend;
+mod fields;
 mod help;
 mod improve;
 mod mangled;

@@ -25,6 +25,9 @@ pub struct CompareJson {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RecordComparisonJson {
     pub file: String,
+    /// Where the layers' temperatures come from, if not from the record's own sensor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub field: Option<String>,
     pub rows: usize,
     pub verdict: String,
     pub rmse_deg_per_h: f64,
@@ -139,6 +142,7 @@ impl RecordComparisonJson {
         let parts = |parts: &[Part]| parts.iter().map(PartJson::new).collect();
         Self {
             file: file.to_owned(),
+            field: None,
             rows: found.rows,
             verdict: verdict_word(found.verdict).to_owned(),
             rmse_deg_per_h: deg_per_h_from_rad_per_s(found.rmse_rad_per_s),

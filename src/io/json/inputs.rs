@@ -24,7 +24,7 @@ pub struct RecordInputJson {
     pub file: String,
     /// Null for a pipe, which cannot be read twice.
     pub sha256: Option<String>,
-    /// "compared", "measured", "fitted" or "held out".
+    /// "compared", "measured", "fitted", "held out" or "temperatures".
     pub role: String,
 }
 

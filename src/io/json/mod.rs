@@ -8,6 +8,7 @@ pub mod diagnosis;
 pub mod effects;
 pub mod experiment;
 pub mod explore;
+pub mod field;
 pub mod fleet;
 pub mod further_schemas;
 pub mod improve;
@@ -145,6 +146,9 @@ pub struct EvaluateJson {
     /// Formulas that the guaranteed rates leave out, which no pattern changes.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub guaranteed_beside: Vec<GuaranteedBesideJson>,
+    /// What the windings were evaluated under, where that is not the model's profiles.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub fields: Vec<field::FieldJson>,
 }
 
 /// A formula that no guaranteed worst case holds.

@@ -7,6 +7,8 @@ pub mod boundary_table;
 pub mod campaign_file;
 pub mod csv_rows;
 pub mod effect_tables;
+mod field_columns;
+pub mod field_file;
 pub mod model_file;
 pub mod pattern_file;
 pub mod plausibility;
