@@ -14,7 +14,6 @@ use super::{CliError, Ending, offered};
 use crate::compensate::{Compensator, Method};
 use crate::io::fault::Faults;
 use crate::io::files::{NewFile, write_atomically};
-use crate::io::json::Document;
 use crate::io::read::model_file::read_model;
 use crate::io::read::record_columns::RecordFormat;
 use crate::io::write::compensation_file::{CompensateJson, MeasuresJson, StreamSummary, compensate_lines};
@@ -47,7 +46,7 @@ pub struct Arguments {
     /// Writes the lines here instead of to stdout; with --all-methods the picture of all (SVG)
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Writes the physical compensator as FILE.json and FILE.h
+    /// Writes the compensator as FILE.json and FILE.h
     #[arg(long, value_name = "FILE")]
     export: Option<PathBuf>,
     /// Looks so far ahead [s]; without it, as far as the fitted record says is worth it
@@ -56,7 +55,7 @@ pub struct Arguments {
     /// One difference equation of fixed gains, without hypotheses about breaks of the air's slope
     #[arg(long)]
     linear: bool,
-    /// Interval of the exported difference equation [s]; without it, that of the fitted record
+    /// Interval of the exported compensator [s]; without it, that of the fitted record
     #[arg(long, value_name = "SECONDS")]
     interval: Option<f64>,
     #[command(flatten)]
@@ -165,9 +164,7 @@ fn stream(
 }
 
 fn export(answer: &Answer, interval_s: Option<f64>, prefix: &Path, screen: &Screen) -> Result<(), CliError> {
-    let equation = answer.difference_equation(interval_s).ok_or(CliError::NoExport)?;
-    let header = equation.c_header();
-    let json = serde_json::to_string_pretty(&Document::new(equation)).map_err(|e| CliError::Stdout(e.into()))? + "\n";
+    let [json, header] = answer.exported(interval_s)?.ok_or(CliError::NoExport)?;
     for (extension, text) in [("json", json), ("h", header)] {
         let path = prefix.with_extension(extension);
         write_atomically(&path, text.as_bytes())?;

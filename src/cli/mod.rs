@@ -144,7 +144,7 @@ pub enum CliError {
     #[error(transparent)]
     Stream(StreamError),
     #[error(
-        "error: only the physical compensator of a model without a bias over temperature can be exported, and it needs an interval: give --interval or --fit"
+        "error: a model with a bias over temperature or further columns has no physical compensator that can be exported (the other methods have), and the interval must be known: give --interval or --fit"
     )]
     NoExport,
     #[error("error: --all-methods needs a record to try them on")]

@@ -32,7 +32,7 @@ const LEAST_ROWS: usize = BLOCKS * 2 * (COLUMNS + 1);
 /// In-sample and cross-validated errors further apart than this factor: it only fits.
 const ONLY_FITS: f64 = 1.5;
 /// Steps this many times the usual one begin anew.
-const LONGEST_GAP: f64 = 1000.0;
+pub const LONGEST_GAP: f64 = 1000.0;
 
 /// Ready for any record of the same gyro.
 #[derive(Debug, Clone, PartialEq)]

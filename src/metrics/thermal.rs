@@ -19,17 +19,17 @@
 use crate::record::Row;
 
 /// Number of lags.
-const LAGS: usize = 10;
+pub const LAGS: usize = 10;
 const LONGEST_LAG_S: f64 = 3e4;
 const SHORTEST_LAG_ROWS: f64 = 2.0;
 /// Shorter lags than this have no thermal meaning in a coil.
 const SHORTEST_LAG_S: f64 = 2.0;
 /// So that powers stay near one.
-const USUAL_K: f64 = 50.0;
+pub(crate) const USUAL_K: f64 = 50.0;
 /// Which lags make the two slopes.
-const SLOPES: [(usize, usize); 2] = [(2, 4), (4, 6)];
+pub(crate) const SLOPES: [(usize, usize); 2] = [(2, 4), (4, 6)];
 /// Lags whose decay from the record's begin counts as warming up.
-const WARM_UPS: [usize; 4] = [3, 5, 6, 8];
+pub(crate) const WARM_UPS: [usize; 4] = [3, 5, 6, 8];
 
 /// Sizes of the groups: what follows linearly, what is curved, warming up.
 pub const GROUPS: [usize; 3] = [LAGS + 1, 3 + 3 * SLOPES.len(), WARM_UPS.len()];
@@ -50,13 +50,18 @@ pub struct ThermalColumns {
     keeps: [f64; LAGS],
 }
 
+/// τ_k for rows of an interval \[s\].
+pub fn lags_s(interval_s: f64) -> [f64; LAGS] {
+    let shortest_s = (SHORTEST_LAG_ROWS * interval_s).max(SHORTEST_LAG_S);
+    let ratio = (LONGEST_LAG_S / shortest_s).max(2.0).powf(1.0 / (LAGS - 1) as f64);
+    std::array::from_fn(|k| shortest_s * ratio.powi(k as i32))
+}
+
 impl ThermalColumns {
     /// At rest at the first row's temperature.
     pub fn new(first: Row, interval_s: f64) -> Self {
-        let shortest_s = (SHORTEST_LAG_ROWS * interval_s).max(SHORTEST_LAG_S);
-        let ratio = (LONGEST_LAG_S / shortest_s).max(2.0).powf(1.0 / (LAGS - 1) as f64);
         Self {
-            lags_s: std::array::from_fn(|k| shortest_s * ratio.powi(k as i32)),
+            lags_s: lags_s(interval_s),
             behind_k: [first.temperature_k; LAGS],
             first_k: first.temperature_k,
             first_s: first.time_s,

@@ -3,9 +3,11 @@
 use crate::compensate::learned::Learned;
 use crate::compensate::stream::{Compensated, Flag, Stream};
 use crate::compensate::{CompensateError, Compensator, Method};
+use crate::io::json::Document;
 use crate::io::model::{ModelFile, NamedPattern};
 use crate::io::write::compensation_file::{BiasLineJson, CompensateJson, MeasuresJson, MethodJson, StreamSummary};
 use crate::io::write::difference_equation::DifferenceEquation;
+use crate::io::write::empirical_export::EmpiricalExport;
 use crate::metrics::Metrics;
 use crate::numeric::statistics::{RunningDeviation, rms};
 use crate::predict::noise_floor_rad_per_s;
@@ -101,6 +103,26 @@ impl Answer {
             methods: Vec::new(),
             lines: BiasLineJson::all(&self.compensator),
         }
+    }
+
+    /// The compensator for an embedded target, as JSON and as a C header, for this interval or that of the fitted record; none where
+    /// no such program holds it or the interval is not known.
+    ///
+    /// # Errors
+    /// None that a compensator causes.
+    pub fn exported(&self, interval_s: Option<f64>) -> Result<Option<[String; 2]>, TaskError> {
+        let pretty = |text: String| text + "\n";
+        if let Some(equation) = self.difference_equation(interval_s) {
+            let header = equation.c_header();
+            return Ok(Some([pretty(serde_json::to_string_pretty(&Document::new(equation))?), header]));
+        }
+        let interval_s = interval_s.or(self.fitted.as_ref().map(Record::interval_s));
+        let interval_s = interval_s.filter(|i| *i > 0.0 && i.is_finite());
+        let Some(empirical) = interval_s.and_then(|s| EmpiricalExport::new(&self.model, &self.compensator, s)) else {
+            return Ok(None);
+        };
+        let header = empirical.c_header();
+        Ok(Some([pretty(serde_json::to_string_pretty(&Document::new(empirical))?), header]))
     }
 
     /// The compensator as a difference equation, for this interval or that of the fitted record; none where no such equation

@@ -144,3 +144,22 @@ fn an_exported_compensator_is_valid() {
     document["gains"] = Value::Array(Vec::new());
     assert!(!compensation.is_valid(&document));
 }
+
+#[test]
+fn exported_compensators_that_know_no_coil_are_valid() {
+    let folder = tempfile::tempdir().unwrap();
+    let (coil, record) = ("tests/data/records/a-control/coil.toml", "tests/data/records/a-control/calibration.csv");
+    let compensation = validator("compensation");
+    for method in ["piecewise", "regression", "learned"] {
+        let prefix = folder.path().join(method).display().to_string();
+        let answer = run(&["compensate", coil, "--fit", record, "--method", method, "--export", &prefix, "-q"]);
+        assert_eq!(code(&answer), 0, "{}", stderr(&answer));
+        let mut document = json(&folder.path().join(format!("{method}.json")));
+        assert_valid(&compensation, method, &document);
+        assert_eq!(document["method"], method);
+        document["method"] = Value::from("other");
+        assert!(!compensation.is_valid(&document), "{method}");
+        let header = std::fs::read_to_string(folder.path().join(format!("{method}.h"))).unwrap();
+        assert!(header.contains("coilwright_step") && !header.contains('@'), "{header}");
+    }
+}

@@ -9,14 +9,17 @@ use std::fmt::Write as _;
 use std::process::Command;
 use std::sync::Mutex;
 
-use coilwright::compensate::empirical::{BiasLine, PiecewiseBias};
+use coilwright::compensate::empirical::{BiasLine, PiecewiseBias, Regression};
+use coilwright::compensate::learned::Learned;
 use coilwright::compensate::physical::USUAL_HYPOTHESES;
+use coilwright::compensate::stream::{Compensated, Reading, Stream};
 use coilwright::compensate::{CompensateError, Compensator, Method};
 use coilwright::io::model::ModelFile;
 use coilwright::io::read::model_file::read_model;
 use coilwright::io::read::record_columns::RecordFormat;
 use coilwright::io::write::compensation_file::compensate_lines;
 use coilwright::io::write::difference_equation::DifferenceEquation;
+use coilwright::io::write::empirical_export::EmpiricalExport;
 use coilwright::numeric::piecewise::PiecewiseLinear;
 use coilwright::numeric::statistics::{median, rms};
 use coilwright::predict::{noise_floor_rad_per_s, rates_rad_per_s};
@@ -323,6 +326,88 @@ fn compare_with_the_header(compensator: &Compensator) {
     let worst = exported.iter().zip(&own).map(|(e, o)| (e - o).abs()).fold(0.0, f64::max);
     println!("largest difference between the C header and the program: {worst:.1e} °/h");
     assert!(worst < 1e-8);
+}
+
+#[test]
+fn the_headers_of_the_methods_that_know_no_coil_give_the_programs_own_output() {
+    if Command::new("cc").arg("--version").output().is_err() {
+        println!("no C compiler here: the headers are not tried");
+        return;
+    }
+    let calibration = record("g-control-zyl", "calibration.csv");
+    let holdout = record("g-control-zyl", "validation.csv");
+    // The bore's thermometer follows an hour behind.
+    let inner = |of: &Record| -> Record {
+        let mut behind_k = of.temperature_k()[0];
+        let inner = of.temperature_k().iter().map(|t| {
+            behind_k += (t - behind_k) / 360.0;
+            behind_k
+        });
+        let inner = inner.collect();
+        of.clone().with_inner_k(inner).unwrap()
+    };
+    let cases = [
+        Compensator::Piecewise(PiecewiseBias::fit(&calibration).unwrap()),
+        Compensator::Regression(Regression::fit(&calibration).unwrap()),
+        Compensator::Regression(Regression::fit(&inner(&calibration)).unwrap()),
+        Compensator::Learned(Learned::fit(&calibration).unwrap()),
+    ];
+    for compensator in cases {
+        let interval_s = holdout.interval_s();
+        let export = EmpiricalExport::new("a coil */ of ours", &compensator, interval_s).unwrap();
+        let reads_inner = export.reads_inner();
+        let tried = if reads_inner { inner(&holdout) } else { holdout.clone() };
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join("compensation.h"), export.c_header()).unwrap();
+        let inner_too = if reads_inner { "i, " } else { "" };
+        let program = format!(
+            "#include <stdio.h>\n#include \"compensation.h\"\nint main(void) {{ coilwright_state s; double t, i;\ncoilwright_start(&s); \
+             while (scanf(\"%lf %lf\", &t, &i) == 2) printf(\"%.17g\\n\", coilwright_step(&s, t, {inner_too}t > -1000.0)); return 0; }}\n"
+        );
+        std::fs::write(dir.path().join("main.c"), program).unwrap();
+        let built = Command::new("cc")
+            .args(["-std=c99", "-Wall", "-Wextra", "-Werror", "-O1", "-o", "try", "main.c", "-lm"])
+            .current_dir(dir.path())
+            .status()
+            .unwrap();
+        assert!(built.success(), "{}", export.method);
+        let mut readings = String::new();
+        let mut own = Vec::new();
+        let mut stream = Stream::new(&compensator);
+        // With a rate of zero what comes out is the bias, its sign turned.
+        let keep =
+            |row: Compensated<()>, own: &mut Vec<f64>| own.push(-deg_per_h_from_rad_per_s(row.rate_rad_per_s.unwrap()));
+        for row in 0..tried.rows() {
+            let reading = compensator.reading(&tried, row);
+            let shown = |k: Option<f64>| if is_lost(row) { -1e6 } else { k.map_or(0.0, celsius_from_kelvin) };
+            writeln!(readings, "{:.17} {:.17}", shown(reading.temperature_k), shown(reading.inner_k)).unwrap();
+            let lost = is_lost(row).then_some(None::<f64>);
+            let reading = Reading {
+                temperature_k: lost.unwrap_or(reading.temperature_k),
+                inner_k: lost.unwrap_or(reading.inner_k),
+                rate_rad_per_s: Some(0.0),
+                ..reading
+            };
+            stream.push((), Some(reading), |row| keep(row, &mut own));
+        }
+        stream.finish(|row| keep(row, &mut own));
+        std::fs::write(dir.path().join("in.txt"), readings).unwrap();
+        let output = Command::new(dir.path().join("try"))
+            .stdin(std::fs::File::open(dir.path().join("in.txt")).unwrap())
+            .output()
+            .unwrap();
+        let exported: Vec<f64> =
+            String::from_utf8(output.stdout).unwrap().lines().map(|l| l.parse().unwrap()).collect();
+        assert_eq!((exported.len(), own.len()), (tried.rows(), tried.rows()));
+        let pairs = exported[export.delay_rows..].iter().zip(&own);
+        let worst = pairs.map(|(e, o)| (e - o).abs()).fold(0.0, f64::max);
+        println!(
+            "{} inner {reads_inner}: largest difference between header and program {worst:.1e} °/h",
+            export.method
+        );
+        assert!(worst < 1e-8, "{}: {worst:e}", export.method);
+        assert!(serde_json::to_value(&export).unwrap()["equations"].is_array());
+    }
 }
 
 /// The chapter's record, from its coefficients: sums of 100 outputs a second, one unit being 3.04e-5 °/s (±2.5 of a

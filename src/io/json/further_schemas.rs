@@ -67,7 +67,7 @@ pub fn compensation_schema() -> Value {
             "variance": described("number", "of the innovation [°C²]"),
         }),
     );
-    with_dialect(table(
+    let physical = table(
         "coilwright compensator as a difference equation",
         &[
             "schema_version",
@@ -102,6 +102,60 @@ pub fn compensation_schema() -> Value {
             "least_log_weight": described("number", "below the best hypothesis' own"),
             "forgotten_rows": whole("without a reading, after which the next one begins anew"),
             "gains": { "type": "array", "minItems": 1, "items": gains },
+            "formulas": { "type": "array", "items": { "type": "string" }, "description": "what they say is added [°/h]" },
         }),
-    ))
+    );
+    let methods = [
+        (
+            "piecewise",
+            &["lines"][..],
+            json!({ "lines": { "type": "array", "minItems": 1, "items": table(
+            "a straight piece",
+            &["until_c", "at_20_c_deg_per_h", "slope_deg_per_h_per_c"],
+            json!({
+                "until_c": { "type": ["number", "null"], "description": "null for the last" },
+                "at_20_c_deg_per_h": described("number", "of the rate error"),
+                "slope_deg_per_h_per_c": described("number", "over the temperature"),
+            }),
+        ) } }),
+        ),
+        (
+            "regression",
+            &["offset_deg_per_h", "per_temperature_deg_per_h_per_k", "per_rate_deg_per_h_s_per_k"],
+            json!({
+                "offset_deg_per_h": described("number", "at 20 °C"),
+                "per_temperature_deg_per_h_per_k": described("number", "of T - 20 °C"),
+                "per_rate_deg_per_h_s_per_k": described("number", "of dT/dt"),
+                "per_difference_rate_deg_per_h_s_per_k": { "type": ["number", "null"],
+                    "description": "of d(T - T_inner)/dt; null where the inner temperature is not read" },
+            }),
+        ),
+        (
+            "learned",
+            &["offset_deg_per_h", "columns_deg_per_h", "lags_s", "forgotten_s"],
+            json!({
+                "offset_deg_per_h": described("number", "of the rate error"),
+                "columns_deg_per_h": numbers("of the columns that equations lists"),
+                "lags_s": numbers("of the lagged temperatures"),
+                "forgotten_s": described("number", "without a reading, after which the next one begins anew"),
+            }),
+        ),
+    ];
+    let further = methods.into_iter().map(|(method, needed, own)| {
+        let mut properties = json!({
+            "schema_version": { "const": SCHEMA_VERSION },
+            "model": described("string", "the model's name"),
+            "method": { "const": method },
+            "equations": { "type": "array", "items": { "type": "string" } },
+            "interval_s": { "type": "number", "exclusiveMinimum": 0 },
+            "delay_rows": whole("the rate error that comes out belongs to the row so many rows ago"),
+        });
+        if let (Value::Object(all), Value::Object(own)) = (&mut properties, own) {
+            all.extend(own);
+        }
+        let common = ["schema_version", "model", "method", "equations", "interval_s", "delay_rows"];
+        table(&format!("coilwright compensator, {method}"), &[&common[..], needed].concat(), properties)
+    });
+    let all: Vec<Value> = std::iter::once(physical).chain(further).collect();
+    with_dialect(json!({ "title": "coilwright compensator as compensate --export writes it", "anyOf": all }))
 }

@@ -9,6 +9,7 @@ pub mod checkpoint;
 pub mod comparison_rows;
 pub mod compensation_file;
 pub mod difference_equation;
+pub mod empirical_export;
 pub mod field_table;
 mod formulas_in_c;
 pub mod machine_program;
