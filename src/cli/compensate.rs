@@ -16,7 +16,7 @@ use crate::io::fault::Faults;
 use crate::io::files::{NewFile, write_atomically};
 use crate::io::read::model_file::read_model;
 use crate::io::read::record_columns::RecordFormat;
-use crate::io::write::compensation_file::{CompensateJson, MeasuresJson, StreamSummary, compensate_lines};
+use crate::io::write::compensation_file::{CompensateJson, MeasuresJson, StreamSummary, compensate_lines_from_turn_on};
 use crate::report::compensation::compensation_chart;
 use crate::task::compensate::{Answer, Request, all_methods as try_all, run as compensator_for};
 use crate::task::measurement::Measurement;
@@ -24,7 +24,7 @@ use crate::task::measurement::Measurement;
 /// Temperature and rate in, compensated rate out, as a file or as a stream
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  coilwright compensate coil.toml day-2.csv --fit day-1.csv > compensated.csv\n  logger | coilwright compensate coil.toml - --fit day-1.csv\n  coilwright compensate coil.toml day-2.csv --fit day-1.csv --all-methods\n  coilwright compensate coil.toml --fit day-1.csv --export embedded/compensation\n\nEvery line comes out, in order, with rate_compensated_deg_per_h and flags behind it: malformed, clock_back, gap,\ntemperature_held, channel_held, rate_held, rate_rejected."
+    after_help = "Examples:\n  coilwright compensate coil.toml day-2.csv --fit day-1.csv > compensated.csv\n  logger | coilwright compensate coil.toml - --fit day-1.csv\n  coilwright compensate coil.toml day-2.csv --fit day-1.csv --all-methods\n  coilwright compensate coil.toml --fit day-1.csv --export embedded/compensation\n\nEvery line comes out, in order, with rate_compensated_deg_per_h and flags behind it: malformed, clock_back, gap,\ntemperature_held, channel_held, rate_held, rate_rejected, turn_on."
 )]
 pub struct Arguments {
     /// The model file
@@ -52,6 +52,10 @@ pub struct Arguments {
     /// Looks so far ahead [s]; without it, as far as the fitted record says is worth it
     #[arg(long, value_name = "SECONDS")]
     delay: Option<f64>,
+    /// Takes off what this start-up added to the bias: the mean of what is left of the first seconds, in which the gyro must stand
+    /// still; those rows are flagged turn_on
+    #[arg(long, value_name = "SECONDS", conflicts_with = "all_methods", value_parser = positive_seconds)]
+    turn_on: Option<f64>,
     /// One difference equation of fixed gains, without hypotheses about breaks of the air's slope
     #[arg(long)]
     linear: bool,
@@ -124,10 +128,18 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         summary.rate_held,
         summary.rate_rejected
     ));
+    if let Some(offset) = summary.turn_on_offset_deg_per_h {
+        screen.note(&format!("offset of this start-up, taken off: {offset:.5} °/h"));
+    }
     if screen.is_json() {
         screen.answer(answer.document(Some(summary)), |_| String::new())?;
     }
     Ok(Ending::Done)
+}
+
+fn positive_seconds(text: &str) -> Result<f64, String> {
+    let seconds = text.parse::<f64>().ok().filter(|s| s.is_finite() && *s > 0.0);
+    seconds.ok_or_else(|| format!("expected a time in seconds above zero, found \"{text}\""))
 }
 
 fn shown(value: Option<f64>) -> String {
@@ -152,10 +164,11 @@ fn stream(
         None => &mut std::io::sink(),
     };
     let summary = if name == "-" {
-        compensate_lines(compensator, format, "standard input", std::io::stdin().lock(), output)?
+        let input = std::io::stdin().lock();
+        compensate_lines_from_turn_on(compensator, format, "standard input", input, output, arguments.turn_on)?
     } else {
         let input = File::open(path).map_err(|e| Faults::of_file(&name, format!("cannot be read: {e}")))?;
-        compensate_lines(compensator, format, &name, input, output)?
+        compensate_lines_from_turn_on(compensator, format, &name, input, output, arguments.turn_on)?
     };
     if let Some(file) = file {
         file.finish()?;

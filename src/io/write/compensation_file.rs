@@ -33,6 +33,9 @@ pub struct StreamSummary {
     /// Standard deviations over the rows without a flag.
     pub rate_deviation_deg_per_h: Option<f64>,
     pub compensated_deviation_deg_per_h: Option<f64>,
+    /// What this start-up added to the bias; null where nobody asked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub turn_on_offset_deg_per_h: Option<f64>,
 }
 
 impl StreamSummary {
@@ -65,7 +68,36 @@ pub enum StreamError {
 struct Passed {
     text: String,
     is_aside: bool,
+    time_s: Option<f64>,
     rate_rad_per_s: Option<f64>,
+}
+
+/// The flag of rows that the offset of a start-up is learned from.
+const TURN_ON: &str = "turn_on";
+
+/// What a start-up adds to the bias: the mean of what compensation leaves while the gyro stands still at the beginning.
+#[derive(Debug)]
+struct TurnOn {
+    for_s: f64,
+    first_s: Option<f64>,
+    sum_rad_per_s: f64,
+    rows: usize,
+}
+
+impl TurnOn {
+    /// The rate without the offset as it is known by then, and whether it is still being learned. What is odd about a row teaches nothing.
+    fn taken_off(&mut self, time_s: f64, rate_rad_per_s: f64, is_sound: bool) -> (f64, bool) {
+        let learns = time_s - *self.first_s.get_or_insert(time_s) < self.for_s;
+        if learns && is_sound {
+            self.sum_rad_per_s += rate_rad_per_s;
+            self.rows += 1;
+        }
+        (rate_rad_per_s - self.offset_rad_per_s(), learns)
+    }
+
+    fn offset_rad_per_s(&self) -> f64 {
+        if self.rows == 0 { 0.0 } else { self.sum_rad_per_s / self.rows as f64 }
+    }
 }
 
 /// Which cells of a row are needed.
@@ -89,8 +121,25 @@ pub fn compensate_lines(
     input: impl Read,
     output: impl Write,
 ) -> Result<StreamSummary, StreamError> {
+    compensate_lines_from_turn_on(compensator, format, name, input, output, None)
+}
+
+/// As [`compensate_lines`], without what this start-up added to the bias: the mean of what is left of the first `turn_on_s`
+/// seconds, in which the gyro stands still.
+///
+/// # Errors
+/// As [`compensate_lines`].
+pub fn compensate_lines_from_turn_on(
+    compensator: &Compensator,
+    format: &RecordFormat,
+    name: &str,
+    input: impl Read,
+    output: impl Write,
+    turn_on_s: Option<f64>,
+) -> Result<StreamSummary, StreamError> {
     let mut rows = CsvRows::new(BufReader::with_capacity(1 << 16, input));
     let mut sink = Sink::new(std::io::BufWriter::with_capacity(1 << 16, output));
+    sink.turn_on = turn_on_s.map(|for_s| TurnOn { for_s, first_s: None, sum_rad_per_s: 0.0, rows: 0 });
     let mut asides = Vec::new();
     let Some((piece, division)) = rows.header(|line| asides.push(line.to_owned())).map_err(StreamError::Read)? else {
         return Err(Faults::of_file(name, NO_HEADER).into());
@@ -114,7 +163,8 @@ pub fn compensate_lines(
             // As one quoted cell, so that the output stays a table and nothing is lost.
             Piece::Row | Piece::Broken(_) => passed_row.one_cell(rows.text(), places.count),
         };
-        let passed = Passed { text, is_aside, rate_rad_per_s: reading.and_then(|r| r.rate_rad_per_s) };
+        let time_s = reading.as_ref().map(|r| r.time_s);
+        let passed = Passed { text, is_aside, time_s, rate_rad_per_s: reading.and_then(|r| r.rate_rad_per_s) };
         stream.push(passed, reading, |row| sink.row(row));
         if rows.waits() {
             // Whoever feeds line by line waits for what is ready.
@@ -128,6 +178,7 @@ pub fn compensate_lines(
     sink.check()?;
     let mut summary = sink.summary;
     summary.rate_deviation_deg_per_h = sink.before.deviation().map(deg_per_h_from_rad_per_s);
+    summary.turn_on_offset_deg_per_h = sink.turn_on.map(|t| deg_per_h_from_rad_per_s(t.offset_rad_per_s()));
     summary.compensated_deviation_deg_per_h = sink.after.deviation().map(deg_per_h_from_rad_per_s);
     Ok(summary)
 }
@@ -216,6 +267,7 @@ struct Sink<W: Write> {
     after: RunningDeviation,
     text: String,
     separator: char,
+    turn_on: Option<TurnOn>,
     failed: Option<std::io::Error>,
 }
 
@@ -228,6 +280,7 @@ impl<W: Write> Sink<W> {
             after: RunningDeviation::default(),
             text: String::new(),
             separator: ',',
+            turn_on: None,
             failed: None,
         }
     }
@@ -261,7 +314,14 @@ impl<W: Write> Sink<W> {
         self.text.clear();
         self.text.push_str(&row.tag.text);
         self.text.push(self.separator);
-        if let Some(rate) = row.rate_rad_per_s {
+        let is_sound = row.flags.is_empty();
+        let turned_on = match (&mut self.turn_on, row.tag.time_s, row.rate_rad_per_s) {
+            (Some(turn_on), Some(time_s), Some(rate)) => Some(turn_on.taken_off(time_s, rate, is_sound)),
+            _ => None,
+        };
+        let rate = turned_on.map(|(rate, _)| rate).or(row.rate_rad_per_s);
+        let is_learning = turned_on.is_some_and(|(_, learns)| learns);
+        if let Some(rate) = rate {
             let _ = write!(self.text, "{:.8}", deg_per_h_from_rad_per_s(rate));
         }
         self.text.push(self.separator);
@@ -272,7 +332,11 @@ impl<W: Write> Sink<W> {
             self.text.push_str(flag.word());
             self.summary.count(*flag);
         }
-        if let (true, Some(before), Some(after)) = (row.flags.is_empty(), row.tag.rate_rad_per_s, row.rate_rad_per_s) {
+        if is_learning {
+            self.text.push_str(if is_sound { "" } else { "|" });
+            self.text.push_str(TURN_ON);
+        }
+        if let (true, Some(before), Some(after)) = (is_sound && !is_learning, row.tag.rate_rad_per_s, rate) {
             self.before.push(before);
             self.after.push(after);
         }
