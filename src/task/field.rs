@@ -68,7 +68,8 @@ pub fn check(model: &ModelFile, field: &ThermalHistory) -> Result<(), TaskError>
     }
     let columns =
         [&field.times_s, &field.temperature_k, &field.rate_k_per_s, &field.ambient_k, &field.ambient_rate_k_per_s];
-    if columns.into_iter().flatten().any(|v| !v.is_finite()) {
+    if columns.into_iter().chain([&field.axial_moment_k, &field.axial_moment_k_per_s]).flatten().any(|v| !v.is_finite())
+    {
         return fault("expected finite numbers, found NaN or infinity".to_owned());
     }
     Ok(())

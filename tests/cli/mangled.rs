@@ -71,6 +71,14 @@ const WAYS: &[(&str, &[&str])] = &[
         "mapped.csv",
         &["metrics", "mapped.csv", "--columns", "time=Zeit:min,temperature=T1:c,rate=Omega:counts,scale=12.5"],
     ),
+    ("table.csv", &["metrics", "table.csv", "--format", "json", "--latitude", "48", "--elevation", "90"]),
+    ("field.csv", &["evaluate", "model.toml", "--field", "field.csv", "--format", "json"]),
+    ("long.csv", &["evaluate", "model.toml", "--field", "long.csv", "--field", "field.csv"]),
+    (
+        "field.csv",
+        &["optimise", "model.toml", "--field", "field.csv", "--rounds", "1", "--moves-per-restart", "20", "-o", "out"],
+    ),
+    ("field.csv", &["compare", "model.toml", "day.csv", "--field", "field.csv", "--format", "json"]),
     ("record.csv", &["compensate", "model.toml", "record.csv"]),
     ("record.csv", &["compensate", "model.toml", "day.csv", "--fit", "record.csv"]),
     (
@@ -184,6 +192,23 @@ pub(super) fn bench(folder: &Path) {
         format!("OK;{};{temperature:.3};{:.2}\n", t / 60.0, 12.5 * rate).replace('.', ",")
     };
     write("mapped.csv", &("Status;Zeit;T1;Omega\n".to_owned() + &(0..160).map(|i| mapped(row(i))).collect::<String>()));
+    let field = |i: usize| format!("{},20,{},{},{}\n", 10 * i, 20.0 + 0.01 * i as f64, 20.0 + 0.02 * i as f64, 21.0);
+    let field: String = (0..240).map(field).collect();
+    write("field.csv", &format!("time_s,layer_1_c,layer_2_c,layer_3_c,layer_4_c\n{field}"));
+    let long = |i: usize| {
+        let turn = |j: usize| format!("{},{},{},{},0.1\n", 10 * (i / 4), i % 4 + 1, j, 20.0 + 0.01 * (i * j) as f64);
+        turn(1) + &turn(2)
+    };
+    write(
+        "long.csv",
+        &("time_s,layer,turn,temperature_c,rate_c_per_h\n".to_owned() + &(0..80).map(long).collect::<String>()),
+    );
+    let turned = |i: usize| {
+        let table = [0.0, 20.0, -20.0][i / 20 % 3];
+        format!("{i},{},{},{table}\n", 20 + i / 60, 3600.0 * table * 1.001 + (i % 5) as f64)
+    };
+    let turned: String = (0..240).map(turned).collect();
+    write("table.csv", &format!("time_s,temperature_c,rate_deg_per_h,table_rate_deg_per_s\n{turned}"));
     for arguments in [
         &["schedule", "model.toml", "-o", "shop"][..],
         &["optimise", "model.toml", "--rounds", "2", "--moves-per-restart", "20", "-o", "run"],

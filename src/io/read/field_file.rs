@@ -15,6 +15,7 @@ use std::path::Path;
 use crate::io::fault::{Fault, Faults};
 use crate::io::files::read_text_up_to;
 use crate::numeric::statistics::median;
+use crate::record::LEAST_INTERVAL_S;
 use crate::thermal::{GivenField, ThermalHistory};
 use crate::units::celsius_from_kelvin;
 
@@ -25,6 +26,8 @@ use super::record_rows::PLAUSIBLE_C;
 /// As a record's.
 const LARGEST_FIELD_BYTES: u64 = 512 * 1024 * 1024;
 const MOST_FAULTS: usize = 50;
+/// No time, temperature or rate is beyond: arithmetic on what is would end in infinities.
+const MOST: f64 = 1e11;
 
 const EXPECTED: &str = "expected time_s with layer_1_c, layer_2_c, … (one row a time), or time_s, layer, temperature_c (one row a time \
                         and layer)";
@@ -139,7 +142,7 @@ impl Table {
                         let cell = cells[column.place];
                         let is_comma = division.decimal_comma && cell.matches(',').count() == 1 && !cell.contains('.');
                         let number = if is_comma { cell.replace(',', ".").parse() } else { cell.parse::<f64>() };
-                        let si = number.ok().map(|v| column.si(v)).filter(|v| v.is_finite());
+                        let si = number.ok().map(|v| column.si(v)).filter(|v| v.abs() <= MOST);
                         values.push(si.unwrap_or(f64::NAN));
                         if si.is_none() {
                             let name = &table.names[column.place];
@@ -147,8 +150,10 @@ impl Table {
                                 "" => "nothing".to_owned(),
                                 cell => format!("\"{}\"", cell.chars().take(40).collect::<String>()),
                             };
-                            let message =
-                                format!("line {}, column {name}: expected a finite number, found {found}", rows.line());
+                            let message = format!(
+                                "line {}, column {name}: expected a finite number up to {MOST:e}, found {found}",
+                                rows.line()
+                            );
                             fault(message, rows.span_of_cell(column.place));
                         }
                     }
@@ -287,6 +292,10 @@ impl Table {
     /// With an ambient, and times and temperatures that can be.
     fn checked(&self, mut history: ThermalHistory) -> Result<ThermalHistory, Fault> {
         let fault = |message: String| Err(Fault::new(message, None));
+        let steps = history.times_s.windows(2).map(|w| w[1] - w[0]);
+        if let Some(step_s) = steps.into_iter().find(|step_s| *step_s > 0.0 && *step_s < LEAST_INTERVAL_S) {
+            return fault(format!("expected times at least {LEAST_INTERVAL_S} s apart, found {step_s:e} s"));
+        }
         let (layers, rows, has_rates) = (history.layers, history.len(), !history.rate_k_per_s.is_empty());
         let times = &history.times_s;
         let at_kink = |row: usize| has_rates && (row < 2 || times[row - 2] < times[row]);
@@ -432,9 +441,11 @@ mod tests {
         );
         assert!(
             said("time_s,layer_1_c\n0,x\n1,1\n")
-                .contains("line 2, column layer_1_c: expected a finite number, found \"x\"")
+                .contains("line 2, column layer_1_c: expected a finite number up to 1e11, found \"x\"")
         );
         assert!(said("time_s,layer_1_c\n0,20\n").contains("at least two times"));
+        assert!(said("time_s,layer_1_c\n0,20\n4e-11,21\n").contains("at least 0.000001 s apart, found 4e-11 s"));
+        assert!(said("time_s,layer_1_c\n0,1e300\n1,21\n").contains("up to 1e11, found \"1e300\""));
         assert!(said("time_s,layer_1_c\n0,293\n1,293\n").contains("found a median of 293.00 °C"));
         assert!(said("time_s,layer,temperature_c\n0,1,20\n0,3,20\n").contains("expected layer 2 next, found layer 3"));
         assert!(
