@@ -5,7 +5,7 @@
 use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
@@ -31,6 +31,9 @@ struct ProgressLine<'a> {
     done: u64,
     /// Null where the end is not known.
     total: Option<u64>,
+    elapsed_s: f64,
+    /// As long as the work is expected to take still; null where nothing is known of its end, or before it has a pace.
+    to_go_s: Option<f64>,
     message: &'a str,
 }
 
@@ -40,6 +43,9 @@ pub struct Progress {
     task: String,
     total: Option<u64>,
     shown: Shown,
+    began: Instant,
+    /// What was done already when the work first said so: it may have been taken up.
+    first: OnceLock<(Instant, u64)>,
 }
 
 #[derive(Debug)]
@@ -57,18 +63,40 @@ impl Progress {
             ProgressMode::Auto if !quiet && std::io::stderr().is_terminal() => Shown::Bar(bar(task, total)),
             ProgressMode::Auto | ProgressMode::None => Shown::Nothing,
         };
-        Self { task: task.to_owned(), total, shown }
+        Self { task: task.to_owned(), total, shown, began: Instant::now(), first: OnceLock::new() }
     }
 
     /// So much is done; `message` says what has been found so far.
     pub fn at(&self, done: u64, message: &str) {
+        self.at_until(done, self.total, None, message);
+    }
+
+    /// The same for work that is expected to end when so much is done, and in any case after so long.
+    pub fn at_until(&self, done: u64, end: Option<u64>, latest: Option<Duration>, message: &str) {
+        if matches!(self.shown, Shown::Nothing) {
+            return;
+        }
+        let (begun, first) = *self.first.get_or_init(|| (Instant::now(), done));
+        let by_pace = end.and_then(|end| to_go(begun.elapsed(), done.saturating_sub(first), end.saturating_sub(done)));
+        let left = by_pace.into_iter().chain(latest).min();
         match &self.shown {
             Shown::Bar(bar) => {
                 bar.set_position(done);
-                bar.set_message(Line::of(message).into_string());
+                let words =
+                    [message.to_owned(), left.map_or_else(String::new, |left| time_left_in_words(left) + " to go")];
+                let words: Vec<String> = words.into_iter().filter(|part| !part.is_empty()).collect();
+                bar.set_message(Line::of(words.join(", ")).into_string());
             }
             Shown::Json => {
-                let line = ProgressLine { task: &self.task, done, total: self.total, message };
+                let tenths = |time: Duration| (time.as_secs_f64() * 10.0).round() / 10.0;
+                let line = ProgressLine {
+                    task: &self.task,
+                    done,
+                    total: self.total,
+                    elapsed_s: tenths(self.began.elapsed()),
+                    to_go_s: left.map(tenths),
+                    message,
+                };
                 if let Ok(json) = serde_json::to_string(&line).map(|json| JsonText::of(&json)) {
                     // Progress that nobody reads any more is no reason to stop the work.
                     let _ = writeln!(std::io::stderr().lock(), "{json}");
@@ -92,7 +120,23 @@ impl Drop for Progress {
     }
 }
 
-const BOUNDED: &str = "{prefix} {bar:20} {percent:>3} % {elapsed}, {eta} to go {msg}";
+/// How long the rest takes at the pace so far; none where there is no pace yet.
+fn to_go(elapsed: Duration, done: u64, left: u64) -> Option<Duration> {
+    let seconds = elapsed.as_secs_f64() * left as f64 / done as f64;
+    Duration::try_from_secs_f64(seconds).ok()
+}
+
+/// One or two digits: it is a guess.
+fn time_left_in_words(left: Duration) -> String {
+    match left.as_secs_f64() {
+        s if s < 90.0 => format!("{:.0} s", s.ceil()),
+        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
+        s if s < 36_000.0 => format!("{:.1} h", s / 3600.0),
+        s => format!("{:.0} h", s / 3600.0),
+    }
+}
+
+const BOUNDED: &str = "{prefix} {bar:20} {percent:>3} % {elapsed} {msg}";
 const UNBOUNDED: &str = "{prefix} {spinner} {elapsed} {rate} {msg}";
 
 /// Three digits and a thousands' letter: nobody reads more of a rate that flickers.
@@ -170,6 +214,16 @@ mod tests {
     fn a_rate_has_three_digits() {
         let said = [0.5, 12.34, 987.6, 12_345.0, 1.5e6].map(rate_in_words);
         assert_eq!(said, ["0.50/s", "12.3/s", "988/s", "12.3 k/s", "1.50 M/s"]);
+    }
+
+    #[test]
+    fn what_is_left_is_foretold_by_the_pace_and_said_in_few_digits() {
+        let seconds = Duration::from_secs;
+        assert_eq!(to_go(seconds(10), 5, 20), Some(seconds(40)));
+        assert_eq!(to_go(seconds(10), 5, 0), Some(seconds(0)));
+        assert_eq!((to_go(seconds(10), 0, 20), to_go(seconds(0), 0, 0)), (None, None));
+        let said = [0, 42, 150, 3 * 3600, 50 * 3600].map(|s| time_left_in_words(seconds(s)));
+        assert_eq!(said, ["0 s", "42 s", "2 min", "3.0 h", "50 h"]);
     }
 
     #[test]

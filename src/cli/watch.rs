@@ -13,7 +13,7 @@ use crate::io::files::WriteError;
 use crate::io::write::checkpoint::write_checkpoint;
 use crate::io::write::run_directory::{Request, write_request};
 use crate::search::Observer;
-use crate::search::anneal::rounds::{Plan, Rounds};
+use crate::search::anneal::rounds::{Plan, Rounds, State};
 use crate::search::proof;
 use crate::search::run::Halt;
 use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
@@ -98,6 +98,19 @@ fn expected_moves(plan: &Plan) -> Option<u64> {
     plan.rules.moves.into_iter().chain(by_rounds).min()
 }
 
+/// How many moves a search will have judged when it ends, if it finds nothing better until then.
+fn moves_at_end(plan: &Plan, state: &State) -> Option<u64> {
+    let of_a_round = plan.moves_per_restart.saturating_mul(plan.restarts_per_round as u64).max(1);
+    let judged = state.work.moves;
+    let rounds = [
+        Some(plan.rules.rounds.saturating_sub(state.round)),
+        Some(plan.rules.patience.saturating_sub(state.rounds_without_improvement)),
+        plan.rules.moves.map(|moves| moves.saturating_sub(judged).div_ceil(of_a_round)),
+    ];
+    let rounds = rounds.into_iter().flatten().min()?;
+    rounds.checked_mul(of_a_round).and_then(|more| judged.checked_add(more))
+}
+
 impl Observer for Watch<'_> {
     fn begun(&mut self, search: &dyn Rounds) {
         self.progress = Some(self.screen.progress("optimise", expected_moves(search.plan())));
@@ -117,13 +130,11 @@ impl Observer for Watch<'_> {
         });
         self.keep(written);
         let message = search.best().map_or_else(String::new, |best| {
-            let left = self.budget.map_or_else(String::new, |budget| {
-                format!(", ends in {} s at the latest", budget.saturating_sub(self.started.elapsed()).as_secs())
-            });
-            format!("round {}, best {:.4} °/h{left}", search.state().round + 1, deg_per_h_from_rad_per_s(best.cost))
+            format!("round {}, best {:.4} °/h", search.state().round + 1, deg_per_h_from_rad_per_s(best.cost))
         });
         if let Some(progress) = &self.progress {
-            progress.at(search.evaluations(), &message);
+            let latest = self.budget.map(|budget| budget.saturating_sub(self.started.elapsed()));
+            progress.at_until(search.evaluations(), moves_at_end(search.plan(), search.state()), latest, &message);
         }
         if self.stop.is_set() || self.fault.is_some() {
             return ControlFlow::Break(Halt::Signal);
@@ -147,8 +158,11 @@ impl Observer for Watch<'_> {
     fn proving(&self, at: proof::Progress) -> ControlFlow<()> {
         let (bar, began) =
             self.proof_progress.get_or_init(|| (self.screen.progress("prove", Some(BAR_STEPS)), Instant::now()));
-        bar.at(
+        let latest = self.proof_time.map(|time| time.saturating_sub(began.elapsed()));
+        bar.at_until(
             percent_from_fraction(at.share_done) as u64,
+            Some(BAR_STEPS),
+            latest,
             &format!(
                 "best {:.4} °/h, lower bound {:.4} °/h",
                 deg_per_h_from_rad_per_s(at.best_rad_per_s),

@@ -4,6 +4,7 @@ use maud::{Markup, html};
 
 use super::page::{figure, page};
 use super::plot::{Axis, Chart, Series};
+use super::words;
 use crate::io::json::built_coils::{BuiltCoilsJson, BuiltPatternJson, QuantileJson};
 use crate::io::json::campaign::CampaignJson;
 
@@ -44,9 +45,14 @@ pub fn built_coils_table(models: &[BuiltCoilsJson]) -> (Vec<&'static str>, Vec<V
     (header, rows)
 }
 
+/// Too few coils leave an end of it open.
 fn interval(quantile: &QuantileJson) -> String {
-    let shown = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |v| format!("{v:.4}"));
-    format!("{} to {}", shown(quantile.low_deg_per_h), shown(quantile.high_deg_per_h))
+    match (quantile.low_deg_per_h, quantile.high_deg_per_h) {
+        (Some(low), Some(high)) => format!("{low:.4} to {high:.4}"),
+        (Some(low), None) => format!("at least {low:.4}"),
+        (None, Some(high)) => format!("at most {high:.4}"),
+        (None, None) => "unknown".to_owned(),
+    }
 }
 
 /// Of each model the pattern whose P99.9 is least, in a sentence.
@@ -105,8 +111,12 @@ pub fn built_coils_page(answer: &CampaignJson) -> String {
             thead { tr { @for (place, name) in header.iter().enumerate() { @if is_word(place) { th.word { (name) } } @else { th { (name) } } } } }
             @for row in &rows { tr { @for (place, cell) in row.iter().enumerate() { @if is_word(place) { td.word { (cell) } } @else { td { (cell) } } } } }
         } }
+        @if models.iter().flat_map(|m| &m.patterns).flat_map(|p| &p.quantiles).any(|q| q.high_deg_per_h.is_none()) {
+            p { "An interval that says only \u{201c}at least\u{201d} has no upper end, because too few coils were drawn: state more samples." }
+        }
         p { "All patterns of a model were judged on the same coils. P99 and P99.9 are exact; median and P95 are read from counts, off by at most a thousandth. "
             "The interval holds the quantile of all coils that could be built with 95 %, whatever their distribution." }
+        (words::of_windings())
         h2 { "What failed" }
         @if answer.failed.is_empty() { p { "Nothing: every block has a result." } } @else {
             p { (answer.failed.len()) " of " (answer.cells.len()) " blocks have no result; their files in cells/ say why: " (answer.failed.join(", ")) }

@@ -5,6 +5,7 @@ use serde_json::Value;
 
 use super::page::{figure, page};
 use super::plot::{Axis, Chart, Series};
+use super::words;
 use crate::io::json::improve::{ImproveJson, PredictedRow};
 use crate::units::min_from_s;
 
@@ -30,6 +31,7 @@ pub fn improvement_page(body: &ImproveJson, rows: &[PredictedRow]) -> String {
         p { (body.predicted_gain.words()) "." }
         h2 { "The next experiment" }
         p { (words(&body.suggested_experiment)) }
+        (words::of_windings())
         h2 { "Step by step" }
         ul {
             @for step in &body.steps { li { (step.step) ": " code { (step.folder) } } }

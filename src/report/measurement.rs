@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::page::page;
-use super::{allan, comparison, diagnosis};
+use super::{allan, comparison, diagnosis, words};
 use crate::io::files::sha256_hex;
 use crate::io::json::inputs::InputsJson;
 use crate::io::write::measurement_folder::Measurements;
@@ -29,6 +29,7 @@ pub fn measurement_page(found: &Measurements) -> String {
         @if let Some((document, tables)) = &found.diagnosis { (diagnosis::section(document, tables)) }
         @if let Some((document, tables)) = &found.comparison { (comparison::section(document, tables)) }
         @if let Some(document) = &found.metrics { (allan::section(document)) }
+        @if found.comparison.is_some() || found.diagnosis.is_some() { (words::of_windings()) }
         h2 { "Inputs" }
         (inputs_table(&inputs))
         (model_source(found, &inputs))

@@ -4,6 +4,7 @@ use maud::{Markup, PreEscaped, html};
 
 use super::cross_section::{Groups, cross_section_in_groups};
 use super::page::{figure, page};
+use super::words;
 use crate::io::json::schedule::{ScheduleJson, StepJson};
 use crate::io::read::schedule_reader::DATA_ELEMENT;
 use crate::pattern::Pattern;
@@ -34,6 +35,8 @@ pub fn traveller_page(document: &ScheduleJson, pattern: &Pattern) -> String {
         (steps(document))
         h2 { "Release" }
         (signatures())
+        h2 { "What these words mean" }
+        (words::of_a_traveller())
         (PreEscaped(DATA_ELEMENT)) (PreEscaped(data.as_str())) (PreEscaped("</script>"))
     };
     page(&title, &body)

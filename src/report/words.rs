@@ -21,3 +21,13 @@ pub(super) fn of_windings() -> Markup {
         }
     }
 }
+
+/// The same for a winding shop: what a traveller's words ask of it. `verify` holds its own copy against this one.
+pub(super) fn of_a_traveller() -> Markup {
+    let names: Vec<String> = Classic::ALL.into_iter().map(|c| format!("{} {}", c.key(), c.title())).collect();
+    html! {
+        p { "Class standard is wound with no captive run, class captive:2 with at most two. Captive: both ends of the fibre on this reel are on \
+             the coil already, so the reel must travel around the coil. A crossover over several layers climbs past those between. Windings by their short names: "
+            (names.join(", ")) "." }
+    }
+}

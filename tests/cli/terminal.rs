@@ -221,7 +221,16 @@ fn progress_comes_as_one_json_object_a_line_on_request_only_and_on_stderr_only()
     for line in &lines {
         assert!(line["task"].is_string() && line["done"].is_u64() && line["message"].is_string(), "{line}");
         assert!(line.get("total").is_some(), "{line}");
+        assert!(line["elapsed_s"].as_f64() >= Some(0.0) && line.get("to_go_s").is_some(), "{line}");
     }
+    // Without a rule that bounds the moves, too, an end is foretold once there is a pace.
+    let unbounded = ["optimise", COIL, "-o", &out, "--fresh", "--moves-per-restart", "200", "--progress", "json"];
+    let told = run(&unbounded);
+    let lines = stderr(&told).lines().filter_map(|l| serde_json::from_str::<serde_json::Value>(l).ok());
+    let searched: Vec<serde_json::Value> = lines.filter(|line| line["task"] == "optimise").collect();
+    assert!(searched.iter().all(|line| line["total"].is_null()), "{searched:?}");
+    let foretold = searched.iter().filter(|line| line["to_go_s"].as_f64() >= Some(0.0)).count();
+    assert!(foretold + 1 >= searched.len() && foretold > 0, "{searched:?}");
     let without = run(&request);
     assert!(!stderr(&without).contains('{'), "{}", stderr(&without));
     assert_eq!(stdout(&with), stdout(&without));

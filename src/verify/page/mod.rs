@@ -16,6 +16,11 @@ use tokens::{Kind, Piece, line_and_column, pieces};
 
 const PRINT_AGAIN: &str = "what the page shows is not what its data say: emit the schedule again, do not edit the page";
 const NOT_OURS: &str = "the page is not as it was emitted: emit the schedule again, do not edit the page";
+/// The short names that a winding may have, and what the shop is asked for.
+const WORDS: &str = "Class standard is wound with no captive run, class captive:2 with at most two. Captive: both ends of the fibre on \
+    this reel are on the coil already, so the reel must travel around the coil. A crossover over several layers climbs past those between. \
+    Windings by their short names: zyl cylindrical winding, sym symmetric winding (Eq. 14), sym-text symmetric winding (as described in \
+    words), dip dipole, qua quadrupole, oct octupole, hex 16-pole.";
 const BLANK: &str = "________________";
 /// The attributes of a picture may differ by the last bits of their numbers.
 const DRAWN_PX: f64 = 1e-6;
@@ -225,6 +230,8 @@ impl Expected<'_> {
         self.steps(claim);
         self.element(None, "a heading", "<h2>", "Release");
         self.signatures();
+        self.element(None, "a heading", "<h2>", "What these words mean");
+        self.element(None, "an explanation", "<p>", WORDS);
         self.tags("<script type=\"application/json\" id=\"coilwright-data\">");
         self.places.push(Place { row: None, field: "the data", want: Want::Data });
         self.tags("</script></main><script>");
