@@ -26,7 +26,7 @@ use rayon::prelude::*;
 
 use super::guaranteed::is_linear;
 use super::samples::any_rate_model;
-use super::worst_case::{SearchError, SolvedProfile, SolvedProfiles};
+use super::worst_case::{PEAK_SHARE, SearchError, SolvedProfile, SolvedProfiles};
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::pattern::Pattern;
 use crate::profile::Profile;
@@ -210,13 +210,17 @@ impl Compared {
     fn of(&self, solved: &SolvedProfiles, pattern: &Pattern) -> Result<f64, SearchError> {
         let path = self.finer.heat_path()?;
         let rate_model = RateModel::new(&self.finer, pattern, &[])?;
-        let worst: Vec<f64> = solved.profiles().par_iter().map(|p| p.worst(&rate_model).0.abs()).collect();
-        let largest = worst.iter().copied().fold(0.0, f64::max);
+        // What is near enough by its samples may still fall behind between them.
+        let worst: Vec<(usize, f64)> = solved
+            .contenders(&rate_model, CONTENDER * PEAK_SHARE)
+            .into_iter()
+            .map(|(index, (rate_rad_per_s, _))| (index, rate_rad_per_s.abs()))
+            .collect();
+        let largest = worst.iter().map(|(_, worst)| *worst).fold(0.0, f64::max);
         let changes: Vec<f64> = worst
             .par_iter()
-            .enumerate()
-            .filter(|(_, worst)| **worst >= CONTENDER * largest)
-            .map(|(index, worst)| {
+            .filter(|(_, worst)| *worst >= CONTENDER * largest)
+            .map(|&(index, worst)| {
                 let again = self.solved[index].get_or_init(|| {
                     SolvedProfile::new(self.profiles[index].clone(), 0, &path, rate_model.remembers())
                         .map_err(SearchError::from)

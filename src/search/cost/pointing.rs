@@ -21,7 +21,7 @@ use rayon::prelude::*;
 
 use super::guaranteed::is_linear;
 use super::samples::{SampleMatrix, any_rate_model};
-use super::worst_case::{SearchError, SolvedProfile, SolvedProfiles, WorstCase};
+use super::worst_case::{PEAK_SHARE, SearchError, SolvedProfile, SolvedProfiles, WorstCase};
 use crate::numeric::lobatto::gauss;
 use crate::numeric::maximise::golden_section;
 use crate::numeric::piecewise::PiecewiseLinear;
@@ -97,12 +97,17 @@ pub fn worst_pointing(model: &CoilModel, solved: &SolvedProfiles, pattern: &Patt
     let part = linear_part(model)?;
     let linear = RateModel::new(&part, pattern, &[])?;
     let whole = if is_linear(model)? { None } else { Some(RateModel::new(model, pattern, &[])?) };
-    let of_each: Vec<WorstCase> = solved
-        .profiles()
-        .par_iter()
-        .enumerate()
-        .map(|(index, profile)| {
-            let (error_rad, time_s) = worst_of(profile, &linear, whole.as_ref());
+    let sampled: Vec<Vec<f64>> =
+        solved.profiles().par_iter().map(|profile| samples_of(profile, &linear, whole.as_ref())).collect();
+    let tops: Vec<f64> =
+        sampled.iter().map(|series| series.iter().fold(0.0, |most: f64, e| most.max(e.abs()))).collect();
+    let least = PEAK_SHARE * tops.iter().copied().fold(0.0, f64::max);
+    let contenders: Vec<usize> = (0..tops.len()).filter(|&index| tops[index] >= least).collect();
+    let of_each: Vec<WorstCase> = contenders
+        .into_par_iter()
+        .map(|index| {
+            let profile = &solved.profiles()[index];
+            let (error_rad, time_s) = worst_of(profile, &sampled[index], &linear, whole.is_none());
             WorstCase {
                 rate_rad_per_s: error_rad,
                 profile: profile.profile.name().to_owned(),
@@ -121,16 +126,22 @@ pub fn worst_pointing(model: &CoilModel, solved: &SolvedProfiles, pattern: &Patt
     Ok(worst)
 }
 
-fn worst_of(profile: &SolvedProfile, linear: &RateModel, whole: Option<&RateModel>) -> (f64, f64) {
-    let history = &profile.history;
-    let mut series = linear.series_rad_per_s(&integrated(history));
+/// ψ at every instant of a profile.
+fn samples_of(profile: &SolvedProfile, linear: &RateModel, whole: Option<&RateModel>) -> Vec<f64> {
+    let mut series = linear.series_rad_per_s(&integrated(&profile.history));
     if let Some(whole) = whole {
         add_rest(profile, whole, linear, &mut series);
     }
+    series
+}
+
+/// The largest of them, between the instants too where the model is linear.
+fn worst_of(profile: &SolvedProfile, series: &[f64], linear: &RateModel, is_linear: bool) -> (f64, f64) {
+    let history = &profile.history;
     let size = |row: usize| series[row].abs();
     let worst = (1..series.len()).fold(0, |best, row| if size(row) > size(best) { row } else { best });
     let found = (series[worst], history.times_s[worst]);
-    if whole.is_some() || worst == 0 || worst + 1 == series.len() {
+    if !is_linear || worst == 0 || worst + 1 == series.len() {
         return found;
     }
     let start = Instant::after(history.times_s[0]);

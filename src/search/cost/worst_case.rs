@@ -78,6 +78,10 @@ impl std::fmt::Display for WorstCase {
 /// Points a piece: close to its start, where layers respond one after the other, and then wider apart.
 const POINTS_PER_PIECE: usize = 96;
 
+/// A local maximum between samples exceeds its neighbours by a few per cent only: below this share of the largest sample it is not
+/// the largest.
+pub(super) const PEAK_SHARE: f64 = 0.9;
+
 /// Where an effect remembers, instants are no wider apart than this share of a piece: between them what it follows counts as
 /// straight.
 const REMEMBERED_SHARE: f64 = 1.0 / 400.0;
@@ -158,12 +162,11 @@ impl SolvedProfiles {
             return Err(fault.into());
         }
         let candidates: Vec<WorstCase> = self
-            .profiles
-            .par_iter()
-            .enumerate()
-            .map(|(index, solved)| {
-                let (rate_rad_per_s, time_s) = solved.worst(&rate_model);
-                WorstCase { rate_rad_per_s, profile: solved.profile.name().to_owned(), profile_index: index, time_s }
+            .contenders(&rate_model, PEAK_SHARE)
+            .into_iter()
+            .map(|(index, (rate_rad_per_s, time_s))| {
+                let profile = self.profiles[index].profile.name().to_owned();
+                WorstCase { rate_rad_per_s, profile, profile_index: index, time_s }
             })
             .collect();
         // The first of equals, so that the answer does not depend on the number of threads.
@@ -174,6 +177,19 @@ impl SolvedProfiles {
             }
         }
         Ok(worst.clone())
+    }
+
+    /// By their indices, in order, the profiles whose largest sample is at least this share of the largest of all; each with its
+    /// largest rate error, between samples too, and the time of it. There is always one.
+    pub(super) fn contenders(&self, rate_model: &RateModel, share: f64) -> Vec<(usize, (f64, f64))> {
+        let tops: Vec<f64> = self
+            .profiles
+            .par_iter()
+            .map(|p| p.series_rad_per_s(rate_model).iter().fold(0.0, |most: f64, rate| most.max(rate.abs())))
+            .collect();
+        let least = share * tops.iter().copied().fold(0.0, f64::max);
+        let contenders: Vec<usize> = (0..tops.len()).filter(|&index| tops[index] >= least).collect();
+        contenders.into_par_iter().map(|index| (index, self.profiles[index].worst(rate_model))).collect()
     }
 }
 
@@ -276,9 +292,8 @@ impl SolvedProfile {
                 if size(i) > best_rate.abs() {
                     (best_rate, best_time_s) = (series[offset + i], piece[i].time_s);
                 }
-                // A local maximum between grid points can exceed its neighbours by a few per cent only.
                 let is_peak = i > 0 && i + 1 < piece.len() && size(i) >= size(i - 1) && size(i) >= size(i + 1);
-                if is_peak && size(i) > 0.9 * largest {
+                if is_peak && size(i) > PEAK_SHARE * largest {
                     let rate_at = |time_s: f64| {
                         let history = self.field.at(&[Instant::after(time_s)]);
                         let mut past = pasts.get(offset + i - 1).cloned().unwrap_or_default();
