@@ -88,6 +88,55 @@ fn a_search_for_p95_reports_what_tolerance_reports_and_writes_the_same_bytes_at_
     assert!(found.is_f64() && found == studied, "{found} {studied}");
 }
 
+/// Wherever a search over built coils says what 95 % of them stay below, it says the same.
+#[test]
+fn p95_is_one_number_in_words_json_pages_and_files() {
+    let root = tempfile::tempdir().unwrap();
+    let model = spread_model(root.path(), "\n[tolerance]\nturns_per_layer_sd = 0.3\nsamples = 20\n");
+    let folder = root.path().join("run");
+    let asked =
+        ["optimise", &model, "--objective", "p95", "--rounds", "1", "--moves-per-restart", "300", "--restarts", "2"];
+    let output = run(&[&asked[..], &["-o", folder.to_str().unwrap(), "-q"]].concat());
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let words = stdout(&output);
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
+    let (summary, page, table) = (read("summary.json"), read("report.html"), read("baselines.csv"));
+    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    let patterns = summary["baselines"].as_array().unwrap().iter().chain([&summary["best"]]);
+    let known: Vec<(&str, f64)> =
+        patterns.map(|p| (p["name"].as_str().unwrap(), p["p95_rate_deg_per_h"].as_f64().unwrap())).collect();
+    assert!(known.len() > 3);
+    let column = table.lines().next().unwrap().split(',').position(|head| head == "p95_rate_deg_per_h").unwrap();
+    for (name, p95) in &known {
+        let shown = format!("{p95:.4}");
+        let row = words.lines().find(|line| line.split_whitespace().next() == Some(name)).unwrap();
+        assert!(row.split_whitespace().any(|cell| cell == shown), "{row}: {shown}");
+        let row = page.split(&format!("<td class=\"word\">{name}</td>")).nth(1).unwrap().split("</tr>").next().unwrap();
+        assert!(row.contains(&format!("<td>{shown}</td>")), "{row}: {shown}");
+        let row = table.lines().find(|line| line.starts_with(&format!("{name},"))).unwrap();
+        assert_eq!(row.split(',').nth(column).unwrap().parse(), Ok(*p95));
+    }
+    let (best, p95) = known[known.len() - 1];
+    assert!(read("best.toml").contains(&format!("# P95 over built coils: {p95:.6} deg/h")));
+    assert!(page.contains(&format!("<dt>95 % of built coils stay below</dt><dd>{p95:.4} °/h</dd>")));
+    // What is drawn is captioned and marked with it.
+    let caption = format!("{best}: as designed ");
+    let caption = page.split(&caption).nth(1).unwrap().split("; of its variance").next().unwrap();
+    assert!(caption.ends_with(&format!("95 % below {p95:.4} °/h")), "{caption}");
+    // Sentences that weigh patterns name theirs.
+    let reasons = summary["recommendation"]["reasons"].as_array().unwrap();
+    let mut weighed = 0;
+    for reason in reasons.iter().filter_map(|reason| reason.as_str()) {
+        let Some((before, _)) = reason.split_once(" for 95 % of built coils") else { continue };
+        let (name, said) = (reason.split(':').next().unwrap(), before.rsplit(' ').next().unwrap());
+        if let Some((_, p95)) = known.iter().find(|(known, _)| *known == name) {
+            assert_eq!(said, format!("{p95:.4}"), "{reason}");
+            weighed += 1;
+        }
+    }
+    assert!(weighed > 0, "{reasons:?}");
+}
+
 #[test]
 fn a_search_for_p95_without_tolerances_is_told_what_is_missing() {
     let output = run(&["optimise", "examples/paper-200m.toml", "--objective", "p95"]);
