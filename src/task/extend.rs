@@ -151,6 +151,9 @@ pub fn effect_of(
     }
 }
 
+/// Names less alike than this are hardly mistaken for one another.
+const LIKE_ENOUGH: f64 = 0.75;
+
 /// The complaint about an effect that does not exist, with the nearest that does.
 /// As an error: where it is stated if it is known, else the effect that was probably meant.
 pub fn unknown_effect(stated: &str) -> TaskError {
@@ -166,7 +169,8 @@ pub fn unknown_effect(stated: &str) -> TaskError {
             let is_part = stated.len() > 2 && spec.kind.contains(stated);
             (strsim::jaro_winkler(spec.kind, stated) + f64::from(u8::from(is_part)), spec.kind)
         })
+        .filter(|(likeness, _)| *likeness > LIKE_ENOUGH)
         .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map_or("", |(_, kind)| kind);
+        .map(|(_, kind)| kind);
     TaskError::UnknownEffect { stated: stated.to_owned(), nearest }
 }

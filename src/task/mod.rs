@@ -124,8 +124,11 @@ pub enum TaskError {
     NoTolerance { path: String },
     #[error("the model has no profile called \"{stated}\": its profiles are {known}")]
     UnknownProfile { stated: String, known: String },
-    #[error("there is no effect {stated}: did you mean {nearest}? `coilwright effects` lists all")]
-    UnknownEffect { stated: String, nearest: &'static str },
+    #[error(
+        "there is no effect {stated}: {}`coilwright effects` lists all",
+        .nearest.map_or_else(String::new, |nearest| format!("did you mean {nearest}? "))
+    )]
+    UnknownEffect { stated: String, nearest: Option<&'static str> },
     #[error("{stated} is no effect: {place}")]
     SetElsewhere { stated: String, place: &'static str },
     #[error("--effect custom needs --formula: give a formula in t, T, dT_dt, T_inner, mean rate or further columns")]

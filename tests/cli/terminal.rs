@@ -168,6 +168,22 @@ fn arguments_that_changed_places_and_words_that_are_no_effects_are_answered_with
     );
     let model = run(&["metrics", COIL]);
     assert!(code(&model) == 2 && stderr(&model).contains("is a model file, no record"), "{}", stderr(&model));
+    let pattern = "patterns/qua-12.toml";
+    for (arguments, expected) in [
+        (&["evaluate", pattern][..], "is a pattern file, no model file: give it to --pattern"),
+        (
+            &["optimise", "examples/campaigns/layers.toml"],
+            "is a campaign file, no model file: give it to `coilwright campaign`",
+        ),
+        (&["evaluate", COIL, "--pattern", COIL], "is a model file, no pattern file"),
+        (&["campaign", COIL, "--list"], "is a model file, no campaign file"),
+        (&["campaign", record, "--list"], "is a table of rows, no campaign file"),
+        (&["effects", "xyz"], "there is no effect xyz: `coilwright effects` lists all"),
+    ] {
+        let said = run(arguments);
+        assert!(code(&said) == 2 && stderr(&said).contains(expected), "{arguments:?}: {}", stderr(&said));
+        assert_eq!(stderr(&said).trim_end().lines().count(), 1, "{}", stderr(&said));
+    }
     let film = run(&["effects", "film"]);
     assert!(
         code(&film) == 2 && stderr(&film).contains("film is no effect: the effect surface_film"),

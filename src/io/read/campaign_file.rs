@@ -6,6 +6,8 @@ use crate::io::fault::Faults;
 use crate::io::files::{read_text, sha256_hex};
 use crate::io::json::campaign::KINDS;
 
+use super::kind_of_file::FileKind;
+use super::model_file::looks_like_a_record;
 use super::pattern_file::states_any;
 use super::toml_reader::{TableReader, TomlReader, parse};
 
@@ -87,7 +89,13 @@ pub fn read_campaign(path: &Path) -> Result<CampaignFile, Faults> {
 /// All faults of the text at once.
 pub fn parse_campaign(path: &Path, source: &str) -> Result<CampaignFile, Faults> {
     let shown = path.display().to_string();
-    let document = parse(&shown, source)?;
+    let document = parse(&shown, source).map_err(|faults| match looks_like_a_record(source) {
+        true => {
+            Faults::of_file(&shown, "is a table of rows, no campaign file: a campaign names its records under [[gyro]]")
+        }
+        false => faults,
+    })?;
+    FileKind::Campaign.check(&shown, source)?;
     let mut reader = TomlReader::new(&shown, source);
     let r = &mut reader;
     let mut root = r.root(&document);

@@ -9,6 +9,7 @@ pub mod csv_rows;
 pub mod effect_tables;
 mod field_columns;
 pub mod field_file;
+mod kind_of_file;
 pub mod model_file;
 pub mod pattern_file;
 pub mod plausibility;

@@ -18,6 +18,7 @@ use crate::units::{m_from_mm, m_from_nm, m_from_um, um_from_m};
 
 use super::boundary_table::read_boundary;
 use super::effect_tables::read_effects;
+use super::kind_of_file::FileKind;
 use super::pattern_file::{ResolveError, resolve_pattern};
 use super::production_table::read_production;
 use super::profile_tables::{read_profiles, too_many_ramps};
@@ -43,7 +44,7 @@ pub fn read_design(path: &Path) -> Result<ModelFile, Faults> {
 }
 
 /// Whether the first line that is no comment is a row of several names, as in a CSV file.
-fn looks_like_a_record(source: &str) -> bool {
+pub(super) fn looks_like_a_record(source: &str) -> bool {
     let first = source.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with('#'));
     first.is_some_and(|line| line.contains([',', ';', '\t']) && !line.contains(['=', '[', '{']))
 }
@@ -58,6 +59,7 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
         true => Faults::of_file(&file, "is a table of rows, no model file: the model comes first, then the records"),
         false => faults,
     })?;
+    FileKind::Model.check(&file, source)?;
     let mut reader = TomlReader::new(&file, source);
     let r = &mut reader;
     let mut root = r.root(&document);

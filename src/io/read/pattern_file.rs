@@ -11,6 +11,7 @@ use crate::pattern::Pattern;
 use crate::pattern::classic::{Classic, ClassicError};
 use crate::text::sink::TomlComment;
 
+use super::kind_of_file::FileKind;
 use super::toml_reader::{TomlReader, parse};
 
 #[derive(Debug, Error)]
@@ -21,6 +22,9 @@ pub enum ResolveError {
     Layers { path: PathBuf, expected: usize, found: usize },
     #[error("{path} is no pattern file: expected TOML with name, layers and segments", path = .path.display())]
     NoPattern { path: PathBuf },
+    /// One of the program's own, of another kind.
+    #[error("{path} {words}", path = .path.display())]
+    Other { path: PathBuf, words: String },
     #[error("the pattern file has faults:\n{0}")]
     File(Faults),
 }
@@ -42,6 +46,9 @@ pub fn resolve_pattern(stated: &str, layers: usize, base: Option<&Path>) -> Resu
         return Err(ClassicError::Unknown { found: format!("\"{stated}\"") }.into());
     }
     let source = read_text(&path).map_err(ResolveError::File)?;
+    if let Some(words) = FileKind::Pattern.instead(&source) {
+        return Err(ResolveError::Other { path, words });
+    }
     // What is something else altogether is named, not shown: it may be any file of the system.
     if !looks_like_a_pattern(&source) {
         return Err(ResolveError::NoPattern { path });
