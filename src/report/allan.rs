@@ -21,7 +21,9 @@ pub fn allan_chart(record: &RecordMetricsJson) -> Chart {
         .y(Axis::log("Allan deviation σ(τ) [°/h]"))
         .with(Series::points("measured, ± one standard error", points).with_errors(errors));
     for noise in &record.allan_noises {
-        let name = format!("{} {} {} (slope {})", noise.noise, digits(noise.value), noise.unit, slope(noise.slope));
+        // What a data sheet calls the bias instability is the curve's minimum, another number.
+        let kind = if noise.slope == 0.0 { "flicker" } else { noise.noise.as_str() };
+        let name = format!("{kind} {} {} (slope {})", digits(noise.value), noise.unit, slope(noise.slope));
         chart = chart.with(Series::dashed(name, line(record, noise)));
     }
     if let (Some(tau_s), Some(deviation)) = (record.bias_instability_tau_s, record.bias_instability_deg_per_h) {
@@ -49,6 +51,11 @@ fn line(record: &RecordMetricsJson, noise: &AllanNoiseJson) -> Vec<(f64, f64)> {
 /// Three significant digits.
 fn digits(value: f64) -> String {
     super::plot::three_digits(value)
+}
+
+/// As many as a data sheet states.
+fn table_digits(value: f64) -> String {
+    super::plot::significant(value, 4)
 }
 
 fn slope(value: f64) -> &'static str {
@@ -97,7 +104,7 @@ fn caption(record: &RecordMetricsJson) -> String {
         " White noise may be absent: the angle random walk in the table is an upper bound."
     };
     format!(
-        "Overlapping Allan deviation of {} regular rows of {}, with one standard error. Dashed: the noises by maximum likelihood on all octaves at once, without what follows the temperature; bias instability B is the flat line at 0.664 B.{walk}",
+        "Overlapping Allan deviation of {} regular rows of {}, with one standard error. Dashed: the noises by maximum likelihood on all octaves at once, without what follows the temperature; flicker of the size B is the flat line at 0.664 B.{walk}",
         record.allan_rows, record.file
     )
 }
@@ -124,7 +131,7 @@ fn measures(metrics: &MetricsJson) -> Markup {
             tbody {
                 @for (name, unit, show) in rows { tr {
                     td.word { (name) } td.word { (unit) }
-                    @for record in &metrics.records { td { (show(record).map_or("–".to_owned(), |v| format!("{v:.6}"))) } }
+                    @for record in &metrics.records { td { (show(record).map_or("–".to_owned(), table_digits)) } }
                 } }
             }
         } }
@@ -133,7 +140,7 @@ fn measures(metrics: &MetricsJson) -> Markup {
             @for caution in &record.cautions { p { strong { "Caution. " } (record.file) ": " (caution) "." } }
         }
         @if let Some(repeatability) = metrics.repeatability_deg_per_h {
-            p { "Repeatability of the bias over " (metrics.records.len()) " records: " (format!("{repeatability:.6}")) " °/h." }
+            p { "Repeatability of the bias over " (metrics.records.len()) " records: " (table_digits(repeatability)) " °/h." }
         }
     }
 }

@@ -38,7 +38,9 @@ pub fn built_coils_table(models: &[BuiltCoilsJson]) -> (Vec<&'static str>, Vec<V
             row.extend(pattern.quantiles.iter().map(|q| format!("{:.4}", q.value_deg_per_h)));
             row.push(pattern.quantiles.last().map(interval).unwrap_or_default());
             row.push(format!("{:.4}", pattern.largest_deg_per_h));
-            row.push(pattern.yield_share.map_or_else(|| "–".to_owned(), |y| format!("{:.4} %", 100.0 * y)));
+            // One coil more or less is seen, and nothing finer.
+            let decimals = ((model.samples.max(1) as f64).log10().ceil() - 2.0).max(0.0) as usize;
+            row.push(pattern.yield_share.map_or_else(|| "–".to_owned(), |y| format!("{:.decimals$} %", 100.0 * y)));
             rows.push(row);
         }
     }

@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::page::{figure, page};
 use super::plot::{Axis, Chart, Mark, Series};
 use crate::io::json::campaign::GyroJson;
-use crate::io::json::fleet::{FleetEffectJson, FleetJson, GyroValueJson, MeasureJson};
+use crate::io::json::fleet::{FleetEffectJson, FleetJson, GyroValueJson, MeasureJson, four_digits};
 
 /// More gyros than these do not fit one picture; the table has them all.
 const MOST_DRAWN: usize = 60;
@@ -15,30 +15,31 @@ pub fn fleet_page(name: &str, fleet: &FleetJson, gyros: &[GyroJson]) -> String {
     let (common, others): (Vec<&String>, Vec<&String>) =
         fleet.sentences.iter().partition(|s| s.starts_with("common: "));
     let failed: Vec<&GyroJson> = gyros.iter().filter(|gyro| gyro.failure.is_some()).collect();
+    let mut figures = figures(fleet);
+    let first = fleet.sentences.first().map_or("", String::as_str);
+    let lead = figures.iter().position(|f| first.contains(&f.about)).unwrap_or(0);
+    let lead = (!figures.is_empty()).then(|| figures.remove(lead));
+    let said = |sentence: &str| readable(sentence, &fleet.measures);
     let body = html! {
         h1 { (name) }
-        p.big { (verdict(fleet.sentences.first(), failed.len(), gyros.len())) }
+        p.big { (said(&verdict(fleet.sentences.first(), failed.len(), gyros.len()))) }
+        @if let Some(lead) = &lead { (lead.markup) }
         dl.facts {
             dt { "gyros" } dd { (gyros.len()) ", " (fleet.gyros) " of them with a result" }
             dt { "asked" } dd { (fleet.kind) }
             dt { "program" } dd { (concat!("coilwright ", env!("CARGO_PKG_VERSION"))) }
         }
         h2 { "What the batch has in common" }
-        @for sentence in &common { p { (sentence.trim_start_matches("common: ")) } }
+        @for sentence in &common { p { (said(sentence.trim_start_matches("common: "))) } }
         @if common.is_empty() { p { "Nothing that was looked for." } }
         h2 { "What is single" }
-        @for sentence in &others { p { (sentence.trim_start_matches("single: ")) } }
+        @for sentence in &others { p { (said(sentence.trim_start_matches("single: "))) } }
         @if others.is_empty() { p { "Nothing: no gyro stands apart." } }
         @if !fleet.effects.is_empty() { (effects(&fleet.effects, fleet.gyros)) }
         @if !fleet.verdicts.is_empty() { (verdicts(fleet)) }
-        @if let Some(curve) = &fleet.thermal_curve {
-            h2 { "Bias over temperature" }
-            @let points = curve.points.iter().map(|p| (p.temperature_c, p.bias_deg_per_h)).collect();
-            @let chart = Chart::new("The batch's bias over temperature").size(860, 240)
-                .x(Axis::linear("temperature [°C]")).y(Axis::linear("about each gyro's own mean [°/h]")).with(Series::points("batch", points));
-            (figure(&chart.svg_to_read(), &format!("Means over the gyros. The curve of the others takes {:.0} % of a gyro's own thermal mean square away.", 100.0 * curve.common_share)))
-        }
         @if !fleet.measures.is_empty() { (measures(&fleet.measures)) }
+        @if !figures.is_empty() { h2 { "Gyro by gyro" } }
+        @for figure in &figures { (figure.markup) }
         h2 { "What failed" }
         @if failed.is_empty() { p { "Nothing: every gyro has a result." } } @else {
             div.scroll { table {
@@ -48,6 +49,57 @@ pub fn fleet_page(name: &str, fleet: &FleetJson, gyros: &[GyroJson]) -> String {
         }
     };
     page(name, &body)
+}
+
+/// A picture, and what a sentence about it holds.
+struct Figure {
+    about: String,
+    markup: Markup,
+}
+
+fn figures(fleet: &FleetJson) -> Vec<Figure> {
+    let mut found = Vec::new();
+    for effect in &fleet.effects {
+        for p in effect.parameters.iter().filter(|p| p.values.len() > 1) {
+            let title = format!("{} of {}", p.parameter, effect.kind);
+            let svg = values(&title, &p.unit, p.mean, &p.values);
+            found.push(Figure {
+                about: effect.kind.clone(),
+                markup: figure(&svg, "Each gyro; the line is the batch's mean."),
+            });
+        }
+    }
+    if let Some(curve) = &fleet.thermal_curve {
+        let points = curve.points.iter().map(|p| (p.temperature_c, p.bias_deg_per_h)).collect();
+        let chart = Chart::new("The batch's bias over temperature")
+            .size(860, 240)
+            .x(Axis::linear("temperature [°C]"))
+            .y(Axis::linear("about each gyro's own mean [°/h]"))
+            .with(Series::points("batch", points));
+        let share = 100.0 * curve.common_share;
+        let caption = format!(
+            "Means over the gyros. The curve of the others takes {share:.0} % of a gyro's own thermal mean square away."
+        );
+        found
+            .push(Figure { about: "bias over temperature".to_owned(), markup: figure(&chart.svg_to_read(), &caption) });
+    }
+    for m in &fleet.measures {
+        let svg = values(&name_of(m), &m.unit, m.median, &m.values);
+        found.push(Figure { about: m.key.clone(), markup: figure(&svg, "Each gyro; the line is the batch's median.") });
+    }
+    found
+}
+
+/// A measure's key without its unit, in words.
+fn name_of(measure: &MeasureJson) -> String {
+    let key = measure.key.as_str();
+    let name = ["_deg", "_arcsec"].into_iter().filter_map(|unit| key.find(unit)).min().map_or(key, |at| &key[..at]);
+    name.replace('_', " ")
+}
+
+/// A sentence with names in the place of keys.
+fn readable(sentence: &str, measures: &[MeasureJson]) -> String {
+    measures.iter().fold(sentence.to_owned(), |said, m| said.replace(&m.key, &name_of(m)))
 }
 
 /// What the batch shows first, in a sentence.
@@ -71,15 +123,9 @@ fn effects(effects: &[FleetEffectJson], gyros: usize) -> Markup {
                 td { (effect.found_in.len()) " of " (gyros) }
                 td { (effect.equivalent_in.len()) }
                 td.word { @for p in &effect.parameters {
-                    (format!("{} = {:.4} ± {:.4} {}, from gyro to gyro ± {:.4}", p.parameter, p.mean, p.standard_error, p.unit, p.spread)) br;
+                    (p.in_words()) br;
                 } }
             } }
-        } }
-        @for effect in effects { @for p in effect.parameters.iter().filter(|p| p.values.len() > 1) {
-            (figure(
-                &values(&format!("{} of {}", p.parameter, effect.kind), &p.unit, p.mean, &p.values),
-                "Each gyro; the line is the batch's mean.",
-            ))
         } }
     }
 }
@@ -102,13 +148,12 @@ fn measures(measures: &[MeasureJson]) -> Markup {
         div.scroll { table {
             tr { th.word { "measure" } th { "median" } th { "from gyro to gyro" } th { "gyros" } th { "common share" } th.word { "single" } }
             @for m in measures { tr {
-                td.word { (m.key) } td { (format!("{:.6} {}", m.median, m.unit)) }
+                td.word { (name_of(m)) } td { (four_digits(m.median)) " " (m.unit) }
                 td { (spread(m)) } td { (m.values.len()) }
                 td { (m.common_share.map_or_else(|| "–".to_owned(), |share| format!("{:.0} %", 100.0 * share))) }
                 td.word { (m.values.iter().filter(|v| v.single).map(|v| v.gyro.as_str()).collect::<Vec<_>>().join(", ")) }
             } }
         } }
-        @for m in measures { (figure(&values(&m.key, &m.unit, m.median, &m.values), "Each gyro; the line is the batch's median.")) }
     }
 }
 
@@ -116,7 +161,7 @@ fn spread(measure: &MeasureJson) -> String {
     if measure.spread_is_factor {
         format!("a factor of {:.3}", measure.spread)
     } else {
-        format!("± {:.6} {}", measure.spread, measure.unit)
+        format!("± {} {}", four_digits(measure.spread), measure.unit)
     }
 }
 
@@ -128,7 +173,7 @@ fn values(title: &str, unit: &str, usual: f64, values: &[GyroValueJson]) -> Stri
     };
     let mut chart = Chart::new(title.to_owned())
         .size(860, 240)
-        .x(Axis::linear(format!("[{unit}]")))
+        .x(Axis::linear(if unit == "1" { title.to_owned() } else { format!("{title} [{unit}]") }))
         .categories(drawn.iter().map(|v| v.gyro.clone()))
         .with(Series::bars("as the batch", &of(false)))
         .mark(Mark::vertical("batch", usual));

@@ -23,7 +23,9 @@ pub fn improvement_page(body: &ImproveJson, rows: &[PredictedRow]) -> String {
         ul { @for reason in list(&body.recommendation["reasons"]) { li { (words(&reason)) } } }
         h2 { "What the records said" }
         p { "Verdict: " (words(&body.verdict)) "." }
-        ul { @for effect in list(&body.effects) { li { (words(&effect["kind"])) } } }
+        ul { @for effect in list(&body.effects) {
+            li { b { (words(&effect["kind"])) } ": " (words(&effect["happens"])) " " (words(&effect["remedy"])) }
+        } }
         @if let Some(film) = body.film_w_per_m2_k {
             p { "The air reached the coil through a film of " (format!("{film:.2}")) " W/(m²K); the search was run behind it." }
         }
@@ -34,11 +36,28 @@ pub fn improvement_page(body: &ImproveJson, rows: &[PredictedRow]) -> String {
         (words::of_windings())
         h2 { "Step by step" }
         ul {
-            @for step in &body.steps { li { (step.step) ": " code { (step.folder) } } }
+            @for step in &body.steps { li {
+                (step.step) ": "
+                @if let Some(file) = page_of(&step.step) {
+                    a href=(format!("{}/{file}", step.step)) { (step.folder) }
+                } @else { code { (step.folder) } }
+            } }
         }
     };
     page(&format!("The next winding of {}", body.model), &content)
 }
+
+/// The page in a step's folder, which is beside this one and has the step's name.
+fn page_of(step: &str) -> Option<&'static str> {
+    match step {
+        "before" | "after" | "diagnosis" | "search" => Some(REPORT),
+        "schedule" => Some(TRAVELLER),
+        _ => None,
+    }
+}
+
+const REPORT: &str = "report.html";
+const TRAVELLER: &str = "traveller.html";
 
 fn predicted_chart(rows: &[PredictedRow]) -> String {
     let stride = rows.len().div_ceil(MOST_POINTS).max(1);

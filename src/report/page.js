@@ -170,7 +170,7 @@ function makeChart(figure, svg) {
     const clip = drawn("svg", { x: left, y: top, width: right - left, height: bottom - top, viewBox: `${left} ${top} ${right - left} ${bottom - top}` });
     into.append(clip);
     const inside = (tag, attributes) => clip.append(drawn(tag, attributes));
-    const bars = plot.series.length, taken = [];
+    const bars = plot.series.length, taken = [], marked = [], words = [];
     plot.series.forEach((s, rank) => {
       if (!visible().includes(s)) return;
       const shown = values(s), at = (i) => [px(x, x.place(s.x[i])), py(y, y.place(shown[i]))];
@@ -181,7 +181,8 @@ function makeChart(figure, svg) {
           const at = top + row * (s.y[i] + 0.5) + (rank - 0.5 * (bars - 1)) * 14 * FINE;
           add("rect", { x: Math.min(zero, end), y: at - 6 * FINE, width: Math.max(FINE, Math.abs(end - zero)), height: 12 * FINE, fill: s.colour, "fill-opacity": 0.9 });
           const before = end < zero;
-          add("text", { x: end + (before ? -4 : 4) * FINE, y: at + TEXT * 0.35, "text-anchor": before ? "end" : "start" }, s.labels[i] || digits(v, 3));
+          // Over the marks, so that no line crosses a word.
+          words.push([{ x: end + (before ? -4 : 4) * FINE, y: at + TEXT * 0.35, "text-anchor": before ? "end" : "start" }, s.labels[i] || digits(v, 3)]);
         });
       } else if (s.shape === "columns") {
         for (let i = 0; i + 1 < s.x.length; i++) {
@@ -214,9 +215,19 @@ function makeChart(figure, svg) {
       if (p < of.low || p > of.high) continue;
       const [from, to] = mark.along === "x" ? [`${px(x, p)} ${top}`, `${px(x, p)} ${bottom}`] : [`${left} ${py(y, p)}`, `${right} ${py(y, p)}`];
       add("path", { d: `M${from}L${to}`, stroke: "currentColor", "stroke-opacity": 0.55, "stroke-width": FINE, "stroke-dasharray": `${5 * FINE} ${4 * FINE}` });
-      const upright = mark.along === "x";
-      add("text", { x: upright ? px(x, p) : right - 4 * FINE, y: upright ? top - 4 * FINE : Math.max(top + TEXT, py(y, p) - 4 * FINE), "text-anchor": upright ? "middle" : "end" }, mark.label);
+      if (!mark.label) continue;
+      if (mark.along === "y") {
+        add("text", { x: right - 4 * FINE, y: Math.max(top + TEXT, py(y, p) - 4 * FINE), "text-anchor": "end" }, mark.label);
+        continue;
+      }
+      // Words that would lie on one another go to different rows.
+      const wide = 0.58 * TEXT * mark.label.length, start = Math.max(left, Math.min(right - wide, px(x, p) - wide / 2));
+      let level = 0;
+      while (level < 5 && marked.some((t) => t[1] === level && start < t[2] && t[0] < start + wide)) level++;
+      marked.push([start, level, start + wide + 8 * FINE]);
+      add("text", { x: start, y: top - 4 * FINE - level * 17 * FINE }, mark.label);
     }
+    for (const [attributes, text] of words) add("text", attributes, text);
   }
 
   /** A word beside a point, where it lies on no other. */

@@ -76,7 +76,8 @@ body{margin:0;background:var(--paper);color:var(--ink);font:16px/1.5 system-ui,'
 main{max-width:78rem;margin:0 auto;padding:1rem}
 h1{font-size:1.6rem;line-height:1.25;margin:.5rem 0}h2{font-size:1.2rem;margin:1.8rem 0 .5rem}
 p{max-width:46rem}
-.scroll{overflow-x:auto;padding-right:1px}
+h1,h2,h3,p,li,figcaption,summary{overflow-wrap:break-word}
+.scroll{overflow-x:auto;padding-right:1px;margin:.5rem 0}
 table{border-collapse:collapse;font-size:.86rem;font-variant-numeric:tabular-nums}
 th,td{border:1px solid var(--line);padding:.25rem .5rem;text-align:right;vertical-align:top}
 th{background:var(--soft);font-weight:600}
@@ -110,8 +111,8 @@ code,pre{font-family:ui-monospace,'DejaVu Sans Mono',monospace;font-size:.86em;o
 .two,.pair{display:block}:root{--ink:#000;--paper:#fff;--soft:#eee;--line:#888}
 body{font-size:10pt}main{max-width:none;padding:0}
 h1{font-size:15pt}h2{font-size:12pt;break-after:avoid}
-table{font-size:7.6pt;width:100%}th,td{padding:1.5pt 3pt}thead{display:table-header-group}tr{break-inside:avoid}
-figure{break-inside:avoid}figure svg{max-height:225mm}.scroll{overflow:visible;padding-right:1.5pt}.fill{min-width:0}.long{min-width:26mm}.screen,.panel{display:none}td code{min-width:0}
+table{font-size:7.3pt;width:100%}th,td{padding:1.2pt 2pt}.keep{white-space:normal}thead{display:table-header-group}tr{break-inside:avoid}
+figure{break-inside:avoid}figure svg{max-height:225mm}.scroll{overflow:visible;padding-right:1.5pt}.fill{min-width:0}.long{min-width:17mm}.screen,.panel{display:none}td code{min-width:0}
 details::details-content{content-visibility:visible;block-size:auto}summary{list-style:none}
 }
 ";

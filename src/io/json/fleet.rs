@@ -97,3 +97,55 @@ pub struct FleetParameterJson {
     pub spread: f64,
     pub values: Vec<GyroValueJson>,
 }
+
+impl FleetParameterJson {
+    /// The mean to two digits of its error, and what the gyros spread beyond that.
+    pub fn in_words(&self) -> String {
+        let decimals = |error: f64| {
+            let exponent = if error > 0.0 && error.is_finite() { error.log10().floor() } else { -3.0 };
+            (1.0 - exponent).clamp(0.0, 12.0) as usize
+        };
+        let places = decimals(self.standard_error);
+        let unit = if self.unit == "1" { String::new() } else { format!(" {}", self.unit) };
+        let spread = if self.spread > 0.0 {
+            format!(", from gyro to gyro ± {:.*}", decimals(self.spread), self.spread)
+        } else {
+            ", the same in all of them within their errors".to_owned()
+        };
+        format!("{} = {:.places$} ± {:.places$}{unit}{spread}", self.parameter, self.mean, self.standard_error)
+    }
+}
+
+/// Four significant digits.
+pub fn four_digits(value: f64) -> String {
+    let exponent = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
+    if (-5.0..7.0).contains(&exponent) {
+        format!("{value:.*}", (3.0 - exponent).clamp(0.0, 12.0) as usize)
+    } else {
+        format!("{value:.3e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_the_digits_that_mean_something() {
+        assert_eq!(
+            [0.0, 9.006_991, -0.022_945, 20_400.0, 1e-7].map(four_digits),
+            ["0.000", "9.007", "-0.02295", "20400", "1.000e-7"]
+        );
+        let mut found = FleetParameterJson {
+            parameter: "mismatch".into(),
+            unit: "1".into(),
+            mean: 0.004_012_3,
+            standard_error: 0.000_123,
+            spread: 0.0,
+            values: Vec::new(),
+        };
+        assert_eq!(found.in_words(), "mismatch = 0.00401 ± 0.00012, the same in all of them within their errors");
+        (found.unit, found.mean, found.standard_error, found.spread) = ("K".into(), 1234.0, 34.0, 5.0);
+        assert_eq!(found.in_words(), "mismatch = 1234 ± 34 K, from gyro to gyro ± 5.0");
+    }
+}

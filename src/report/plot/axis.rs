@@ -183,14 +183,19 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
 
 /// Three significant digits, for the end of a bar.
 pub(in crate::report) fn three_digits(value: f64) -> String {
+    significant(value, 3)
+}
+
+/// So many significant digits, for a table.
+pub(in crate::report) fn significant(value: f64, count: i32) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
     let exponent = value.abs().log10().floor() as i32;
     if (-4..6).contains(&exponent) {
-        number(value, (2 - exponent).max(0) as usize)
+        number(value, (count - 1 - exponent).max(0) as usize)
     } else {
-        format!("{}·10{}", number(value / 10f64.powi(exponent), 2), superscript(exponent))
+        format!("{}·10{}", number(value / 10f64.powi(exponent), (count - 1) as usize), superscript(exponent))
     }
 }
 

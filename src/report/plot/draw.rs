@@ -110,12 +110,14 @@ fn draw(chart: &Chart, layout: &Layout, root: &Area) -> Drawn {
     for (index, series) in chart.series.iter().enumerate() {
         any |= draw_series(chart, layout, root, series, index)?;
     }
-    draw_labels(chart, layout, root)?;
     if !any {
         let (x, y) = ((layout.left + layout.right) / 2, (layout.top + layout.bottom) / 2);
         root.draw(&text("no data", x, y, HPos::Center, VPos::Center))?;
     }
-    draw_marks(chart, layout, root, lying)
+    draw_marks(chart, layout, root, lying)?;
+    // Over the marks, so that no line crosses a word.
+    draw_bars_words(chart, layout, root)?;
+    draw_labels(chart, layout, root)
 }
 
 /// Title and legend.
@@ -220,9 +222,8 @@ fn draw_marks(chart: &Chart, layout: &Layout, root: &Area, lying: bool) -> Drawn
             Along::Y if chart.y.admits(mark.value) => {
                 let y = layout.y_px(chart.y.position(mark.value), lying);
                 root.draw(&dash(at(f64::from(layout.left), y), at(f64::from(layout.right), y)))?;
-                let above = y as i32 - 3 - TEXT_PX > layout.top;
-                let (place, v) = if above { (y as i32 - 3, VPos::Bottom) } else { (y as i32 + 3, VPos::Top) };
-                root.draw(&text(&mark.label, layout.right - 4, place, HPos::Right, v))?;
+                let (left, top) = labels::along_a_mark(chart, layout, &mark.label, y);
+                root.draw(&text(&mark.label, left, top, HPos::Left, VPos::Top))?;
             }
             _ => {}
         }
@@ -299,26 +300,41 @@ fn draw_series(
             }
         }
         Shape::Bars => {
-            let bars = chart.series.iter().filter(|s| s.shape == Shape::Bars).count() as f64;
-            let rank = chart.series[..index].iter().filter(|s| s.shape == Shape::Bars).count() as f64;
-            let zero = layout.x_px(layout.x.base(&chart.x));
             for &(value, category) in series.points.iter().filter(|p| chart.x.admits(p.0)) {
                 any = true;
-                let x = layout.x_px(chart.x.position(value));
-                let middle = layout.y_px(category, true) + (rank - 0.5 * (bars - 1.0)) * 14.0;
-                let (from, to) = (zero.min(x), zero.max(x).max(zero.min(x) + 1.0));
+                let (from, to, middle) = bar(chart, layout, index, value, category);
                 root.draw(&Rectangle::new([at(from, middle - 6.0), at(to, middle + 6.0)], hue.mix(0.9).filled()))?;
-                let words = series.labels.get(category as usize).cloned().unwrap_or_else(|| three_digits(value));
-                let (h, place) = if value < 0.0 && !chart.x.is_log() {
-                    (HPos::Right, from as i32 - 4)
-                } else {
-                    (HPos::Left, to as i32 + 4)
-                };
-                root.draw(&text(&words, place, middle.round() as i32, h, VPos::Center))?;
             }
         }
     }
     Ok(any)
+}
+
+/// Where a lying bar is [px]: its ends and its middle across.
+fn bar(chart: &Chart, layout: &Layout, index: usize, value: f64, category: f64) -> (f64, f64, f64) {
+    let bars = |of: &[Series]| of.iter().filter(|s| s.shape == Shape::Bars).count() as f64;
+    let zero = layout.x_px(layout.x.base(&chart.x));
+    let x = layout.x_px(chart.x.position(value));
+    let middle =
+        layout.y_px(category, true) + (bars(&chart.series[..index]) - 0.5 * (bars(&chart.series) - 1.0)) * 14.0;
+    (zero.min(x), zero.max(x).max(zero.min(x) + 1.0), middle)
+}
+
+/// The numbers at the ends of lying bars.
+fn draw_bars_words(chart: &Chart, layout: &Layout, root: &Area) -> Drawn {
+    for (index, series) in chart.series.iter().enumerate().filter(|(_, s)| s.shape == Shape::Bars) {
+        for &(value, category) in series.points.iter().filter(|p| chart.x.admits(p.0)) {
+            let (from, to, middle) = bar(chart, layout, index, value, category);
+            let words = series.labels.get(category as usize).cloned().unwrap_or_else(|| three_digits(value));
+            let (h, place) = if value < 0.0 && !chart.x.is_log() {
+                (HPos::Right, from as i32 - 4)
+            } else {
+                (HPos::Left, to as i32 + 4)
+            };
+            root.draw(&text(&words, place, middle.round() as i32, h, VPos::Center))?;
+        }
+    }
+    Ok(())
 }
 
 /// The words beside points.

@@ -68,10 +68,42 @@ pub(super) fn places(chart: &Chart, layout: &Layout) -> Vec<Vec<Option<Place>>> 
         .collect()
 }
 
+/// Left and upper edge [px] of the word on a level mark at the height `y`: above it or below, further right or left, where it
+/// covers least of what is drawn.
+pub(super) fn along_a_mark(chart: &Chart, layout: &Layout, word: &str, y: f64) -> (i32, i32) {
+    let (wide, high) = (text_width_px(word), TEXT_PX + 3);
+    let free = (layout.right - layout.left - wide - 8).max(0);
+    let lines = chart.series.iter().filter(|s| !matches!(s.shape, Shape::Bars | Shape::Cells | Shape::Histogram));
+    let drawn: Vec<(f64, f64)> = lines
+        .flat_map(|s| &s.points)
+        .filter(|p| chart.x.admits(p.0) && chart.y.admits(p.1))
+        .map(|p| (layout.x_px(chart.x.position(p.0)), layout.y_px(chart.y.position(p.1), false)))
+        .collect();
+    let covered = |left: i32, top: i32| {
+        let area = [left, top, left + wide, top + high].map(f64::from);
+        drawn.iter().filter(|(x, y)| *x > area[0] && *x < area[2] && *y > area[1] && *y < area[3]).count()
+    };
+    let (above, below) = (y as i32 - 3 - high, y as i32 + 3);
+    let heights = [above, below].into_iter().filter(|top| *top >= layout.top && *top + high <= layout.bottom);
+    let places = heights.flat_map(|top| (0..=8).map(move |part| (layout.right - 4 - wide - free * part / 8, top)));
+    // The first of equals: at the right, above.
+    places.min_by_key(|&(left, top)| covered(left, top)).unwrap_or((layout.right - 4 - wide, below))
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::{Axis, Series};
     use super::*;
+
+    #[test]
+    fn a_word_on_a_mark_keeps_clear_of_a_line_that_crosses_its_end() {
+        let line: Vec<(f64, f64)> = (0..400).map(|i| (f64::from(i), if i < 200 { -8.0 } else { 1.0 })).collect();
+        let chart = Chart::new("x").with(Series::line("", line)).mark(super::super::Mark::horizontal("limit", 0.5));
+        let layout = Layout::new(&chart);
+        let y = layout.y_px(chart.y.position(0.5), false);
+        let (left, top) = along_a_mark(&chart, &layout, "limit", y);
+        assert!(top < y as i32 && left + text_width_px("limit") <= (layout.left + layout.right) / 2, "{left} {top}");
+    }
 
     #[test]
     fn words_of_points_that_lie_together_lie_apart_and_inside_the_frame() {

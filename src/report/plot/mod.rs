@@ -25,7 +25,7 @@ mod draw;
 mod labels;
 mod layout;
 
-pub(super) use axis::three_digits;
+pub(super) use axis::{significant, three_digits};
 pub(super) use draw::STYLE;
 
 pub use axis::Axis;

@@ -8,7 +8,7 @@
 
 use crate::io::json::campaign::GyroJson;
 use crate::io::json::diagnosis::{DiagnosisJson, FindingJson};
-use crate::io::json::fleet::{FleetEffectJson, FleetJson, FleetParameterJson, GyroValueJson, VerdictJson};
+use crate::io::json::fleet::{FleetEffectJson, FleetJson, FleetParameterJson, GyroValueJson, VerdictJson, four_digits};
 
 use super::measures::{self, FEWEST, apart};
 
@@ -154,8 +154,7 @@ fn sentences(fleet: &FleetJson) -> Vec<String> {
             words += &format!(", and as an equal explanation in {} more", effect.equivalent_in.len());
         }
         for p in &effect.parameters {
-            words += &format!("; {} = {:.4} ± {:.4} {}", p.parameter, p.mean, p.standard_error, p.unit);
-            words += &format!(", from gyro to gyro ± {:.4}", p.spread);
+            words += &format!("; {}", p.in_words());
         }
         said.push(words);
     }
@@ -178,8 +177,12 @@ fn sentences(fleet: &FleetJson) -> Vec<String> {
         }
         for value in measure.values.iter().filter(|value| value.single) {
             said.push(format!(
-                "single: {}: {} = {:.6} {}, where the batch's median is {:.6}",
-                value.gyro, measure.key, value.value, measure.unit, measure.median
+                "single: {}: {} = {} {}, where the batch's median is {}",
+                value.gyro,
+                measure.key,
+                four_digits(value.value),
+                measure.unit,
+                four_digits(measure.median)
             ));
         }
     }
@@ -187,8 +190,13 @@ fn sentences(fleet: &FleetJson) -> Vec<String> {
         for parameter in &effect.parameters {
             for value in parameter.values.iter().filter(|value| value.single) {
                 said.push(format!(
-                    "single: {}: {} of {} = {:.4} {}, where the batch has {:.4}",
-                    value.gyro, parameter.parameter, effect.kind, value.value, parameter.unit, parameter.mean
+                    "single: {}: {} of {} = {} {}, where the batch has {}",
+                    value.gyro,
+                    parameter.parameter,
+                    effect.kind,
+                    four_digits(value.value),
+                    parameter.unit,
+                    four_digits(parameter.mean)
                 ));
             }
         }
