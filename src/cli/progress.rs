@@ -12,6 +12,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde::Serialize;
 
 use crate::text::sink::{JsonText, Line};
+use crate::units::{h_from_s, min_from_s};
 
 /// How progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -130,9 +131,9 @@ fn to_go(elapsed: Duration, done: u64, left: u64) -> Option<Duration> {
 fn time_left_in_words(left: Duration) -> String {
     match left.as_secs_f64() {
         s if s < 90.0 => format!("{:.0} s", s.ceil()),
-        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
-        s if s < 36_000.0 => format!("{:.1} h", s / 3600.0),
-        s => format!("{:.0} h", s / 3600.0),
+        s if s < 5400.0 => format!("{:.0} min", min_from_s(s)),
+        s if s < 36_000.0 => format!("{:.1} h", h_from_s(s)),
+        s => format!("{:.0} h", h_from_s(s)),
     }
 }
 

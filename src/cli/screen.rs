@@ -90,10 +90,10 @@ impl Screen {
         Progress::new(self.progress, self.quiet, task, total)
     }
 
-    /// A note to the person at the terminal: one line.
+    /// A note to the person at the terminal: one line, which a terminal gets broken between words.
     pub fn note(&self, text: &str) {
         if !self.quiet {
-            eprintln!("{}", Line::of(text));
+            eprintln!("{}", fitted(Line::of(text).as_str()));
         }
     }
 }
@@ -123,11 +123,7 @@ fn may_colour(outlet: &impl IsTerminal) -> bool {
 /// Writes an error to stderr; on a terminal its first word is coloured, and what is one line is broken between words.
 pub fn complain(words: &Block) {
     let words = words.as_str().trim_end();
-    let width = Table::new().use_stderr().width().map(usize::from);
-    let shown = match width {
-        Some(width) if !words.contains('\n') => broken(words, width.max(LEAST_WIDTH)),
-        _ => words.to_owned(),
-    };
+    let shown = if words.contains('\n') { words.to_owned() } else { fitted(words) };
     if may_colour(&std::io::stderr()) {
         let coloured = |line: &str| match line.strip_prefix("error") {
             Some(rest) => format!("{RED}error{PLAIN}{rest}"),
@@ -136,6 +132,14 @@ pub fn complain(words: &Block) {
         eprintln!("{}", shown.lines().map(coloured).collect::<Vec<_>>().join("\n"));
     } else {
         eprintln!("{shown}");
+    }
+}
+
+/// One line for stderr: on a terminal broken between words where its window is narrower.
+fn fitted(line: &str) -> String {
+    match Table::new().use_stderr().width() {
+        Some(width) => broken(line, usize::from(width).max(LEAST_WIDTH)),
+        None => line.to_owned(),
     }
 }
 
