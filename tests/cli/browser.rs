@@ -27,26 +27,66 @@ fn coilwright(arguments: &[&str]) {
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
 }
 
-/// Every kind of page.
-fn pages(folder: &Path) -> Vec<PathBuf> {
-    let (schedule, run) = (folder.join("schedule"), folder.join("run"));
-    coilwright(&["schedule", MODEL, "--pattern", "qua", "-q", "-o", schedule.to_str().unwrap()]);
-    coilwright(&["optimise", MODEL, "--rounds", "1", "--moves-per-restart", "500", "-q", "-o", run.to_str().unwrap()]);
-    let (compared, measured) = (folder.join("compared"), folder.join("measured"));
-    let [model, record] = ["coil.toml", "validation.csv"].map(|name| format!("tests/data/records/c-spool/{name}"));
-    coilwright(&["compare", &model, &record, "-q", "-o", compared.to_str().unwrap()]);
-    let (coil, day) = ("examples/chamber-coil.toml", "examples/chamber-day-1.csv");
-    let diagnosed = folder.join("diagnosed");
-    coilwright(&["diagnose", coil, day, "-q", "-o", diagnosed.to_str().unwrap()]);
-    coilwright(&["metrics", &record, "-q", "-o", measured.to_str().unwrap()]);
-    vec![
-        schedule.join("traveller.html"),
-        run.join("report.html"),
-        compared.join("report.html"),
-        measured.join("report.html"),
-        diagnosed.join("report.html"),
-    ]
+fn in_folder(folder: &Path, arguments: &[&str]) {
+    let out = Command::new(env!("CARGO_BIN_EXE_coilwright")).current_dir(folder).args(arguments).output().unwrap();
+    assert!(out.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&out.stderr));
 }
+
+/// Every kind of page but the explorer's: those of a schedule, a search, a comparison, a diagnosis, of what to wind next, of measures, and
+/// of the three kinds of campaign.
+fn pages(folder: &Path) -> Vec<PathBuf> {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let run = folder.join("run");
+    coilwright(&["optimise", MODEL, "--rounds", "1", "--moves-per-restart", "500", "-q", "-o", run.to_str().unwrap()]);
+    super::improve::prepare(folder);
+    in_folder(folder, &["improve", "coil.toml", "monday.csv", "tuesday.csv", "-q", "-o", "next"]);
+    in_folder(folder, &["metrics", "monday.csv", "-q", "-o", "measured"]);
+    let paper = std::fs::read_to_string(here.join(MODEL)).unwrap().replace("count = 64", "count = 4");
+    let spreads = "\n[tolerance]\nturns_per_layer_sd = 0.3\nsamples = 5\nlimit_deg_per_h = 1.0\n";
+    let gyros = |kind: &str| {
+        format!(
+            "kind = \"{kind}\"\nname = \"two gyros\"\n[[gyro]]\nname = \"serial number 1\"\nrecords = [\"monday.csv\"]\n\
+             [[gyro]]\nname = \"serial number 2\"\nrecords = [\"tuesday.csv\"]\n"
+        )
+    };
+    for (name, text) in [
+        ("paper.toml", paper + spreads),
+        (
+            "grid.toml",
+            "name = \"grid\"\nmodels = [\"paper.toml\"]\nlayers = [4, 8]\nrounds = 1\nmoves_per_restart = 100\n"
+                .to_owned(),
+        ),
+        ("built.toml", "kind = \"tolerance\"\nname = \"built\"\nmodels = [\"paper.toml\"]\nsamples = 100\n".to_owned()),
+        ("fleet.toml", gyros("metrics")),
+        (
+            "diagnosed.toml",
+            gyros("diagnose")
+                .replace("name = \"two gyros\"\n", "name = \"two gyros\"\nmodel = \"coil.toml\"\nterms = [\"none\"]\n"),
+        ),
+    ] {
+        std::fs::write(folder.join(name), text).unwrap();
+    }
+    for campaign in ["grid", "built", "fleet", "diagnosed"] {
+        in_folder(folder, &["campaign", &format!("{campaign}.toml"), "-q", "-o", campaign]);
+    }
+    [
+        "run/report.html",
+        "next/index.html",
+        "next/schedule/traveller.html",
+        "next/before/report.html",
+        "next/diagnosis/report.html",
+        "measured/report.html",
+        "grid/report.html",
+        "built/report.html",
+        "fleet/report.html",
+        "diagnosed/report.html",
+    ]
+    .map(|name| folder.join(name))
+    .to_vec()
+}
+
+/// The largest that a page may be [bytes]; `docs/src/explore.md` states what they are.
+const MOST_BYTES: u64 = 3_000_000;
 
 fn run(browser: &str, profile: &Path, arguments: &[&str]) -> (String, String) {
     let out = Command::new(browser)
@@ -75,6 +115,10 @@ fn pages_hold_everything_themselves_and_open_without_a_script_error_on_desktop_p
             assert!(!text.contains(outside), "{} asks for {outside}", page.display());
         }
     }
+    for page in pages.iter().chain([&folder.path().join("run/explorer.html")]) {
+        let bytes = std::fs::metadata(page).unwrap().len();
+        assert!(bytes < MOST_BYTES, "{} has {bytes} bytes", page.display());
+    }
     let Some(browser) = browser() else { return };
     for page in &pages {
         let address = format!("file://{}", page.display());
@@ -100,10 +144,10 @@ fn pages_hold_everything_themselves_and_open_without_a_script_error_on_desktop_p
         assert!(std::fs::metadata(&pdf).is_ok_and(|found| found.len() > 10_000), "{log}");
     }
     let report = folder.path().join("run/report.html");
-    assert!(std::fs::metadata(&report).unwrap().len() < 3_000_000, "a search's report stays a small file");
     let mut page = Page::open(browser, folder.path(), &report, folder.path());
     charts_can_be_touched(&mut page);
     let everything: Vec<PathBuf> = pages.into_iter().chain([folder.path().join("run/explorer.html")]).collect();
+    nothing_is_cut(&mut page, &everything);
     nothing_shuts_out(&mut page, &everything);
     assert_eq!(page.complaints(), Vec::<String>::new());
     page.close();
@@ -147,10 +191,30 @@ fn charts_can_be_touched(page: &mut Page) {
     }
 }
 
+/// A sheet of A4 without its margins, at 96 pixels an inch.
+const PAPER_PX: u32 = 703;
+
+/// Nothing is wider than a phone or a sheet of paper but what scrolls by itself, and on paper nothing does.
+fn nothing_is_cut(page: &mut Page, files: &[PathBuf]) {
+    for file in files {
+        page.go(file);
+        page.until(
+            "!document.getElementById('layers') || (!document.body.dataset.busy && !!document.body.dataset.shown)",
+        );
+        for (width, medium) in [(390, "screen"), (PAPER_PX, "print")] {
+            page.resize(width);
+            page.look_as(medium, "light");
+            let wide = page.value("document.documentElement.scrollWidth").as_u64();
+            assert!(wide <= Some(u64::from(width)), "{}: {wide:?} of {width} px, {medium}", file.display());
+        }
+        page.look_as("screen", "light");
+    }
+}
+
 /// Where the rules of accessibility are looked for: npm's `axe-core` (MPL 2.0), which `.ci/run` fetches and nothing commits.
 const AXE: &str = "target/axe/package/axe.min.js";
 
-/// Axe finds no serious fault in any kind of page, on a desk and on a phone.
+/// Axe finds no serious fault in any kind of page, on a desk and on a phone, light and dark.
 fn nothing_shuts_out(page: &mut Page, files: &[PathBuf]) {
     let Ok(axe) = std::fs::read_to_string(AXE) else {
         println!("skipped: no {AXE}: npm pack axe-core, unpacked there, brings it");
@@ -162,14 +226,15 @@ fn nothing_shuts_out(page: &mut Page, files: &[PathBuf]) {
             "!document.getElementById('layers') || (!document.body.dataset.busy && !!document.body.dataset.shown)",
         );
         page.value(&format!("{axe}; 0"));
-        for width in [1280, 390] {
+        for (width, scheme) in [(1280, "light"), (390, "dark")] {
             page.resize(width);
+            page.look_as("screen", scheme);
             let found = page.value(
                 "axe.run({ resultTypes: ['violations'] }).then((found) => found.violations \
                  .filter((fault) => ['serious', 'critical'].includes(fault.impact)) \
                  .map((fault) => `${fault.id}: ${fault.nodes.map((node) => node.html.slice(0, 200)).slice(0, 3).join(' ')}`))",
             );
-            assert_eq!(found, serde_json::json!([]), "{} at {width} px", file.display());
+            assert_eq!(found, serde_json::json!([]), "{} at {width} px, {scheme}", file.display());
         }
     }
 }
@@ -203,7 +268,23 @@ fn pages_with_hostile_names_in_every_field_run_no_script_in_a_browser() {
         bench.done(&["compare", "model.toml", "record.csv", "-o", "compared", "-q"]);
         bench.done(&["metrics", "record.csv", "-o", "measured", "-q"]);
         bench.done(&["diagnose", "model.toml", "record.csv", "-o", "diagnosed", "-q"]);
-        let pages = ["shop/traveller", "run/report", "compared/report", "measured/report", "diagnosed/report"];
+        let name = super::ways::quoted(name);
+        let built = format!("kind = \"tolerance\"\nname = {name}\nmodels = [\"model.toml\"]\nsamples = 20\n");
+        let gyro = format!("[[gyro]]\nname = {name}\nrecords = [\"record.csv\"]\n");
+        let fleet = format!("kind = \"metrics\"\nname = {name}\n{gyro}");
+        for (campaign, text) in [("built", built), ("fleet", fleet)] {
+            std::fs::write(bench.path.join(campaign).with_extension("toml"), text).unwrap();
+            bench.done(&["campaign", &format!("{campaign}.toml"), "-o", campaign, "-q"]);
+        }
+        let pages = [
+            "shop/traveller",
+            "run/report",
+            "compared/report",
+            "measured/report",
+            "diagnosed/report",
+            "built/report",
+            "fleet/report",
+        ];
         for page in pages.map(|page| bench.path.join(page).with_extension("html")) {
             let text = std::fs::read_to_string(&page).unwrap();
             let (dom, log) = run(browser, profile.path(), &["--dump-dom", &address(&page)]);

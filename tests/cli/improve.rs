@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::{code, root, run_in, stderr, stdout};
 
 /// A small coil and two of its days, under the names that the help's example has.
-fn prepare(folder: &Path) {
+pub(super) fn prepare(folder: &Path) {
     let read = |name: &str| std::fs::read_to_string(root().join("tests/data/records/d-mismatch").join(name)).unwrap();
     let profiles = "\n[profiles]\nmax_rate_c_per_h = 60.0\ncount = 4\nsegments = 3\nduration_s = 3000.0\nseed = 1\n";
     std::fs::write(folder.join("coil.toml"), read("coil.toml") + profiles).unwrap();

@@ -79,6 +79,12 @@ impl Page {
         self.call("Emulation.setDeviceMetricsOverride", size);
     }
 
+    /// Shows the page as on a `screen` or in `print`, to a reader who prefers `light` or `dark`.
+    pub fn look_as(&mut self, medium: &str, scheme: &str) {
+        let features = json!([{ "name": "prefers-color-scheme", "value": scheme }]);
+        self.call("Emulation.setEmulatedMedia", json!({ "media": medium, "features": features }));
+    }
+
     /// Calls a method; its result.
     pub fn call(&mut self, method: &str, parameters: Value) -> Value {
         self.last_id += 1;
