@@ -59,6 +59,18 @@ struct Figure {
 
 fn figures(fleet: &FleetJson) -> Vec<Figure> {
     let mut found = Vec::new();
+    if let Some(first) = fleet.effects.first() {
+        let counts =
+            |of: fn(&FleetEffectJson) -> usize| fleet.effects.iter().map(|e| of(e) as f64).collect::<Vec<f64>>();
+        let chart = Chart::new("In how many gyros each effect was found")
+            .size(860, 240)
+            .x(Axis::whole(format!("gyros of {}", fleet.gyros)).reaching(fleet.gyros as f64))
+            .categories(fleet.effects.iter().map(|e| e.kind.clone()))
+            .with(Series::bars("found", &counts(|e| e.found_in.len())))
+            .with(Series::bars("explains as well what was found", &counts(|e| e.equivalent_in.len())));
+        let caption = "What at least half of the gyros have is common to the batch.";
+        found.push(Figure { about: first.kind.clone(), markup: figure(&chart.svg_to_read(), caption) });
+    }
     for effect in &fleet.effects {
         for p in effect.parameters.iter().filter(|p| p.values.len() > 1) {
             let title = format!("{} of {}", p.parameter, effect.kind);
