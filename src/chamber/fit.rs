@@ -61,7 +61,7 @@ pub struct Fit {
     pub evidence: f64,
     /// Information of data and prior.
     pub(super) information: DMatrix<f64>,
-    /// Whether it was taken as far as [`Effort::FULL`] asks.
+    /// Whether its ascent was that of [`Effort::FULL`], from whatever start.
     pub(super) is_full: bool,
     /// Of every record of the chamber.
     pub(super) numbers: Vec<Numbers>,

@@ -78,6 +78,7 @@ impl Fit {
 
     /// Begins again with a gyro whose wander is the prior's and whose white noise makes up for it.
     pub fn calm(&mut self, records: &[usize]) {
+        self.is_full = false;
         for &r in records {
             let numbers = &mut self.numbers[r];
             let white = numbers.get(Quantity::RateNoise);
@@ -90,6 +91,7 @@ impl Fit {
 
     /// Another value of a number of the chamber, for a fit to begin with.
     pub fn set_number(&mut self, quantity: Quantity, value: f64) {
+        self.is_full = false;
         self.numbers.iter_mut().for_each(|n| n.set(quantity, value));
     }
 }
@@ -122,7 +124,8 @@ impl Fit {
         merit
     }
 
-    /// Whether a fit with [`super::Effort::FULL`] would end where it is.
+    /// Whether it was made with [`super::Effort::FULL`]: the same again from there gains less than that effort's tolerance, unless the
+    /// ascent ended at its last iteration.
     pub fn is_full(&self) -> bool {
         self.is_full
     }

@@ -290,21 +290,9 @@ mod folder {
     use crate::io::json::Document;
     use crate::io::read::pattern_file::print_pattern;
     use crate::io::write::checkpoint::CHECKPOINT_FILE;
+    use crate::io::write::run_directory::KINDS;
     use crate::task::schedule;
     use crate::text::sink::TomlComment;
-
-    /// What a search may leave, this one or another; the summary first: while it is there, the rest is of its run.
-    const FILES: [&str; 9] = [
-        "summary.json",
-        "best.toml",
-        "baselines.csv",
-        "history.csv",
-        "schedule.csv",
-        "schedule.json",
-        "report.html",
-        "explorer.html",
-        "model.toml",
-    ];
 
     impl Found {
         /// Writes the pattern, its schedule and the document.
@@ -335,7 +323,7 @@ mod folder {
             files.add("model.toml", model.source.as_bytes())?;
             let summary = serde_json::to_string_pretty(&Document::new(d))? + "\n";
             files.add("summary.json", summary.as_bytes())?;
-            files.commit(&FILES)?;
+            files.commit(&KINDS)?;
             Ok(())
         }
     }

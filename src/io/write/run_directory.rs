@@ -120,8 +120,8 @@ pub fn write_request(folder: &Path, request: &Request) -> Result<(), WriteError>
     files.commit(&KINDS)
 }
 
-/// What a search may leave; the summary first: while it is there, the rest is of its run.
-const KINDS: [&str; 11] = [
+/// What a search may leave, over profiles or over fields; the summary first: while it is there, the rest is of its run.
+pub const KINDS: [&str; 11] = [
     "summary.json",
     "best.toml",
     "baselines.csv",
