@@ -178,6 +178,7 @@ def improve(
     output: str,
     pattern: PatternArgument | None = None,
     seed: int | None = None,
+    terms: list[str] | None = None,
     progress: Progress = None,
 ) -> Answered: ...
 def optimise(

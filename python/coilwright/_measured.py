@@ -68,6 +68,11 @@ def compare(
     return result
 
 
+def terms_asked(terms: str | Sequence[str] | None) -> list[str] | None:
+    """What a formula may be made of, as the library takes it."""
+    return [terms] if isinstance(terms, str) else None if terms is None else list(terms)
+
+
 def diagnose(
     model: ModelLike,
     records: RecordLike | Sequence[RecordLike],
@@ -102,7 +107,7 @@ def diagnose(
             optional_pattern(pattern),
             optional_path(output),
             seed if wanted else None,
-            [terms] if isinstance(terms, str) else None if terms is None else list(terms),
+            terms_asked(terms),
             at,
         )
     result = result_of(DiagnoseResult, answered)
@@ -195,6 +200,7 @@ def improve(
     holdout: RecordLike | Sequence[RecordLike] | None = None,
     pattern: PatternLike | None = None,
     seed: int | None = None,
+    terms: str | Sequence[str] | None = None,
     progress: bool | Progress | None = None,
 ) -> ImproveResult:
     """The whole loop: compares and diagnoses records, extends the model, searches the next winding and writes its schedule.
@@ -202,6 +208,7 @@ def improve(
     Args:
         records: of the coil as it is; the first is the one that is predicted for the new coil.
         output: the folder of all steps.
+        terms: as of :func:`diagnose`.
     """
     with _progress.shown(progress, "improve") as at:
         answered = _coilwright.improve(
@@ -211,6 +218,7 @@ def improve(
             os.fspath(output),
             optional_pattern(pattern),
             seed,
+            terms_asked(terms),
             at,
         )
     return result_of(ImproveResult, answered)

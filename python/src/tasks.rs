@@ -210,12 +210,7 @@ pub fn diagnose(
             pattern: pattern.as_ref(),
             holdout: &held_out,
             experiment_seed,
-            terms: match terms.as_deref() {
-                None => Terms::default(),
-                Some([]) => Terms::None,
-                Some([all]) if all == "all" => Terms::All,
-                Some(words) => Terms::Among(words),
-            },
+            terms: Terms::asked(terms.as_deref()),
             ..task::diagnose::Request::new(&file, &taken)
         };
         let answer = task::diagnose::run(&request, &watcher)?;
@@ -338,7 +333,7 @@ pub fn metrics(
 }
 
 #[pyfunction]
-#[pyo3(signature = (model, records, holdout, output, pattern=None, seed=None, progress=None))]
+#[pyo3(signature = (model, records, holdout, output, pattern=None, seed=None, terms=None, progress=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn improve(
     py: Python,
@@ -348,6 +343,7 @@ pub fn improve(
     output: PathBuf,
     pattern: Option<PatternArgument>,
     seed: Option<u64>,
+    terms: Option<Vec<String>>,
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Answered> {
     let file = Arc::clone(&model.file);
@@ -362,6 +358,7 @@ pub fn improve(
             holdout: &held_out,
             folder: &output,
             seed,
+            terms: Terms::asked(terms.as_deref()),
         };
         match task::improve::run(&request, &watcher)? {
             Some(body) => Ok(document(body)?),

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use super::pattern_asked::pattern_asked;
 use super::records::RecordArguments;
 use super::screen::{Screen, held, table};
+use super::terms::TermArguments;
 use super::watching::Watching;
 use super::{CliError, Ending, offered};
-use crate::diagnose::Terms;
 use crate::io::files::write_atomically;
 use crate::io::json::diagnosis::{DiagnosisJson, FindingJson};
 use crate::io::read::model_file::read_model;
@@ -50,13 +50,8 @@ pub struct Arguments {
     /// Seed of the profiles that the experiment is chosen from
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Seeks no formula for what the listed effects leave
-    #[arg(long, conflicts_with = "terms")]
-    no_discovery: bool,
-    /// Forms and variables that a formula for what the listed effects leave may be made of, such as relaxation, hysteresis,
-    /// T_mean or a column's name; all without it
-    #[arg(long, value_name = "all|WORD,…", value_delimiter = ',')]
-    terms: Vec<String>,
+    #[command(flatten)]
+    terms: TermArguments,
     #[command(flatten)]
     reading: RecordArguments,
 }
@@ -75,12 +70,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         pattern: pattern.as_ref(),
         holdout: &holdout,
         experiment_seed: wants_experiment.then_some(arguments.seed),
-        terms: match arguments.terms.as_slice() {
-            [] if arguments.no_discovery => Terms::None,
-            [] => Terms::All,
-            [all] if all == "all" => Terms::All,
-            words => Terms::Among(words),
-        },
+        terms: arguments.terms.asked(),
         ..Request::new(&file, &measurements)
     };
     let watching = Watching::new(screen, "diagnose");

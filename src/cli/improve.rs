@@ -7,10 +7,12 @@ use serde_json::Value;
 use super::pattern_asked::pattern_asked;
 use super::progress::StopFlag;
 use super::screen::{Screen, held};
+use super::terms::TermArguments;
 use super::watching::Watching;
 use super::{CliError, Ending, offered};
 use crate::io::json::improve::ImproveJson;
 use crate::io::read::model_file::read_model;
+use crate::report::proposal::proposal_in_words;
 use crate::task::improve::{Request, run as improve};
 use crate::task::measurement::Measurement;
 
@@ -41,6 +43,8 @@ pub struct Arguments {
     /// Seed of the search; without it, the model's own
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    #[command(flatten)]
+    terms: TermArguments,
 }
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
@@ -59,6 +63,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
         holdout: &holdout,
         folder: &arguments.output,
         seed: arguments.seed,
+        terms: arguments.terms.asked(),
     };
     let watching = Watching::quiet(screen).stopped_by(&stop);
     match improve(&request, &watching)? {
@@ -82,6 +87,9 @@ fn text(body: &ImproveJson) -> String {
     text += &format!("\n{}: {}\n", body.model, words(&body.verdict));
     for effect in body.effects.as_array().into_iter().flatten() {
         text += &format!("  {}\n", words(&effect["kind"]));
+    }
+    for line in body.proposals.iter().flat_map(proposal_in_words) {
+        text += &format!("{line}\n");
     }
     if let Some(film) = body.film_w_per_m2_k {
         text += &format!("film learned from the records: {film:.2} W/(m²K)\n");

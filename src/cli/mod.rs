@@ -31,6 +31,7 @@ mod schedule;
 mod schema;
 pub mod screen;
 mod temperatures;
+mod terms;
 mod tolerance;
 mod trim;
 mod verify;

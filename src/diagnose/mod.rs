@@ -69,6 +69,18 @@ pub enum Terms<'a> {
     None,
 }
 
+impl<'a> Terms<'a> {
+    /// As a user says it: nothing said or the word `all`, no words, or some.
+    pub fn asked(words: Option<&'a [String]>) -> Self {
+        match words {
+            None => Self::All,
+            Some([]) => Self::None,
+            Some([all]) if all == "all" => Self::All,
+            Some(words) => Self::Among(words),
+        }
+    }
+}
+
 /// The answer in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {

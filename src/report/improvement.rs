@@ -5,6 +5,7 @@ use serde_json::Value;
 
 use super::page::{figure, page};
 use super::plot::{Axis, Chart, Series};
+use super::proposal::proposal_in_words;
 use super::words;
 use crate::io::json::improve::{ImproveJson, PredictedRow};
 use crate::units::min_from_s;
@@ -25,6 +26,9 @@ pub fn improvement_page(body: &ImproveJson, rows: &[PredictedRow]) -> String {
         p { "Verdict: " (words(&body.verdict)) "." }
         ul { @for effect in list(&body.effects) {
             li { b { (words(&effect["kind"])) } ": " (words(&effect["happens"])) " " (words(&effect["remedy"])) }
+        } }
+        @for proposal in &body.proposals { ul {
+            @for line in proposal_in_words(proposal) { li { (line) } }
         } }
         @if let Some(film) = body.film_w_per_m2_k {
             p { "The air reached the coil through a film of " (format!("{film:.2}")) " W/(m²K); the search was run behind it." }

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
+use crate::diagnose::Terms;
 use crate::effect::{DeclaredEffect, FILM};
 use crate::io::fault::Faults;
 use crate::io::files::{WriteError, read_text, write_atomically};
@@ -19,7 +20,7 @@ use crate::io::read::model_file::read_model;
 use crate::io::read::pattern_file::print_pattern;
 use crate::io::read::posterior::drawn_models;
 use crate::io::write::checkpoint::{read_checkpoint, write_checkpoint};
-use crate::io::write::measurement_folder::{self, check_free, write_table};
+use crate::io::write::measurement_folder::{self, PROPOSED_FILE, check_free, write_table};
 use crate::io::write::model_edit::{Remark, with_effect, with_sensor_and_pattern};
 use crate::io::write::run_directory::{self, write_request};
 use crate::pattern::Pattern;
@@ -52,6 +53,8 @@ pub struct Request<'a> {
     pub folder: &'a Path,
     /// Of the search; none for the model's own.
     pub seed: Option<u64>,
+    /// Whether formulas are sought for what no listed effect explains, and among which.
+    pub terms: Terms<'a>,
 }
 
 /// Of the profiles that the next experiment is chosen from.
@@ -98,7 +101,10 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Option<ImproveJ
     let source = with_sensor_and_pattern(&shown(&file.path), &source, None, "measured-pattern.toml")?;
     write_atomically(&extended_path, source.as_bytes())?;
     let extended = read_model(&extended_path)?;
-    way.compared(&extended, &after)?;
+    let document: DiagnosisJson = serde_json::from_value(found.clone())?;
+    let explained = with_proposal(&document, &diagnosis.join(PROPOSED_FILE), &folder.join(PROPOSED_FILE))?;
+    let explained = explained.as_ref().unwrap_or(&extended);
+    way.compared(explained, &after)?;
     let film = learned_film(&extended);
     let design_path = folder.join("design.toml");
     let source = match &film {
@@ -118,7 +124,6 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Option<ImproveJ
 
     observer.at(0.5, "diagnosed; now searching");
     let search = folder.join("search");
-    let document: DiagnosisJson = serde_json::from_value(found.clone())?;
     let seed = request.seed.unwrap_or(design.search.seed);
     let refitted: Vec<RefittedJson> =
         document.refitted.iter().cloned().chain(film.as_ref().map(LearnedFilm::as_refitted)).collect();
@@ -132,7 +137,7 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Option<ImproveJ
     way.scheduled(&design, &new, &schedule_folder)?;
 
     let predicted_path = folder.join(PREDICTED);
-    let rows = predicted_rows(&extended, &new.pattern, &request.measurements[0].record)?;
+    let rows = predicted_rows(explained, &new.pattern, &request.measurements[0].record)?;
     write_table(folder, PREDICTED, &rows)?;
     let gain = match serde_json::from_value::<GainJson>(summary["predicted_gain"].clone()) {
         Ok(gain) => gain,
@@ -145,6 +150,7 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Option<ImproveJ
         measured_pattern: old.name.clone(),
         verdict: found["verdict"].clone(),
         effects: found["effects"].clone(),
+        proposals: document.proposals,
         film_w_per_m2_k: film.as_ref().map(|f| f.value_w_per_m2_k),
         recommendation: summary["recommendation"].clone(),
         validation: summary["validation"].clone(),
@@ -169,7 +175,7 @@ fn clear(folder: &Path) -> Result<(), WriteError> {
     for step in ["after", "diagnosis", "before"] {
         measurement_folder::clear(&folder.join(step))?;
     }
-    remove_kinds(folder, &["design.toml", "extended.toml", EXPERIMENT, "measured-pattern.toml"])
+    remove_kinds(folder, &["design.toml", "extended.toml", PROPOSED_FILE, EXPERIMENT, "measured-pattern.toml"])
 }
 
 /// What follows from the search.
@@ -195,7 +201,7 @@ impl Way<'_> {
 
     /// What a step that judges records is made of; `None` where nobody can say.
     fn of_records(&self, model: &ModelFile) -> Option<String> {
-        let roles = format!("{} fitted", self.request.measurements.len());
+        let roles = format!("{} fitted, {:?}", self.request.measurements.len(), self.request.terms);
         made_of(&[&model.source, self.old_source, &roles], &self.all())
     }
 
@@ -266,7 +272,7 @@ impl Way<'_> {
             measurements: self.request.measurements,
             holdout: self.request.holdout,
             experiment_seed: Some(EXPERIMENT_SEED),
-            terms: crate::diagnose::Terms::None,
+            terms: self.request.terms,
         };
         let found = diagnose::run(&request, &Quietly(self.observer))?;
         if let Some(experiment) = found.experiment_source(file) {
@@ -309,6 +315,17 @@ impl Way<'_> {
         self.note_done(folder, made_of.as_deref())?;
         read_json(&folder.join(SUMMARY)).map(Some)
     }
+}
+
+/// The model with the formula that was proposed, where that predicts; written into the folder. No winding changes it: the search
+/// is for what a winding can change, and goes without it.
+fn with_proposal(document: &DiagnosisJson, stated: &Path, path: &Path) -> Result<Option<ModelFile>, TaskError> {
+    if !document.proposals.first().is_some_and(|proposal| proposal.predicts) {
+        return Ok(None);
+    }
+    let source = with_sensor_and_pattern(&shown(stated), &read_text(stated)?, None, "measured-pattern.toml")?;
+    write_atomically(path, source.as_bytes())?;
+    Ok(Some(read_model(path)?))
 }
 
 /// What the steps leave in their folders.

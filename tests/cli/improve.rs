@@ -107,3 +107,42 @@ fn cutting_planes_list_the_profiles_that_joined_and_are_refused_where_they_mean_
     assert_eq!(code(&refused), 2);
     assert!(stderr(&refused).contains("--cutting-planes"), "{}", stderr(&refused));
 }
+
+#[test]
+fn a_formula_that_predicts_is_in_what_the_next_coil_should_show_and_not_in_the_search() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |name: &str| std::fs::read_to_string(root().join("examples").join(name)).unwrap();
+    let profiles = "\n[profiles]\nmax_rate_c_per_h = 60.0\ncount = 4\nsegments = 3\nduration_s = 3000.0\nseed = 1\n";
+    std::fs::write(folder.path().join("coil.toml"), read("fan-coil.toml") + profiles).unwrap();
+    for day in ["fan-day-1.csv", "fan-day-2.csv"] {
+        std::fs::write(folder.path().join(day), read(day)).unwrap();
+    }
+    let words =
+        ["improve", "coil.toml", "fan-day-1.csv", "--holdout", "fan-day-2.csv", "-o", "next", "--format", "json"];
+    let restricted = [&words[..], &["--terms", "lagged_size,fan_a"]].concat();
+    let found = run_in(folder.path(), &restricted);
+    assert_eq!(code(&found), 0, "{}", stderr(&found));
+    let answer: Value = serde_json::from_str(stdout(&found)).unwrap();
+    let proposal = &answer["proposals"][0];
+    assert_eq!(proposal["predicts"], true, "{proposal}");
+    assert!(proposal["formula"].as_str().unwrap().contains("lag(abs(fan_a)"), "{proposal}");
+    let next = folder.path().join("next");
+    let holds_formula = |name: &str| std::fs::read_to_string(next.join(name)).unwrap().contains("lag(abs(fan_a)");
+    assert_eq!(["proposed.toml", "extended.toml", "design.toml"].map(holds_formula), [true, false, false]);
+    assert!(holds_formula("index.html"));
+    let rmse = |step: &str| -> f64 {
+        let text = std::fs::read_to_string(next.join(step).join("comparison.json")).unwrap();
+        let document: Value = serde_json::from_str(&text).unwrap();
+        document["records"][1]["rmse_deg_per_h"].as_f64().unwrap()
+    };
+    let (before, after) = (rmse("before"), rmse("after"));
+    assert!(after < 0.5 * before, "held out: {before} °/h before, {after} after");
+
+    // Not sought: another request, whose folder keeps no formula.
+    let plain = run_in(folder.path(), &[&words[..], &["--no-discovery"]].concat());
+    assert_eq!(code(&plain), 0, "{}", stderr(&plain));
+    let answer: Value = serde_json::from_str(stdout(&plain)).unwrap();
+    assert_eq!(answer["proposals"].as_array().unwrap().len(), 0);
+    assert!(!next.join("proposed.toml").exists());
+    assert!((rmse("after") / before - 1.0).abs() < 0.2);
+}

@@ -44,6 +44,9 @@ pub(in crate::diagnose) struct Discovered {
 const BEATS: f64 = 3.0;
 /// Sets within so much of the best stay beside it.
 const NEAR: f64 = 6.0;
+/// A listed set that takes the place of a formula with a correlation of 0.9 leaves a fifth of what the formula explains. Where the
+/// set gains more than this, over five times what a term costs, that fifth is seen and the set is not alone.
+const UNMISTAKABLE: f64 = 100.0;
 /// Looks for terms beside what the search over listed effects found; None where nothing beats it.
 ///
 /// # Errors
@@ -62,11 +65,13 @@ pub(in crate::diagnose) fn discover(
     let best_listed = found.explanations.iter().map(Explanation::total).fold(f64::NEG_INFINITY, f64::max);
     let listed = found.explanations.iter().find(is_listed);
     let mut sets: Vec<Set> = Vec::new();
-    // Where a listed set is the answer and leaves nothing, a formula in its place would have to do the same for more.
+    // Where a listed set is the answer, explains much and leaves nothing, a formula in its place would have to do the same for more.
     let is_answer = |e: &Explanation| !e.is_outside() && e.total() > best_listed - NEAR;
     if let Some(listed) = listed.filter(|e| is_answer(e)) {
         sets = tools.search(tools.plain(listed), &|share| progress(0.4 * share));
-        if sets.len() < 2 {
+        let others = found.explanations.iter().filter(|e| e.members.is_empty() || e.is_outside());
+        let gained = listed.total() - others.map(Explanation::total).fold(f64::NEG_INFINITY, f64::max);
+        if sets.len() < 2 && gained > UNMISTAKABLE {
             return Ok(None);
         }
     }

@@ -3,6 +3,7 @@
 use serde::Serialize;
 use serde_json::Value;
 
+use super::proposals::ProposalJson;
 use super::search::GainJson;
 
 /// The parts that other commands have answered are theirs word for word.
@@ -12,6 +13,8 @@ pub struct ImproveJson {
     pub measured_pattern: String,
     pub verdict: Value,
     pub effects: Value,
+    /// Formulas for what no listed effect explains; the first is in `after` and in the predicted record where it predicts.
+    pub proposals: Vec<ProposalJson>,
     /// Null where the model declares one, or no record showed any.
     pub film_w_per_m2_k: Option<f64>,
     pub recommendation: Value,
