@@ -233,6 +233,7 @@ pub fn predict_from(
     let rows = record.rows();
     let names: Vec<String> = record.channels().iter().map(|c| c.name.clone()).collect();
     let rate = RateModel::new(model, pattern, &names)?;
+    let seen = record.channel_means(model.rate_mean_s);
     let mut channels = vec![0.0; names.len()];
     let mut past = Past::default();
     let mut coil_rad_per_s = Vec::with_capacity(rows);
@@ -242,9 +243,7 @@ pub fn predict_from(
         let to = (from + ROWS_AT_A_TIME).min(rows);
         let history = boundary.history(record, from..to, model.rate_mean_s);
         for row in 0..history.len() {
-            for (value, channel) in channels.iter_mut().zip(record.channels()) {
-                *value = channel.values[from + row];
-            }
+            channels.iter_mut().zip(&seen).for_each(|(value, column)| *value = column[from + row]);
             let state = rate.state(&history, row, &channels);
             coil_rad_per_s.push(rate.checked_after(&state, &mut past)?);
             let last = history.layers - 1;
@@ -430,13 +429,12 @@ pub fn rates_rad_per_s(
 ) -> Result<Vec<f64>, RateError> {
     let names: Vec<String> = record.channels().iter().map(|c| c.name.clone()).collect();
     let rate = RateModel::new(model, pattern, &names)?;
+    let seen = record.channel_means(model.rate_mean_s);
     let mut channels = vec![0.0; names.len()];
     let mut past = Past::default();
     (0..history.len())
         .map(|row| {
-            for (value, channel) in channels.iter_mut().zip(record.channels()) {
-                *value = channel.values[row];
-            }
+            channels.iter_mut().zip(&seen).for_each(|(value, column)| *value = column[row]);
             rate.checked_after(&rate.state(history, row, &channels), &mut past)
         })
         .collect()

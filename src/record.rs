@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use crate::numeric::piecewise::trailing_means;
 use crate::numeric::statistics::{gross_errors, robust_deviation};
 use crate::units::rad_per_s_from_deg_per_h;
 
@@ -182,6 +183,15 @@ impl Record {
 
     pub fn ambient_k(&self) -> Option<&[f64]> {
         self.ambient_k.as_deref()
+    }
+
+    /// Of each further column the means over the time that a rate is a mean over: what a rate sees of it.
+    ///
+    /// # Shapes
+    /// Columns × rows.
+    pub fn channel_means(&self, rate_mean_s: f64) -> Vec<Vec<f64>> {
+        let mean = |channel: &Channel| trailing_means(&self.times_s, &channel.values, rate_mean_s);
+        self.channels.iter().map(mean).collect()
     }
 
     pub fn channels(&self) -> &[Channel] {

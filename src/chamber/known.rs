@@ -18,7 +18,6 @@ use super::series::Series;
 use super::system::{Gains, driven_by_air};
 use crate::effect::PackState;
 use crate::rate::{Past, RateModel};
-use crate::record::Record;
 use crate::thermal::reduced::Reduced;
 use crate::thermal::{HeatPath, ThermalError};
 use crate::units::REFERENCE_TEMPERATURE_K;
@@ -99,12 +98,7 @@ impl Asked<'_> {
 ///
 /// # Errors
 /// A conductivity that is not positive somewhere in the reference.
-pub(super) fn known(
-    asked: &Asked,
-    record: &Record,
-    series: &Series,
-    reference: &Reference,
-) -> Result<Values, ThermalError> {
+pub(super) fn known(asked: &Asked, series: &Series, reference: &Reference) -> Result<Values, ThermalError> {
     let mut values = Values { of: std::array::from_fn(|_| Vec::new()) };
     if asked.is_empty() {
         return Ok(values);
@@ -127,7 +121,7 @@ pub(super) fn known(
         }
     }
     if asked.beyond_linear {
-        beyond_linear(asked, record, series, reference, &mut rates);
+        beyond_linear(asked, series, reference, &mut rates);
     }
     values.of[RATE] = rates;
     Ok(values)
@@ -220,19 +214,16 @@ fn driven(reduced: &Reduced, series: &Series, air_k: &[f64]) -> Vec<f64> {
 }
 
 /// Adds what the full model says at the reference beyond its linear part; NaN where a channel has no value.
-pub(super) fn beyond_linear(asked: &Asked, record: &Record, series: &Series, reference: &Reference, rates: &mut [f64]) {
+pub(super) fn beyond_linear(asked: &Asked, series: &Series, reference: &Reference, rates: &mut [f64]) {
     let layers = reference.layers;
     let lengths_m = asked.rate.coil().layer_lengths_m();
     let length_m = asked.rate.coil().length_m();
     let mean = |values: &[f64]| values.iter().zip(lengths_m).map(|(v, l)| v * l).sum::<f64>() / length_m;
-    let mut channels = vec![0.0; record.channels().len()];
+    let mut channels = vec![0.0; series.columns.len()];
     let mut start = Vec::new();
     let mut past = Past::default();
     for (k, rate) in rates.iter_mut().enumerate() {
-        for (value, channel) in channels.iter_mut().zip(record.channels()) {
-            let (from, to) = series.spans[k];
-            *value = channel.values[from..=to].iter().sum::<f64>() / (to + 1 - from) as f64;
-        }
+        channels.iter_mut().zip(&series.columns).for_each(|(value, column)| *value = column[k]);
         if k == 0 {
             // What remembers begins at rest.
             if asked.rate.remembers() {

@@ -104,9 +104,7 @@ impl CoilSide {
         reference: Option<&Reference>,
     ) -> Result<Values, ChamberError> {
         let mut values = match reference {
-            Some(reference) => {
-                taken_off(&observed.series, &known(&self.asked(), observed.record, &observed.series, reference)?)
-            }
+            Some(reference) => taken_off(&observed.series, &known(&self.asked(), &observed.series, reference)?),
             None => Values { of: observed.series.values.clone() },
         };
         for input in &assumed.inputs {
@@ -136,7 +134,7 @@ impl CoilSide {
         let air = course.window_rates(series, None);
         rates.iter_mut().zip(air).for_each(|(r, a)| *r += self.gains.air * a);
         if self.beyond_linear {
-            super::known::beyond_linear(&self.asked(), observed.record, series, course, &mut rates);
+            super::known::beyond_linear(&self.asked(), series, course, &mut rates);
         }
         for input in &assumed.inputs {
             let Some(own) = input.rate_rad_per_s.get(place) else { continue };

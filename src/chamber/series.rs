@@ -18,6 +18,8 @@ pub(super) struct Series {
     /// Readings in K above `reference_k` (sensor, bore, air), and the rate in rad/s; NaN where there is none.
     pub values: [Vec<f64>; MEASURED],
     pub reference_k: f64,
+    /// The record's further columns as a row's rate sees them.
+    pub columns: Vec<Vec<f64>>,
     /// One entry a row; `Row::measured` holds places of [`Self::shapes`] times measured.
     pub rows: Vec<Row>,
     /// Distinct lengths of steps [s].
@@ -119,6 +121,11 @@ impl Series {
             times_s: blocks.iter().map(|b| b.time_s).collect(),
             values: std::array::from_fn(|m| blocks.iter().map(|b| b.values[m]).collect()),
             reference_k,
+            columns: record
+                .channel_means(rate_mean_s)
+                .iter()
+                .map(|c| blocks.iter().map(|b| b.mean(c)).collect())
+                .collect(),
             rows: Vec::new(),
             steps_s: Vec::new(),
             shapes: Vec::new(),
@@ -236,6 +243,13 @@ struct Block {
     time_s: f64,
     values: [f64; MEASURED],
     span: (usize, usize),
+}
+
+impl Block {
+    fn mean(&self, values: &[f64]) -> f64 {
+        let (from, to) = self.span;
+        values[from..=to].iter().sum::<f64>() / (to + 1 - from) as f64
+    }
 }
 
 /// Of a slot's rows at least this share must be there.

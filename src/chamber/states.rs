@@ -56,12 +56,8 @@ impl Chamber<'_> {
         let gains = self.layer_gains(fit)?;
         let thermal = |k: usize| gains.iter().zip(&rates_k_per_s).map(|(g, r)| g * r[k]).sum();
         let thermal_rate_rad_per_s = (0..rows).map(thermal).collect();
-        let mean = |values: &[f64], k: usize| {
-            let (from, to) = series.spans[k];
-            values[from..=to].iter().sum::<f64>() / (to + 1 - from) as f64
-        };
-        let channels = self.observed[record].record.channels().iter();
-        let channels = channels.map(|c| (c.name.clone(), (0..rows).map(|k| mean(&c.values, k)).collect())).collect();
+        let names = self.observed[record].channels.iter().cloned();
+        let channels = names.zip(series.columns.iter().cloned()).collect();
         Ok(RowStates {
             times_s: series.times_s.clone(),
             temperatures_k,

@@ -21,6 +21,21 @@ pub const MOST_COLUMNS: usize = 8;
 /// A row's values of them; None where there is none.
 pub type Columns = [Option<f64>; MOST_COLUMNS];
 
+/// What a rate sees of a column: its mean over the time that the rate is a mean over, at most that since the row before, by a
+/// straight line from there.
+pub fn seen(now: f64, before: f64, since_s: f64, rate_mean_s: f64) -> f64 {
+    if before.is_finite() && since_s > 0.0 {
+        now - (now - before) * 0.5 * rate_mean_s.min(since_s) / since_s
+    } else {
+        now
+    }
+}
+
+/// [`seen`] of each column; one that is missing stays so.
+pub fn columns_seen(now: &Columns, before: &Columns, since_s: f64, rate_mean_s: f64) -> Columns {
+    std::array::from_fn(|i| now[i].map(|value| seen(value, before[i].unwrap_or(f64::NAN), since_s, rate_mean_s)))
+}
+
 /// The formulas of a model and what they need of the pack.
 #[derive(Debug, Clone)]
 pub struct Formulas {

@@ -27,7 +27,7 @@ mod beside;
 
 use super::CompensateError;
 use super::filter::{Dynamics, Filter, Tuning};
-use super::formulas::Formulas;
+use super::formulas::{Formulas, seen};
 use super::heating::Heating;
 use crate::chamber::{BREAK_K2_PER_S2, BREAKS_PER_S, Causal, Surroundings};
 use crate::effect::DeclaredEffect;
@@ -200,7 +200,7 @@ impl Physical {
         let mut sums = vec![(0.0, 0.0, 0.0); TRIAL_DELAY_ROWS + 1];
         let rates = record.rate_rad_per_s();
         let error = |row: usize, air: f64| {
-            let channel = self.channel_bias_of(record, row).unwrap_or(0.0);
+            let channel = self.channel_seen_rad_per_s(record, row).unwrap_or(0.0);
             self.error_rad_per_s(air, record.times_s()[row], Some(record.temperature_k()[row]), channel)
         };
         let mut rows_of_step: Vec<Option<usize>> = Vec::new();
@@ -260,6 +260,19 @@ impl Physical {
     /// What the further columns add; None where one is missing.
     pub fn channel_bias_rad_per_s(&self, values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
         self.channels.iter().zip(values).map(|((_, gain), value)| Some(gain * value.filter(|v| v.is_finite())?)).sum()
+    }
+
+    /// As a rate sees it.
+    fn channel_seen_rad_per_s(&self, record: &Record, row: usize) -> Option<f64> {
+        let now = self.channel_bias_of(record, row)?;
+        let Some(last) = row.checked_sub(1) else { return Some(now) };
+        let before = self.channel_bias_of(record, last).unwrap_or(f64::NAN);
+        Some(seen(now, before, record.times_s()[row] - record.times_s()[last], self.rate_mean_s))
+    }
+
+    /// The time that a rate is a mean over [s].
+    pub fn rate_mean_s(&self) -> f64 {
+        self.rate_mean_s
     }
 
     pub(super) fn channel_bias_of(&self, record: &Record, row: usize) -> Option<f64> {

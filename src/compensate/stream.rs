@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 use super::Compensator;
 use super::empirical::Window;
 use super::filter::Filter;
-use super::formulas::{AtWork, Columns};
+use super::formulas::{AtWork, Columns, columns_seen, seen};
 use super::learned::Follower;
 use crate::numeric::statistics::{median, median_in_place};
 
@@ -122,7 +122,8 @@ pub struct Stream<'c, T> {
     last_s: f64,
     bridgeable_steps: f64,
     last_temperature: Option<(f64, u64)>,
-    last_channel_rad_per_s: f64,
+    /// What the further columns were in the row before, and when; none before the first.
+    last_columns: Option<(f64, f64, Columns)>,
     leaps: Vec<f64>,
     before: VecDeque<f64>,
     usual_change: f64,
@@ -144,7 +145,7 @@ impl<'c, T> Stream<'c, T> {
             last_s: f64::NEG_INFINITY,
             bridgeable_steps: LONGEST_GAP_STEPS,
             last_temperature: None,
-            last_channel_rad_per_s: 0.0,
+            last_columns: None,
             leaps: Vec::new(),
             before: VecDeque::new(),
             usual_change: 0.0,
@@ -243,12 +244,11 @@ impl<'c, T> Stream<'c, T> {
             if temperature_k.is_none() {
                 pending.flags.push(Flag::TemperatureHeld);
             }
-            match reading.channel_rad_per_s.filter(|c| c.is_finite()) {
-                Some(channel) => self.last_channel_rad_per_s = channel,
-                None => pending.flags.push(Flag::ChannelHeld),
+            let channel = reading.channel_rad_per_s.filter(|c| c.is_finite());
+            if channel.is_none() {
+                pending.flags.push(Flag::ChannelHeld);
             }
-            pending.channel_rad_per_s = self.last_channel_rad_per_s;
-            pending.columns = reading.columns;
+            (pending.channel_rad_per_s, pending.columns) = self.seen(reading.time_s, channel, &reading.columns);
             let of_the_air_k = match self.compensator {
                 Compensator::Physical(physical) => temperature_k.map(|t| physical.of_the_air_k(reading.time_s, t)),
                 Compensator::Piecewise(_) | Compensator::Regression(_) | Compensator::Learned(_) => temperature_k,
@@ -347,6 +347,20 @@ impl<'c, T> Stream<'c, T> {
             Some(Predictor::Piecewise) | None => {}
         }
         self.step += 1;
+    }
+
+    /// What the row's rate sees of the further columns: of what the model's channels add, and of each that formulas read.
+    fn seen(&mut self, time_s: f64, channel_rad_per_s: Option<f64>, columns: &Columns) -> (f64, Columns) {
+        let Compensator::Physical(physical) = self.compensator else { return (0.0, Columns::default()) };
+        let Some((last_s, last, before)) = self.last_columns else {
+            let channel = channel_rad_per_s.unwrap_or(0.0);
+            self.last_columns = Some((time_s, channel, *columns));
+            return (channel, *columns);
+        };
+        let now = channel_rad_per_s.unwrap_or(last);
+        self.last_columns = Some((time_s, now, *columns));
+        let (since_s, mean_s) = (time_s - last_s, physical.rate_mean_s());
+        (seen(now, last, since_s, mean_s), columns_seen(columns, &before, since_s, mean_s))
     }
 
     /// The bias of a pending row as it is known now.

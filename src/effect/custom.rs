@@ -19,7 +19,8 @@
 //! `lag(x, tau_s)` and `play(x, half_width)` remember what x was before and begin at rest, y = x.
 //!
 //! Every other name is a parameter, if the model file lists it, or a column of the record. A profile has no columns;
-//! a formula that reads one adds nothing there.
+//! a formula that reads one adds nothing there. Where the rate is a mean over `rate_mean_s`, so is a column, by straight lines between rows:
+//! a rate sees what a current was since the row before, not only what it is at the row.
 
 use thiserror::Error;
 

@@ -91,9 +91,57 @@ impl PiecewiseLinear {
     }
 }
 
+/// Means over the time `over` until each place, of straight lines between values; constant before the first. `places`
+/// increase strictly. A value that is no number has no mean, and the next one stands for it in means that reach back to it.
+///
+/// ```text
+/// y_k = (1/τ) ∫_{x_k − τ}^{x_k} y dx;   for τ no longer than the step h:  y_k − (y_k − y_{k−1}) τ / (2 h)
+/// ```
+pub fn trailing_means(places: &[f64], values: &[f64], over: f64) -> Vec<f64> {
+    if !(over > 0.0) {
+        return values.to_vec();
+    }
+    let mut held = values.to_vec();
+    for k in (1..held.len()).rev() {
+        if !held[k - 1].is_finite() {
+            held[k - 1] = held[k];
+        }
+    }
+    let mean = |k: usize| {
+        let mut left = over;
+        let mut sum = 0.0;
+        let mut at = k;
+        while left > 0.0 && at > 0 {
+            let step = places[at] - places[at - 1];
+            let taken = step.min(left);
+            sum += taken * (held[at] - (held[at] - held[at - 1]) * 0.5 * taken / step);
+            left -= taken;
+            at -= 1;
+        }
+        (sum + left.max(0.0) * held[at]) / over
+    };
+    (0..values.len()).map(|k| if values[k].is_finite() { mean(k) } else { values[k] }).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn trailing_means_are_the_integrals_of_straight_lines() {
+        // y = 2 x on rows that are not evenly apart, from x = 1 on.
+        let places = [1.0, 2.0, 2.5, 5.0, 6.0];
+        let values = places.map(|x| 2.0 * x);
+        assert_eq!(trailing_means(&places, &values, 0.0), values);
+        let short = trailing_means(&places, &values, 0.5);
+        assert_eq!(short, [2.0, 3.5, 4.5, 9.5, 11.5]);
+        // Over three steps and before the beginning, where it is constant.
+        let long = trailing_means(&places, &values, 4.0);
+        assert!((long[4] - 2.0 * 4.0).abs() < 1e-12);
+        assert!((long[1] - (3.0 * 2.0 + 1.0 * 3.0) / 4.0).abs() < 1e-12);
+        let gaps = trailing_means(&[0.0, 1.0, 2.0], &[1.0, f64::NAN, 3.0], 1.0);
+        assert!(gaps[1].is_nan() && (gaps[0], gaps[2]) == (1.0, 3.0));
+    }
 
     #[test]
     fn values_and_one_sided_slopes_are_those_of_a_ramp_and_a_soak() {

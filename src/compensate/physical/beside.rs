@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::{MOST_DELAY_ROWS, Physical};
-use crate::compensate::formulas::{AtWork, Columns, Formulas, MOST_COLUMNS};
+use crate::compensate::formulas::{AtWork, Columns, Formulas, MOST_COLUMNS, columns_seen};
 use crate::record::Record;
 
 impl Physical {
@@ -27,7 +27,7 @@ impl Physical {
                 formulas.see(&filter.state(), 0);
                 let air = filter.rate_error_rad_per_s(0);
                 let thermal = self.thermal_rate_rad_per_s(air, time_s, Some(temperature_k));
-                formulas.rate_rad_per_s(0, time_s, thermal, &self.columns_of(record, row))
+                formulas.rate_rad_per_s(0, time_s, thermal, &self.columns_seen(record, row))
             })
             .collect()
     }
@@ -49,6 +49,13 @@ impl Physical {
             *value = record.channels().iter().find(|c| c.name == name).map(|c| c.values[row]);
         }
         columns
+    }
+
+    /// As a rate sees them.
+    fn columns_seen(&self, record: &Record, row: usize) -> Columns {
+        let Some(last) = row.checked_sub(1) else { return self.columns_of(record, row) };
+        let since_s = record.times_s()[row] - record.times_s()[last];
+        columns_seen(&self.columns_of(record, row), &self.columns_of(record, last), since_s, self.rate_mean_s)
     }
 
     /// Columns that formulas read, at most as many as a row holds for them.

@@ -22,7 +22,7 @@ pub(in crate::diagnose) use proposal::amend;
 pub use proposal::{Alternative, NO_WINDING, Proposal, ProposedTerm, Shown, TermParameter};
 
 use courses::Courses;
-use search::{Set, Tools};
+use search::{MOST_TERMS, Set, Tools};
 
 /// What won against everything that is listed.
 #[derive(Debug)]
@@ -44,9 +44,6 @@ pub(in crate::diagnose) struct Discovered {
 const BEATS: f64 = 3.0;
 /// Sets within so much of the best stay beside it.
 const NEAR: f64 = 6.0;
-/// A listed set that takes the place of a formula with a correlation of 0.9 leaves a fifth of what the formula explains. Where the
-/// set gains more than this, over five times what a term costs, that fifth is seen and the set is not alone.
-const UNMISTAKABLE: f64 = 100.0;
 /// Looks for terms beside what the search over listed effects found; None where nothing beats it.
 ///
 /// # Errors
@@ -65,21 +62,19 @@ pub(in crate::diagnose) fn discover(
     let best_listed = found.explanations.iter().map(Explanation::total).fold(f64::NEG_INFINITY, f64::max);
     let listed = found.explanations.iter().find(is_listed);
     let mut sets: Vec<Set> = Vec::new();
-    // Where a listed set is the answer, explains much and leaves nothing, a formula in its place would have to do the same for more.
+    // Where a listed set is the answer, leaves nothing, a formula in its place has to do the same for more.
     let is_answer = |e: &Explanation| !e.is_outside() && e.total() > best_listed - NEAR;
     if let Some(listed) = listed.filter(|e| is_answer(e)) {
-        sets = tools.search(tools.plain(listed), &|share| progress(0.4 * share));
-        let others = found.explanations.iter().filter(|e| e.members.is_empty() || e.is_outside());
-        let gained = listed.total() - others.map(Explanation::total).fold(f64::NEG_INFINITY, f64::max);
-        if sets.len() < 2 && gained > UNMISTAKABLE {
+        sets = tools.search(tools.plain(listed), MOST_TERMS, &|share| progress(0.4 * share));
+        if sets.len() < 2 && !tools.may_replace(umbrella(&tools, found, declared), best_listed) {
             return Ok(None);
         }
     }
     let from_listed = !sets.is_empty();
-    sets.extend(tools.search(umbrella(&tools, found, declared), &|share| progress(0.4 + 0.4 * share)));
+    sets.extend(tools.search(umbrella(&tools, found, declared), MOST_TERMS, &|share| progress(0.4 + 0.4 * share)));
     let best_yet = sets.iter().map(Set::total).fold(f64::NEG_INFINITY, f64::max);
     if let Some(listed) = listed.filter(|e| !from_listed && e.total() + BEATS > best_yet) {
-        sets.extend(tools.search(tools.plain(listed), &|_| ()));
+        sets.extend(tools.search(tools.plain(listed), MOST_TERMS, &|_| ()));
     }
     sets.retain(|s| !s.terms.is_empty() && s.total().is_finite());
     sets.sort_by(|a, b| b.total().total_cmp(&a.total()));
@@ -193,8 +188,10 @@ mod tests {
     use crate::thermal::solve;
     use crate::units::{REFERENCE_TEMPERATURE_K, rad_per_s_from_deg_per_h};
 
-    /// A day in a chamber with a fan whose current wanders, and what the fan adds [°/h] by its lagged size.
-    fn day(gain: f64, tau_s: f64, seed: u64) -> Record {
+    type Noise<'a> = &'a mut dyn FnMut(f64) -> f64;
+
+    /// A day in a chamber with a fan: `row` gives its current at the end of each row and what it adds to the rate [°/h].
+    fn day_of(seed: u64, mut row: impl FnMut(Noise) -> (f64, f64)) -> Record {
         let model = model(Vec::new());
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let normal = Normal::new(0.0, 1.0).unwrap();
@@ -206,20 +203,55 @@ mod tests {
         let exposed = expose(&model.heat_path().unwrap(), Some(25.0), 0.0, &air, &times_s).unwrap();
         let history = solve(&exposed.path, &exposed.drive).unwrap().means(&times_s, model.rate_mean_s);
         let rates = RateModel::new(&model, &pattern(), &[]).unwrap().series_rad_per_s(&history);
-        let (mut fan, mut lagged) = (0.0, None);
         let (mut fans, mut all) = (Vec::new(), Vec::new());
         for rate in rates {
+            let (fan, added) = row(&mut noise);
+            fans.push(fan);
+            all.push(rate + rad_per_s_from_deg_per_h(added) + noise(2e-7));
+        }
+        let temperature_k = exposed.shown_k.into_iter().map(|t| t + noise(0.002)).collect();
+        let record = Record::new(format!("day {seed}"), times_s, temperature_k, all).unwrap();
+        record.with_channel(Channel { name: "fan_a".to_owned(), values: fans }).unwrap()
+    }
+
+    /// A current that wanders, and adds by its lagged size.
+    fn day(gain: f64, tau_s: f64, seed: u64) -> Record {
+        let (mut fan, mut lagged) = (0.0, None);
+        day_of(seed, |noise| {
             fan += -0.02 * fan + noise(0.2);
             let size: f64 = f64::abs(fan);
             let before: f64 = lagged.unwrap_or(size);
             let now = before + (size - before) * (1.0 - (-10.0 / tau_s).exp());
             lagged = Some(now);
-            fans.push(fan);
-            all.push(rate + rad_per_s_from_deg_per_h(gain * now) + noise(2e-7));
-        }
-        let temperature_k = exposed.shown_k.into_iter().map(|t| t + noise(0.002)).collect();
-        let record = Record::new(format!("day {seed}"), times_s, temperature_k, all).unwrap();
-        record.with_channel(Channel { name: "fan_a".to_owned(), values: fans }).unwrap()
+            (fan, gain * now)
+        })
+    }
+
+    #[test]
+    fn a_current_acts_on_a_rate_by_what_it_was_since_the_row_before() {
+        let (declared, pattern) = (model(Vec::new()), pattern());
+        assert_eq!(declared.rate_mean_s, 10.0);
+        // Ten values a row, of which one is logged; the rate is the mean over all.
+        let squared = |seed: u64| {
+            let mut fan = 1.0;
+            day_of(seed, |noise| {
+                let squares = (0..10).map(|_| {
+                    fan += -0.01 * fan + noise(0.1);
+                    0.3 * fan * fan
+                });
+                let mean = squares.sum::<f64>() / 10.0;
+                (fan, mean)
+            })
+        };
+        let (records, holdout) = ([squared(1)], [squared(2)]);
+        let request =
+            Request { model: &declared, pattern: &pattern, records: &records, holdout: &holdout, terms: Terms::All };
+        let found = diagnose(&request, &|_| ()).unwrap();
+        let best = &found.proposals[0];
+        println!("{} {:?}", best.formula, best.terms[0].parameters);
+        assert_eq!((best.terms.len(), best.terms[0].form), (1, "square"));
+        let gain = best.terms[0].parameters.iter().find(|p| p.key == "a").unwrap().value;
+        assert!((gain / 0.3 - 1.0).abs() < 0.03, "{gain}");
     }
 
     #[test]

@@ -76,6 +76,8 @@ const WORTH_BESIDE: f64 = 0.25;
 const HELD_OUT_TRIED: usize = 2;
 /// A step must gain so much more than it costs, and the held-out records anything at all.
 const WORTH_A_STEP: f64 = 2.0;
+/// A first term that is further behind than this is given up: the window of the search over listed effects.
+const WITHIN_REACH: f64 = 20.0;
 /// An amplitude is likely to make a term of so many of the record's noises.
 const LIKELY_NOISES: f64 = 10.0;
 /// Rounds in which inner numbers follow the fitted amplitude; a step below this share of its error ends them.
@@ -389,15 +391,21 @@ impl Tools<'_, '_> {
         next
     }
 
-    /// Forward and back from a set; every set that was fitted and judged, best first.
-    pub fn search(&self, from: Set, progress: &(dyn Fn(f64) + Sync)) -> Vec<Set> {
+    /// Whether one term in the place of all that is listed comes near what the listed effects are worth.
+    pub fn may_replace(&self, declared: Set, listed: f64) -> bool {
+        let one = self.search(declared, 1, &|_| ());
+        one.iter().any(|set| !set.terms.is_empty() && set.total() > listed - WITHIN_REACH)
+    }
+
+    /// Forward and back from a set, to so many terms; every set that was fitted and judged, best first.
+    pub fn search(&self, from: Set, most_terms: usize, progress: &(dyn Fn(f64) + Sync)) -> Vec<Set> {
         let mut best = self.judged(from);
         let mut all = vec![best.clone()];
-        for stage in 0..MOST_TERMS {
-            if best.terms.len() >= MOST_TERMS {
+        for stage in 0..most_terms {
+            if best.terms.len() >= most_terms {
                 break;
             }
-            progress(stage as f64 / MOST_TERMS as f64);
+            progress(stage as f64 / most_terms as f64);
             let mut next = self.onwards(&best);
             for set in &mut next {
                 set.held_out_gain = set.held_out.zip(best.held_out).map(|(a, b)| a - b);

@@ -88,7 +88,9 @@ impl DifferenceEquation {
         if most_hypotheses > 1 {
             equations.extend(BRANCHES);
         }
-        let formulas_in_c = physical.formulas(interval_s).map(|(formulas, work)| FormulasInC::new(formulas, &work));
+        let formulas_in_c = physical
+            .formulas(interval_s)
+            .map(|(formulas, work)| FormulasInC::new(formulas, &work, physical.rate_mean_s()));
         Some(Self {
             formulas: formulas_in_c.as_ref().map_or_else(Vec::new, |f| f.stated.clone()),
             formulas_in_c,

@@ -1,6 +1,7 @@
 /* Formulas beside the coil's own error. Call coilwright_gyro_step instead of coilwright_step: it returns the whole rate error
    [deg/h] of the call COILWRIGHT_DELAY calls ago. columns: the further columns of this call, in the order of the model's
-   formulas. What a formula remembers begins at rest. */
+   formulas; a rate sees their mean over @mean@ s, by a straight line from the call before. What a formula remembers begins
+   at rest. */
 #define COILWRIGHT_LAYERS @layers@
 #define COILWRIGHT_MEMORIES @memories@
 #define COILWRIGHT_COLUMNS @columns@
@@ -27,6 +28,8 @@ typedef struct {
   coilwright_state coil;
   coilwright_memory memory;
   coilwright_pack pack[COILWRIGHT_DELAY + 1];
+  double column[COILWRIGHT_COLUMNS], column_s;
+  int called;
 } coilwright_gyro;
 
 static const double coilwright_layer[COILWRIGHT_LAYERS][COILWRIGHT_STATES] = {
@@ -79,6 +82,7 @@ static void coilwright_gyro_start(coilwright_gyro *g) {
   coilwright_start(&g->coil);
   for (i = 0; i < COILWRIGHT_MEMORIES; ++i) g->memory.slot[i].known = 0;
   for (i = 0; i <= COILWRIGHT_DELAY; ++i) g->pack[i].known = 0;
+  g->called = 0;
 }
 
 static double coilwright_formulas(coilwright_memory *m, const coilwright_pack *p, double thermal_rate) {
@@ -116,6 +120,14 @@ static double coilwright_gyro_step(coilwright_gyro *g, double time_s, double tem
   }
   p->air = g->coil.origin + state[@air@] / (weights > 0.0 ? weights : 1.0);
   p->air_rate = state[@slope@] / (weights > 0.0 ? weights : 1.0);
-  for (i = 0; columns && i < COILWRIGHT_COLUMNS; ++i) p->column[i] = columns[i];
+  for (i = 0; columns && i < COILWRIGHT_COLUMNS; ++i) {
+    double since_s = time_s - g->column_s, change = columns[i] - g->column[i];
+    p->column[i] = columns[i];
+    if (g->called && since_s > 0.0 && isfinite(g->column[i]))
+      p->column[i] = columns[i] - change * 0.5 * (since_s < @mean@ ? since_s : @mean@) / since_s;
+    g->column[i] = columns[i];
+  }
+  g->column_s = time_s;
+  g->called = 1;
   return rate + coilwright_formulas(&g->memory, &g->pack[COILWRIGHT_DELAY], rate - coilwright_offset);
 }

@@ -19,6 +19,7 @@ pub(super) struct FormulasInC {
     rates: Vec<String>,
     shares: Vec<f64>,
     air: (usize, usize),
+    rate_mean_s: f64,
 }
 
 fn list(values: impl Iterator<Item = f64>) -> String {
@@ -30,7 +31,7 @@ fn rows(of: &DMatrix<f64>) -> Vec<String> {
 }
 
 impl FormulasInC {
-    pub fn new(formulas: &Formulas, work: &AtWork) -> Self {
+    pub fn new(formulas: &Formulas, work: &AtWork, rate_mean_s: f64) -> Self {
         let (mut stated, mut expressions, mut memories) = (Vec::new(), Vec::new(), 0);
         let layers = work.shares().len();
         for effect in formulas.effects() {
@@ -87,6 +88,7 @@ impl FormulasInC {
             rates: rows(rates),
             shares: work.shares(),
             air: work.air(),
+            rate_mean_s,
         }
     }
 
@@ -105,6 +107,7 @@ impl FormulasInC {
                 ("air", self.air.0.to_string()),
                 ("slope", self.air.1.to_string()),
                 ("sum", sum),
+                ("mean", format!("{:?}", self.rate_mean_s)),
             ],
         );
         match header.rfind("#endif") {
