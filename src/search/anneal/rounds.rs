@@ -356,23 +356,48 @@ impl<C: Cost> Rounds for Optimisation<C> {
     }
 
     fn refined(&self, starts: &[Vec<usize>], moves: u64) -> Vec<Found> {
-        let refine = |(index, start): (usize, &Vec<usize>)| {
+        let refine = |cost: &C, stream: usize, start: &[usize]| {
             let hot = WARMTH * self.full.in_full(start, &[]).cost;
             let cooling = Cooling { hot, cold: hot * COLD_OVER_WARM, moves };
             // Streams far from those of the rounds' restarts.
-            let mut restart = Restart::new(&self.full, self.plan.seed, u64::MAX / 2 + index as u64, Some(start));
+            let mut restart = Restart::new(cost, self.plan.seed, u64::MAX / 2 + stream as u64, Some(start));
             while !restart.is_done(&cooling) {
-                restart.advance(&self.full, &cooling);
+                restart.advance(cost, &cooling);
             }
-            self.judged(&restart.best_segments)
+            restart.best_segments
         };
-        starts.par_iter().enumerate().map(refine).collect()
+        let all = |cost: &C, pass: usize, starts: &[Vec<usize>]| -> Vec<Vec<usize>> {
+            let stream = |index: usize| pass * starts.len() + index;
+            starts.par_iter().enumerate().map(|(index, start)| refine(cost, stream(index), start)).collect()
+        };
+        if !self.full.is_approximated() || self.state.working.is_empty() {
+            return all(&self.full, 0, starts).iter().map(|segments| self.judged(segments)).collect();
+        }
+        // On samples that bind, as in the rounds; what binds besides joins for the second pass.
+        let mut working = self.state.working.clone();
+        let (mut found, mut from) = (Vec::new(), starts.to_vec());
+        for pass in 0..PASSES {
+            from = all(&self.full.narrowed(&working), pass, &from);
+            for segments in &mut from {
+                let InFull { cost, segments: kept, joining } = self.full.in_full(segments, &working);
+                working.extend(joining);
+                segments.clone_from(&kept);
+                found.push(Found { cost, segments: kept });
+            }
+            working.sort_unstable();
+            working.dedup();
+            let best: Vec<&[usize]> = from.iter().map(Vec::as_slice).collect();
+            self.full.order_working_set(&best, &mut working);
+        }
+        found
     }
 }
 
 /// Start of a refinement's cooling over the cost where it begins, and its end over its start.
 const WARMTH: f64 = 0.05;
 const COLD_OVER_WARM: f64 = 1e-2;
+/// Passes of a refinement where rounds run on what is only near the cost.
+const PASSES: usize = 2;
 
 #[cfg(test)]
 mod tests {

@@ -136,6 +136,11 @@ impl Cost for SampleCost {
         Self { space: Space::new(matrix, self.space.class()), norm: self.norm, frozen: None }
     }
 
+    fn narrowed(&self, working: &[usize]) -> Self {
+        let matrix = self.space.matrix().select(working);
+        Self { space: Space::new(matrix, self.space.class()), norm: self.norm, frozen: None }
+    }
+
     fn is_approximated(&self) -> bool {
         self.frozen.is_some()
     }

@@ -78,6 +78,11 @@ pub trait Cost: Clone + Send + Sync + std::fmt::Debug {
     /// The cost on some of the samples only.
     fn select(&self, working: &[usize]) -> Self;
 
+    /// The cost itself on some of its samples, also where rounds run on what is only near it.
+    fn narrowed(&self, working: &[usize]) -> Self {
+        self.select(working)
+    }
+
     /// The samples that a search begins with; empty for all of them in their own order.
     fn first_working_set(&self, seed: u64, starts: &[Vec<usize>]) -> Vec<usize>;
 
