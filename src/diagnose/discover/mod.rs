@@ -8,6 +8,7 @@
 //! The score test as in [`crate::chamber`]; forms and prices as in the book's chapter on what is missing.
 
 mod courses;
+mod exchange;
 mod forms;
 mod grammar;
 mod proposal;
@@ -77,6 +78,9 @@ pub(in crate::diagnose) fn discover(
         sets.extend(tools.search(tools.plain(listed), MOST_TERMS, &|_| ()));
     }
     sets.retain(|s| !s.terms.is_empty() && s.total().is_finite());
+    sets.sort_by(|a, b| b.total().total_cmp(&a.total()));
+    let exchanged = sets.first().map(|best| tools.exchanged(best)).unwrap_or_default();
+    sets.extend(exchanged.into_iter().filter(|s| s.total().is_finite()));
     sets.sort_by(|a, b| b.total().total_cmp(&a.total()));
     let Some(best) = sets.first().cloned() else { return Ok(None) };
     let confirmed = question.held_out.is_empty() || best.held_out_gain.is_none_or(|gain| gain > 0.0);

@@ -68,16 +68,16 @@ pub const MOST_TERMS: usize = 4;
 const REFINED: usize = 12;
 const TRIED: usize = 4;
 /// Listed effects that are fitted beside them.
-const LISTED_TRIED: usize = 2;
+pub const LISTED_TRIED: usize = 2;
 /// … if they promise so much; terms, if they promise this share of what the first does.
-const WORTH_LISTED: f64 = 8.0;
+pub const WORTH_LISTED: f64 = 8.0;
 const WORTH_BESIDE: f64 = 0.25;
 /// Sets whose held-out records are looked at after each stage.
 const HELD_OUT_TRIED: usize = 2;
 /// A step must gain so much more than it costs, and the held-out records anything at all.
 const WORTH_A_STEP: f64 = 2.0;
 /// A first term that is further behind than this is given up: the window of the search over listed effects.
-const WITHIN_REACH: f64 = 20.0;
+pub const WITHIN_REACH: f64 = 20.0;
 /// An amplitude is likely to make a term of so many of the record's noises.
 const LIKELY_NOISES: f64 = 10.0;
 /// Rounds in which inner numbers follow the fitted amplitude; a step below this share of its error ends them.
@@ -232,7 +232,7 @@ impl Tools<'_, '_> {
         Some(self.set(found, terms))
     }
 
-    fn with_listed(&self, set: &Set, proposal: &Proposal) -> Option<Set> {
+    pub fn with_listed(&self, set: &Set, proposal: &Proposal) -> Option<Set> {
         let begin = with(self.question, self.windings, &set.explanation.fit, proposal.member, proposal.values.clone())?;
         let mut members = set.explanation.members.clone();
         members.push(proposal.member);
@@ -439,7 +439,7 @@ impl Tools<'_, '_> {
     }
 
     /// The set without one of its members: listed ones first, then terms.
-    fn without(&self, set: &Set, place: usize) -> Option<Set> {
+    pub fn without(&self, set: &Set, place: usize) -> Option<Set> {
         let listed = set.explanation.members.len();
         let fit = &set.explanation.fit;
         let (begin, members, terms) = if place < listed {

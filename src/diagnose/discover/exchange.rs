@@ -1,0 +1,37 @@
+//! Listed effects of a set exchanged for others: a search that goes forward takes what promises most first, which need not be what is
+//! best beside the terms that follow.
+
+use rayon::prelude::*;
+
+use super::search::{LISTED_TRIED, Set, Tools, WITHIN_REACH, WORTH_LISTED};
+use crate::diagnose::joint::proposals;
+
+impl Tools<'_, '_> {
+    /// The set with each of its listed effects exchanged for what else promises much in its place.
+    pub fn exchanged(&self, set: &Set) -> Vec<Set> {
+        let mut all = Vec::new();
+        for place in 0..set.explanation.members.len() {
+            let Some(fewer) = self.without(set, place) else { continue };
+            let Ok(mut others) = proposals(self.question, &fewer.explanation) else { continue };
+            others.retain(|p| p.gain > WORTH_LISTED && p.member != set.explanation.members[place]);
+            others.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+            others.truncate(LISTED_TRIED);
+            let sets: Vec<Set> = others.par_iter().filter_map(|p| self.with_listed(&fewer, p)).collect();
+            let near = sets.into_iter().filter(|s| s.merit > set.merit - WITHIN_REACH);
+            all.extend(
+                near.collect::<Vec<_>>()
+                    .into_par_iter()
+                    .map(|s| self.as_confirmed_as(set, self.judged(self.followed(s))))
+                    .collect::<Vec<_>>(),
+            );
+        }
+        all
+    }
+
+    /// What the held-out records gained with the other set's last member, and what they gained or lost by the exchange.
+    fn as_confirmed_as(&self, other: &Set, set: Set) -> Set {
+        let by_exchange = set.held_out.zip(other.held_out).map(|(a, b)| a - b);
+        let held_out_gain = other.held_out_gain.zip(by_exchange).map(|(gain, more)| gain + more);
+        Set { held_out_gain, ..set }
+    }
+}
