@@ -54,7 +54,8 @@ error without it, with the parameters from which a fit starts. This chapter and 
 `cargo run --release --example effect_signatures`; a test compares them.
 
 Two more effects have no picture, because a profile does not have what they read: `channel:NAME` is linear in any further column
-of a record, `custom` is a formula of your own (`coilwright effects` describes both).
+of a record, `custom` is a formula of your own (`coilwright effects` describes both). `thermal_stress` is computed from
+the model's materials: [Thermal stress from materials](stress.md).
 ";
 
 fn describe(page: &mut String, spec: &EffectSpec, picture: &str) -> Result<(), std::fmt::Error> {

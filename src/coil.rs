@@ -181,6 +181,13 @@ impl Coil {
         Ok(coil)
     }
 
+    /// The same coil of fibre with another expansion, which adds to κ.
+    pub fn with_thermal_expansion(&self, per_k: f64) -> Self {
+        let mut coil = self.clone();
+        coil.fibre.thermal_expansion_per_k = per_k;
+        coil
+    }
+
     pub fn fibre(&self) -> &Fibre {
         &self.fibre
     }

@@ -37,6 +37,7 @@ pub mod profile;
 pub mod record;
 // Floor 2: heat and effects.
 pub mod effect;
+pub mod stress;
 pub mod thermal;
 // Floor 3: the readable reference of the rate error.
 pub mod rate;

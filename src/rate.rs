@@ -22,7 +22,10 @@
 //! 654 (1980). The sign is the paper's: positive Ω for a positive phase as written.
 
 mod builder;
+mod materials;
 mod past;
+
+use std::borrow::Cow;
 
 use thiserror::Error;
 
@@ -278,11 +281,23 @@ impl RateModel {
         coil + self.outside_rad_per_s(&PackState { thermal_rate_rad_per_s: coil, ..*state }, past)
     }
 
+    /// What the layers' optical paths follow: their rates of temperature, unless an effect makes them follow others'.
+    fn followed_rates<'a>(&self, state: &PackState<'a>) -> Cow<'a, [f64]> {
+        let mut rates = Cow::Borrowed(state.rates_k_per_s);
+        for effect in &self.effects {
+            if let Some(followed) = effect.followed_rates(state.temperatures_k, &rates) {
+                rates = Cow::Owned(followed);
+            }
+        }
+        rates
+    }
+
     /// The coil's own part of Ω, lead included.
     fn thermal_rate_rad_per_s(&self, state: &PackState) -> f64 {
         let scale = self.scale_per_m2();
+        let rates_k_per_s = self.followed_rates(state);
         let mut coil_sum = 0.0;
-        for (layer, (&rate, &temperature_k)) in state.rates_k_per_s.iter().zip(state.temperatures_k).enumerate() {
+        for (layer, (&rate, &temperature_k)) in rates_k_per_s.iter().zip(state.temperatures_k).enumerate() {
             let here = self.layer(layer, temperature_k);
             coil_sum += here.weighted_m2_per_k * rate;
             if let Some(moment) = state.axial_moments_k_per_s.get(layer) {
@@ -290,7 +305,7 @@ impl RateModel {
             }
         }
         let gain: f64 = self.effects.iter().map(|e| e.coil_gain(state)).product();
-        let lead: f64 = self.surplus.iter().map(|s| self.surplus_rad_per_s(s, state)).sum();
+        let lead: f64 = self.surplus.iter().map(|s| self.surplus_rad_per_s(s, state, &rates_k_per_s)).sum();
         scale * coil_sum * gain + lead
     }
 
@@ -303,7 +318,8 @@ impl RateModel {
     /// [`RateModel::check_searchable`].
     pub fn weight_response_after(&self, state: &PackState, past: &mut Past) -> WeightResponse {
         let gain: f64 = self.effects.iter().map(|e| e.coil_gain(state)).product();
-        let lead: f64 = self.surplus.iter().map(|s| self.surplus_rad_per_s(s, state)).sum();
+        let rates_k_per_s = self.followed_rates(state);
+        let lead: f64 = self.surplus.iter().map(|s| self.surplus_rad_per_s(s, state, &rates_k_per_s)).sum();
         // What is outside the coil may follow the coil's own rate: c + s Ω.
         let outside_at = |rate: f64, past: &mut Past| {
             self.outside_rad_per_s(&PackState { thermal_rate_rad_per_s: rate, ..*state }, past)
@@ -315,7 +331,7 @@ impl RateModel {
         let scale = self.scale_per_m2() * gain * own;
         let layers = state.rates_k_per_s.len();
         let kappa = |layer: usize, half| self.path_per_k(layer, half, state.temperatures_k[layer]);
-        let of_half = |half| (0..layers).map(|j| scale * kappa(j, half) * state.rates_k_per_s[j]).collect::<Vec<f64>>();
+        let of_half = |half| (0..layers).map(|j| scale * kappa(j, half) * rates_k_per_s[j]).collect::<Vec<f64>>();
         let axial = state.axial_moments_k_per_s.iter().enumerate();
         WeightResponse {
             half_a_rad_per_s_m2: of_half(Half::A),
@@ -328,13 +344,12 @@ impl RateModel {
     }
 
     /// Surplus fibre 2δ at end A moves the coil by 2δ along z and adds a lead at z < 2δ; exact in δ.
-    fn surplus_rad_per_s(&self, surplus: &SurplusFibre, state: &PackState) -> f64 {
+    fn surplus_rad_per_s(&self, surplus: &SurplusFibre, state: &PackState, rates_k_per_s: &[f64]) -> f64 {
         let lead_rate = match surplus.lead {
             Lead::Ambient => state.ambient_rate_k_per_s,
             Lead::Isothermal => 0.0,
         };
-        let moved: f64 = state
-            .rates_k_per_s
+        let moved: f64 = rates_k_per_s
             .iter()
             .zip(state.temperatures_k)
             .zip(self.coil.layer_lengths_m())

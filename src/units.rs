@@ -165,6 +165,16 @@ pub fn nm_from_m(length_m: f64) -> f64 {
     length_m / NANO
 }
 
+/// \[Pa\].
+pub fn pa_from_mpa(stress_mpa: f64) -> f64 {
+    stress_mpa / MICRO
+}
+
+/// \[MPa\].
+pub fn mpa_from_pa(stress_pa: f64) -> f64 {
+    stress_pa * MICRO
+}
+
 pub fn percent_from_fraction(fraction: f64) -> f64 {
     fraction * 100.0
 }

@@ -44,7 +44,18 @@ _TABLES = {
 }
 """Keys that stand in one table only, so that they need not be nested."""
 
-_NESTED = ("fibre", "winding", "thermal", "sensor", "profiles", "search", "tolerance", "production", "record")
+_NESTED = (
+    "fibre",
+    "winding",
+    "thermal",
+    "sensor",
+    "profiles",
+    "search",
+    "tolerance",
+    "production",
+    "record",
+    "materials",
+)
 
 
 def _plain(value: Any) -> Any:
@@ -102,7 +113,7 @@ class Model:
 
     Keyword arguments are the keys of a model file. A key that stands in one table only may be given by itself; the others as
     dictionaries: ``fibre``, ``winding``, ``thermal``, ``sensor``, ``profiles``, ``search``, ``tolerance``, ``production``,
-    ``record``; ``effects`` is a list of dictionaries, each with its ``kind``; ``thermal_model`` is ``thermal.model``.
+    ``record``, ``materials``; ``effects`` is a list of dictionaries, each with its ``kind``; ``thermal_model`` is ``thermal.model``.
     The number's units are in the keys, as in a file.
 
     >>> import coilwright as cw

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use coilwright::effect::{CATALOGUE, CHANNEL, CUSTOM};
+use coilwright::effect::{CATALOGUE, CHANNEL, CUSTOM, THERMAL_STRESS};
 use coilwright::io::files::write_atomically;
 use coilwright::io::json::effects::{EffectJson, EffectsJson};
 use coilwright::io::json::{CheckJson, FaultJson};
@@ -169,7 +169,7 @@ pub fn check_model(py: Python, path: PathBuf) -> PyResult<String> {
 /// The effects that a model file can declare, as the command `effects` prints them.
 #[pyfunction]
 pub fn effects(py: Python, kinds: Vec<String>) -> PyResult<String> {
-    let known = || CATALOGUE.iter().copied().chain([CHANNEL, CUSTOM]);
+    let known = || CATALOGUE.iter().copied().chain([CHANNEL, CUSTOM, THERMAL_STRESS]);
     if let Some(stated) = kinds.iter().find(|stated| known().all(|spec| spec.kind != *stated)) {
         return Err(raise(py, unknown_effect(stated)));
     }

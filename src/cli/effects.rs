@@ -2,7 +2,7 @@
 
 use super::screen::Screen;
 use super::{CliError, Ending, offered};
-use crate::effect::{CATALOGUE, CHANNEL, CUSTOM};
+use crate::effect::{CATALOGUE, CHANNEL, CUSTOM, THERMAL_STRESS};
 use crate::io::json::effects::{EffectJson, EffectsJson, ParameterJson};
 use crate::task::extend::unknown_effect;
 
@@ -16,7 +16,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
-    let known = || CATALOGUE.iter().copied().chain([CHANNEL, CUSTOM]);
+    let known = || CATALOGUE.iter().copied().chain([CHANNEL, CUSTOM, THERMAL_STRESS]);
     for stated in &arguments.kinds {
         if !known().any(|spec| spec.kind == stated) {
             return Err(unknown_effect(stated).into());

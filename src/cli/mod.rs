@@ -15,6 +15,7 @@ mod extend;
 mod former;
 mod improve;
 mod man;
+mod materials;
 mod metrics;
 mod new;
 mod offered;
@@ -23,6 +24,7 @@ mod optimise_field;
 mod pareto;
 mod pattern_asked;
 mod patterns;
+mod potting;
 pub mod progress;
 mod records;
 mod report;
@@ -30,6 +32,7 @@ mod reproduce;
 mod schedule;
 mod schema;
 pub mod screen;
+mod stress;
 mod temperatures;
 mod terms;
 mod tolerance;
@@ -102,6 +105,9 @@ enum Command {
     Exact(exact::Arguments),
     Explore(explore::Arguments),
     Effects(effects::Arguments),
+    Materials(materials::Arguments),
+    Stress(stress::Arguments),
+    Potting(potting::Arguments),
     Temperatures(temperatures::Arguments),
     Tolerance(tolerance::Arguments),
     Patterns(patterns::Arguments),
@@ -233,6 +239,9 @@ fn carry_out(command: &Command, screen: &Screen) -> Result<Ending, CliError> {
         Command::Exact(arguments) => exact::run(arguments, screen),
         Command::Explore(arguments) => explore::run(arguments, screen),
         Command::Effects(arguments) => effects::run(arguments, screen),
+        Command::Materials(arguments) => materials::run(arguments, screen),
+        Command::Stress(arguments) => stress::run(arguments, screen),
+        Command::Potting(arguments) => potting::run(arguments, screen),
         Command::Temperatures(arguments) => temperatures::run(arguments, screen),
         Command::Tolerance(arguments) => tolerance::run(arguments, screen),
         Command::Patterns(arguments) => patterns::run(arguments, screen),

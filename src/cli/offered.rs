@@ -5,7 +5,7 @@ use std::ffi::OsStr;
 use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
 use clap::{Arg, Command, Error};
 
-use crate::effect::{CATALOGUE, CHANNEL, CUSTOM};
+use crate::effect::{CATALOGUE, CHANNEL, CUSTOM, THERMAL_STRESS};
 use crate::pattern::classic::Classic;
 use crate::search::cost::objective::Objective;
 
@@ -37,7 +37,7 @@ pub(super) fn patterns() -> Offered<StringValueParser> {
 }
 
 pub(super) fn effects() -> Offered<StringValueParser> {
-    let values = CATALOGUE.iter().copied().chain([CHANNEL, CUSTOM]).map(|spec| spec.kind).collect();
+    let values = CATALOGUE.iter().copied().chain([CHANNEL, CUSTOM, THERMAL_STRESS]).map(|spec| spec.kind).collect();
     Offered { read: StringValueParser::new(), values }
 }
 

@@ -39,7 +39,7 @@ struct ChannelBias {
 fn column(binding: &Binding) -> Option<usize> {
     match binding.subject {
         Subject::Channel(name) => binding.channels.iter().position(|c| c == name),
-        Subject::None | Subject::Formula(_) => None,
+        Subject::None | Subject::Formula(_) | Subject::Materials(_) => None,
     }
 }
 

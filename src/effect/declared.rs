@@ -2,8 +2,12 @@
 
 use thiserror::Error;
 
-use super::{Acts, Address, Binding, CHANNEL, CUSTOM, Effect, EffectSpec, FILM, ParameterSpec, Subject, custom};
+use super::{
+    Acts, Address, Binding, CHANNEL, CUSTOM, Effect, EffectSpec, FILM, ParameterSpec, Subject, THERMAL_STRESS, custom,
+    thermal_stress,
+};
 use crate::coil::Coil;
+use crate::stress::Materials;
 use crate::units::Unit;
 
 /// An effect with its parameters, as a model declares it.
@@ -110,6 +114,12 @@ impl DeclaredEffect {
         Self { spec: CHANNEL, values: vec![gain_rad_per_s_per_unit], choices: Vec::new(), subject }
     }
 
+    /// The thermal stress of what the coil is made of.
+    pub fn thermal_stress(materials: Materials) -> Self {
+        let subject = thermal_stress::subject(materials);
+        Self { spec: THERMAL_STRESS, values: Vec::new(), choices: Vec::new(), subject }
+    }
+
     /// A formula of the user's own; `values` in the order of its parameters.
     ///
     /// # Errors
@@ -134,6 +144,10 @@ impl DeclaredEffect {
                 _ => Err(EffectError::Count { kind: CHANNEL.kind, expected: 1, found: values.len() }),
             },
             Subject::Formula(formula) => Self::custom(formula.clone(), values),
+            Subject::Materials(_) if values.is_empty() => Ok(self.clone()),
+            Subject::Materials(_) => {
+                Err(EffectError::Count { kind: THERMAL_STRESS.kind, expected: 0, found: values.len() })
+            }
         }
     }
 
@@ -141,7 +155,7 @@ impl DeclaredEffect {
     pub fn kind(&self) -> String {
         match &self.subject {
             Subject::Channel(name) => format!("channel:{name}"),
-            Subject::None | Subject::Formula(_) => self.spec.kind.to_owned(),
+            Subject::None | Subject::Formula(_) | Subject::Materials(_) => self.spec.kind.to_owned(),
         }
     }
 
@@ -162,7 +176,7 @@ impl DeclaredEffect {
                     upper: f64::INFINITY,
                 })
                 .collect(),
-            Subject::None | Subject::Channel(_) => self
+            Subject::None | Subject::Channel(_) | Subject::Materials(_) => self
                 .spec
                 .parameters
                 .iter()
@@ -179,7 +193,7 @@ impl DeclaredEffect {
     /// The record's columns that it reads, besides the needed ones.
     pub fn channels(&self) -> Vec<String> {
         match &self.subject {
-            Subject::None => Vec::new(),
+            Subject::None | Subject::Materials(_) => Vec::new(),
             Subject::Channel(name) => vec![name.clone()],
             Subject::Formula(formula) => formula.channels().to_vec(),
         }

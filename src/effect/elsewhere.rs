@@ -17,6 +17,13 @@ const SET_ELSEWHERE: &[(&str, &str)] = &[
     ("fibre", "its properties stand under [fibre]"),
     ("fiber", "its properties stand under [fibre]"),
     ("conductivity", "it is conductivity_w_per_m_k under [thermal]"),
+    (
+        "thermal_stress",
+        "it follows from what stands under [materials]; `coilwright materials` lists what may stand there",
+    ),
+    ("materials", "they stand under [materials]; `coilwright materials` lists what may stand there"),
+    ("adhesive", "it is adhesive under [materials]; `coilwright potting` compares them"),
+    ("potting", "it is adhesive under [materials]; `coilwright potting` compares them"),
     ("ramp", "the steepest is max_rate_c_per_h under [profiles], listed ones are [[profiles.ramp]]"),
     ("profile", "ramps and courses of temperature stand under [profiles]"),
     ("profiles", "ramps and courses of temperature stand under [profiles]"),

@@ -27,6 +27,7 @@ mod spool_mass;
 mod strain_mismatch;
 mod stress_gradient;
 mod surface_film;
+mod thermal_stress;
 mod thermo_optic;
 mod thermo_optic_temperature;
 mod turn_mismatch;
@@ -71,6 +72,9 @@ pub const CHANNEL: &EffectSpec = &channel::SPEC;
 
 /// An effect that the user writes.
 pub const CUSTOM: &EffectSpec = &custom::SPEC;
+
+/// What the materials of a model file do.
+pub const THERMAL_STRESS: &EffectSpec = &thermal_stress::SPEC;
 
 /// One parameter of one effect: what a spread of built coils varies.
 #[derive(Debug, Clone, Copy)]
@@ -125,6 +129,12 @@ pub trait Effect: std::fmt::Debug + Send + Sync {
     /// Whether [`Effect::path_factor`] depends on the place's temperature.
     fn path_depends_on_temperature(&self) -> bool {
         false
+    }
+
+    /// The rates of temperature that the layers' optical paths follow as if each layer followed its own alone; none where
+    /// they do.
+    fn followed_rates(&self, _temperatures_k: &[f64], _rates_k_per_s: &[f64]) -> Option<Vec<f64>> {
+        None
     }
 
     /// Factor on the coil's rate error; those of several effects multiply.
@@ -225,6 +235,8 @@ pub enum Subject {
     Channel(String),
     /// A formula of the user's own.
     Formula(custom::Formula),
+    /// What the coil is made of.
+    Materials(std::sync::Arc<crate::stress::Materials>),
 }
 
 /// What an effect is bound to before it acts.

@@ -13,6 +13,7 @@ use crate::rate::CoilModel;
 use crate::schedule::production::Production;
 use crate::search::cost::objective::Objective;
 use crate::search::cost::tolerance::ToleranceSpec;
+use crate::stress::material::Material;
 use crate::thermal::Location;
 
 /// A model file, understood.
@@ -35,6 +36,8 @@ pub struct ModelFile {
     pub stated_length_m: Option<f64>,
     /// What records taught of film, offset and chamber.
     pub learned: Option<Learned>,
+    /// Materials that the file itself defines.
+    pub own_materials: Vec<Material>,
 }
 
 impl ModelFile {

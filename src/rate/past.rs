@@ -15,7 +15,7 @@ pub struct Past {
 pub(super) fn formula_of(effect: &DeclaredEffect) -> String {
     match effect.subject() {
         Subject::Formula(formula) => formula.expression().source().to_owned(),
-        Subject::None | Subject::Channel(_) => String::new(),
+        Subject::None | Subject::Channel(_) | Subject::Materials(_) => String::new(),
     }
 }
 

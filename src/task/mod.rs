@@ -15,6 +15,7 @@ pub mod metrics;
 pub mod optimise;
 pub mod pareto;
 pub mod schedule;
+pub mod stress;
 pub mod temperatures;
 pub mod tolerance;
 pub mod trim;
@@ -122,6 +123,10 @@ pub enum TaskError {
     Report(#[from] crate::report::search_run::ReportError),
     #[error("{path} has no [tolerance]: state at least one spread there, such as turns_per_layer_sd = 0.3")]
     NoTolerance { path: String },
+    #[error(
+        "{path} has no [materials]: state there what fibre, adhesive and spool are made of; `coilwright materials` lists what there is"
+    )]
+    NoMaterials { path: String },
     #[error("the model has no profile called \"{stated}\": its profiles are {known}")]
     UnknownProfile { stated: String, known: String },
     #[error(

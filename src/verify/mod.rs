@@ -22,6 +22,7 @@ mod physics;
 mod program;
 mod rate;
 mod stepping;
+mod strain;
 
 use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;

@@ -10,6 +10,7 @@
 
 use super::heat::State;
 use super::physics::{Bias, Physics};
+use super::strain::Strain;
 use crate::coil::Coil;
 use crate::units::{REFERENCE_TEMPERATURE_K, celsius_from_kelvin, deg_per_h_from_rad_per_s, rad_per_s_from_deg_per_h};
 
@@ -29,6 +30,8 @@ pub(super) struct Optics {
     axial_m2: Vec<f64>,
     /// 1/r² less its mean over the fibre, largest size 1.
     stress: Vec<f64>,
+    /// Where the materials are stated.
+    strain: Option<Strain>,
 }
 
 impl Optics {
@@ -79,6 +82,7 @@ impl Optics {
             axial_m2,
             stress: (0..segments.len()).map(|j| (inverse_square(j) - mean) / peak).collect(),
             physics: physics.clone(),
+            strain: physics.materials.as_ref().map(|materials| Strain::new(materials, coil)),
         }
     }
 
@@ -124,7 +128,15 @@ impl Optics {
         let mean_rate = mean(&state.rate_k_per_s);
         // ∫ κ Ṫ (2z − L) dz, and ∫ κ Ṫ dz with the mean κ of the halves.
         let (mut coil, mut moved) = (0.0, 0.0);
-        for (layer, rate) in state.rate_k_per_s.iter().enumerate() {
+        let followed = self.strain.as_ref().map(|strain| {
+            let temperatures_k: Vec<f64> = match state.rise_k.len() {
+                0 => vec![REFERENCE_TEMPERATURE_K; state.rate_k_per_s.len()],
+                _ => state.rise_k.iter().map(|rise| rise + REFERENCE_TEMPERATURE_K).collect(),
+            };
+            let paths = strain.paths(&temperatures_k, &state.rate_k_per_s);
+            paths.iter().map(|path| path / self.kappa_per_k).collect::<Vec<f64>>()
+        });
+        for (layer, rate) in followed.as_ref().unwrap_or(&state.rate_k_per_s).iter().enumerate() {
             let [a, b] = self.kappas_per_k(layer, state.rise_k[layer]);
             let both = 0.5 * (a + b);
             coil += (a * self.weights_m2[layer][0] + b * self.weights_m2[layer][1]) * rate;

@@ -3,9 +3,12 @@
 //! One match over the effects' names stands here on purpose: it is the second reading of `effect`'s catalogue. An
 //! effect that it does not know makes [`Physics::read`] say so, and the rate error then counts as not verified.
 
+use std::sync::Arc;
+
 use crate::effect::Subject;
 use crate::effect::custom::Formula;
 use crate::rate::CoilModel;
+use crate::stress::Materials;
 use crate::thermal::{Extent, Location, Material};
 
 /// What the heat flows through and what the light sees, with every declared effect.
@@ -37,6 +40,8 @@ pub(super) struct Physics {
     pub asymmetries: Vec<f64>,
     pub surplus: Vec<Surplus>,
     pub biases: Vec<Bias>,
+    /// What the coil is made of, where its stress is to be worked out.
+    pub materials: Option<Arc<Materials>>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -111,6 +116,7 @@ impl Physics {
             asymmetries: Vec::new(),
             surplus: Vec::new(),
             biases: Vec::new(),
+            materials: None,
         };
         for effect in &model.effects {
             let (values, choices) = (effect.values(), effect.choices());
@@ -120,6 +126,7 @@ impl Physics {
                 (Subject::Formula(formula), ..) => {
                     p.biases.push(Bias::Formula { formula: formula.clone(), values: values.to_vec() });
                 }
+                (Subject::Materials(materials), ..) => p.materials = Some(materials.clone()),
                 (_, "finite_pack", _) => p.is_pack = true,
                 (_, "spool_mass", &[capacity, contact, mount]) => {
                     p.spool = Some(SpoolMass {
@@ -171,6 +178,7 @@ impl Physics {
     pub fn depends_on_temperature(&self) -> bool {
         let of_bias = |b: &Bias| matches!(b, Bias::Temperature { .. } | Bias::Formula { .. });
         !self.path_slopes_per_k.is_empty()
+            || self.materials.as_ref().is_some_and(|m| !m.is_constant())
             || self.mismatches.iter().any(|m| m.below.is_some())
             || self.biases.iter().any(of_bias)
     }

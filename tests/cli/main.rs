@@ -27,6 +27,7 @@ mod reproduce;
 mod resume;
 mod schemas;
 mod sinks;
+mod stress;
 mod terminal;
 mod ways;
 

@@ -21,6 +21,7 @@ const FLOORS: &[(&str, u8)] = &[
     ("profile", 1),
     ("record", 1),
     ("thermal", 2),
+    ("stress", 2),
     ("effect", 2),
     ("rate", 3),
     ("chamber", 4),
@@ -45,6 +46,7 @@ const FLOORS: &[(&str, u8)] = &[
 const SIBLING_EDGES: &[(&str, &str)] = &[
     ("numeric", "units"),
     ("effect", "thermal"),
+    ("effect", "stress"),
     ("diagnose", "chamber"),
     ("compare", "chamber"),
     ("predict", "chamber"),
@@ -175,7 +177,8 @@ fn a_new_effect_is_one_file_and_two_lines_beside_it() {
             .map(|two| two[0].line)
             .collect();
         // A third line gives it an address where built coils spread.
-        let is_in_catalogue = !["channel", "custom"].contains(&name) && !kinds_in(&source.tokens).is_empty();
+        let is_in_catalogue =
+            !["channel", "custom", "thermal_stress"].contains(&name) && !kinds_in(&source.tokens).is_empty();
         if is_in_catalogue && !(2..=3).contains(&lines.len()) {
             faults.push(format!("{name} stands on {} lines of {}", lines.len(), catalogue.name));
         }

@@ -15,4 +15,5 @@ mod nist_strd;
 mod pack;
 mod paper;
 mod records;
+mod stress;
 mod truth;

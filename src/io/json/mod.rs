@@ -21,6 +21,7 @@ pub mod scale_factor;
 pub mod schedule;
 pub mod schema;
 pub mod search;
+pub mod stress;
 pub mod temperatures;
 pub mod tolerance;
 pub mod trim;

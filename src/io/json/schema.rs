@@ -145,6 +145,7 @@ pub fn model_schema() -> Value {
             "production": production(),
             "tolerance": tolerance(),
             "boundary": super::boundary::schema(),
+            "materials": super::stress::schema(),
         }),
     ))
 }
@@ -482,6 +483,7 @@ mod tests {
             "production",
             "tolerance",
             "boundary",
+            "materials",
         ] {
             assert_eq!(keys(&schema["properties"][name]), known(&format!("[{name}]")), "{name}");
         }

@@ -10,6 +10,7 @@ pub mod effect_tables;
 mod field_columns;
 pub mod field_file;
 mod kind_of_file;
+pub mod materials_table;
 pub mod model_file;
 pub mod pattern_file;
 pub mod plausibility;

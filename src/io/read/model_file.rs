@@ -19,6 +19,7 @@ use crate::units::{m_from_mm, m_from_nm, m_from_um, um_from_m};
 use super::boundary_table::read_boundary;
 use super::effect_tables::read_effects;
 use super::kind_of_file::FileKind;
+use super::materials_table::{made_of, read_materials};
 use super::pattern_file::{ResolveError, resolve_pattern};
 use super::production_table::read_production;
 use super::profile_tables::{read_profiles, too_many_ramps};
@@ -75,6 +76,7 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
     let mut tolerance_table = root.table(r, "tolerance");
     let mut record_table = root.table(r, "record");
     let mut boundary_table = root.table(r, "boundary");
+    let mut materials_table = root.table(r, "materials");
     root.finish(r);
 
     let fibre = read_fibre(r, &mut fibre_table);
@@ -99,6 +101,9 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
     let rate_mean_s = sensor.number(r, "rate_mean_s", Limits::between(0.0, 1e5)).unwrap_or(0.0);
     sensor.finish(r);
     let effects = read_effects(r, effect_tables);
+    let has_materials = materials_table.is_present();
+    let materials = read_materials(r, &mut materials_table);
+    materials_table.finish(r);
     let has_profiles = profiles_table.is_present();
     let profiles = read_profiles(r, &mut profiles_table);
     profiles_table.finish(r);
@@ -128,6 +133,10 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
             effects: effects?,
         })
     })();
+    let whole = match &materials {
+        Some(stated) => whole.and_then(|model| made_of(r, stated, &model)),
+        None => whole.filter(|_| !has_materials),
+    };
     if let Some(model) = &whole {
         check_whole(r, model, thermal_span);
         check_layers(r, model, source);
@@ -166,6 +175,7 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
             advice,
             stated_length_m,
             learned,
+            own_materials: materials.map_or_else(Vec::new, |stated| stated.own),
         }
     });
     reader.finish(value)

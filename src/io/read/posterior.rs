@@ -62,7 +62,7 @@ pub fn drawn_models(
 }
 
 /// The effects of one set at values drawn from their covariance. What the design has beside the set, such as a film that
-/// was learned, stays; what it has in the place of another member of the set does not.
+/// was learned or the stress of its materials, stays; what it has in the place of another member of the set does not.
 fn drawn_effects(share: &ShareJson, design: &CoilModel, draw: &mut impl FnMut() -> f64) -> Option<Vec<DeclaredEffect>> {
     let mut effects: Vec<DeclaredEffect> = Vec::with_capacity(share.members.len());
     for member in &share.members {
@@ -83,6 +83,12 @@ fn drawn_effects(share: &ShareJson, design: &CoilModel, draw: &mut impl FnMut() 
         && !effects.iter().any(|e| e.is_at(effect::FILM))
     {
         effects.push(film.clone());
+    }
+    let of_materials = |e: &&DeclaredEffect| e.spec().kind == effect::THERMAL_STRESS.kind;
+    if let Some(stress) = design.effects.iter().find(of_materials)
+        && !effects.iter().any(|e| of_materials(&e))
+    {
+        effects.push(stress.clone());
     }
     Some(effects)
 }

@@ -148,6 +148,11 @@ impl<'d> TableReader<'d> {
         self.has(key)
     }
 
+    /// What stands behind a key.
+    pub fn raw(&self, key: &str) -> Option<&'d Item> {
+        self.table?.get(key)
+    }
+
     pub fn keys(&self) -> Vec<String> {
         self.table.map(|t| t.iter().map(|(k, _)| k.to_owned()).collect()).unwrap_or_default()
     }

@@ -33,7 +33,7 @@ pub fn with_effect(file: &str, source: &str, effect: &DeclaredEffect, remarks: &
         let same_kind = t.get("kind").and_then(Item::as_str) == Some(kind.as_str());
         let same_formula = match effect.subject() {
             Subject::Formula(f) => t.get("formula").and_then(Item::as_str) == Some(f.expression().source()),
-            Subject::None | Subject::Channel(_) => true,
+            Subject::None | Subject::Channel(_) | Subject::Materials(_) => true,
         };
         same_kind && same_formula
     };
