@@ -5,8 +5,10 @@ use thiserror::Error;
 /// The fibre's optical properties.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fibre {
-    /// n, of the guided mode.
+    /// n, the phase index of the guided mode.
     pub refractive_index: f64,
+    /// n_g, with which light travels; None: the phase index, as in the paper.
+    pub group_index: Option<f64>,
     /// dn/dT.
     pub thermo_optic_per_k: f64,
     /// α, in n·α; 0 gives the paper's Eq. (4).
@@ -17,6 +19,11 @@ pub struct Fibre {
 }
 
 impl Fibre {
+    /// n_g: how long light takes, and so by how much the two beams meet a change at different times.
+    pub fn transit_index(&self) -> f64 {
+        self.group_index.unwrap_or(self.refractive_index)
+    }
+
     /// κ = dn/dT + n·α, the change of optical path per metre and kelvin (paper, Eq. 2).
     pub fn path_per_k(&self) -> f64 {
         self.thermo_optic_per_k + self.refractive_index * self.thermal_expansion_per_k

@@ -1,14 +1,14 @@
 //! The rate error of a coil: the readable reference that every fast path is tested against.
 //!
 //! ```text
-//! Ω = n/(L D) · { Σ_j κ_j Ṫ_j w_j + 2 Σ_j κ_j d_j l_j² m_j } · gain + lead + outside
+//! Ω = n_g/(L D) · { Σ_j κ_j Ṫ_j w_j + 2 Σ_j κ_j d_j l_j² m_j } · gain + lead + outside
 //! w_j = ∫_segment (2z − L) dz = l_j (2 z̄_j − L)
 //! ```
 //!
 //! | symbol | meaning | unit | in code |
 //! |---|---|---|---|
 //! | Ω | rate error, positive as written | rad/s | `rate_error_rad_per_s` |
-//! | n, κ | refractive index, path per kelvin | 1, 1/K | `Fibre` |
+//! | n_g, κ | group index (the phase index where none is stated), path per kelvin | 1, 1/K | `Fibre` |
 //! | L, D | fibre length, mean coil diameter | m | `Coil` |
 //! | Ṫ_j | rate of the layer's axial mean temperature | K/s | `PackState::rates_k_per_s` |
 //! | m_j | first axial moment of the rate | K/s | `PackState::axial_moments_k_per_s` |
@@ -259,9 +259,9 @@ impl RateModel {
         &self.weights
     }
 
-    /// n/(L D) [1/m²].
+    /// n_g/(L D) [1/m²].
     pub fn scale_per_m2(&self) -> f64 {
-        self.coil.fibre().refractive_index / (self.coil.length_m() * self.coil.mean_diameter_m())
+        self.coil.fibre().transit_index() / (self.coil.length_m() * self.coil.mean_diameter_m())
     }
 
     /// κ times the effects' factors [1/K].
@@ -368,10 +368,10 @@ impl RateModel {
             / (self.coil.fibre().wavelength_m * LIGHT_SPEED_M_PER_S)
     }
 
-    /// The hard bound n κ k0 L/(4D) on |Ω| of the coil alone while all layer rates lie between 0 and `rate_k_per_s`.
+    /// The hard bound n_g κ k0 L/(4D) on |Ω| of the coil alone while all layer rates lie between 0 and `rate_k_per_s`.
     pub fn hard_bound_rad_per_s(&self, rate_k_per_s: f64) -> f64 {
         let fibre = self.coil.fibre();
-        fibre.refractive_index * fibre.path_per_k() * rate_k_per_s * self.coil.length_m()
+        fibre.transit_index() * fibre.path_per_k() * rate_k_per_s * self.coil.length_m()
             / (4.0 * self.coil.mean_diameter_m())
     }
 

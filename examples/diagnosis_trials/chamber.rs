@@ -35,6 +35,7 @@ pub fn declared(index: usize, extent: Extent) -> Result<(CoilModel, Pattern), Bo
         fibre: Fibre {
             refractive_index: 1.45,
             thermo_optic_per_k: 1e-5,
+            group_index: None,
             thermal_expansion_per_k: 0.0,
             wavelength_m: 1.55e-6,
             outer_diameter_m: pitch_m,

@@ -16,7 +16,9 @@ from ._pattern import Pattern
 
 _TABLES = {
     "fibre": (
+        "library",
         "refractive_index",
+        "group_index",
         "thermo_optic_per_k",
         "thermal_expansion_per_k",
         "wavelength_nm",

@@ -12,6 +12,7 @@ mod evaluate;
 mod exact;
 mod explore;
 mod extend;
+mod fibres;
 mod former;
 mod improve;
 mod man;
@@ -105,6 +106,7 @@ enum Command {
     Exact(exact::Arguments),
     Explore(explore::Arguments),
     Effects(effects::Arguments),
+    Fibres(fibres::Arguments),
     Materials(materials::Arguments),
     Stress(stress::Arguments),
     Potting(potting::Arguments),
@@ -239,6 +241,7 @@ fn carry_out(command: &Command, screen: &Screen) -> Result<Ending, CliError> {
         Command::Exact(arguments) => exact::run(arguments, screen),
         Command::Explore(arguments) => explore::run(arguments, screen),
         Command::Effects(arguments) => effects::run(arguments, screen),
+        Command::Fibres(arguments) => fibres::run(arguments, screen),
         Command::Materials(arguments) => materials::run(arguments, screen),
         Command::Stress(arguments) => stress::run(arguments, screen),
         Command::Potting(arguments) => potting::run(arguments, screen),

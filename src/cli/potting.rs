@@ -13,7 +13,7 @@ use crate::task::stress::{PottingRequest, potting};
 /// Adhesives and spools in the order of the worst rate error that the best winding has with them
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  coilwright potting coil.toml\n  coilwright potting coil.toml --spools --pattern best.toml"
+    after_help = "Examples:\n  coilwright potting potted.toml\n  coilwright potting potted.toml --spools --pattern qua"
 )]
 pub struct Arguments {
     /// The model file, with [materials]

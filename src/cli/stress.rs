@@ -15,7 +15,7 @@ use crate::units::kelvin_from_celsius;
 /// Thermal strain of every layer from the model's materials, and what it makes of windings
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  coilwright stress coil.toml\n  coilwright stress coil.toml --at -40 --at 20 --at 70 --pattern qua"
+    after_help = "Examples:\n  coilwright stress potted.toml\n  coilwright stress potted.toml --at -40 --at 20 --at 70 --pattern qua"
 )]
 pub struct Arguments {
     /// The model file, with [materials]

@@ -9,6 +9,7 @@ use crate::thermal::{DEFAULT_CELLS_PER_LAYER, Extent, Location, Material};
 const USUAL_FIBRE: Fibre = Fibre {
     refractive_index: 1.447,
     thermo_optic_per_k: 1.35e-5,
+    group_index: None,
     thermal_expansion_per_k: 0.0,
     wavelength_m: 1.3e-6,
     outer_diameter_m: 250e-6,

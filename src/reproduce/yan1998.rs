@@ -201,6 +201,7 @@ pub fn model_of_layers(length_m: f64, layers: usize) -> Result<CoilModel, CoilEr
     let fibre = Fibre {
         refractive_index: 1.447,
         thermo_optic_per_k: 1.35e-5,
+        group_index: None,
         thermal_expansion_per_k: 0.0,
         wavelength_m: m_from_nm(1300.0),
         outer_diameter_m: diameter_m,

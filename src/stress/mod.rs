@@ -23,6 +23,7 @@
 //! (2004).
 
 pub mod cell;
+pub mod fibres;
 pub mod library;
 pub mod material;
 pub mod ring;
@@ -73,23 +74,28 @@ impl Materials {
             && self.spool.as_ref().is_none_or(|s| s.material.is_constant())
     }
 
-    fn rings(&self, temperature_k: f64, with_adhesive_to_m: Option<f64>) -> Vec<Ring> {
-        let glass = (&self.fibre.glass, self.fibre.glass_radius_m);
-        let coatings = self.fibre.coatings.iter().map(|(m, radius_m)| (m, *radius_m));
-        let adhesive = with_adhesive_to_m.map(|radius_m| (&self.adhesive, radius_m));
-        std::iter::once(glass)
+    fn rings(&self, temperature_k: f64, cell_radius_m: f64) -> Vec<Ring> {
+        let mut rings = self.fibre.rings(temperature_k);
+        rings.push(Ring { outer_radius_m: cell_radius_m, material: self.adhesive.at(temperature_k) });
+        rings
+    }
+}
+
+impl CoatedFibre {
+    fn rings(&self, temperature_k: f64) -> Vec<Ring> {
+        let coatings = self.coatings.iter().map(|(m, radius_m)| (m, *radius_m));
+        std::iter::once((&self.glass, self.glass_radius_m))
             .chain(coatings)
-            .chain(adhesive)
             .map(|(m, outer_radius_m)| Ring { outer_radius_m, material: m.at(temperature_k) })
             .collect()
     }
 
     /// The coated fibre by itself, nothing holding it.
-    pub fn free_fibre(&self, fibre: &Fibre, temperature_k: f64) -> FreeFibre {
-        let cell = Cell::new(self.fibre.hole_radius_m, &self.rings(temperature_k, None));
+    pub fn free_fibre(&self, optics: &Fibre, temperature_k: f64) -> FreeFibre {
+        let cell = Cell::new(self.hole_radius_m, &self.rings(temperature_k));
         let (axial, transverse) = cell.moduli.free_expansion_per_k();
         let strain = Strain { hoop: axial, radial: transverse, axial: transverse };
-        FreeFibre { expansion_per_k: axial, path_per_k: self.path_change(fibre, &cell, &strain, 1.0).path }
+        FreeFibre { expansion_per_k: axial, path_per_k: self.path_change(optics, &cell, &strain, 1.0).path }
     }
 
     fn path_change(&self, fibre: &Fibre, cell: &Cell, strain: &Strain, change_k: f64) -> LayerChange {
@@ -98,7 +104,7 @@ impl Materials {
             + glass.per_axial * strain.hoop
             + glass.per_k * change_k;
         let free = cell.glass_expansion_per_k * change_k;
-        let (n, p11, p12) = (fibre.refractive_index, self.fibre.p11, self.fibre.p12);
+        let (n, p11, p12) = (fibre.refractive_index, self.p11, self.p12);
         let index = 0.5 * n.powi(3) * ((p11 + p12) * (across - free) + p12 * (strain.hoop - free));
         LayerChange {
             strain: *strain,
@@ -166,7 +172,7 @@ impl PackStress {
     fn node(&self, place: usize) -> &Cell {
         self.cells[place].get_or_init(|| {
             let temperature_k = COLDEST_K + place as f64 * CELL_STEP_K;
-            let rings = self.materials.rings(temperature_k, Some(self.cell_radius_m));
+            let rings = self.materials.rings(temperature_k, self.cell_radius_m);
             Cell::new(self.materials.fibre.hole_radius_m, &rings)
         })
     }
@@ -211,7 +217,7 @@ impl PackStress {
         let strains = ring.strains(&loads);
         let own = strains[usize::from(with_spool)..].iter().zip(temperatures_k).zip(changes_k);
         own.map(|((strain, &temperature_k), &change_k)| {
-            self.materials.path_change(&self.fibre, &self.cell(temperature_k), strain, change_k)
+            self.materials.fibre.path_change(&self.fibre, &self.cell(temperature_k), strain, change_k)
         })
         .collect()
     }

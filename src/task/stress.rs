@@ -41,7 +41,7 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<StressJson, Tas
     for &temperature_k in request.temperatures_k {
         let layers = stress.per_kelvin(temperature_k);
         let paths: Vec<f64> = layers.iter().map(|layer| layer.path).collect();
-        let free = materials.free_fibre(coil.fibre(), temperature_k);
+        let free = materials.fibre.free_fibre(coil.fibre(), temperature_k);
         let of_patterns = patterns.iter().map(|named| {
             let steady = Steady::new(&file.model, &named.pattern, &paths)?;
             Ok(PatternStressJson {
@@ -93,7 +93,7 @@ impl Steady {
         let (length_m, diameter_m) = (coil.length_m(), coil.mean_diameter_m());
         let mean = paths.iter().zip(coil.layer_lengths_m()).map(|(p, l)| p * l).sum::<f64>() / length_m;
         Ok(Self {
-            rate_per_k: coil.fibre().refractive_index / (length_m * diameter_m) * sum,
+            rate_per_k: coil.fibre().transit_index() / (length_m * diameter_m) * sum,
             mismatch: 4.0 * sum / (mean * length_m * length_m),
         })
     }

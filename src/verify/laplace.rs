@@ -205,6 +205,7 @@ pub(super) mod tests {
         let fibre = Fibre {
             refractive_index: 1.45,
             thermo_optic_per_k: 1e-5,
+            group_index: None,
             thermal_expansion_per_k: 0.0,
             wavelength_m: 1.55e-6,
             outer_diameter_m: 165e-6,

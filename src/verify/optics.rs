@@ -76,7 +76,8 @@ impl Optics {
         let diameter_m = 2.0 * bore_m + segments.len() as f64 * pitch_m;
         Self {
             kappa_per_k: fibre.thermo_optic_per_k + fibre.refractive_index * fibre.thermal_expansion_per_k,
-            scale_per_m2: fibre.refractive_index / (length_m * diameter_m),
+            // The beams meet a change at times that differ by n_g (2z − L)/c.
+            scale_per_m2: fibre.group_index.unwrap_or(fibre.refractive_index) / (length_m * diameter_m),
             lengths_m: lengths_m.to_vec(),
             weights_m2,
             axial_m2,

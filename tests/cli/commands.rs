@@ -173,3 +173,25 @@ fn optimise_says_what_a_former_pattern_costs_and_whether_the_best_one_changed() 
     assert_eq!((code(&refused), stdout(&refused)), (2, ""));
     assert!(stderr(&refused).contains("holds no best.toml"), "{}", stderr(&refused));
 }
+
+#[test]
+fn a_group_index_scales_every_rate_error_by_how_much_longer_light_takes() {
+    let plain = std::fs::read_to_string(super::root().join("examples/paper-200m.toml")).unwrap();
+    let text = plain.replacen("refractive_index = 1.447", "refractive_index = 1.447\ngroup_index = 1.468", 1);
+    assert_ne!(text, plain);
+    let (folder, path) = super::folder_with("group.toml", text);
+    let model = path.display().to_string();
+    let worst = |model: &str| super::json(&["evaluate", model, "--pattern", "qua"])["patterns"][0].clone();
+    let (with, without) = (worst(&model), worst("examples/paper-200m.toml"));
+    for key in ["worst_rate_deg_per_h", "worst_phase_rad"] {
+        let ratio = with[key].as_f64().unwrap() / without[key].as_f64().unwrap();
+        assert!((ratio * 1.447 / 1.468 - 1.0).abs() < 1e-9, "{key} {ratio}");
+    }
+    // The second solution knows it too.
+    for arguments in
+        [["schedule", &model, "--pattern", "qua", "-o", "out"].as_slice(), &["verify", &model, "out/schedule.json"]]
+    {
+        let done = super::run_in(folder.path(), arguments);
+        assert_eq!(super::code(&done), 0, "{}{}", String::from_utf8_lossy(&done.stdout), super::stderr(&done));
+    }
+}

@@ -62,6 +62,7 @@ fn prepare(folder: &Path) {
     let coil = read("examples/paper-200m.toml").replace("count = 64", "count = 2");
     write(folder, "examples/paper-200m.toml", &coil);
     let spread = "\n[tolerance]\nturns_per_layer_sd = 0.3\nsamples = 5\n";
+    write(folder, "potted.toml", &read("examples/stress-coil.toml").replace("count = 16", "count = 2"));
     write(folder, "my-coil.toml", &(coil.replace("\"paper\"", "\"warm-up\"") + spread));
     write(folder, "patterns/qua-12.toml", &read("patterns/qua-12.toml"));
     write(folder, "results/my-coil/best.toml", &read("patterns/searched-standard-12.toml"));

@@ -57,6 +57,8 @@ const WAYS: &[(&str, &[&str])] = &[
     ("model.toml", &["extend", "model.toml", "--effect", "spool_mass", "-o", "out/extended.toml"]),
     ("model.toml", &["explore", "model.toml", "-o", "out/explorer.html"]),
     ("pattern.toml", &["explore", "model.toml", "pattern.toml", "-o", "out/explorer.html"]),
+    ("stressed.toml", &["stress", "stressed.toml", "--at", "-40", "--format", "json"]),
+    ("stressed.toml", &["potting", "stressed.toml", "--pattern", "qua", "--format", "json"]),
     ("model.toml", &["report", "run"]),
     ("model.toml", &["trim", "model.toml", "record.csv", "--format", "json"]),
     ("record.csv", &["trim", "model.toml", "record.csv"]),
@@ -118,6 +120,22 @@ const WAYS: &[(&str, &[&str])] = &[
     ),
 ];
 
+const MATERIALS: &str = r#"
+[materials]
+adhesive = "mine"
+spool = "invar"
+spool_thickness_mm = 2.0
+[materials.fibre]
+glass = "silica-over-temperature"
+glass_diameter_um = 80.0
+coatings = [{ material = "acrylate-soft", outer_diameter_um = 125.0 }, { material = "acrylate-hard", outer_diameter_um = 165.0 }]
+[[materials.own]]
+name = "mine"
+youngs_modulus_mpa = { glassy = 2100.0, rubbery = 12.0, transition_c = 18.0, width_k = 6.0 }
+bulk_modulus_mpa = 3000.0
+expansion_per_k = [[-40.0, 7.0e-5], [30.0, 1.9e-4]]
+"#;
+
 const MODEL: &str = r#"
 name = "small coil"
 [fibre]
@@ -166,6 +184,7 @@ bad_rows = "refuse"
 pub(super) fn bench(folder: &Path) {
     let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
     write("model.toml", MODEL);
+    write("stressed.toml", &format!("{MODEL}{MATERIALS}"));
     write("pattern.toml", "name = \"p\"\nlayers = 4\nsegments = [2, 3, 4, 1]\n");
     write(
         "campaign.toml",

@@ -42,7 +42,11 @@ pub const COMMANDS: &[(&str, Way)] = &[
     ("diagnose", Way::Slow(diagnose)),
     ("improve", Way::Slow(improve)),
     ("trim", Way::Slow(|b| drop(b.run(&["trim", "model.toml", "record.csv", "--format", "json"])))),
+    ("stress", Way::Quick(stress)),
+    ("potting", Way::Quick(potting)),
     ("effects", Way::None),
+    ("materials", Way::None),
+    ("fibres", Way::None),
     ("patterns", Way::None),
     ("reproduce", Way::None),
     ("schema", Way::None),
@@ -166,6 +170,35 @@ fn evaluate(b: &Bench) {
     b.is_name(&found["patterns"][0]["worst_profile"]);
     let ramps = toml(&b.read("out/bang-bang.toml"))["profiles"]["ramp"].clone();
     b.is_name(&ramps[0]["name"]);
+}
+
+/// The model with a material of its own by that name.
+fn stressed(b: &Bench) {
+    let q = quoted(&b.name);
+    let materials = format!(
+        "[materials]\nadhesive = {q}\n[materials.fibre]\nglass = \"silica\"\nglass_diameter_um = 80.0\n\
+         coatings = [{{ material = \"acrylate-hard-glassy\", outer_diameter_um = 165.0 }}]\n[[materials.own]]\nname = {q}\n\
+         youngs_modulus_mpa = 3000.0\npoisson_ratio = 0.35\nexpansion_per_k = 6e-5\nsource = {q}\n"
+    );
+    b.write("stressed.toml", &(model(&b.name) + &materials));
+}
+
+fn stress(b: &Bench) {
+    stressed(b);
+    b.done(&["stress", "stressed.toml"]);
+    let found = b.json(&["stress", "stressed.toml", "--pattern", "pattern.toml"]);
+    b.is_name(&found["model"]);
+    b.is_name(&found["temperatures"][0]["patterns"][0]["name"]);
+}
+
+fn potting(b: &Bench) {
+    stressed(b);
+    b.done(&["potting", "stressed.toml"]);
+    let found = b.json(&["potting", "stressed.toml", "--pattern", "pattern.toml"]);
+    let choices = found["choices"].as_array().unwrap();
+    b.is_name(&choices.iter().find(|c| c["is_declared"] == true).unwrap()["adhesive"]);
+    b.is_name(&choices[0]["best_pattern"]);
+    b.is_name(&choices[0]["worst_profile"]);
 }
 
 fn exact(b: &Bench) {

@@ -63,6 +63,7 @@ fn cases(halves: std::ops::RangeInclusive<usize>) -> impl Strategy<Value = Case>
         let fibre = Fibre {
             refractive_index: 1.45,
             thermo_optic_per_k: 1.0e-5,
+            group_index: None,
             thermal_expansion_per_k: 0.5e-6,
             wavelength_m: 1550e-9,
             outer_diameter_m: radial_pitch_m,

@@ -72,6 +72,7 @@ fn unit_model(layers: usize) -> CoilModel {
     let fibre = Fibre {
         refractive_index: 1.0,
         thermo_optic_per_k: 1.0,
+        group_index: None,
         thermal_expansion_per_k: 0.0,
         wavelength_m: 1300e-9,
         outer_diameter_m: pitch_m,

@@ -21,6 +21,7 @@ fn model() -> CoilModel {
     let fibre = Fibre {
         refractive_index: 1.4445,
         thermo_optic_per_k: 8.4e-6,
+        group_index: None,
         thermal_expansion_per_k: 0.55e-6,
         wavelength_m: 1550e-9,
         outer_diameter_m: 165e-6,

@@ -25,6 +25,7 @@ fn coil(layers: usize, pitch_m: f64, bore_m: f64) -> Coil {
     let fibre = Fibre {
         refractive_index: 1.45,
         thermo_optic_per_k: 1.0e-5,
+        group_index: None,
         thermal_expansion_per_k: 0.0,
         wavelength_m: 1550e-9,
         outer_diameter_m: pitch_m,

@@ -17,6 +17,7 @@ pub fn paper_model(length_m: f64, diffusivity_m2_per_s: f64) -> CoilModel {
     let fibre = Fibre {
         refractive_index: 1.447,
         thermo_optic_per_k: 1.35e-5,
+        group_index: None,
         thermal_expansion_per_k: 0.0,
         wavelength_m: 1300e-9,
         outer_diameter_m: 250e-6,

@@ -19,6 +19,7 @@ fn fibre(refractive_index: f64, thermo_optic_per_k: f64, outer_um: f64) -> Fibre
     Fibre {
         refractive_index,
         thermo_optic_per_k,
+        group_index: None,
         thermal_expansion_per_k: 0.0,
         wavelength_m: 1.55e-6,
         outer_diameter_m: outer_um * 1e-6,
@@ -179,9 +180,8 @@ const SOLID_INDEX: f64 = 1.468;
 
 /// κ at a temperature of coated and bare fibres by themselves, in the library's materials.
 fn free_path(index: f64, index_per_k: f64, made: &CoatedFibre, celsius: f64) -> f64 {
-    let materials = Materials { fibre: made.clone(), adhesive: named("epoxy"), spool: None };
     let outer_um = 2e6 * made.coatings.last().map_or(made.glass_radius_m, |(_, r)| *r);
-    materials.free_fibre(&fibre(index, index_per_k, outer_um), kelvin_from_celsius(celsius)).path_per_k
+    made.free_fibre(&fibre(index, index_per_k, outer_um), kelvin_from_celsius(celsius)).path_per_k
 }
 
 #[test]

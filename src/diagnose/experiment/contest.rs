@@ -164,6 +164,7 @@ pub(in crate::diagnose) mod tests {
         let fibre = Fibre {
             refractive_index: 1.45,
             thermo_optic_per_k: 1.0e-5,
+            group_index: None,
             thermal_expansion_per_k: 0.0,
             wavelength_m: 1550e-9,
             outer_diameter_m: 330e-6,

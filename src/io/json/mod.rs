@@ -8,6 +8,7 @@ pub mod diagnosis;
 pub mod effects;
 pub mod experiment;
 pub mod explore;
+pub mod fibres;
 pub mod field;
 pub mod fleet;
 pub mod further_schemas;

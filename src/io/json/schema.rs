@@ -51,17 +51,6 @@ pub(super) fn with_dialect(mut schema: Value) -> Value {
 /// The schema of a model file.
 pub fn model_schema() -> Value {
     let windings: Vec<&str> = Classic::ALL.iter().map(|c| c.key()).collect();
-    let fibre = table(
-        "fibre",
-        &["refractive_index", "thermo_optic_per_k", "wavelength_nm", "outer_diameter_um"],
-        json!({
-            "refractive_index": described("number", "of the guided mode"),
-            "thermo_optic_per_k": described("number", "dn/dT"),
-            "thermal_expansion_per_k": described("number", "alpha in dn/dT + n·alpha; 0 leaves it out"),
-            "wavelength_nm": described("number", "of the light in vacuum"),
-            "outer_diameter_um": described("number", "over the coating"),
-        }),
-    );
     let winding = table(
         "winding",
         &["layers", "layer_length"],
@@ -134,7 +123,7 @@ pub fn model_schema() -> Value {
         &["name", "fibre", "winding", "thermal"],
         json!({
             "name": name("of the coil, on every answer and page"),
-            "fibre": fibre,
+            "fibre": super::fibres::schema(),
             "winding": winding,
             "thermal": thermal,
             "sensor": sensor,

@@ -6,14 +6,12 @@ use toml_edit::{Item, Value};
 
 use crate::io::fault::Fault;
 use crate::rate::CoilModel;
+use crate::stress::fibres::{FibreEntry, STRAIN_OPTIC};
 use crate::stress::material::{COLDEST_K, Compression, HOTTEST_K, Material, Property};
 use crate::stress::{CoatedFibre, Materials, Spool, library};
 use crate::units::{celsius_from_kelvin, kelvin_from_celsius, m_from_mm, m_from_um, mm_from_m, pa_from_mpa, um_from_m};
 
 use super::toml_reader::{Limits, TableReader, TomlReader, nearest};
-
-/// Of silica fibre: Bertholds and Dändliker, J. Lightwave Technol. 6, 17 (1988).
-pub const STRAIN_OPTIC: (f64, f64) = (0.113, 0.252);
 
 /// Two micrometres that are the same may differ by so much.
 const DIAMETER_ROUNDING: f64 = 1e-6;
@@ -30,8 +28,12 @@ pub(super) struct Stated {
     surface_span: Option<Range<usize>>,
 }
 
-/// The `[materials]` table, if there is one.
-pub(super) fn read_materials(r: &mut TomlReader, table: &mut TableReader) -> Option<Stated> {
+/// The `[materials]` table, if there is one; a fibre of the library need not be described again.
+pub(super) fn read_materials(
+    r: &mut TomlReader,
+    table: &mut TableReader,
+    of_library: Option<&FibreEntry>,
+) -> Option<Stated> {
     let before = r.fault_count();
     let own = read_own(r, table);
     let span = table.span();
@@ -56,9 +58,11 @@ pub(super) fn read_materials(r: &mut TomlReader, table: &mut TableReader) -> Opt
         let message = "materials.spool_thickness_mm is that of materials.spool, which is missing: state its material too, or leave both out for a pack that stands by itself";
         r.fault(Fault::new(message, spool_span.clone()));
     }
-    let mut fibre_table = if is_present { table.needed_table(r, "fibre") } else { table.table(r, "fibre") };
+    let is_of_library = of_library.is_some() && !table.has("fibre");
+    let mut fibre_table =
+        if is_present && !is_of_library { table.needed_table(r, "fibre") } else { table.table(r, "fibre") };
     let surface_span = fibre_table.span_of("coatings").or_else(|| fibre_table.span());
-    let glass = named(r, &mut fibre_table, "glass", is_present);
+    let glass = named(r, &mut fibre_table, "glass", is_present && !is_of_library);
     let diameter = Limits::between(1.0, 5_000.0);
     let glass_diameter_um = fibre_table.needed_number(r, "glass_diameter_um", diameter);
     let hole_diameter_um = fibre_table.number(r, "hole_diameter_um", Limits::between(0.0, 5_000.0)).unwrap_or(0.0);
@@ -93,8 +97,9 @@ pub(super) fn read_materials(r: &mut TomlReader, table: &mut TableReader) -> Opt
     if !is_present || r.fault_count() > before {
         return None;
     }
-    let materials = Materials {
-        fibre: CoatedFibre {
+    let fibre = match of_library.filter(|_| is_of_library) {
+        Some(entry) => entry.made_of()?,
+        None => CoatedFibre {
             glass: glass?,
             glass_radius_m: m_from_um(0.5 * glass_diameter_um?),
             hole_radius_m: m_from_um(0.5 * hole_diameter_um),
@@ -102,6 +107,9 @@ pub(super) fn read_materials(r: &mut TomlReader, table: &mut TableReader) -> Opt
             p11,
             p12,
         },
+    };
+    let materials = Materials {
+        fibre,
         adhesive: adhesive?,
         spool: spool.zip(thickness_mm).map(|(material, mm)| Spool { material, thickness_m: m_from_mm(mm) }),
     };

@@ -7,6 +7,7 @@ pub mod boundary_table;
 pub mod campaign_file;
 pub mod csv_rows;
 pub mod effect_tables;
+mod fibre_table;
 mod field_columns;
 pub mod field_file;
 mod kind_of_file;

@@ -14,10 +14,11 @@ use crate::pattern::windability::WindabilityClass;
 use crate::rate::CoilModel;
 use crate::search::cost::objective::Objective;
 use crate::thermal::{self, DEFAULT_CELLS_PER_LAYER, Extent, Location, Material};
-use crate::units::{m_from_mm, m_from_nm, m_from_um, um_from_m};
+use crate::units::{m_from_mm, m_from_um, um_from_m};
 
 use super::boundary_table::read_boundary;
 use super::effect_tables::read_effects;
+use super::fibre_table::read_fibre;
 use super::kind_of_file::FileKind;
 use super::materials_table::{made_of, read_materials};
 use super::pattern_file::{ResolveError, resolve_pattern};
@@ -79,7 +80,8 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
     let mut materials_table = root.table(r, "materials");
     root.finish(r);
 
-    let fibre = read_fibre(r, &mut fibre_table);
+    let has_materials = materials_table.is_present();
+    let (fibre, of_library) = read_fibre(r, &mut fibre_table, has_materials);
     fibre_table.finish(r);
     let layers = read_layers(r, &mut winding);
     let coil = read_coil(r, &mut winding, layers, fibre);
@@ -101,8 +103,7 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
     let rate_mean_s = sensor.number(r, "rate_mean_s", Limits::between(0.0, 1e5)).unwrap_or(0.0);
     sensor.finish(r);
     let effects = read_effects(r, effect_tables);
-    let has_materials = materials_table.is_present();
-    let materials = read_materials(r, &mut materials_table);
+    let materials = read_materials(r, &mut materials_table, of_library);
     materials_table.finish(r);
     let has_profiles = profiles_table.is_present();
     let profiles = read_profiles(r, &mut profiles_table);
@@ -191,21 +192,6 @@ fn span_in(source: &str, key: &str) -> Option<Range<usize>> {
         start += line.len();
     }
     None
-}
-
-fn read_fibre(r: &mut TomlReader, table: &mut TableReader) -> Option<Fibre> {
-    let refractive_index = table.needed_number(r, "refractive_index", Limits::between(1.0, 4.0));
-    let thermo_optic_per_k = table.needed_number(r, "thermo_optic_per_k", Limits::between(-1e-3, 1e-3));
-    let thermal_expansion_per_k = table.number(r, "thermal_expansion_per_k", Limits::between(-1e-3, 1e-3));
-    let wavelength_nm = table.needed_number(r, "wavelength_nm", Limits::between(200.0, 10_000.0));
-    let outer_diameter_um = table.needed_number(r, "outer_diameter_um", Limits::between(10.0, 5_000.0));
-    Some(Fibre {
-        refractive_index: refractive_index?,
-        thermo_optic_per_k: thermo_optic_per_k?,
-        thermal_expansion_per_k: thermal_expansion_per_k.unwrap_or(0.0),
-        wavelength_m: m_from_nm(wavelength_nm?),
-        outer_diameter_m: m_from_um(outer_diameter_um?),
-    })
 }
 
 /// The most layers that a model may have: matrices grow with the square.
