@@ -47,7 +47,8 @@ pub fn write_chapter(folder: &Path) -> Result<(), Box<dyn Error>> {
 
 const HEAD: &str = "# Effects
 
-One piece of physics each. A model file names the ones that it includes; `diagnose` tries the others against a record. Each picture
+One piece of physics each. A model file names the ones that it includes; `diagnose` tries the others against a record, but for
+housings, a spool's flanges and conduction, and an unsteady start, which are fitted where they are declared or asked for. Each picture
 shows what the effect adds to the rate error of one coil, a quadrupole of twelve layers (24 m of fibre between radii of 40 mm and
 42 mm), whose outermost layer warms for ten minutes at 1 °C/min, rests, cools as fast, and rests: the error with the effect less the
 error without it, with the parameters from which a fit starts. This chapter and its pictures are written by

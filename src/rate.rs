@@ -100,7 +100,7 @@ impl CoilModel {
     /// Whether the outermost layer follows the drive at once, with no film of air between them: the first instant of a
     /// ramp then heats that layer alone, and windings that put the same pieces of fibre there tie.
     pub fn prescribes_outermost_layer(&self) -> bool {
-        self.location == Location::OuterLayer && self.heat_path().is_ok_and(|path| path.film_w_per_m2_k.is_none())
+        self.heat_path().is_ok_and(|path| path.location == Location::OuterLayer && path.film_w_per_m2_k.is_none())
     }
 
     /// The sensor's lag behind what it is attached to \[s\]; several lags add.

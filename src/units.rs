@@ -205,16 +205,19 @@ pub enum Unit {
     PerKelvin,
     Second,
     Metre,
+    Millimetre,
     Celsius,
     Kelvin,
     WattPerSquareMetre,
     WattPerSquareMetreKelvin,
+    WattPerMetreKelvin,
     JoulePerSquareMetreKelvin,
     DegPerHour,
     DegPerHourPerKelvin,
     DegPerHourPerSquareKelvin,
     DegPerHourSecondPerKelvin,
     DegPerHourPerUnit,
+    CelsiusPerHour,
 }
 
 impl Unit {
@@ -225,16 +228,19 @@ impl Unit {
             Unit::PerKelvin => "1/K",
             Unit::Second => "s",
             Unit::Metre => "m",
+            Unit::Millimetre => "mm",
             Unit::Celsius => "°C",
             Unit::Kelvin => "K",
             Unit::WattPerSquareMetre => "W/m²",
             Unit::WattPerSquareMetreKelvin => "W/(m²K)",
+            Unit::WattPerMetreKelvin => "W/(m K)",
             Unit::JoulePerSquareMetreKelvin => "J/(m²K)",
             Unit::DegPerHour => "°/h",
             Unit::DegPerHourPerKelvin => "°/h/K",
             Unit::DegPerHourPerSquareKelvin => "°/h/K²",
             Unit::DegPerHourSecondPerKelvin => "°/h per K/s",
             Unit::DegPerHourPerUnit => "°/h per unit",
+            Unit::CelsiusPerHour => "°C/h",
         }
     }
 
@@ -266,6 +272,8 @@ impl Unit {
             | Unit::DegPerHourPerSquareKelvin
             | Unit::DegPerHourSecondPerKelvin
             | Unit::DegPerHourPerUnit => rad_per_s_from_deg_per_h(1.0),
+            Unit::Millimetre => MILLI,
+            Unit::CelsiusPerHour => k_per_s_from_c_per_h(1.0),
             _ => 1.0,
         }
     }
@@ -285,8 +293,15 @@ mod tests {
 
     #[test]
     fn a_stated_parameter_survives_the_round_trip_in_every_unit() {
-        for unit in [Unit::One, Unit::Celsius, Unit::Kelvin, Unit::DegPerHourSecondPerKelvin, Unit::WattPerSquareMetre]
-        {
+        for unit in [
+            Unit::One,
+            Unit::Celsius,
+            Unit::Kelvin,
+            Unit::DegPerHourSecondPerKelvin,
+            Unit::WattPerSquareMetre,
+            Unit::Millimetre,
+            Unit::CelsiusPerHour,
+        ] {
             let stated = -12.5;
             assert!((unit.from_si(unit.to_si(stated)) - stated).abs() < 1e-12, "{unit:?}");
         }

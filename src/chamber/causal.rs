@@ -104,7 +104,7 @@ impl Causal {
         surroundings: &Surroundings,
         row_s: f64,
     ) -> Result<Self, ThermalError> {
-        let shows_air = path.location == Location::Ambient;
+        let shows_air = path.location != Location::OuterLayer;
         let film = if shows_air { path.film_w_per_m2_k.unwrap_or(f64::INFINITY) } else { surroundings.film_w_per_m2_k };
         let (driven, skin_s) = driven_by_air(path, film);
         let modes = if path.extent == Extent::HalfSpace {

@@ -90,7 +90,7 @@ pub(super) struct Asked<'a> {
 impl Asked<'_> {
     /// Whether there is anything to work out.
     pub fn is_empty(&self) -> bool {
-        !self.beyond_linear && self.path.bore_heat.is_none() && self.path.conductivity_slope_per_k == 0.0
+        !self.beyond_linear && !self.path.has_own_course() && self.path.conductivity_slope_per_k == 0.0
     }
 }
 
@@ -106,7 +106,7 @@ pub(super) fn known(asked: &Asked, series: &Series, reference: &Reference) -> Re
     let rows = series.times_s.len();
     let outputs = asked.reduced.outputs;
     let mut rates = vec![0.0; rows];
-    if asked.path.bore_heat.is_some() || asked.path.conductivity_slope_per_k != 0.0 {
+    if asked.path.has_own_course() || asked.path.conductivity_slope_per_k != 0.0 {
         let changes = changes(asked, series, reference)?;
         let outer: Vec<f64> = (0..rows).map(|k| changes[k * outputs + asked.reduced.layers - 1]).collect();
         if !asked.shows_air {
@@ -149,7 +149,7 @@ pub(super) fn changes(asked: &Asked, series: &Series, reference: &Reference) -> 
     let (rows, outputs) = (series.times_s.len(), asked.reduced.outputs);
     let mut changes = vec![0.0; rows * outputs];
     for (k, line) in changes.chunks_exact_mut(outputs).enumerate() {
-        if let Some(heat) = asked.reduced.heat_k(series.times_s[k] - series.start_s) {
+        if let Some(heat) = asked.reduced.own_k(series.times_s[k] - series.start_s) {
             line.copy_from_slice(&heat);
         }
     }
@@ -173,7 +173,7 @@ pub(super) fn changes(asked: &Asked, series: &Series, reference: &Reference) -> 
             }
             let mut path = asked.path.clone();
             path.material = path.material.scaled(factor);
-            path.bore_heat = None;
+            path = path.driven_only();
             let (path, _) = driven_by_air(&path, asked.film_w_per_m2_k);
             let there = Reduced::new(&path, asked.modes, series.shortest_s(), series.duration_s)?;
             fields.push(driven(&there, series, &reference.air_k));

@@ -46,7 +46,7 @@ impl CoilSide {
     pub fn new(assumed: &Assumption, film: f64, modes: usize, observed: &Observed) -> Result<Self, ChamberError> {
         let model = &assumed.model;
         let path = model.heat_path()?;
-        let shows_air = path.location == Location::Ambient;
+        let shows_air = path.location != Location::OuterLayer;
         let film_w_per_m2_k = if shows_air { path.film_w_per_m2_k.unwrap_or(f64::INFINITY) } else { film };
         check(&path)?;
         let (driven, skin_s) = driven_by_air(&path, film_w_per_m2_k);
@@ -173,7 +173,7 @@ impl CoilSide {
         let mut found = Reference { layers: self.reduced.layers, outputs, air_k: air, outputs_k };
         // Known changes of the layers belong to the course; they were taken off the readings.
         let asked = self.asked();
-        if asked.path.bore_heat.is_some() || asked.path.conductivity_slope_per_k != 0.0 {
+        if asked.path.has_own_course() || asked.path.conductivity_slope_per_k != 0.0 {
             let about = before.unwrap_or(&found);
             let changes = super::known::changes(&asked, &observed.series, about)?;
             found.outputs_k.iter_mut().zip(changes).for_each(|(o, c)| *o += c);

@@ -98,8 +98,8 @@ pub(super) fn driven_by_air(path: &HeatPath, film_w_per_m2_k: f64) -> (HeatPath,
     }
     if path.location == Location::OuterLayer {
         driven.film_w_per_m2_k = Some(film_w_per_m2_k);
+        driven.location = Location::Ambient;
     }
-    driven.location = Location::Ambient;
     (driven, None)
 }
 

@@ -41,8 +41,10 @@ impl Heating {
         window_s: f64,
         lag_s: f64,
     ) -> Result<Option<Self>, CompensateError> {
-        let Some(heat) = path.bore_heat else { return Ok(None) };
-        let end_s = SETTLED * (heat.time_constant_s + 1.0 / slowest_per_s);
+        if !path.has_own_course() {
+            return Ok(None);
+        }
+        let end_s = SETTLED * (path.own_course_s() + 1.0 / slowest_per_s);
         let times_s: Vec<f64> = (1..=POINTS).map(|i| i as f64 / POINTS as f64 * end_s).collect();
         let field = thermal::solve(path, &Drive::boundary(PiecewiseLinear::constant(REFERENCE_TEMPERATURE_K)))?;
         let instants: Vec<Instant> = times_s.iter().map(|t| Instant::after(*t)).collect();

@@ -112,10 +112,9 @@ impl Physical {
         let mut path = model.heat_path()?;
         let is_half_space = path.extent == Extent::HalfSpace;
         let cannot_be_heated = is_half_space || matches!(path.material, Material::Diffusivity { .. });
-        if path.flange.is_some() || (path.bore_heat.is_some() && cannot_be_heated) {
-            let is_refused = |one: &CoilModel| {
-                one.heat_path().is_ok_and(|p| p.flange.is_some() || (p.bore_heat.is_some() && cannot_be_heated))
-            };
+        let has_no_chain = |p: &HeatPath| p.varies_along() || (p.has_own_course() && cannot_be_heated);
+        if has_no_chain(&path) {
+            let is_refused = |one: &CoilModel| one.heat_path().is_ok_and(|p| has_no_chain(&p));
             return Err(not_linear(model, is_refused));
         }
         let linearised = linearise(&mut path, range_k);
@@ -126,18 +125,20 @@ impl Physical {
         };
         let LinearModel { gains, gain_air, factor, bias, channels } = linear;
         let mut heating = None;
-        if path.bore_heat.is_some() {
+        if path.has_own_course() {
             let mut heated = path.clone();
-            heated.location = Location::Ambient;
+            if path.location == Location::OuterLayer {
+                heated.location = Location::Ambient;
+            }
             if path.location == Location::OuterLayer {
                 heated.film_w_per_m2_k = Some(surroundings.film_w_per_m2_k);
             }
             let slowest_per_s = Pack::new(&heated)?.decays_per_s().iter().copied().fold(f64::INFINITY, f64::min);
             heating = Heating::of(&heated, &gains, slowest_per_s, model.rate_mean_s, model.sensor_lag_s())?;
-            if path.location == Location::Ambient {
+            if path.location != Location::OuterLayer {
                 heating = heating.map(Heating::unseen);
             }
-            path.bore_heat = None;
+            path = path.driven_only();
         }
         let found = Self {
             formulas: Formulas::new(&model.coil, formulas.clone()),

@@ -1,6 +1,6 @@
 //! What may be missing: the effects that a model lacks, as things to fit.
 
-use crate::effect::{CATALOGUE, DeclaredEffect, EffectSpec, Nature, Subject};
+use crate::effect::{CATALOGUE, DeclaredEffect, EffectSpec, NOT_SOUGHT, Nature, Subject};
 use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::units::Unit;
@@ -52,8 +52,15 @@ pub fn is_declared_number(effect: &DeclaredEffect) -> bool {
     effect.spec().nature == Nature::DeclaredNumber
 }
 
-/// Everything of the catalogue that the model does not have, and every further column that all records share.
+/// Everything of the catalogue that the model does not have and that is looked for, and every further column that all
+/// records share.
 pub fn candidates(model: &CoilModel, records: &[&Record]) -> Vec<Candidate> {
+    let mut all = all_candidates(model, records);
+    all.retain(|c| NOT_SOUGHT.iter().all(|spec| spec.kind != c.effect.spec().kind));
+    all
+}
+
+fn all_candidates(model: &CoilModel, records: &[&Record]) -> Vec<Candidate> {
     let present: Vec<String> = model.effects.iter().map(DeclaredEffect::kind).collect();
     let temperatures = temperature_quartiles_k(records);
     let mut all = Vec::new();
@@ -94,7 +101,7 @@ pub(super) fn of_kind(model: &CoilModel, records: &[&Record], effect: &DeclaredE
         let free = (0..effect.values().len()).collect();
         return vec![Candidate { effect: effect.clone(), free, starts: vec![effect.values().to_vec()] }];
     }
-    candidates(model, records).into_iter().filter(|c| c.kind() == effect.kind()).collect()
+    all_candidates(model, records).into_iter().filter(|c| c.kind() == effect.kind()).collect()
 }
 
 /// The `index`-th combination of choices.

@@ -18,11 +18,14 @@ mod elsewhere;
 mod finite_pack;
 mod glass_transition;
 mod heating_cooling_asymmetry;
+mod housing;
 mod layer_gain;
 mod layer_gap;
 mod midpoint_offset;
 mod self_heating;
 mod sensor_lag;
+mod spool_conduction;
+mod spool_flange;
 mod spool_mass;
 mod strain_mismatch;
 mod stress_gradient;
@@ -31,6 +34,7 @@ mod thermal_stress;
 mod thermo_optic;
 mod thermo_optic_temperature;
 mod turn_mismatch;
+mod unsteady_start;
 
 pub use crate::numeric::expression::Memory;
 pub use declared::{DeclaredEffect, DeclaredParameter, EffectError};
@@ -50,6 +54,10 @@ pub const CATALOGUE: &[&EffectSpec] = &[
     &sensor_lag::SPEC,
     &self_heating::SPEC,
     &axial_gradient::SPEC,
+    &spool_flange::SPEC,
+    &spool_conduction::SPEC,
+    &housing::SPEC,
+    &unsteady_start::SPEC,
     &conductivity_temperature::SPEC,
     &layer_gap::SPEC,
     &layer_gain::SPEC,
@@ -66,6 +74,12 @@ pub const CATALOGUE: &[&EffectSpec] = &[
     &diffusivity::SPEC,
     &thermo_optic::SPEC,
 ];
+
+/// Effects that a diagnosis does not look for by itself: what a housing, a spool's flanges or an unsteady start do to one record
+/// others do too (a film and a lag; a heated flange; the start that every fit leaves free). Declared or asked for by name, they
+/// are fitted as any other.
+pub const NOT_SOUGHT: &[&EffectSpec] =
+    &[&spool_flange::SPEC, &spool_conduction::SPEC, &housing::SPEC, &unsteady_start::SPEC];
 
 /// An effect of any further column of a record; one declaration a column, `channel:NAME`.
 pub const CHANNEL: &EffectSpec = &channel::SPEC;

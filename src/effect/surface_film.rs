@@ -35,7 +35,10 @@ struct SurfaceFilm {
 
 impl Effect for SurfaceFilm {
     fn change_heat_path(&self, path: &mut HeatPath) {
-        path.location = Location::Ambient;
+        // A sensor on a housing, the spool or a flange stays there: the film then joins the air to the coil behind it.
+        if path.location == Location::OuterLayer {
+            path.location = Location::Ambient;
+        }
         path.film_w_per_m2_k = Some(self.film_w_per_m2_k);
     }
 }

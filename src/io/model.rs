@@ -14,7 +14,7 @@ use crate::schedule::production::Production;
 use crate::search::cost::objective::Objective;
 use crate::search::cost::tolerance::ToleranceSpec;
 use crate::stress::material::Material;
-use crate::thermal::Location;
+use crate::thermal::{Flange, Location};
 
 /// A model file, understood.
 #[derive(Debug, Clone)]
@@ -64,6 +64,30 @@ impl ModelFile {
         let film = self.learned.as_ref()?.film_w_per_m2_k?;
         let path = self.model.heat_path().ok()?;
         (path.location == Location::OuterLayer && path.film_w_per_m2_k.is_none()).then_some(film)
+    }
+}
+
+/// What `sensor.location` can be.
+pub(crate) const LOCATIONS: &[&str] = &[
+    "outer_layer",
+    "ambient",
+    "first_housing",
+    "second_housing",
+    "third_housing",
+    "spool",
+    "first_flange",
+    "second_flange",
+];
+
+/// By its place among them.
+pub(crate) fn location_of(word: usize) -> Location {
+    match word {
+        0 => Location::OuterLayer,
+        1 => Location::Ambient,
+        2..=4 => Location::Housing(word - 2),
+        5 => Location::Spool,
+        6 => Location::Flange(Flange::First),
+        _ => Location::Flange(Flange::Second),
     }
 }
 

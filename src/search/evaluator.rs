@@ -338,6 +338,9 @@ impl Evaluator<'_> {
         let boundary = match self.model.location {
             Location::OuterLayer => "with the outermost layer's temperature prescribed",
             Location::Ambient => "with the ambient temperature prescribed",
+            Location::Housing(_) => "with the housing's temperature prescribed",
+            Location::Spool => "with the spool's temperature prescribed",
+            Location::Flange(_) => "with the temperature of the spool's flange prescribed",
         };
         let (what, unit) = (self.objective.title(), self.objective.unit());
         let shown = |judged: &Judged| deg_per_h_from_rad_per_s(judged.objective_rad_per_s);

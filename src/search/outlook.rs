@@ -189,6 +189,10 @@ fn other_boundary(model: &CoilModel) -> Result<Option<(CoilModel, String)>, Sear
         return Ok(None);
     }
     let path = model.heat_path()?;
+    // What drives a housing, a spool or a flange has no other side to be driven from.
+    if !path.housings.is_empty() || !matches!(path.location, Location::OuterLayer | Location::Ambient) {
+        return Ok(None);
+    }
     if path.film_w_per_m2_k.is_none() {
         if model.location != Location::OuterLayer {
             return Ok(None);

@@ -141,7 +141,8 @@ pub fn cells(p: &PatternJson) -> [String; 11] {
         p.name.clone(),
         format!("{:.4}", p.worst_rate_deg_per_h),
         p.guaranteed_worst_rate_deg_per_h.map_or("-".to_owned(), |g| format!("{g:.4}")),
-        p.grid_margin_deg_per_h.map_or("-".to_owned(), |m| format!("{m:.1e}")),
+        // A closed form has no grid.
+        p.grid_margin_deg_per_h.filter(|m| *m > 0.0).map_or("-".to_owned(), |m| format!("{m:.1e}")),
         p.worst_pointing_error_deg.map_or("-".to_owned(), |p| format!("{p:.5}")),
         format!("{:.3e}", p.worst_phase_rad),
         p.worst_profile.clone(),

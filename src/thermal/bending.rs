@@ -12,7 +12,7 @@ use crate::numeric::tridiagonal::diagonalise_full;
 use crate::units::REFERENCE_TEMPERATURE_K;
 
 /// What one input has put into the modes of the linear pack so far.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Track<'a> {
     input: &'a PiecewiseLinear,
     /// Content that a kelvin of it drives.
@@ -101,7 +101,7 @@ impl System {
         let places = axial.nrows();
         let mut radial = Vec::new();
         let mut decay_per_s = Vec::with_capacity(n * places);
-        let is_shared = network.spool_nodes == 0;
+        let is_shared = network.pack_nodes == network.nodes();
         let mut of_shared = Vec::new();
         for per_m2 in &axial_per_m2 {
             let extra_per_s = diffusivity_m2_per_s * per_m2;
@@ -142,11 +142,11 @@ impl System {
         let at_bore = |share: f64| -> Vec<f64> { (0..n).map(|i| if i == 0 { share } else { 0.0 }).collect() };
         system.by_boundary = system.content(&uniform(&system.network.boundary()));
         system.by_heat = system.content(&uniform(&at_bore(system.network.heated)));
-        let mut from_air = uniform(&at_bore(system.network.mount));
+        let mut from_air = uniform(&system.network.to_ambient);
         if let Some(axis) = &system.axis {
             for &(node, film) in &axis.flanges {
                 let per_capacity = diffusivity_m2_per_s / system.network.conductivity_w_per_m_k * film;
-                for i in system.network.spool_nodes..n {
+                for i in system.network.pack() {
                     from_air[(i, node)] += system.network.capacity[i] * per_capacity;
                 }
             }
@@ -244,7 +244,7 @@ impl System {
                 column.iter_mut().zip(&self.network.from_drive).for_each(|(f, k)| *f = (*f + k * drive) * mass);
             }
             let along = &field * &axis.stiffness_per_m2;
-            for i in self.network.spool_nodes..n {
+            for i in self.network.pack() {
                 let capacity = self.network.capacity[i] * self.diffusivity_m2_per_s;
                 for k in 0..places {
                     into[(i, k)] -= capacity * along[(i, k)];

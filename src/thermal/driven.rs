@@ -195,7 +195,7 @@ impl Driven {
     /// # Errors
     /// As [`solve`].
     pub fn means(&self, path: &HeatPath) -> Result<ThermalHistory, ThermalError> {
-        if path.extent == Extent::HalfSpace || path.conductivity_slope_per_k != 0.0 {
+        if path.extent == Extent::HalfSpace || path.conductivity_slope_per_k != 0.0 || path.start.is_some() {
             return Ok(solve(path, &self.drive)?.means(&self.rows.times_s, self.rows.window_s));
         }
         check(path)?;

@@ -4,6 +4,7 @@
 //! gives a [`Field`], which can be asked for any instants. The field does not depend on the winding pattern.
 
 mod bending;
+mod checked;
 mod driven;
 mod elements;
 pub mod exposure;
@@ -11,188 +12,34 @@ mod given;
 pub mod half_space;
 mod half_space_memory;
 mod history;
+mod joined;
 mod modal;
 mod network;
 pub mod pack;
 mod panel;
+mod path;
 pub mod reduced;
 mod slope;
 mod stepped;
 
+use std::sync::Arc;
+
 use thiserror::Error;
 
-use crate::coil::Coil;
 use crate::numeric::piecewise::PiecewiseLinear;
+pub use checked::check;
 pub use driven::{Driven, Memory};
 pub use given::GivenField;
 use half_space::HalfSpaceField;
 pub use history::{Instant, Side, ThermalHistory};
-use modal::PackField;
+use modal::{PackField, Prepared};
 use pack::Pack;
+pub use path::{
+    BoreHeat, DEFAULT_CELLS_PER_LAYER, Extent, Flange, FlangeFilm, HeatPath, Housing, LayerGap, Location, Material,
+    PackShape, Spool, SpoolFlange, SpoolWall, Start,
+};
 pub use slope::{SLOPE_ORDERS, SlopeTerm, slope_powers, slope_series};
 use stepped::SteppedField;
-
-/// What the pack is made of, thermally.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Material {
-    /// Only K = k/ρc is known; effects that exchange heat with something else need both.
-    Diffusivity {
-        m2_per_s: f64,
-    },
-    Conductivity {
-        w_per_m_k: f64,
-        heat_capacity_j_per_m3_k: f64,
-    },
-}
-
-impl Material {
-    pub fn diffusivity_m2_per_s(&self) -> f64 {
-        match *self {
-            Material::Diffusivity { m2_per_s } => m2_per_s,
-            Material::Conductivity { w_per_m_k, heat_capacity_j_per_m3_k } => w_per_m_k / heat_capacity_j_per_m3_k,
-        }
-    }
-
-    /// The same material conducting `factor` times as well.
-    pub fn scaled(self, factor: f64) -> Self {
-        match self {
-            Material::Diffusivity { m2_per_s } => Material::Diffusivity { m2_per_s: m2_per_s * factor },
-            Material::Conductivity { w_per_m_k, heat_capacity_j_per_m3_k } => {
-                Material::Conductivity { w_per_m_k: w_per_m_k * factor, heat_capacity_j_per_m3_k }
-            }
-        }
-    }
-}
-
-/// Where the pack ends inwards.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Extent {
-    /// Nowhere: the paper's half space behind the outermost layer.
-    HalfSpace,
-    /// At an adiabatic bore (unless a spool is there), in cylindrical coordinates.
-    Pack,
-}
-
-/// What the driving temperature is the temperature of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Location {
-    /// The outermost layer itself.
-    OuterLayer,
-    /// The air outside the film; without a film, the pack's outer surface.
-    Ambient,
-}
-
-/// A lumped spool behind a contact.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Spool {
-    /// Per bore area.
-    pub heat_capacity_j_per_m2_k: f64,
-    pub contact_w_per_m2_k: f64,
-    /// From the spool to the ambient.
-    pub mount_w_per_m2_k: f64,
-}
-
-/// Heat into the bore after power-on at the drive's first knot: q∞ (1 − e^{−t/τ}).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BoreHeat {
-    pub power_w_per_m2: f64,
-    pub time_constant_s: f64,
-}
-
-/// Which flange: layer 1 starts at the first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Flange {
-    First,
-    Second,
-}
-
-/// A flange that exchanges heat with the ambient.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FlangeFilm {
-    pub flange: Flange,
-    pub film_w_per_m2_k: f64,
-}
-
-/// The pack's dimensions as far as heat is concerned.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PackShape {
-    pub layers: usize,
-    pub bore_radius_m: f64,
-    pub radial_pitch_m: f64,
-    pub height_m: f64,
-}
-
-impl PackShape {
-    pub fn of(coil: &Coil) -> Self {
-        Self {
-            layers: coil.layers(),
-            bore_radius_m: coil.bore_radius_m(),
-            radial_pitch_m: coil.radial_pitch_m(),
-            height_m: coil.height_m(),
-        }
-    }
-}
-
-/// Everything that the heat flows through, from the drive to the bore.
-#[derive(Debug, Clone, PartialEq)]
-pub struct HeatPath {
-    pub shape: PackShape,
-    pub extent: Extent,
-    pub material: Material,
-    pub location: Location,
-    /// At the outer surface; only used where the drive is the ambient.
-    pub film_w_per_m2_k: Option<f64>,
-    pub spool: Option<Spool>,
-    pub bore_heat: Option<BoreHeat>,
-    pub flange: Option<FlangeFilm>,
-    /// Of the other flange, where that exchanges heat too.
-    pub opposite_flange: Option<FlangeFilm>,
-    /// a in k = k0 (1 + a (T − 20 °C)).
-    pub conductivity_slope_per_k: f64,
-    /// Places where layers touch less well than the pack conducts.
-    pub gaps: Vec<LayerGap>,
-    /// How fine the grid is: the elements at the surface are half a layer over this number, and of a higher order.
-    pub cells_per_layer: usize,
-}
-
-/// A contact between two layers.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LayerGap {
-    /// Layers inside it.
-    pub above_layer: usize,
-    pub conductance_w_per_m2_k: f64,
-}
-
-/// A grid that puts guaranteed and worst rates within a few millionths of the continuum (`tests/validation/pack.rs`).
-pub const DEFAULT_CELLS_PER_LAYER: usize = 1;
-
-impl HeatPath {
-    pub fn new(shape: PackShape, extent: Extent, material: Material, location: Location) -> Self {
-        Self {
-            shape,
-            extent,
-            material,
-            location,
-            film_w_per_m2_k: None,
-            spool: None,
-            bore_heat: None,
-            flange: None,
-            opposite_flange: None,
-            conductivity_slope_per_k: 0.0,
-            gaps: Vec::new(),
-            cells_per_layer: DEFAULT_CELLS_PER_LAYER,
-        }
-    }
-
-    pub fn without_flanges(&self) -> Self {
-        Self { flange: None, opposite_flange: None, ..self.clone() }
-    }
-
-    /// What lies between the drive and the first layer that does not touch it.
-    pub fn untouched_m(&self) -> f64 {
-        self.shape.radial_pitch_m * if self.location == Location::OuterLayer { 0.5 } else { 1.0 }
-    }
-}
 
 /// What drives the field: temperatures against time, the pack being in a steady state before the first knot.
 #[derive(Debug, Clone, PartialEq)]
@@ -215,6 +62,14 @@ impl Drive {
     pub fn start_s(&self) -> f64 {
         self.boundary_k.knots()[0]
     }
+
+    /// With the ramp that ended where it begins.
+    fn after(&self, start: &Start) -> Self {
+        Self {
+            boundary_k: start.before(&self.boundary_k),
+            ambient_k: self.ambient_k.as_ref().map(|ambient_k| start.before(ambient_k)),
+        }
+    }
 }
 
 /// A part of the heat path that not every pack can have.
@@ -232,6 +87,16 @@ pub enum HeatPart {
     Flange,
     #[error("a contact between layers")]
     Gap,
+    #[error("a housing")]
+    Housing,
+    #[error("a start at which parts differ in temperature")]
+    UnevenStart,
+    #[error("a spool that conducts along its axis beside a conductivity that depends on temperature")]
+    JoinedVarying,
+    #[error("a start at which parts differ in temperature beside a conductivity that depends on temperature")]
+    UnevenStartVarying,
+    #[error("a sensor on a spool beside a spool that conducts along its axis, where it has no single temperature,")]
+    SensorAlong,
     #[error("a conductivity that depends on temperature")]
     VaryingConductivity,
     #[error("a conductivity that depends on temperature, beside a flange that exchanges heat,")]
@@ -260,6 +125,16 @@ pub enum ThermalError {
         "the conductivity at {temperature_k:.1} K is not positive: the slope {slope_per_k} per K is too steep for this record or profile"
     )]
     ConductivityNotPositive { temperature_k: f64, slope_per_k: f64 },
+    #[error(
+        "the sensor is on {on}, which is not there: declare the effect that puts it into the heat's way, or move the sensor"
+    )]
+    NothingThere { on: &'static str },
+    #[error(
+        "with the sensor on {on}, the air reaches the coil through a film: add an [[effect]] of kind = \"surface_film\""
+    )]
+    NeedsFilm { on: &'static str },
+    #[error("{part} cannot be solved: remove one of them")]
+    Together { part: HeatPart },
     #[error("{part} makes the field nonlinear: it has no step response")]
     Nonlinear { part: HeatPart },
 }
@@ -323,54 +198,48 @@ pub enum Field {
 /// # Errors
 /// A heat path whose parts contradict each other or lack a material property.
 pub fn solve(path: &HeatPath, drive: &Drive) -> Result<Field, ThermalError> {
-    check(path)?;
-    Ok(match path.extent {
-        Extent::HalfSpace => Field::HalfSpace(HalfSpaceField::new(half_space::HalfSpace::new(path), drive)),
-        Extent::Pack if path.conductivity_slope_per_k != 0.0 => {
-            Field::Stepped(Box::new(SteppedField::new(path, drive)?))
-        }
-        Extent::Pack => Field::Pack(Box::new(PackField::new(Pack::new(path)?, drive))),
-    })
+    Solver::new(path)?.field(drive)
 }
 
-/// What a heat path cannot be.
-///
-/// # Errors
-/// Parts that contradict each other or lack a material property.
-pub fn check(path: &HeatPath) -> Result<(), ThermalError> {
-    if path.extent == Extent::HalfSpace {
-        let extras = [
-            (path.location == Location::Ambient, HeatPart::AmbientSensor),
-            (path.spool.is_some(), HeatPart::Spool),
-            (path.bore_heat.is_some(), HeatPart::BoreHeat),
-            (path.flange.is_some(), HeatPart::Flange),
-            (!path.gaps.is_empty(), HeatPart::Gap),
-            (path.conductivity_slope_per_k != 0.0, HeatPart::VaryingConductivity),
-        ];
-        if let Some((_, part)) = extras.into_iter().find(|(present, _)| *present) {
-            return Err(ThermalError::NeedsPack { part });
+/// A heat path ready for any number of drives, which share what does not depend on them.
+#[derive(Debug, Clone)]
+pub struct Solver {
+    path: HeatPath,
+    /// Of a pack that is linear.
+    pack: Option<Arc<Prepared>>,
+}
+
+impl Solver {
+    /// # Errors
+    /// As [`solve`].
+    pub fn new(path: &HeatPath) -> Result<Self, ThermalError> {
+        check(path)?;
+        let is_modal = path.extent == Extent::Pack && path.conductivity_slope_per_k == 0.0;
+        let pack = is_modal.then(|| Ok(Arc::new(Prepared::new(Pack::new(path)?)))).transpose()?;
+        Ok(Self { path: path.clone(), pack })
+    }
+
+    pub fn path(&self) -> &HeatPath {
+        &self.path
+    }
+
+    /// # Errors
+    /// A conductivity that does not stay positive under the drive.
+    pub fn field(&self, drive: &Drive) -> Result<Field, ThermalError> {
+        let path = &self.path;
+        if let Some(pack) = &self.pack {
+            return Ok(Field::Pack(Box::new(PackField::new(Arc::clone(pack), drive))));
         }
+        Ok(match path.extent {
+            Extent::HalfSpace => {
+                let boundary = &drive.boundary_k;
+                let boundary_k = path.start.map_or_else(|| boundary.clone(), |start| start.before(boundary));
+                let drive = Drive { boundary_k, ambient_k: drive.ambient_k.clone() };
+                Field::HalfSpace(HalfSpaceField::new(half_space::HalfSpace::new(path), &drive))
+            }
+            Extent::Pack => Field::Stepped(Box::new(SteppedField::new(path, drive)?)),
+        })
     }
-    if matches!(path.material, Material::Diffusivity { .. }) {
-        let extras = [
-            (path.location == Location::Ambient && path.film_w_per_m2_k.is_some(), HeatPart::Film),
-            (path.spool.is_some(), HeatPart::Spool),
-            (path.bore_heat.is_some(), HeatPart::BoreHeat),
-            (path.flange.is_some(), HeatPart::Flange),
-            (!path.gaps.is_empty(), HeatPart::Gap),
-        ];
-        if let Some((_, part)) = extras.into_iter().find(|(present, _)| *present) {
-            return Err(ThermalError::NeedsConductivity { part });
-        }
-    }
-    if path.cells_per_layer == 0 {
-        return Err(ThermalError::Cells { found: path.cells_per_layer });
-    }
-    let most = path.shape.layers - 1;
-    if let Some(gap) = path.gaps.iter().find(|gap| gap.above_layer == 0 || gap.above_layer > most) {
-        return Err(ThermalError::Gap { found: gap.above_layer, most });
-    }
-    Ok(())
 }
 
 /// Which columns of a history are wanted; the others stay empty.

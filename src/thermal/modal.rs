@@ -6,9 +6,11 @@
 //! c_i(t) = Σ_q Δk_q e^{−λ_i (t−t_q)},   Ṫ = s k − A c,   T = s u − (A Λ⁻¹ 1) k + A Λ⁻¹ c
 //! ```
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 
-use super::pack::Pack;
+use super::pack::{OwnStart, Pack};
 use super::{BoreHeat, Drive, Instant, Side, ThermalHistory, Wanted};
 use crate::numeric::piecewise::PiecewiseLinear;
 
@@ -100,16 +102,46 @@ pub(super) struct InputAt {
     pub kink: f64,
 }
 
+/// A pack that any number of drives share.
+#[derive(Debug)]
+pub struct Prepared {
+    pack: Pack,
+    joint: Response,
+}
+
+impl Prepared {
+    pub(super) fn new(pack: Pack) -> Self {
+        let joint = pack.joint();
+        Self { pack, joint }
+    }
+
+    fn response(&self, through: Through) -> &Response {
+        match (through, &self.pack.ambient) {
+            (Through::Boundary, _) => &self.pack.boundary,
+            (Through::Ambient, Some(ambient)) => ambient,
+            _ => &self.joint,
+        }
+    }
+}
+
+/// Where an input reaches the pack.
+#[derive(Debug, Clone, Copy)]
+enum Through {
+    Boundary,
+    Ambient,
+    Both,
+}
+
 /// One input and how it acts.
 #[derive(Debug, Clone)]
 struct Track {
     contents: Contents,
-    response: Response,
+    through: Through,
 }
 
 impl Track {
-    fn new(input: &PiecewiseLinear, response: Response, decay_per_s: &[f64]) -> Self {
-        Self { contents: Contents::new(input, decay_per_s), response }
+    fn new(input: &PiecewiseLinear, through: Through, decay_per_s: &[f64]) -> Self {
+        Self { contents: Contents::new(input, decay_per_s), through }
     }
 }
 
@@ -163,36 +195,30 @@ impl Contents {
 /// A pack under one drive.
 #[derive(Debug, Clone)]
 pub struct PackField {
-    layers: usize,
-    outputs: usize,
-    decay_per_s: Vec<f64>,
-    heat: Option<(BoreHeat, DMatrix<f64>)>,
+    prepared: Arc<Prepared>,
     drive: Drive,
     tracks: Vec<Track>,
 }
 
 impl PackField {
-    pub fn new(pack: Pack, drive: &Drive) -> Self {
-        let decay_per_s = &pack.decay_per_s;
-        let tracks = match (&pack.ambient, &drive.ambient_k) {
-            (Some(ambient), Some(ambient_k)) => vec![
-                Track::new(&drive.boundary_k, pack.boundary.clone(), decay_per_s),
-                Track::new(ambient_k, ambient.clone(), decay_per_s),
+    pub fn new(prepared: Arc<Prepared>, drive: &Drive) -> Self {
+        let decay_per_s = &prepared.pack.decay_per_s;
+        let tracks = match (&prepared.pack.ambient, &drive.ambient_k) {
+            (Some(_), Some(ambient_k)) => vec![
+                Track::new(&drive.boundary_k, Through::Boundary, decay_per_s),
+                Track::new(ambient_k, Through::Ambient, decay_per_s),
             ],
-            _ => vec![Track::new(&drive.boundary_k, pack.joint(), decay_per_s)],
+            _ => vec![Track::new(&drive.boundary_k, Through::Both, decay_per_s)],
         };
-        Self {
-            layers: pack.layers,
-            outputs: pack.outputs,
-            tracks,
-            drive: drive.clone(),
-            decay_per_s: pack.decay_per_s,
-            heat: pack.heat,
-        }
+        Self { prepared, tracks, drive: drive.clone() }
+    }
+
+    fn pack(&self) -> &Pack {
+        &self.prepared.pack
     }
 
     pub(super) fn at(&self, instants: &[Instant], wanted: Wanted) -> ThermalHistory {
-        let mut history = ThermalHistory::with_capacity(self.layers, instants.len());
+        let mut history = ThermalHistory::with_capacity(self.pack().layers, instants.len());
         for batch in instants.chunks(BATCH) {
             self.add_batch(batch, wanted, &mut history);
         }
@@ -204,11 +230,11 @@ impl PackField {
     }
 
     fn add_batch(&self, batch: &[Instant], wanted: Wanted, history: &mut ThermalHistory) {
-        let modes = self.decay_per_s.len();
+        let modes = self.pack().decay_per_s.len();
         let mut state = DMatrix::zeros(modes, batch.len());
-        let mut temperature = wanted.temperatures().then(|| DMatrix::zeros(self.outputs, batch.len()));
-        let mut rate = wanted.rates().then(|| DMatrix::zeros(self.outputs, batch.len()));
-        let mut decay = Decay::new(&self.decay_per_s);
+        let mut temperature = wanted.temperatures().then(|| DMatrix::zeros(self.pack().outputs, batch.len()));
+        let mut rate = wanted.rates().then(|| DMatrix::zeros(self.pack().outputs, batch.len()));
+        let mut decay = Decay::new(&self.pack().decay_per_s);
         let mut inputs = vec![InputAt::default(); batch.len()];
         for track in &self.tracks {
             let mut remembered = 0;
@@ -218,7 +244,7 @@ impl PackField {
                 *input = track.contents.at(instant, &mut decay, column);
                 remembered = remembered.max(decay.remembered);
             }
-            let response = &track.response;
+            let response = self.prepared.response(track.through);
             let contents = state.rows(0, remembered);
             if let Some(temperature) = &mut temperature {
                 temperature.gemm(1.0, &response.lag.columns(0, remembered), &contents, 1.0);
@@ -237,10 +263,10 @@ impl PackField {
                 }
             }
         }
-        if let Some((heat, content)) = &self.heat {
+        if let Some((heat, content)) = &self.pack().heat {
             let mut warming = DMatrix::zeros(modes, batch.len());
             for (c, instant) in batch.iter().enumerate() {
-                for (i, &l) in self.decay_per_s.iter().enumerate() {
+                for (i, &l) in self.pack().decay_per_s.iter().enumerate() {
                     let since_s = instant.time_s - self.drive.start_s();
                     let (left, building) = ((-l * since_s).exp(), (-since_s / heat.time_constant_s).exp());
                     (state[(i, c)], warming[(i, c)]) = heated_mode(heat, l, since_s, left, building);
@@ -253,14 +279,54 @@ impl PackField {
                 rate.gemm(1.0, content, &warming, 1.0);
             }
         }
+        if let Some(start) = &self.pack().start {
+            self.add_start(start, batch, &mut temperature, &mut rate);
+        }
         let share = |block: Option<DMatrix<f64>>, means: &mut Vec<f64>, moments: &mut Vec<f64>| {
-            for column in block.iter().flat_map(|b| b.as_slice().chunks_exact(self.outputs)) {
-                means.extend_from_slice(&column[..self.layers]);
-                moments.extend_from_slice(&column[self.layers..]);
+            for column in block.iter().flat_map(|b| b.as_slice().chunks_exact(self.pack().outputs)) {
+                means.extend_from_slice(&column[..self.pack().layers]);
+                moments.extend_from_slice(&column[self.pack().layers..]);
             }
         };
         share(temperature, &mut history.temperature_k, &mut history.axial_moment_k);
         share(rate, &mut history.rate_k_per_s, &mut history.axial_moment_k_per_s);
+    }
+}
+
+impl PackField {
+    /// What a start that was not steady leaves.
+    fn add_start(
+        &self,
+        start: &OwnStart,
+        batch: &[Instant],
+        temperature: &mut Option<DMatrix<f64>>,
+        rate: &mut Option<DMatrix<f64>>,
+    ) {
+        let modes = self.pack().decay_per_s.len();
+        let (mut left, mut change) = (DMatrix::zeros(modes, batch.len()), DMatrix::zeros(modes, batch.len()));
+        for (c, instant) in batch.iter().enumerate() {
+            let since_s = instant.time_s - self.drive.start_s();
+            // Before the start the ramp goes on steadily.
+            let is_before = since_s < 0.0 || (since_s == 0.0 && instant.side == Side::Before);
+            for (i, &l) in self.pack().decay_per_s.iter().enumerate() {
+                left[(i, c)] = (-l * since_s.max(0.0)).exp();
+                change[(i, c)] = if is_before { 0.0 } else { -l * left[(i, c)] };
+            }
+            if is_before {
+                if let Some(temperature) = temperature {
+                    temperature.column_mut(c).axpy(since_s, &start.before_k_per_s, 1.0);
+                }
+                if let Some(rate) = rate {
+                    rate.column_mut(c).axpy(1.0, &start.before_k_per_s, 1.0);
+                }
+            }
+        }
+        if let Some(temperature) = temperature {
+            temperature.gemm(1.0, &start.content, &left, 1.0);
+        }
+        if let Some(rate) = rate {
+            rate.gemm(1.0, &start.content, &change, 1.0);
+        }
     }
 }
 

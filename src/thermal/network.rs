@@ -1,4 +1,5 @@
-//! The pack in space: spectral elements from the bore outwards, a lumped spool in front of them, elements along the axis.
+//! The pack in space: spectral elements from the bore outwards, a lumped spool in front of them, housings behind them,
+//! elements along the axis.
 //!
 //! ```text
 //! C dT/dt = −(K + X) T + b u(t) + b_a a(t) + b_q q(t)          per radian and height
@@ -37,8 +38,7 @@ fn order(first: usize, cells_per_layer: usize) -> usize {
 /// A conductance between two nodes that is not of the material.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Contact {
-    /// Its two nodes: the inner one, and the next.
-    pub inner: usize,
+    pub nodes: [usize; 2],
     pub conductance: f64,
 }
 
@@ -46,22 +46,21 @@ pub(super) struct Contact {
 #[derive(Debug, Clone)]
 pub(super) struct Network {
     pub conductivity_w_per_m_k: f64,
-    /// One entry a node; the spool (if any) first.
+    /// One entry a node; the spool (if any) first, housings last.
     pub capacity: Vec<f64>,
     /// K at the declared conductivity.
     pub conduction: DMatrix<f64>,
     /// Heat that the material conducts into each node per kelvin of the drive, where the drive is the outermost node.
     pub from_drive: Vec<f64>,
-    /// Between neighbouring nodes.
     pub contacts: Vec<Contact>,
-    /// From the drive into the last node.
-    pub film: f64,
-    /// From the spool to the ambient; zero without a mount.
-    pub mount: f64,
+    /// What else joins each node to the drive, and what joins it to the ambient.
+    pub to_drive: Vec<f64>,
+    pub to_ambient: Vec<f64>,
     /// The bore's heat enters node 0; this is its share per unit flux.
     pub heated: f64,
     /// Nodes in front of the pack's first one.
     pub spool_nodes: usize,
+    pub pack_nodes: usize,
     pub layers: usize,
     /// The share of each node in a layer's mean, layers × nodes …
     pub shares: DMatrix<f64>,
@@ -80,6 +79,8 @@ impl Network {
         };
         let edge_m = |layers: f64| shape.bore_radius_m + layers * pitch_m;
         let outer_layer_is_drive = path.location == Location::OuterLayer;
+        let spool_is_drive = path.location == Location::Spool;
+        let (housings, film_w_per_m2_k) = path.enclosure();
         // The drive sits in the middle of the outermost layer, or at its surface.
         let depth_layers = shape.layers as f64 - if outer_layer_is_drive { 0.5 } else { 0.0 };
         let narrowest_m = NARROWEST_LAYERS * pitch_m / path.cells_per_layer as f64;
@@ -94,23 +95,42 @@ impl Network {
         let gaps_m: Vec<f64> = path.gaps.iter().map(|gap| gap.above_layer as f64 * pitch_m).collect();
         let elements = Elements::new(order(ORDER, path.cells_per_layer), grading.breaks(length_m), &gaps_m);
 
-        let spool_nodes = usize::from(path.spool.is_some());
+        let spool_nodes = usize::from(path.spool.is_some() && !spool_is_drive);
         let inner = elements.nodes();
-        let drive_is_node = outer_layer_is_drive || path.film_w_per_m2_k.is_none();
+        let drive_is_node = film_w_per_m2_k.is_none();
         let solved = inner - usize::from(drive_is_node);
-        let n = spool_nodes + solved;
+        let n = spool_nodes + solved + housings.len();
         let radius_m = |x: f64| shape.bore_radius_m + x;
         let mut capacity = Vec::with_capacity(n);
         let mut contacts = Vec::new();
+        let mut to_drive = vec![0.0; n];
+        let mut to_ambient = vec![0.0; n];
+        let join = |a: usize, b: usize, conductance: f64| Contact { nodes: [a, b], conductance };
+        let first_housing = spool_nodes + solved;
         if let Some(spool) = path.spool {
-            capacity.push(spool.heat_capacity_j_per_m2_k * shape.bore_radius_m);
-            contacts.push(Contact { inner: 0, conductance: spool.contact_w_per_m2_k * shape.bore_radius_m });
+            let contact = spool.contact_w_per_m2_k * shape.bore_radius_m;
+            // What is inside a housing is mounted to it.
+            let mount = spool.mount_w_per_m2_k * shape.bore_radius_m;
+            if spool_is_drive {
+                to_drive[0] += contact;
+                if !housings.is_empty() {
+                    to_drive[first_housing] += mount;
+                }
+            } else {
+                capacity.push(spool.heat_capacity_j_per_m2_k * shape.bore_radius_m);
+                contacts.push(join(0, 1, contact));
+                if mount > 0.0 && !housings.is_empty() {
+                    contacts.push(join(0, first_housing, mount));
+                } else {
+                    to_ambient[0] += mount;
+                }
+            }
         }
         capacity.extend(elements.masses(radius_m).iter().take(solved).map(|m| m * heat_capacity));
         for (gap, gap_m) in path.gaps.iter().zip(&gaps_m) {
             if let Some(behind) = elements.node_behind(*gap_m).filter(|behind| *behind > 0) {
                 let conductance = gap.conductance_w_per_m2_k * radius_m(*gap_m);
-                contacts.push(Contact { inner: spool_nodes + behind - 1, conductance });
+                contacts.push(join(spool_nodes + behind - 1, spool_nodes + behind, conductance));
             }
         }
         let stiffness = elements.stiffness(radius_m) * conductivity;
@@ -142,17 +162,28 @@ impl Network {
                 }
             }
         }
-        let film = if drive_is_node { 0.0 } else { path.film_w_per_m2_k.unwrap_or(0.0) * edge_m(depth_layers) };
+        let surface_m = edge_m(depth_layers);
+        for (i, housing) in housings.iter().enumerate() {
+            capacity.push(housing.heat_capacity_j_per_m2_k * surface_m);
+            contacts.push(join(first_housing + i - 1, first_housing + i, housing.gap_w_per_m2_k * surface_m));
+        }
+        if let Some(film) = film_w_per_m2_k {
+            // A sensor on the spool or a flange leaves the outer surface to the air.
+            let is_ambient = matches!(path.location, Location::Spool | Location::Flange(_));
+            let outside = if is_ambient { &mut to_ambient } else { &mut to_drive };
+            outside[n - 1] += film * surface_m;
+        }
         Self {
             conductivity_w_per_m_k: conductivity,
             capacity,
             conduction,
             from_drive,
             contacts,
-            film,
-            mount: path.spool.map_or(0.0, |s| s.mount_w_per_m2_k * shape.bore_radius_m),
-            heated: shape.bore_radius_m,
+            to_drive,
+            to_ambient,
+            heated: if spool_is_drive { 0.0 } else { shape.bore_radius_m },
             spool_nodes,
+            pack_nodes: solved,
             layers: shape.layers,
             shares,
             drive_share,
@@ -163,27 +194,28 @@ impl Network {
         self.capacity.len()
     }
 
+    /// Which nodes are the pack's own.
+    pub fn pack(&self) -> std::ops::Range<usize> {
+        self.spool_nodes..self.spool_nodes + self.pack_nodes
+    }
+
     /// b: heat into each node per kelvin of the drive.
     pub fn boundary(&self) -> Vec<f64> {
-        let mut boundary = self.from_drive.clone();
-        if let Some(last) = boundary.last_mut() {
-            *last += self.film;
-        }
-        boundary
+        self.from_drive.iter().zip(&self.to_drive).map(|(a, b)| a + b).collect()
     }
 
     /// K + X.
     pub fn operator(&self) -> DMatrix<f64> {
         let mut operator = self.conduction.clone();
-        for &Contact { inner, conductance } in &self.contacts {
-            operator[(inner, inner)] += conductance;
-            operator[(inner + 1, inner + 1)] += conductance;
-            operator[(inner, inner + 1)] -= conductance;
-            operator[(inner + 1, inner)] -= conductance;
+        for &Contact { nodes: [a, b], conductance } in &self.contacts {
+            operator[(a, a)] += conductance;
+            operator[(b, b)] += conductance;
+            operator[(a, b)] -= conductance;
+            operator[(b, a)] -= conductance;
         }
-        let last = self.nodes() - 1;
-        operator[(last, last)] += self.film;
-        operator[(0, 0)] += self.mount;
+        for (i, (drive, ambient)) in self.to_drive.iter().zip(&self.to_ambient).enumerate() {
+            operator[(i, i)] += drive + ambient;
+        }
         operator
     }
 
@@ -194,7 +226,7 @@ impl Network {
         for (mut column, root) in matrix.column_iter_mut().zip(&roots) {
             column.iter_mut().zip(&roots).for_each(|(v, r)| *v *= r * root);
         }
-        for i in self.spool_nodes..self.nodes() {
+        for i in self.pack() {
             matrix[(i, i)] += extra_per_s;
         }
         matrix
@@ -210,14 +242,16 @@ pub(super) struct Axis {
     pub stiffness_per_m2: DMatrix<f64>,
     /// Weights of ∫ T ζ dζ over −½ … ½.
     pub moment: Vec<f64>,
-    /// The flanges' nodes and their films over the height [W/(m³ K)].
+    /// The flanges' nodes and their films over the height [W/(m³ K)]; where a spool's flange touches the pack, that contact, last.
     pub flanges: Vec<(usize, f64)>,
 }
 
 impl Axis {
     /// None where no flange is heated.
     pub fn new(path: &HeatPath) -> Option<Self> {
-        let flanges: Vec<FlangeFilm> = path.flange.into_iter().chain(path.opposite_flange).collect();
+        let touched =
+            path.spool_flanges.iter().map(|f| FlangeFilm { flange: f.flange, film_w_per_m2_k: f.contact_w_per_m2_k });
+        let flanges: Vec<FlangeFilm> = path.flange.into_iter().chain(path.opposite_flange).chain(touched).collect();
         if flanges.is_empty() {
             return None;
         }

@@ -30,9 +30,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::joined;
 use super::modal::Response;
 use super::network::{Axis, Network};
-use super::{BoreHeat, HeatPath, ThermalError};
+use super::{BoreHeat, HeatPath, Location, ThermalError};
 use crate::numeric::tridiagonal::diagonalise_full;
 
 /// The modal form of a pack's heat path.
@@ -49,6 +50,16 @@ pub struct Pack {
     pub(super) ambient: Option<Response>,
     /// Outputs × modes: the temperature of an output per mode content that the bore's heat excites.
     pub(super) heat: Option<(BoreHeat, DMatrix<f64>)>,
+    pub(super) start: Option<OwnStart>,
+}
+
+/// What a start that is not steady leaves in the outputs.
+#[derive(Debug, Clone)]
+pub(super) struct OwnStart {
+    /// Outputs × modes: what decays with each mode.
+    pub content: DMatrix<f64>,
+    /// The outputs' rates before the start.
+    pub before_k_per_s: DVector<f64>,
 }
 
 /// A mode whose share of every response is smaller than this is left out: a heated flange makes thousands of them, which
@@ -56,17 +67,19 @@ pub struct Pack {
 const NEGLIGIBLE: f64 = 1e-9;
 
 /// Eigenmodes along the axis; without a heated flange there is one, uniform.
-struct AxialModes {
+pub(super) struct AxialModes {
     /// μ_m [1/m²].
-    decay_per_m2: Vec<f64>,
+    pub decay_per_m2: Vec<f64>,
     /// What a mode's content adds to the mean over the axis, and what a uniform input adds to its content.
-    mean: Vec<f64>,
-    uniform: Vec<f64>,
+    pub mean: Vec<f64>,
+    pub uniform: Vec<f64>,
+    /// Places of the axis × modes.
+    pub places: DMatrix<f64>,
     /// Mode content per unit of the flange's air [1/m²], and the mode's first moment; both empty without a flange.
     flange_per_m2: Vec<f64>,
-    moment: Vec<f64>,
+    pub moment: Vec<f64>,
     /// Of the pack's material.
-    diffusivity_m2_per_s: f64,
+    pub diffusivity_m2_per_s: f64,
 }
 
 impl AxialModes {
@@ -77,6 +90,7 @@ impl AxialModes {
                 decay_per_m2: vec![0.0],
                 mean: vec![1.0],
                 uniform: vec![1.0],
+                places: DMatrix::from_element(1, 1, 1.0),
                 flange_per_m2: Vec::new(),
                 moment: Vec::new(),
                 diffusivity_m2_per_s,
@@ -86,10 +100,11 @@ impl AxialModes {
         let roots: Vec<f64> = axis.masses.iter().map(|m| m.sqrt()).collect();
         let n = axis.nodes();
         let mut operator = DMatrix::from_fn(n, n, |i, j| axis.stiffness_per_m2[(i, j)] / (roots[i] * roots[j]));
-        let mut rows = DMatrix::from_fn(3, n, |row, i| match row {
+        let mut rows = DMatrix::from_fn(3 + n, n, |row, i| match row {
             0 => roots[i],
             1 => 0.0,
-            _ => axis.moment[i] / roots[i],
+            2 => axis.moment[i] / roots[i],
+            place => f64::from(u8::from(place - 3 == i)) / roots[i],
         });
         for &(node, film_w_per_m3_k) in &axis.flanges {
             let to_air = film_w_per_m3_k / k;
@@ -102,6 +117,7 @@ impl AxialModes {
             decay_per_m2,
             mean: row(0),
             uniform: row(0),
+            places: rows.rows(3, n).into_owned(),
             flange_per_m2: row(1),
             moment: row(2),
             diffusivity_m2_per_s,
@@ -114,12 +130,14 @@ impl AxialModes {
 }
 
 /// One mode: its decay, what each output sees of it, and what each input puts into it.
-struct Mode {
-    decay_per_s: f64,
-    seen: Vec<f64>,
-    boundary: f64,
-    ambient: f64,
-    heat: f64,
+pub(super) struct Mode {
+    pub decay_per_s: f64,
+    pub seen: Vec<f64>,
+    pub boundary: f64,
+    pub ambient: f64,
+    pub heat: f64,
+    /// Its content at a start that is not even.
+    pub start: f64,
 }
 
 impl Pack {
@@ -130,22 +148,17 @@ impl Pack {
         let axial = AxialModes::new(path, &network)?;
         let layers = network.layers;
         let outputs = layers * if axial.has_moments() { 2 } else { 1 };
-        let mut modes = Vec::with_capacity(network.nodes() * axial.mean.len());
-        // A spool does not conduct along the axis: only without one do all axial modes share their radial ones.
-        let shared = (network.spool_nodes == 0).then(|| radial(&network, &axial, 0.0)).transpose()?;
-        for m in 0..axial.mean.len() {
-            let extra_per_s = axial.diffusivity_m2_per_s * axial.decay_per_m2[m];
-            match &shared {
-                Some(shared) => modes.extend(radial_modes(shared, extra_per_s, &network, &axial, m)),
-                None => modes.extend(radial_modes(&radial(&network, &axial, extra_per_s)?, 0.0, &network, &axial, m)),
-            }
-        }
+        let mut modes = if path.is_joined() {
+            joined::modes(path, &network, &axial)?
+        } else {
+            separable_modes(path, &network, &axial)?
+        };
         if modes.iter().any(|mode| !(mode.decay_per_s > 0.0)) {
             return Err(ThermalError::Eigen);
         }
         modes.sort_by(|a, b| a.decay_per_s.total_cmp(&b.decay_per_s));
 
-        let has_ambient = network.mount != 0.0 || axial.has_moments();
+        let has_ambient = network.to_ambient.iter().any(|g| *g != 0.0) || axial.has_moments();
         let steady_of = |input: fn(&Mode) -> f64| {
             let mut steady = DVector::zeros(outputs);
             for mode in &modes {
@@ -184,9 +197,26 @@ impl Pack {
         let heat = path.bore_heat.map(|bore_heat| {
             (bore_heat, DMatrix::from_fn(outputs, modes.len(), |j, i| modes[i].seen[j] * modes[i].heat))
         });
+        let (boundary, ambient) = match (path.location, ambient) {
+            // What is inside a housing sees nothing else.
+            (Location::Housing(_), Some(ambient)) => (boundary.plus(&ambient), None),
+            (_, ambient) => (boundary, ambient),
+        };
+        let start = path.start.map(|start| {
+            let joint = ambient.as_ref().map_or_else(|| boundary.clone(), |ambient| boundary.plus(ambient));
+            // A ramp that ends there has left each mode behind.
+            let behind_s = |l: f64| -(-l * start.lasted_s).exp_m1() / l;
+            OwnStart {
+                content: DMatrix::from_fn(outputs, modes.len(), |j, i| {
+                    modes[i].seen[j] * modes[i].start
+                        - start.rate_k_per_s * joint.amplitude[(j, i)] * behind_s(decay_per_s[i])
+                }),
+                before_k_per_s: &joint.steady * start.rate_k_per_s,
+            }
+        });
         // Heat crosses half a layer in about this time.
         let shortest_s = path.shape.radial_pitch_m.powi(2) / (16.0 * path.material.diffusivity_m2_per_s());
-        Ok(Self { layers, outputs, shortest_s, decay_per_s, boundary, ambient, heat })
+        Ok(Self { layers, outputs, shortest_s, decay_per_s, boundary, ambient, heat, start })
     }
 
     pub(super) fn modes(&self) -> usize {
@@ -240,6 +270,21 @@ impl Pack {
     }
 }
 
+/// Products of radial and axial modes.
+fn separable_modes(path: &HeatPath, network: &Network, axial: &AxialModes) -> Result<Vec<Mode>, ThermalError> {
+    let mut modes = Vec::with_capacity(network.nodes() * axial.mean.len());
+    // A spool does not conduct along the axis: only without one do all axial modes share their radial ones.
+    let shared = (network.pack_nodes == network.nodes()).then(|| radial(path, network, axial, 0.0)).transpose()?;
+    for m in 0..axial.mean.len() {
+        let extra_per_s = axial.diffusivity_m2_per_s * axial.decay_per_m2[m];
+        match &shared {
+            Some(shared) => modes.extend(radial_modes(shared, extra_per_s, network, axial, m)),
+            None => modes.extend(radial_modes(&radial(path, network, axial, extra_per_s)?, 0.0, network, axial, m)),
+        }
+    }
+    Ok(modes)
+}
+
 /// Radial modes: their decays, and what layers (rows) and inputs (the last rows) see of each.
 struct Radial {
     decay_per_s: Vec<f64>,
@@ -247,11 +292,12 @@ struct Radial {
 }
 
 /// With `extra_per_s` added to every cell's decay.
-fn radial(network: &Network, axial: &AxialModes, extra_per_s: f64) -> Result<Radial, ThermalError> {
+fn radial(path: &HeatPath, network: &Network, axial: &AxialModes, extra_per_s: f64) -> Result<Radial, ThermalError> {
     let (n, layers) = (network.nodes(), network.layers);
     let has_moments = axial.has_moments();
-    let (boundary_row, mount_row, heat_row, flange_row) = (layers, layers + 1, layers + 2, layers + 3);
-    let mut rows = DMatrix::zeros(layers + 3 + usize::from(has_moments), n);
+    let (boundary_row, ambient_row, heat_row, start_row, flange_row) =
+        (layers, layers + 1, layers + 2, layers + 3, layers + 4);
+    let mut rows = DMatrix::zeros(layers + 4 + usize::from(has_moments), n);
     let boundary = network.boundary();
     for (i, capacity) in network.capacity.iter().enumerate() {
         let root = capacity.sqrt();
@@ -260,10 +306,16 @@ fn radial(network: &Network, axial: &AxialModes, extra_per_s: f64) -> Result<Rad
         }
         rows[(boundary_row, i)] = boundary[i] / root;
         if i == 0 {
-            rows[(mount_row, i)] = network.mount / root;
             rows[(heat_row, i)] = network.heated / root;
         }
-        if has_moments && i >= network.spool_nodes {
+        rows[(ambient_row, i)] = network.to_ambient[i] / root;
+        rows[(start_row, i)] = root
+            * path.start.map_or(0.0, |start| match i {
+                i if i < network.spool_nodes => start.spool_above_k,
+                i if network.pack().contains(&i) => start.pack_above_k,
+                _ => start.housing_above_k,
+            });
+        if has_moments && network.pack().contains(&i) {
             rows[(flange_row, i)] = root * axial.diffusivity_m2_per_s;
         }
     }
@@ -281,7 +333,8 @@ fn radial_modes(
 ) -> impl Iterator<Item = Mode> {
     let (n, layers) = (network.nodes(), network.layers);
     let has_moments = axial.has_moments();
-    let (boundary_row, mount_row, heat_row, flange_row) = (layers, layers + 1, layers + 2, layers + 3);
+    let (boundary_row, ambient_row, heat_row, start_row, flange_row) =
+        (layers, layers + 1, layers + 2, layers + 3, layers + 4);
     let rows = &radial.rows;
     (0..n).map(move |i| {
         let mut seen = vec![0.0; layers * if has_moments { 2 } else { 1 }];
@@ -296,8 +349,9 @@ fn radial_modes(
             decay_per_s: radial.decay_per_s[i] + extra_per_s,
             seen,
             boundary: axial.uniform[m] * rows[(boundary_row, i)],
-            ambient: axial.uniform[m] * rows[(mount_row, i)] + from_flange,
+            ambient: axial.uniform[m] * rows[(ambient_row, i)] + from_flange,
             heat: axial.uniform[m] * rows[(heat_row, i)],
+            start: axial.uniform[m] * rows[(start_row, i)],
         }
     })
 }
@@ -306,10 +360,11 @@ fn radial_modes(
 fn drop_negligible(modes: &mut Vec<Mode>) {
     let shares = |mode: &Mode| {
         let seen = mode.seen.iter().fold(0.0, |most: f64, s| if s.abs() > most { s.abs() } else { most });
-        [mode.boundary, mode.ambient, mode.heat].map(|input| (seen * input / mode.decay_per_s).abs())
+        [mode.boundary, mode.ambient, mode.heat, mode.start * mode.decay_per_s]
+            .map(|input| (seen * input / mode.decay_per_s).abs())
     };
-    let of_each: Vec<[f64; 3]> = modes.iter().map(shares).collect();
-    let largest = [0, 1, 2].map(|input| of_each.iter().map(|shares| shares[input]).fold(0.0, f64::max));
+    let of_each: Vec<[f64; 4]> = modes.iter().map(shares).collect();
+    let largest = [0, 1, 2, 3].map(|input| of_each.iter().map(|shares| shares[input]).fold(0.0, f64::max));
     let mut of_each = of_each.iter();
     modes.retain(|_| {
         of_each.next().is_some_and(|shares| shares.iter().zip(largest).any(|(s, most)| *s > NEGLIGIBLE * most))

@@ -47,6 +47,8 @@ pub(super) struct Panel {
     pub(super) places: Vec<f64>,
     /// Coefficients of s^q in the slope of what has given values at the nodes.
     pub(super) slope_powers: DMatrix<f64>,
+    /// What the values at the nodes have of Legendre's polynomial of the highest degree.
+    pub(super) last_term: Vec<f64>,
 }
 
 impl Panel {
@@ -56,7 +58,18 @@ impl Panel {
         let vandermonde = DMatrix::from_fn(DEGREE + 1, DEGREE + 1, |i, q| places[i].powi(q as i32));
         let inverse = vandermonde.try_inverse().ok_or(ThermalError::Eigen)?;
         let slope_powers = inverse * &lobatto.derivative * 2.0;
-        Ok(Self { lobatto, places, slope_powers })
+        // w_i = 2/(p (p+1) P_p(x_i)²), and the discrete norm of P_p is 2/p; its sign alternates between neighbouring nodes.
+        let p = DEGREE as f64;
+        let last_term = lobatto
+            .weights
+            .iter()
+            .enumerate()
+            .map(|(i, w)| {
+                let size = (2.0 / (p * (p + 1.0) * w)).sqrt();
+                0.5 * p * w * if (DEGREE - i).is_multiple_of(2) { size } else { -size }
+            })
+            .collect();
+        Ok(Self { lobatto, places, slope_powers, last_term })
     }
 
     /// Of all modes on a panel of a length.

@@ -9,7 +9,7 @@
 //! | u | the drive: the air outside the film, or a half space's outermost layer | K | – |
 //! | x_i, λ_i | state of mode i, 1 per kelvin of the drive in equilibrium; its decay | K, 1/s | `decay_per_s` |
 //! | a_ji, ρ_j | share of a mode, and of the drive itself, in an output | 1 | `amplitude`, `residue` |
-//! | T^heat | what the bore's heat adds, over all modes | K | [`Reduced::heat_k`] |
+//! | T^heat | what the bore's heat and an unsteady start add, over all modes | K | [`Reduced::own_k`] |
 //!
 //! A half space has no modes; a sum of exponentials with decays spaced evenly in the logarithm is fitted to its response
 //! over the times that a record knows.
@@ -38,14 +38,15 @@ pub struct Reduced {
     pub decay_per_s: Vec<f64>,
     pub amplitude: Vec<f64>,
     pub residue: Vec<f64>,
-    heat: Option<Heated>,
+    own: Option<OwnCourse>,
 }
 
+/// What changes by itself, over all modes.
 #[derive(Debug, Clone)]
-struct Heated {
-    heat: BoreHeat,
+struct OwnCourse {
     decay_per_s: Vec<f64>,
-    content: DMatrix<f64>,
+    heat: Option<(BoreHeat, DMatrix<f64>)>,
+    start: Option<DMatrix<f64>>,
 }
 
 /// Points in time at which a half space's response is fitted.
@@ -78,10 +79,10 @@ impl Reduced {
             decay_per_s: kept.iter().map(|&i| pack.decay_per_s[i]).collect(),
             amplitude: Vec::with_capacity(outputs * kept.len()),
             residue: joint.steady.as_slice().to_vec(),
-            heat: pack.heat.as_ref().map(|(heat, content)| Heated {
-                heat: *heat,
+            own: (pack.heat.is_some() || pack.start.is_some()).then(|| OwnCourse {
                 decay_per_s: pack.decay_per_s.clone(),
-                content: content.clone(),
+                heat: pack.heat.clone(),
+                start: pack.start.as_ref().map(|start| start.content.clone()),
             }),
         };
         for j in 0..outputs {
@@ -114,7 +115,15 @@ impl Reduced {
         let amplitude: Vec<f64> =
             (0..layers).flat_map(|j| found.column(j).iter().copied().collect::<Vec<_>>()).collect();
         let residue = amplitude.chunks_exact(modes).map(|row| 1.0 - row.iter().sum::<f64>()).collect();
-        Ok(Self { layers, outputs: layers, decay_per_s, amplitude, residue, heat: None })
+        let own = path.start.map(|start| OwnCourse {
+            heat: None,
+            start: Some(DMatrix::from_fn(layers, modes, |j, i| {
+                let behind_s = -(-decay_per_s[i] * start.lasted_s).exp_m1() / decay_per_s[i];
+                -start.rate_k_per_s * found[(i, j)] * behind_s
+            })),
+            decay_per_s: decay_per_s.clone(),
+        });
+        Ok(Self { layers, outputs: layers, decay_per_s, amplitude, residue, own })
     }
 
     pub fn modes(&self) -> usize {
@@ -126,16 +135,21 @@ impl Reduced {
         &self.amplitude[output * self.modes()..(output + 1) * self.modes()]
     }
 
-    /// What the bore's heat adds to each output so long after power-on; None where nothing heats the bore.
-    pub fn heat_k(&self, since_s: f64) -> Option<Vec<f64>> {
-        let heated = self.heat.as_ref()?;
-        let building = (-since_s / heated.heat.time_constant_s).exp();
-        let contents = heated.decay_per_s.iter().map(|&l| {
-            let left = (-l * since_s).exp();
-            heated_mode(&heated.heat, l, since_s, left, building).0
-        });
-        let contents = DVector::from_iterator(heated.decay_per_s.len(), contents);
-        Some((&heated.content * contents).as_slice().to_vec())
+    /// What the bore's heat, and a start that was not steady, add to each output so long after power-on; None without either.
+    pub fn own_k(&self, since_s: f64) -> Option<Vec<f64>> {
+        let own = self.own.as_ref()?;
+        let left = DVector::from_iterator(
+            own.decay_per_s.len(),
+            own.decay_per_s.iter().map(|&l| (-l * since_s.max(0.0)).exp()),
+        );
+        let mut sum = own.start.as_ref().map_or_else(|| DVector::zeros(self.outputs), |start| start * &left);
+        if let Some((heat, content)) = &own.heat {
+            let building = (-since_s / heat.time_constant_s).exp();
+            let contents = own.decay_per_s.iter().zip(left.iter());
+            let contents = contents.map(|(&l, &left)| heated_mode(heat, l, since_s, left, building).0);
+            sum += content * DVector::from_iterator(own.decay_per_s.len(), contents);
+        }
+        Some(sum.as_slice().to_vec())
     }
 }
 
@@ -172,7 +186,7 @@ mod tests {
         let field = solve(&path, &drive).unwrap();
         for time_s in [10.0, 60.0, 300.0, 900.0] {
             let exact = field.at(&[Instant::after(time_s)]);
-            let heat = reduced.heat_k(time_s).unwrap();
+            let heat = reduced.own_k(time_s).unwrap();
             for (j, ramp) in ramped(&reduced, time_s).iter().enumerate() {
                 let found = ramp * 15.0 / 900.0 + heat[j];
                 assert!((found - exact.temperatures_k(0)[j]).abs() < 1e-4, "{time_s} {j}");

@@ -60,7 +60,7 @@ pub fn slope_series(
     window_s: f64,
 ) -> Result<[SlopeTerm; SLOPE_ORDERS], ThermalError> {
     check(&HeatPath { conductivity_slope_per_k: 1.0, ..path.clone() })?;
-    if path.extent == Extent::HalfSpace || path.flange.is_some() {
+    if path.extent == Extent::HalfSpace || path.varies_along() || path.start.is_some() {
         return Err(ThermalError::Nonlinear { part: HeatPart::VaryingConductivityBesideFlange });
     }
     let (instants, places) = window_instants(ends_s, window_s);
@@ -88,8 +88,11 @@ pub fn slope_series(
         for (into, per_k) in into.column_mut(t).iter_mut().zip(&boundary) {
             *into = per_k * (boundary_k[t] - REFERENCE_TEMPERATURE_K);
         }
-        into[(0, t)] +=
-            network.mount * (drive.ambient_k().value(time_s) - REFERENCE_TEMPERATURE_K) + network.heated * heat;
+        let ambient_k = drive.ambient_k().value(time_s) - REFERENCE_TEMPERATURE_K;
+        for (into, per_k) in into.column_mut(t).iter_mut().zip(&network.to_ambient) {
+            *into += per_k * ambient_k;
+        }
+        into[(0, t)] += network.heated * heat;
     }
     // Everything in kelvins above the reference.
     let zeroth = modes.solve(&into).0;

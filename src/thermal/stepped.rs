@@ -14,7 +14,7 @@
 //! | g, c, e | what bends a mode, by how much, and at which rate | – | `bent`, `contents`, `rate` |
 //!
 //! T_linear is the exact solution of [`super::pack`] at T_m. For the rest time is cut into panels that grow behind every knot
-//! of the drive (a drive with many knots was sampled: there panels span several). On a panel g is a polynomial through
+//! of the drive, as long as ν is smooth in them (a drive with many knots was sampled: there panels span several). On a panel g is a polynomial through
 //! Lobatto's nodes, under which every mode has a closed form however fast it is; g and the temperatures it makes are
 //! found by repeated substitution, which gains a factor a θ/2 or so each time. What the outputs gain is a polynomial
 //! through the same nodes.
@@ -28,21 +28,28 @@
 
 use std::collections::HashMap;
 use std::rc::Rc;
+use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
 use super::bending::{System, Track};
-use super::modal::PackField;
+use super::modal::{PackField, Prepared};
 use super::pack::Pack;
 use super::panel::{DEGREE, Panel, Weights};
-use super::{Drive, HeatPath, Instant, Side, ThermalError, ThermalHistory, Wanted};
+use super::{Drive, HeatPath, Instant, Material, Side, ThermalError, ThermalHistory, Wanted};
 use crate::numeric::lobatto::Lobatto;
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::units::REFERENCE_TEMPERATURE_K;
 
-/// The first panel behind a knot, in units of the time in which heat crosses half a layer; the next ones grow.
-const FIRST: f64 = 0.5;
+/// The first panel behind a knot that is tried, and the shortest, in units of the time in which heat crosses half a layer.
+const FIRST: f64 = 128.0;
+const SHORTEST: f64 = 0.5;
+/// The next one is so many times as long, or the square of that where much less would do; one that bends too much is tried again
+/// as much shorter.
 const GROWTH: f64 = 4.0;
+const EASY: f64 = 1e-3;
+/// What the last term of ν changes at, as a share of the drive's rate: what is left out is a fraction of it.
+const BENDING: f64 = 3e-6;
 /// With so many knots the drive was sampled; a panel then spans some of them.
 const SAMPLED_KNOTS: usize = 100;
 const KNOTS_A_PANEL: usize = 4;
@@ -77,6 +84,7 @@ impl SteppedField {
     /// # Errors
     /// Values so extreme that nothing converges; a conductivity that does not stay positive.
     pub fn new(path: &HeatPath, drive: &Drive) -> Result<Self, ThermalError> {
+        let (given, drive) = (drive, &path.start.map_or_else(|| drive.clone(), |start| drive.after(&start)));
         let values = || drive.boundary_k.values().iter().chain(drive.ambient_k().values()).copied();
         let (lowest_k, highest_k) = values().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
         let slope_per_k = path.conductivity_slope_per_k;
@@ -92,7 +100,8 @@ impl SteppedField {
             conductivity_slope_per_k: slope_per_k / factor(middle_k),
             ..path.clone()
         };
-        let system = System::new(&at_middle, drive, middle_k)?;
+        let mut system = System::new(&at_middle, drive, middle_k)?;
+        system.start_s = given.start_s();
         let linear = Pack::new(&at_middle)?;
         let settling_s = linear.settling_s() * factor(middle_k) / factor(lowest_k).min(factor(highest_k));
         let warming_s = path.bore_heat.map_or(0.0, |heat| 40.0 * heat.time_constant_s);
@@ -122,6 +131,8 @@ impl SteppedField {
             drive,
             panel: &panel,
             span_k: highest_k - lowest_k,
+            scale_k_per_s: scale_k_per_s(path, drive),
+            shortest_s: 0.0,
             pieces: Vec::new(),
             weights: HashMap::new(),
         };
@@ -130,10 +141,16 @@ impl SteppedField {
         for pair in knots.windows(2) {
             let is_one = is_sampled && pair[1] <= last_s;
             let first_s = if is_one { pair[1] - pair[0] } else { FIRST * linear.shortest_s() };
+            march.shortest_s = if is_one { first_s } else { SHORTEST * linear.shortest_s() };
             (rate, bent) = march.through(pair[0], pair[1], first_s, rate, bent)?;
         }
         let pieces = march.pieces;
-        Ok(Self { layers: path.shape.layers, linear: PackField::new(linear, drive), pieces, lobatto: panel.lobatto })
+        Ok(Self {
+            layers: path.shape.layers,
+            linear: PackField::new(Arc::new(Prepared::new(linear)), given),
+            pieces,
+            lobatto: panel.lobatto,
+        })
     }
 
     pub(super) fn at(&self, instants: &[Instant], wanted: Wanted) -> ThermalHistory {
@@ -172,6 +189,31 @@ struct Bent {
     slope_per_s: Vec<f64>,
 }
 
+/// What became of a panel.
+enum Step {
+    Done {
+        rate: Vec<f64>,
+        bent: Bent,
+        /// ν is so smooth that the next one may be much longer.
+        is_easy: bool,
+    },
+    TooLong,
+}
+
+/// The steepest slope of the drive, or what the bore's heat alone would make of the pack.
+fn scale_k_per_s(path: &HeatPath, drive: &Drive) -> f64 {
+    let steepest =
+        |input: &PiecewiseLinear| (0..input.knots().len()).map(|i| input.slope_of(i).abs()).fold(0.0, f64::max);
+    let thickness_m = path.shape.layers as f64 * path.shape.radial_pitch_m;
+    let by_heat = match (path.bore_heat, path.material) {
+        (Some(heat), Material::Conductivity { heat_capacity_j_per_m3_k, .. }) => {
+            heat.power_w_per_m2.abs() / (heat_capacity_j_per_m3_k * thickness_m)
+        }
+        _ => 0.0,
+    };
+    steepest(&drive.boundary_k).max(steepest(drive.ambient_k())).max(by_heat)
+}
+
 /// On the way through a drive.
 struct March<'a> {
     system: &'a System,
@@ -179,6 +221,10 @@ struct March<'a> {
     drive: &'a Drive,
     panel: &'a Panel,
     span_k: f64,
+    /// How fast the pack is made to warm.
+    scale_k_per_s: f64,
+    /// A panel of this length is not cut.
+    shortest_s: f64,
     pieces: Vec<Piece>,
     /// By the length's bits: panels behind every knot begin with the same lengths.
     weights: HashMap<u64, Rc<Weights>>,
@@ -224,20 +270,37 @@ impl March<'_> {
             // No sliver is left for a last panel.
             let left_s = to_s - time_s;
             let step_s = if length_s * 1.5 >= left_s { left_s } else { length_s };
-            (rate, bent) = self.step(time_s, step_s, &rate, &bent)?;
-            time_s = if step_s == left_s { to_s } else { time_s + step_s };
-            length_s *= GROWTH;
+            let before = self.tracks.clone();
+            match self.step(time_s, step_s, &rate, &bent)? {
+                Step::Done { rate: next, bent: at_end, is_easy } => {
+                    (rate, bent) = (next, at_end);
+                    time_s = if step_s == left_s { to_s } else { time_s + step_s };
+                    length_s *= if is_easy { GROWTH * GROWTH } else { GROWTH };
+                }
+                Step::TooLong => {
+                    self.tracks = before;
+                    while 2.0 * length_s > step_s {
+                        length_s /= GROWTH;
+                    }
+                    length_s = length_s.max(self.shortest_s);
+                }
+            }
         }
         Ok((rate, bent))
     }
 
-    fn step(
-        &mut self,
-        from_s: f64,
-        length_s: f64,
-        rate: &[f64],
-        bent: &Bent,
-    ) -> Result<(Vec<f64>, Bent), ThermalError> {
+    /// How fast the last term of ν's polynomials changes, in units of what may be.
+    fn bending(&self, temperatures: &DMatrix<f64>, length_s: f64) -> f64 {
+        let half = 0.5 * self.system.slope_per_k;
+        let last = temperatures
+            .row_iter()
+            .map(|row| row.iter().zip(&self.panel.last_term).map(|(t, w)| w * half * t * t).sum::<f64>().abs());
+        let per_s = (DEGREE as f64 + 1.0) * 2.0 / length_s;
+        let rounding = ROUNDING * half.abs() * self.span_k.max(1.0).powi(2);
+        (last.fold(0.0, f64::max) - rounding).max(0.0) * per_s / (BENDING * self.scale_k_per_s).max(f64::MIN_POSITIVE)
+    }
+
+    fn step(&mut self, from_s: f64, length_s: f64, rate: &[f64], bent: &Bent) -> Result<Step, ThermalError> {
         let system = self.system;
         let (modes, nodes) = (rate.len(), DEGREE + 1);
         let times_s = self.panel.places.iter().map(|x| from_s + x * length_s);
@@ -284,6 +347,9 @@ impl March<'_> {
             from_bent = system.bent(&temperatures, &drive_k);
             let moved_k = (temperatures.column(DEGREE) - temperatures.column(0)).amax();
             let enough_k = TOLERANCE * moved_k + ROUNDING * self.span_k.max(1.0);
+            if before.nrows() == 0 && length_s > 1.5 * self.shortest_s && self.bending(&temperatures, length_s) > 1.0 {
+                return Ok(Step::TooLong);
+            }
             let is_done = before.nrows() > 0 && (&temperatures - &before).amax() <= enough_k;
             before = temperatures;
             if is_done || system.slope_per_k == 0.0 {
@@ -294,7 +360,8 @@ impl March<'_> {
                     value: from_bent.column(DEGREE).as_slice().to_vec(),
                     slope_per_s: (&from_bent * ends).as_slice().to_vec(),
                 };
-                return Ok((rates.column(DEGREE).as_slice().to_vec(), bent));
+                let is_easy = self.bending(&before, length_s) < EASY;
+                return Ok(Step::Done { rate: rates.column(DEGREE).as_slice().to_vec(), bent, is_easy });
             }
         }
         Err(ThermalError::Eigen)
@@ -323,7 +390,8 @@ mod tests {
     /// The largest differences of temperatures, rates, moments and their rates, each as a share of its largest value.
     fn differences(path: &HeatPath) -> [f64; 4] {
         let instants: Vec<Instant> = (0..240).map(|i| Instant::after(1.0 + 4.9 * i as f64)).collect();
-        let exact = PackField::new(Pack::new(path).unwrap(), &drive()).at(&instants, Wanted::All);
+        let exact =
+            PackField::new(Arc::new(Prepared::new(Pack::new(path).unwrap())), &drive()).at(&instants, Wanted::All);
         let stepped = SteppedField::new(path, &drive()).unwrap().at(&instants, Wanted::All);
         let share =
             |a: &[f64], b: &[f64], scale: f64| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / scale;

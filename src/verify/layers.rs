@@ -47,6 +47,9 @@ pub(super) struct Layers {
     cosines: Option<Vec<Cosine>>,
     /// Layers inside a contact, and its conductance per area [W/(m² K)].
     gaps: Vec<(usize, f64)>,
+    /// Heat capacity and conductance inwards of each housing, and what joins the outermost to the drive, times the outer radius.
+    housings: Vec<[f64; 2]>,
+    outside: f64,
 }
 
 /// One cosine along the axis.
@@ -106,10 +109,16 @@ impl Layers {
                 })
                 .collect()
         });
+        let outer_m = faces_m[layers];
+        let housings: Vec<[f64; 2]> = physics.housings.iter().map(|h| h.map(|v| v * outer_m)).collect();
+        // The pack's own surface faces the innermost housing.
+        let film = housings.first().map(|housing| housing[1]).or(film.map(|h| h * outer_m));
         Self {
             layers,
             outermost_is_drive,
-            film: film.map(|h| h * faces_m[layers]),
+            film,
+            outside: physics.film_w_per_m2_k.map_or(0.0, |h| h * outer_m),
+            housings,
             faces_m,
             conductivity_w_per_m_k: physics.conductivity_w_per_m_k,
             heat_capacity_j_per_m3_k: physics.heat_capacity_j_per_m3_k,
@@ -136,7 +145,14 @@ impl Layers {
         // s q̂ = q∞/(1 + s τ).
         let by_heat = heat.map(|h| h.power_w_per_m2 / (s * h.time_constant_s + 1.0));
         for cosine in self.cosines.as_deref().unwrap_or(&[uniform]) {
-            let (by_drive, by_bore) = self.means(s, cosine);
+            let (mut by_drive, mut by_bore, from_inside) = self.means(s, cosine);
+            if !self.housings.is_empty() {
+                let [inner, heated] = self.innermost(s, from_inside);
+                for (of_bore, of_drive) in by_bore.iter_mut().zip(&by_drive) {
+                    *of_bore += of_drive * heated;
+                }
+                by_drive.iter_mut().for_each(|of_drive| *of_drive *= inner);
+            }
             for layer in 0..self.layers {
                 let put = |out: &mut [C], value: C| {
                     out[layer] += value * cosine.mean;
@@ -153,8 +169,26 @@ impl Layers {
         (ramp, heated)
     }
 
-    /// The layers' means under drive and air of one kelvin, and under a heat flow of one watt a square metre into the bore.
-    fn means(&self, s: C, cosine: &Cosine) -> (Vec<C>, Vec<C>) {
+    /// The innermost housing's temperature per kelvin of the drive, and per watt a square metre into the bore; `inside` is what
+    /// comes back from within per kelvin of that housing, and per watt.
+    fn innermost(&self, s: C, inside: [C; 2]) -> [C; 2] {
+        // What the innermost passes on outwards: a chain of links, folded up from the drive inwards.
+        let (mut link, mut source) = (C::new(self.outside, 0.0), C::new(1.0, 0.0));
+        for (i, [capacity, inwards]) in self.housings.iter().enumerate().skip(1).rev() {
+            let own = s * capacity + link + inwards;
+            debug_assert!(i > 0);
+            source = source * link / (own - inwards);
+            link = (own - inwards) * inwards / own;
+        }
+        let [capacity, inwards] = self.housings[0];
+        let mount = self.spool.map_or(0.0, |spool| spool[2]);
+        let own = s * capacity + inwards + mount - inside[0] + link;
+        [link * source / own, inside[1] / own]
+    }
+
+    /// The layers' means under drive and air of one kelvin, and under a heat flow of one watt a square metre into the bore; and
+    /// what surface and spool give back to what drives them.
+    fn means(&self, s: C, cosine: &Cosine) -> (Vec<C>, Vec<C>, [C; 2]) {
         let capacity = self.heat_capacity_j_per_m3_k;
         let diffusivity = self.conductivity_w_per_m_k / capacity;
         let per_s = s + cosine.decay_per_s;
@@ -247,7 +281,10 @@ impl Layers {
                 by_bore[layer] += mean(&warmed);
             }
         }
-        (by_drive, by_bore)
+        let mount = self.spool.map_or(0.0, |spool| spool[2]);
+        let back = |of: &[C]| of[last] * self.film.unwrap_or(0.0) + if spool > 0 { of[0] * mount } else { zero };
+        let given_back = [back(&driven), back(&warmed)];
+        (by_drive, by_bore, given_back)
     }
 
     fn piece(&self, q: C, per_s: C, from_m: f64, to_m: f64) -> Piece {

@@ -3,6 +3,7 @@
 //! One match over the effects' names stands here on purpose: it is the second reading of `effect`'s catalogue. An
 //! effect that it does not know makes [`Physics::read`] say so, and the rate error then counts as not verified.
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 use crate::effect::Subject;
@@ -29,6 +30,10 @@ pub(super) struct Physics {
     pub gaps: Vec<(usize, f64)>,
     /// Layer, counted from 1 innermost, and relative change of its κ.
     pub layer_changes: Vec<(usize, f64)>,
+    /// Heat capacity and conductance inwards per area of the pack's outer surface, from the coil outwards.
+    pub housings: Vec<[f64; 2]>,
+    /// Parts that are not worked out a second time: a spool's flanges and wall, an uneven start, a sensor on spool or flange.
+    pub is_beyond: bool,
     pub conductivity_slope_per_k: f64,
     /// Missing on every second layer, the innermost being the first.
     pub missing_turns: f64,
@@ -100,13 +105,15 @@ impl Physics {
             is_pack: model.extent == Extent::Pack,
             conductivity_w_per_m_k: conductivity,
             heat_capacity_j_per_m3_k: heat_capacity,
-            driven_from_outside: model.location == Location::Ambient,
+            driven_from_outside: model.location != Location::OuterLayer,
             film_w_per_m2_k: None,
             spool: None,
             bore_heat: None,
             flanges: Vec::new(),
             gaps: Vec::new(),
             layer_changes: Vec::new(),
+            housings: Vec::new(),
+            is_beyond: matches!(model.location, Location::Spool | Location::Flange(_)),
             conductivity_slope_per_k: 0.0,
             missing_turns: 0.0,
             path_factor: 1.0,
@@ -118,6 +125,7 @@ impl Physics {
             biases: Vec::new(),
             materials: None,
         };
+        let mut housings = Vec::new();
         for effect in &model.effects {
             let (values, choices) = (effect.values(), effect.choices());
             match (effect.subject(), effect.spec().kind, values) {
@@ -147,6 +155,15 @@ impl Physics {
                 (_, "axial_gradient", &[film_w_per_m2_k]) => {
                     p.flanges.push(HeatedFlange { is_first: choices == [0], film_w_per_m2_k });
                 }
+                (_, "spool_flange" | "spool_conduction" | "unsteady_start", _) => p.is_beyond = true,
+                (_, "housing", &[capacity, gap_m, gas, emissivity, middle_k, spacers]) => {
+                    p.driven_from_outside = true;
+                    // σ from the constants that define it: 2 π⁵ k⁴/(15 h³ c²).
+                    let (k, h, c): (f64, f64, f64) = (1.380_649e-23, 6.626_070_15e-34, 299_792_458.0);
+                    let sigma = 2.0 * PI.powi(5) * k.powi(4) / (15.0 * h.powi(3) * c * c);
+                    let inwards = gas / gap_m + spacers + 4.0 * emissivity * sigma * middle_k.powi(3);
+                    housings.push((choices.first().copied().unwrap_or(0), [capacity, inwards]));
+                }
                 (_, "conductivity_temperature", &[slope]) => p.conductivity_slope_per_k = slope,
                 (_, "layer_gap", &[above, conductance]) => p.gaps.push((above as usize, conductance)),
                 (_, "layer_gain", &[layer, change]) => p.layer_changes.push((layer as usize, change)),
@@ -171,6 +188,19 @@ impl Physics {
                 (_, kind, _) => return Err(kind),
             }
         }
+        housings.sort_by_key(|(place, _)| *place);
+        if let Location::Housing(place) = model.location {
+            // Where the drive is a housing, what lies outside it is cut off.
+            housings.retain(|(known, _)| *known <= place);
+            p.film_w_per_m2_k = None;
+        }
+        p.housings = housings.into_iter().map(|(_, housing)| housing).collect();
+        if p.film_w_per_m2_k.is_none() {
+            // The outermost then has the drive's temperature: only its gap is left.
+            p.film_w_per_m2_k = p.housings.pop().map(|[_, inwards]| inwards);
+        }
+        let varies = !p.flanges.is_empty() || p.conductivity_slope_per_k != 0.0;
+        p.is_beyond |= !p.housings.is_empty() && varies;
         Ok(p)
     }
 

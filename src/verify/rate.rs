@@ -57,6 +57,9 @@ pub(super) fn check(truth: &Truth, claim: &Claim, segments: &[usize], findings: 
             return RateCheck::None;
         }
     };
+    if physics.is_beyond {
+        return RateCheck::None;
+    }
     let optics = Optics::new(
         &truth.model.coil,
         &physics,

@@ -15,6 +15,7 @@ mod experiment;
 mod explorer;
 mod extend;
 mod fields;
+mod heat_paths;
 mod help;
 mod improve;
 mod mangled;

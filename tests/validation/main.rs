@@ -10,6 +10,7 @@ mod exhaustive;
 mod flange;
 mod fog_v7;
 mod grid;
+mod heat_paths;
 mod memory;
 mod nist_strd;
 mod pack;

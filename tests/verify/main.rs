@@ -168,6 +168,12 @@ const EFFECTS: &[&str] = &[
     "kind = 'axial_gradient'\nfilm_w_per_m2_k = 20.0\nflange = 'first'",
     "kind = 'axial_gradient'\nfilm_w_per_m2_k = 60.0\nflange = 'second'",
     "kind = 'conductivity_temperature'\nslope_per_k = 0.004",
+    "kind = 'housing'\nplace = 'first'\nheat_capacity_j_per_m2_k = 5000.0\ngap_mm = 1.5",
+    "kind = 'housing'\nplace = 'second'\nheat_capacity_j_per_m2_k = 9000.0\ngap_mm = 4.0\ngas_w_per_m_k = 0.0\n\
+     emissivity = 0.8\nspacers_w_per_m2_k = 3.0\n[[effect]]\nkind = 'housing'\nplace = 'first'\n\
+     heat_capacity_j_per_m2_k = 2000.0\ngap_mm = 0.5\n[[effect]]\nkind = 'surface_film'\nfilm_w_per_m2_k = 30.0\n\
+     [[effect]]\nkind = 'spool_mass'\nheat_capacity_j_per_m2_k = 3000.0\ncontact_w_per_m2_k = 200.0\n\
+     mount_w_per_m2_k = 25.0\n[[effect]]\nkind = 'self_heating'\npower_w_per_m2 = 50.0\ntime_constant_s = 600.0",
     "kind = 'stress_gradient'\nstrength = 0.05",
     "kind = 'layer_gain'\nlayer = 9\nchange = -0.08",
     "kind = 'layer_gap'\nabove_layer = 7\nconductance_w_per_m2_k = 250.0",
@@ -194,9 +200,31 @@ const EFFECTS: &[&str] = &[
      [[effect]]\nkind = 'self_heating'\npower_w_per_m2 = 30.0\ntime_constant_s = 300.0",
 ];
 
+/// What the verification takes as given, and says so.
+const GIVEN: &[&str] = &[
+    "kind = 'spool_flange'\nflange = 'first'\nheat_capacity_j_per_m2_k = 4900.0\ncontact_w_per_m2_k = 300.0\n\
+     film_w_per_m2_k = 20.0",
+    "kind = 'spool_mass'\nheat_capacity_j_per_m2_k = 4000.0\ncontact_w_per_m2_k = 300.0\n[[effect]]\n\
+     kind = 'spool_conduction'\nconductivity_w_per_m_k = 167.0\nwall_mm = 2.0\n[[effect]]\nkind = 'axial_gradient'\n\
+     film_w_per_m2_k = 20.0\nflange = 'first'",
+    "kind = 'unsteady_start'\npack_above_k = 0.5\n[[effect]]\nkind = 'surface_film'\nfilm_w_per_m2_k = 30.0",
+];
+
+#[test]
+fn a_rate_error_that_is_not_worked_out_again_is_said_to_be_taken_as_given() {
+    for effect in GIVEN {
+        let file = model(&format!("{WARM}[[effect]]\n{effect}\n"));
+        let (_, document) = plan(&file, &classic(Classic::Qua, 12).unwrap());
+        let found = judged(&file, &serde_json::to_string(&document).unwrap()).unwrap();
+        assert_eq!(found.rate_check, RateCheck::None);
+        assert!(found.taken_as_given.contains(&"the rate error"), "{:?}", found.taken_as_given);
+        assert_eq!(found.violations, [], "{effect}");
+    }
+}
+
 #[test]
 fn the_rate_error_of_every_effect_is_found_again_by_code_of_its_own() {
-    let stated = EFFECTS.concat();
+    let stated = [EFFECTS, GIVEN].concat().concat();
     for spec in coilwright::effect::CATALOGUE.iter().filter(|spec| spec.kind != "finite_pack") {
         assert!(stated.contains(&format!("kind = '{}'", spec.kind)), "{} is not tried here", spec.kind);
     }

@@ -5,6 +5,7 @@
 use serde_json::{Map, Value, json};
 
 use crate::effect::{CATALOGUE, CHANNEL, CUSTOM, EffectSpec};
+use crate::io::model::LOCATIONS;
 use crate::pattern::classic::Classic;
 use crate::search::cost::objective::Objective;
 use crate::text::{MOST_NAME_CHARACTERS, NAME_PATTERN, NAME_RULE};
@@ -85,7 +86,8 @@ pub fn model_schema() -> Value {
         "sensor",
         &[],
         json!({
-            "location": { "enum": ["outer_layer", "ambient"] },
+            "location": { "enum": LOCATIONS,
+                "description": "what a record or profile is the temperature of; a housing, the spool or one of its flanges must be declared as effects" },
             "rate_mean_s": described("number", "each rate is the mean over this interval, which ends at its stamp"),
         }),
     );

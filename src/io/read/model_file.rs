@@ -9,7 +9,7 @@ use crate::coil::{Coil, CoilError, CoilSpec, Fibre, LayerLength};
 use crate::effect::{self, DeclaredEffect, Subject};
 use crate::io::fault::{Fault, Faults};
 use crate::io::files::read_text;
-use crate::io::model::{Advice, ModelFile, NamedPattern, SearchSettings};
+use crate::io::model::{Advice, LOCATIONS, ModelFile, NamedPattern, SearchSettings, location_of};
 use crate::pattern::windability::WindabilityClass;
 use crate::rate::CoilModel;
 use crate::search::cost::objective::Objective;
@@ -96,10 +96,7 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
     let cells = thermal.integer(r, "cells_per_layer", 1, MOST_CELLS_PER_LAYER);
     let thermal_span = thermal.span();
     thermal.finish(r);
-    let location = match sensor.word(r, "location", &["outer_layer", "ambient"]) {
-        Some(1) => Location::Ambient,
-        _ => Location::OuterLayer,
-    };
+    let location = sensor.word(r, "location", LOCATIONS).map_or(Location::OuterLayer, location_of);
     let rate_mean_s = sensor.number(r, "rate_mean_s", Limits::between(0.0, 1e5)).unwrap_or(0.0);
     sensor.finish(r);
     let effects = read_effects(r, effect_tables);
@@ -419,7 +416,9 @@ fn advice_for(model: &CoilModel, has_profiles: bool) -> Vec<Advice> {
     let film = model.effects.iter().find(|e| e.is_at(effect::FILM)).map(DeclaredEffect::kind);
     match (model.location, film) {
         (Location::OuterLayer, Some(effect)) => advice.push(Advice::FilmMovesSensor { effect }),
-        (Location::Ambient, None) => advice.push(Advice::AmbientWithoutFilm { film: effect::FILM.spec.kind }),
+        (Location::Ambient, None) if model.heat_path().is_ok_and(|path| path.housings.is_empty()) => {
+            advice.push(Advice::AmbientWithoutFilm { film: effect::FILM.spec.kind })
+        }
         _ => {}
     }
     if model.extent == Extent::Pack {

@@ -31,7 +31,7 @@ use crate::numeric::piecewise::PiecewiseLinear;
 use crate::pattern::Pattern;
 use crate::profile::Profile;
 use crate::rate::{CoilModel, RateModel};
-use crate::thermal::{Drive, Extent, HeatPath, Instant, StepResponse, ThermalHistory, solve};
+use crate::thermal::{Drive, Extent, HeatPath, Instant, Solver, StepResponse, ThermalHistory, solve};
 use crate::units::REFERENCE_TEMPERATURE_K;
 
 /// Of the change from the model's grid to the finer one: what that leaves of the continuum's is a fraction of it (tests).
@@ -140,9 +140,8 @@ impl Linear {
     fn new(model: CoilModel) -> Result<Self, SearchError> {
         let coarse = model.heat_path()?;
         let fine = HeatPath { cells_per_layer: FINER * coarse.cells_per_layer, ..coarse.clone() };
-        let without = |path: &HeatPath| HeatPath { bore_heat: None, ..path.clone() };
-        let heat_s = coarse.bore_heat.map_or(0.0, |heat| 20.0 * heat.time_constant_s);
-        let last_s = StepResponse::of(&without(&coarse))?.settling_s().max(heat_s);
+        let heat_s = 20.0 * coarse.own_course_s();
+        let last_s = StepResponse::of(&coarse.driven_only())?.settling_s().max(heat_s);
         let first_s = UNTOUCHED * coarse.untouched_m().powi(2) / coarse.material.diffusivity_m2_per_s();
         let count = ((last_s / first_s).ln() / RATIO.ln()).ceil().max(1.0) as i32;
         let times: Vec<Instant> = (0..=count)
@@ -158,8 +157,8 @@ impl Linear {
         let ramp = PiecewiseLinear::new(vec![0.0, end_s], vec![0.0, end_s])
             .map_err(|_| SearchError::Thermal(crate::thermal::ThermalError::Eigen))?;
         let still = Drive::boundary(PiecewiseLinear::constant(REFERENCE_TEMPERATURE_K));
-        let heat = coarse.bore_heat.is_some().then(|| difference(&still, &fine, &coarse)).transpose()?;
-        let ramp = difference(&Drive::boundary(ramp), &without(&fine), &without(&coarse))?;
+        let heat = coarse.has_own_course().then(|| difference(&still, &fine, &coarse)).transpose()?;
+        let ramp = difference(&Drive::boundary(ramp), &fine.driven_only(), &coarse.driven_only())?;
         Ok(Self { model, ramp, heat })
     }
 
@@ -222,7 +221,10 @@ impl Compared {
             .filter(|(_, worst)| *worst >= CONTENDER * largest)
             .map(|&(index, worst)| {
                 let again = self.solved[index].get_or_init(|| {
-                    SolvedProfile::new(self.profiles[index].clone(), 0, &path, rate_model.remembers())
+                    Solver::new(&path)
+                        .and_then(|solver| {
+                            SolvedProfile::new(self.profiles[index].clone(), 0, &solver, rate_model.remembers())
+                        })
                         .map_err(SearchError::from)
                 });
                 let again = again.as_ref().map_err(Clone::clone)?;

@@ -125,9 +125,10 @@ impl UnitStep {
         if let Some(kind) = nonlinear_effect(model)? {
             return Err(GuaranteedError::Effect { kind });
         }
-        let mut path = model.heat_path().map_err(SearchError::from)?;
-        let heated_path = path.bore_heat.map(|_| path.clone());
-        let heat_settled_s = path.bore_heat.take().map_or(0.0, |heat| HEAT_SETTLED * heat.time_constant_s);
+        let whole = model.heat_path().map_err(SearchError::from)?;
+        let path = whole.driven_only();
+        let heat_settled_s = HEAT_SETTLED * whole.own_course_s();
+        let heated_path = whole.has_own_course().then_some(whole);
         let response = StepResponse::of(&path).map_err(SearchError::from)?;
         let (first_s, last_s) = (1e-2 * response.shortest_s(), response.settling_s().max(heat_settled_s));
         let count = ((last_s / first_s).ln() / GRID_RATIO.ln()).ceil() as usize;

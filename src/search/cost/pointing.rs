@@ -217,7 +217,7 @@ impl EndlessRamp {
     /// Heat paths that cannot be solved.
     pub fn new(model: &CoilModel) -> Result<Option<Self>, SearchError> {
         let path = model.heat_path()?;
-        if !is_linear(model)? || path.bore_heat.is_some() {
+        if !is_linear(model)? || path.has_own_course() {
             return Ok(None);
         }
         let response = StepResponse::of(&path)?;

@@ -17,7 +17,7 @@ use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::profile::{Piece, Profile};
 use crate::rate::{CoilModel, Past, RateError, RateModel, WeightResponse};
-use crate::thermal::{Drive, Field, HeatPath, Instant, StepResponse, ThermalError, ThermalHistory, solve};
+use crate::thermal::{Drive, Field, HeatPath, Instant, Solver, StepResponse, ThermalError, ThermalHistory};
 use crate::units::{REFERENCE_TEMPERATURE_K, RotationRate};
 
 #[derive(Debug, Error, Clone, PartialEq)]
@@ -117,8 +117,8 @@ impl SolvedProfiles {
         if profiles.is_empty() {
             return Err(SearchError::NoProfiles);
         }
-        let (path, remembers) = (model.heat_path()?, model.remembers());
-        let profiles = profiles.par_iter().map(|p| SolvedProfile::new(p.clone(), 0, &path, remembers));
+        let (solver, remembers) = (Solver::new(&model.heat_path()?)?, model.remembers());
+        let profiles = profiles.par_iter().map(|p| SolvedProfile::new(p.clone(), 0, &solver, remembers));
         Ok(Self { profiles: profiles.collect::<Result<_, ThermalError>>()? })
     }
 
@@ -129,7 +129,7 @@ impl SolvedProfiles {
     /// A heat path that cannot be solved.
     pub fn after_the_ends(model: &CoilModel, profiles: &[Profile]) -> Result<Option<Self>, SearchError> {
         let (path, remembers) = (model.heat_path()?, model.remembers());
-        let settling_s = settling_s(&path)?;
+        let (settling_s, solver) = (settling_s(&path)?, Solver::new(&path)?);
         let soaked: Vec<SolvedProfile> = profiles
             .par_iter()
             .filter_map(|profile| {
@@ -139,7 +139,7 @@ impl SolvedProfiles {
                 let pieces = profile.pieces().iter().copied().chain([soak]).collect();
                 (!settles).then(|| {
                     let longer = Profile::new(profile.name(), pieces).expect("a soak of a positive duration");
-                    SolvedProfile::new(longer, profile.pieces().len(), &path, remembers)
+                    SolvedProfile::new(longer, profile.pieces().len(), &solver, remembers)
                 })
             })
             .collect::<Result<_, ThermalError>>()?;
@@ -195,8 +195,8 @@ impl SolvedProfiles {
 
 /// Ten time constants of the slowest mode, and of the bore's heat; for the half space the time to its power-law tail.
 fn settling_s(path: &HeatPath) -> Result<f64, ThermalError> {
-    let heat_s = path.bore_heat.map_or(0.0, |heat| 10.0 * heat.time_constant_s);
-    let linear = HeatPath { bore_heat: None, conductivity_slope_per_k: 0.0, ..path.clone() };
+    let heat_s = 10.0 * path.own_course_s();
+    let linear = HeatPath { conductivity_slope_per_k: 0.0, ..path.driven_only() };
     let response = StepResponse::of(&linear)?;
     let settled_s = match response {
         StepResponse::Pack(_) => response.settling_s() / 5.0,
@@ -210,13 +210,13 @@ impl SolvedProfile {
     pub(super) fn new(
         profile: Profile,
         first_piece: usize,
-        path: &HeatPath,
+        solver: &Solver,
         remembers: bool,
     ) -> Result<Self, ThermalError> {
         let drive = Drive::boundary(profile.temperature(REFERENCE_TEMPERATURE_K));
-        let field = solve(path, &drive)?;
+        let field = solver.field(&drive)?;
         let knots = drive.boundary_k.knots();
-        let of = |knots: &[f64]| instants_of_piece(knots[0], knots[1], path, remembers);
+        let of = |knots: &[f64]| instants_of_piece(knots[0], knots[1], solver.path(), remembers);
         let pieces: Vec<Vec<Instant>> = knots[first_piece..]
             .windows(2)
             .map(of)
