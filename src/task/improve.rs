@@ -175,7 +175,7 @@ fn clear(folder: &Path) -> Result<(), WriteError> {
     for step in ["after", "diagnosis", "before"] {
         measurement_folder::clear(&folder.join(step))?;
     }
-    remove_kinds(folder, &["design.toml", "extended.toml", PROPOSED_FILE, EXPERIMENT, "measured-pattern.toml"])
+    remove_kinds(folder, &FILES)
 }
 
 /// What follows from the search.
@@ -221,13 +221,13 @@ impl Way<'_> {
         let names: Vec<&str> = files.iter().map(|(name, _)| name.as_ref()).collect();
         if !self.is_done(folder, made_of.as_deref(), &names) {
             Replacement::all(folder, &files)?;
-            self.note_done(folder, made_of.as_deref())?;
+            self.note_done(folder, made_of.as_deref(), &names)?;
         }
         Ok(())
     }
 
-    fn note_done(&mut self, into: &Path, made_of: Option<&str>) -> Result<(), TaskError> {
-        made_of.map_or(Ok(()), |made_of| self.steps.take(into, made_of))
+    fn note_done(&mut self, into: &Path, made_of: Option<&str>, results: &[&str]) -> Result<(), TaskError> {
+        made_of.map_or(Ok(()), |made_of| self.steps.take(into, made_of, results))
     }
 
     /// The comparison as a document; its folder is written.
@@ -244,7 +244,7 @@ impl Way<'_> {
                 fields: &[],
             };
             compare::run(&request, &Quietly(self.observer))?.write(folder, model)?;
-            self.note_done(folder, made_of.as_deref())?;
+            self.note_done(folder, made_of.as_deref(), &[COMPARISON])?;
         }
         Ok(())
     }
@@ -279,7 +279,7 @@ impl Way<'_> {
             write_atomically(&self.request.folder.join(EXPERIMENT), experiment.as_bytes())?;
         }
         found.write(folder, file)?;
-        self.note_done(folder, made_of.as_deref())
+        self.note_done(folder, made_of.as_deref(), &[DIAGNOSIS])
     }
 
     /// What a search for the next winding found; its folder is written. None if the observer ended it.
@@ -312,7 +312,7 @@ impl Way<'_> {
         let Some(answer) = answer.filter(|_| self.observer.goes_on()) else { return Ok(None) };
         let document = OptimiseJson::of(&design.model.name, &request, &answer, 0.0, 0.0);
         optimise::write(folder, design, &document, &answer)?;
-        self.note_done(folder, made_of.as_deref())?;
+        self.note_done(folder, made_of.as_deref(), &[SUMMARY])?;
         read_json(&folder.join(SUMMARY)).map(Some)
     }
 }
@@ -345,6 +345,18 @@ fn read_json(path: &Path) -> Result<Value, TaskError> {
 
 /// The name of the predicted record in the folder.
 const PREDICTED: &str = "predicted-record.csv";
+
+/// What is written into the folder itself, and taken away where it is another request's.
+pub const FILES: [&str; 8] = [
+    "index.html",
+    PREDICTED,
+    "recommended.toml",
+    "design.toml",
+    EXTENDED,
+    PROPOSED_FILE,
+    EXPERIMENT,
+    "measured-pattern.toml",
+];
 
 fn shown(path: &Path) -> String {
     path.display().to_string()

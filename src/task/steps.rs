@@ -1,8 +1,10 @@
 //! Which steps of a longer use case were taken, and of what: a step is taken again only where something that it is made of
-//! has changed.
+//! has changed, or what it left.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
 
 use crate::io::files::{read_text, sha256_hex, write_atomically};
 
@@ -15,8 +17,17 @@ const STEPS: &str = "steps.json";
 /// The steps of one folder; each writes a folder of its own within it.
 pub(super) struct Steps {
     path: PathBuf,
-    /// By the name of a step's folder: a hash of what it was made of.
-    made_of: BTreeMap<String, String>,
+    /// By the name of a step's folder.
+    taken: BTreeMap<String, Step>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Step {
+    /// A hash of what it was made of.
+    made_of: String,
+    /// A hash of each file that later steps read: one that was changed since is not gone on from.
+    left: BTreeMap<String, String>,
 }
 
 impl Steps {
@@ -24,22 +35,30 @@ impl Steps {
     pub fn of(folder: &Path) -> Self {
         let path = folder.join(STEPS);
         // A file that cannot be understood says nothing: all steps are taken again.
-        let made_of = read_text(&path).ok().and_then(|text| serde_json::from_str(&text).ok());
-        Self { path, made_of: made_of.unwrap_or_default() }
+        let taken = read_text(&path).ok().and_then(|text| serde_json::from_str(&text).ok());
+        Self { path, taken: taken.unwrap_or_default() }
     }
 
-    /// Whether a step was taken of the same and all that it wrote is there.
+    /// Whether a step was taken of the same and its results are there as it left them.
     pub fn is_taken(&self, into: &Path, made_of: &str, results: &[&str]) -> bool {
-        let is_there = results.iter().all(|result| into.join(result).is_file());
-        is_there && self.made_of.get(&name_of(into)).is_some_and(|known| known == made_of)
+        let Some(step) = self.taken.get(&name_of(into)).filter(|step| step.made_of == made_of) else { return false };
+        results.iter().all(|result| {
+            let there = hash_of(&into.join(result));
+            there.is_some() && there.as_ref() == step.left.get(*result)
+        })
     }
 
-    /// Notes that a step was taken, or begun.
-    pub fn take(&mut self, step: &Path, made_of: &str) -> Result<(), TaskError> {
-        self.made_of.insert(name_of(step), made_of.to_owned());
-        let text = serde_json::to_string_pretty(&self.made_of)? + "\n";
+    /// Notes that a step was taken, and what it left.
+    pub fn take(&mut self, step: &Path, made_of: &str, results: &[&str]) -> Result<(), TaskError> {
+        let hashes = results.iter().filter_map(|result| Some(((*result).to_owned(), hash_of(&step.join(result))?)));
+        self.taken.insert(name_of(step), Step { made_of: made_of.to_owned(), left: hashes.collect() });
+        let text = serde_json::to_string_pretty(&self.taken)? + "\n";
         Ok(write_atomically(&self.path, text.as_bytes())?)
     }
+}
+
+fn hash_of(path: &Path) -> Option<String> {
+    Some(sha256_hex(&std::fs::read_to_string(path).ok()?))
 }
 
 pub(super) fn name_of(folder: &Path) -> String {

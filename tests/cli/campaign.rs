@@ -136,6 +136,13 @@ fn only_what_a_change_reaches_is_computed_again_and_a_damaged_cell_is_missing() 
     assert_eq!(ids(&run(&["--merge"], 1)["missing"]), before[..1]);
     assert_eq!(run(&[], 0)["searched"], 1);
     assert_eq!(std::fs::read_to_string(&cell).unwrap(), text);
+    // Nor is what holds another number than the search found.
+    let mut changed: serde_json::Value = serde_json::from_str(&text).unwrap();
+    changed["worst_rate_deg_per_h"] = 0.0123.into();
+    std::fs::write(&cell, serde_json::to_string_pretty(&changed).unwrap()).unwrap();
+    assert_eq!(ids(&run(&["--merge"], 1)["missing"]), before[..1]);
+    assert_eq!(run(&[], 0)["searched"], 1);
+    assert_eq!(std::fs::read_to_string(&cell).unwrap(), text);
 }
 
 #[test]
@@ -293,6 +300,16 @@ fn every_point_of_the_front_is_a_pattern_that_schedule_takes_and_none_is_beaten_
     assert_eq!(std::fs::read(folder.join("pareto.csv")).unwrap(), before);
     assert_eq!(std::fs::read_dir(&parts).unwrap().count(), count);
     assert_eq!(written(1), first, "a part that was there was searched again");
+    // A part that holds another pattern than was found is searched again.
+    let part = parts.join("001.json");
+    let found = std::fs::read_to_string(&part).unwrap();
+    let mut changed: serde_json::Value = serde_json::from_str(&found).unwrap();
+    changed["found"][0].as_array_mut().unwrap().reverse();
+    std::fs::write(&part, changed.to_string()).unwrap();
+    assert!(coilwright(&again).status.success());
+    assert_eq!(std::fs::read_to_string(&part).unwrap(), found);
+    assert_eq!(std::fs::read(folder.join("pareto.csv")).unwrap(), before);
+    let first = written(1);
     // A part of another request is not taken for one of this.
     assert!(coilwright(&[&again[..], &["--seed", "9"]].concat()).status.success());
     assert_ne!(written(1), first, "a part of another seed was taken");

@@ -55,6 +55,15 @@ fn the_example_of_improve_runs_from_records_to_a_schedule_and_takes_no_step_twic
         assert!(notes.contains(&format!("{step}: done before")), "{step}: {notes}");
     }
 
+    // A step whose result was changed since is taken again.
+    let compared = written.join("after/comparison.json");
+    let whole = std::fs::read_to_string(&compared).unwrap();
+    std::fs::write(&compared, whole.replacen("\"rmse_deg_per_h\": 0.", "\"rmse_deg_per_h\": 1.", 1)).unwrap();
+    let again = run_in(folder.path(), &words);
+    assert_eq!(stdout(&again), stdout(&first));
+    assert!(stderr(&again).contains("after …") && stderr(&again).contains("search: done before"), "{}", stderr(&again));
+    assert_eq!(std::fs::read_to_string(&compared).unwrap(), whole);
+
     // Another request takes all of this away before its own first file comes; here it gets no further.
     std::fs::write(written.join("notes.txt"), "mine").unwrap();
     std::fs::write(written.join("before/run.toml"), "").unwrap();

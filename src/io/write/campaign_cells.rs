@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::io::files::{WriteError, write_atomically};
+use serde_json::{Map, Value};
+
+use crate::io::files::{WriteError, sha256_hex, write_atomically};
 use crate::io::folder::Replacement;
 use crate::io::json::campaign::{BlockJson, CellDocument, CellJson, GyroJson};
 use crate::io::read::campaign_file::{Cell, Work};
@@ -18,10 +20,22 @@ pub fn cell_path(folder: &Path, id: &str) -> PathBuf {
     folder.join("cells").join(&id[..FOLDER_DIGITS.min(id.len())]).join(format!("{id}.json"))
 }
 
-/// A cell's result, if it is there, whole and of this cell.
+/// A cell's result, if it is there, as it was written, and of this cell.
 pub fn read_cell<T: CellDocument>(folder: &Path, id: &str) -> Option<T> {
     let text = std::fs::read_to_string(cell_path(folder, id)).ok()?;
-    serde_json::from_str::<T>(&text).ok().filter(|found| found.id() == id)
+    let mut document: Map<String, Value> = serde_json::from_str(&text).ok()?;
+    let stated = document.shift_remove(CHECKSUM)?;
+    if stated.as_str() != Some(&sum(&document)) {
+        return None;
+    }
+    serde_json::from_value::<T>(document.into()).ok().filter(|found| found.id() == id)
+}
+
+/// The key of the SHA-256 of all the rest: a number that was changed would go into the table unnoticed.
+const CHECKSUM: &str = "checksum";
+
+fn sum(document: &Map<String, Value>) -> String {
+    sha256_hex(&serde_json::to_string(document).expect("a cell's numbers can be written"))
 }
 
 /// Whether a cell's result is there.
@@ -38,7 +52,10 @@ pub fn is_done(folder: &Path, cell: &Cell) -> bool {
 /// # Errors
 /// A file that cannot be written.
 pub fn write_cell<T: CellDocument>(folder: &Path, found: &T) -> Result<(), WriteError> {
-    let json = serde_json::to_string_pretty(found).expect("a cell's numbers can be written") + "\n";
+    let document = serde_json::to_value(found).expect("a cell's numbers can be written");
+    let Value::Object(mut document) = document else { unreachable!("a cell's result has named fields") };
+    document.insert(CHECKSUM.to_owned(), sum(&document).into());
+    let json = serde_json::to_string_pretty(&document).expect("a cell's numbers can be written") + "\n";
     write_atomically(&cell_path(folder, found.id()), json.as_bytes())?;
     forget_state(folder, found.id());
     Ok(())

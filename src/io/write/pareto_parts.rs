@@ -23,10 +23,18 @@ pub struct Front<'a> {
 #[serde(deny_unknown_fields)]
 struct PartJson {
     fingerprint: String,
+    /// SHA-256 of the part's other lines: a pattern that was changed is no longer what was found.
+    checksum: String,
     /// What was searched, in words.
     part: String,
     /// P(j) of each pattern found, innermost layer first.
     found: Vec<Vec<usize>>,
+}
+
+impl PartJson {
+    fn sum(&self) -> String {
+        sha256_hex(&format!("{}\n{}\n{:?}", self.fingerprint, self.part, self.found))
+    }
 }
 
 /// What an earlier front left in the folder: its pictures, the pattern files that its table lists, and the table, last: it must
@@ -49,7 +57,9 @@ impl Front<'_> {
         let text = std::fs::read_to_string(self.path(number)).ok()?;
         let read: PartJson = serde_json::from_str(&text).ok()?;
         let layers = self.file.model.coil.layers();
-        let fits = read.fingerprint == self.fingerprint(part) && read.found.iter().all(|s| s.len() == layers);
+        let fits = read.fingerprint == self.fingerprint(part)
+            && read.checksum == read.sum()
+            && read.found.iter().all(|s| s.len() == layers);
         fits.then(|| read.found.into_iter().map(|s| Pattern::new(s).ok()).collect())?
     }
 
@@ -59,7 +69,9 @@ impl Front<'_> {
     /// A file that cannot be written.
     pub fn write_part(&self, number: usize, part: &str, found: &[Pattern]) -> Result<(), WriteError> {
         let found = found.iter().map(|p| p.segments().to_vec()).collect();
-        let document = PartJson { fingerprint: self.fingerprint(part), part: part.to_owned(), found };
+        let (fingerprint, part) = (self.fingerprint(part), part.to_owned());
+        let mut document = PartJson { fingerprint, checksum: String::new(), part, found };
+        document.checksum = document.sum();
         let json = serde_json::to_string(&document).expect("numbers, strings and lists can always be written as JSON");
         write_atomically(&self.path(number), (json + "\n").as_bytes())
     }
