@@ -9,7 +9,7 @@ use super::watching::Watching;
 use super::{CliError, Ending, offered};
 use crate::io::json::comparison::{CompareJson, NoisePartsJson, PartJson, RecordComparisonJson};
 use crate::io::read::model_file::read_model;
-use crate::io::write::measurement_folder::check_free;
+use crate::io::write::measurement_folder::{COMPARISON_FILE, check_free, check_kept};
 use crate::task::compare::{Request, run as compare};
 use crate::task::page::REPORT_FILE;
 use crate::task::under_fields::FieldFile;
@@ -48,6 +48,9 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
+    if let Some(folder) = &arguments.output {
+        check_kept(folder, COMPARISON_FILE, screen.named())?;
+    }
     let _held = arguments.output.as_deref().map(|folder| held(folder, "compare")).transpose()?;
     if let Some(folder) = &arguments.output {
         check_free(folder)?;

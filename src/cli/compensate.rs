@@ -8,15 +8,17 @@ use clap::ValueEnum;
 
 use super::pattern_asked::pattern_asked;
 use super::records::RecordArguments;
-use super::screen::{Screen, table};
+use super::screen::{Screen, run_of, table};
 use super::watching::Watching;
 use super::{CliError, Ending, offered};
 use crate::compensate::{Compensator, Method};
 use crate::io::fault::Faults;
-use crate::io::files::{NewFile, write_atomically};
+use crate::io::files::{NewFile, folder_of, write_atomically};
+use crate::io::folder::{HeldFolder, Replacement};
 use crate::io::read::model_file::read_model;
 use crate::io::read::record_columns::RecordFormat;
 use crate::io::write::compensation_file::{CompensateJson, MeasuresJson, StreamSummary, compensate_lines_from_turn_on};
+use crate::record::LEAST_INTERVAL_S;
 use crate::report::compensation::compensation_chart;
 use crate::task::compensate::{Answer, Request, all_methods as try_all, run as compensator_for};
 use crate::task::measurement::Measurement;
@@ -50,7 +52,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     export: Option<PathBuf>,
     /// Looks so far ahead [s]; without it, as far as the fitted record says is worth it
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", value_parser = delay_seconds)]
     delay: Option<f64>,
     /// Takes off what this start-up added to the bias: the mean of what is left of the first seconds, in which the gyro must stand
     /// still; those rows are flagged turn_on
@@ -60,7 +62,7 @@ pub struct Arguments {
     #[arg(long)]
     linear: bool,
     /// Interval of the exported compensator [s]; without it, that of the fitted record
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", value_parser = interval_seconds)]
     interval: Option<f64>,
     #[command(flatten)]
     reading: RecordArguments,
@@ -105,9 +107,13 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     if arguments.all_methods {
         return all_methods(arguments, &request, &format, screen);
     }
+    let prefix = arguments.export.as_deref();
+    let held = prefix.map(|prefix| HeldFolder::take_prefix(prefix, &run_of("compensate"))).transpose()?;
     let answer = compensator_for(&request, &Watching::quiet(screen))?;
-    if let Some(prefix) = &arguments.export {
+    if let Some(prefix) = prefix {
         export(&answer, arguments.interval, prefix, screen)?;
+        // A stream may go on for days.
+        drop(held);
         if arguments.record.is_none() {
             return Ok(Ending::Done);
         }
@@ -136,6 +142,21 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     }
     Ok(Ending::Done)
 }
+
+fn delay_seconds(text: &str) -> Result<f64, String> {
+    let seconds = text.parse::<f64>().ok().filter(|s| (0.0..=LONGEST_S).contains(s));
+    seconds.ok_or_else(|| format!("expected a time in seconds from 0 to {LONGEST_S}, found \"{text}\""))
+}
+
+/// A compensator whose rows are closer than those of any record, or a day apart, is none.
+fn interval_seconds(text: &str) -> Result<f64, String> {
+    let seconds = text.parse::<f64>().ok().filter(|s| (LEAST_INTERVAL_S..=LONGEST_S).contains(s));
+    seconds
+        .ok_or_else(|| format!("expected a time in seconds from {LEAST_INTERVAL_S} to {LONGEST_S}, found \"{text}\""))
+}
+
+/// A day: no coil remembers longer.
+const LONGEST_S: f64 = 86_400.0;
 
 fn positive_seconds(text: &str) -> Result<f64, String> {
     let seconds = text.parse::<f64>().ok().filter(|s| s.is_finite() && *s > 0.0);
@@ -178,11 +199,15 @@ fn stream(
 
 fn export(answer: &Answer, interval_s: Option<f64>, prefix: &Path, screen: &Screen) -> Result<(), CliError> {
     let [json, header] = answer.exported(interval_s)?.ok_or(CliError::NoExport)?;
-    for (extension, text) in [("json", json), ("h", header)] {
-        let path = prefix.with_extension(extension);
-        write_atomically(&path, text.as_bytes())?;
-        screen.note(&format!("wrote {}", path.display()));
-    }
+    let folder = folder_of(prefix);
+    let mut replacement = Replacement::of(&folder);
+    let paths = ["json", "h"].map(|extension| prefix.with_extension(extension));
+    let names = paths.each_ref().map(|path| path.file_name().unwrap_or_default());
+    names.iter().zip([json, header]).try_for_each(|(name, text)| replacement.add(name, text.as_bytes()))?;
+    // Of the two files none stays that is another run's.
+    let kinds = names.map(|name| name.to_string_lossy().into_owned());
+    replacement.commit(&kinds.each_ref().map(String::as_str))?;
+    paths.iter().for_each(|path| screen.note(&format!("wrote {}", path.display())));
     Ok(())
 }
 

@@ -11,7 +11,7 @@ use super::{CliError, Ending, offered};
 use crate::io::files::write_atomically;
 use crate::io::json::diagnosis::{DiagnosisJson, FindingJson};
 use crate::io::read::model_file::read_model;
-use crate::io::write::measurement_folder::check_free;
+use crate::io::write::measurement_folder::{DIAGNOSIS_FILE, check_free, check_kept};
 use crate::report::diagnosis::{
     explanations, posterior_in_words, refitted_in_words, rest_in_words, value_in_words, verdict_in_words,
 };
@@ -58,6 +58,9 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
+    if let Some(folder) = &arguments.output {
+        check_kept(folder, DIAGNOSIS_FILE, screen.named())?;
+    }
     let _held = arguments.output.as_deref().map(|folder| held(folder, "diagnose")).transpose()?;
     if let Some(folder) = &arguments.output {
         check_free(folder)?;

@@ -10,10 +10,11 @@ use super::screen::{Screen, held};
 use super::terms::TermArguments;
 use super::watching::Watching;
 use super::{CliError, Ending, offered};
+use crate::io::folder::check_read;
 use crate::io::json::improve::ImproveJson;
 use crate::io::read::model_file::read_model;
 use crate::report::proposal::proposal_in_words;
-use crate::task::improve::{Request, run as improve};
+use crate::task::improve::{FILES, Request, run as improve};
 use crate::task::measurement::Measurement;
 
 /// The whole loop: compares and diagnoses records, extends the model, searches the next winding and writes its schedule
@@ -51,6 +52,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let stop = StopFlag::listen();
     let file = read_model(&arguments.model)?;
     let pattern = pattern_asked(&file, arguments.pattern.as_deref())?;
+    check_read(&arguments.output, &FILES, screen.named())?;
     let _held = held(&arguments.output, "improve")?;
     let read = |paths: &[PathBuf]| -> Result<Vec<Measurement>, CliError> {
         paths.iter().map(|path: &PathBuf| Ok(Measurement::read(Path::new(path), &file.record)?)).collect()

@@ -13,7 +13,7 @@ use crate::io::json::inputs::RecordInputJson;
 use crate::io::json::metrics::{MetricsJson, NoiseJson, RecordMetricsJson};
 use crate::io::json::scale_factor::{EstimateJson, ScaleFactorJson};
 use crate::io::read::record_columns::RecordFormat;
-use crate::io::write::measurement_folder::check_free;
+use crate::io::write::measurement_folder::{METRICS_FILE, check_free, check_kept};
 use crate::metrics::earth::Attitude;
 use crate::task::Observer;
 use crate::task::metrics::{self, DEFAULT_AVERAGE_S, Measured, Settings, measure_stream};
@@ -52,6 +52,9 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+    if let Some(folder) = &arguments.output {
+        check_kept(folder, METRICS_FILE, screen.named())?;
+    }
     let _held = arguments.output.as_deref().map(|folder| held(folder, "metrics")).transpose()?;
     if let Some(folder) = &arguments.output {
         check_free(folder)?;

@@ -43,7 +43,6 @@ mod watch;
 mod watching;
 
 use std::ffi::OsString;
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand, ValueEnum};
@@ -214,7 +213,7 @@ pub fn run_with(words: impl IntoIterator<Item = impl Into<OsString>>) -> u8 {
             return error.exit_code() as u8;
         }
     };
-    let screen = Screen::new(&cli.output, words.first().map_or_else(PathBuf::new, PathBuf::from));
+    let screen = Screen::new(&cli.output, &words);
     let started = std::time::Instant::now();
     let ending = carry_out(&cli.command, &screen);
     if cli.output.verbose {

@@ -19,7 +19,7 @@ use crate::io::model::ModelFile;
 use crate::io::read::model_file::read_design;
 use crate::io::read::posterior::drawn_models;
 use crate::io::write::checkpoint::{BROKEN_FILE, CHECKPOINT_FILE, read_checkpoint, set_broken_aside};
-use crate::io::write::run_directory::Request;
+use crate::io::write::run_directory::{Request, check_kept};
 use crate::pattern::windability::WindabilityClass;
 use crate::search;
 use crate::search::anneal::rounds::{DEFAULT_RESTARTS_PER_ROUND, State};
@@ -199,6 +199,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     };
     searched.uncertain = &uncertain;
     let folder = arguments.output.as_deref();
+    folder.map_or(Ok(()), |folder| check_kept(folder, screen.named()))?;
     let _held = folder.map(|folder| held(folder, "optimise")).transpose()?;
     searched.saved = match folder {
         Some(folder) => saved_state(arguments, folder, &request, screen)?,

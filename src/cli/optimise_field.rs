@@ -10,6 +10,7 @@ use super::watching::Watching;
 use super::{CliError, Ending};
 use crate::io::json::field::FieldSearchJson;
 use crate::io::model::ModelFile;
+use crate::io::write::run_directory::check_kept;
 use crate::search::Observer;
 use crate::search::anneal::rounds::Rounds;
 use crate::search::answer::Ended;
@@ -31,6 +32,7 @@ pub(super) fn run(
     let wishes = Wishes { objective: Some(objective), ..options.wishes(file)? };
     let fields = arguments.field.iter().map(|path| FieldFile::read(path)).collect::<Result<Vec<_>, _>>()?;
     let folder = arguments.output.as_deref();
+    folder.map_or(Ok(()), |folder| check_kept(folder, screen.named()))?;
     let _held = folder.map(|folder| held(folder, "optimise")).transpose()?;
     let class = wishes.class(file);
     let request = Search { model: file, fields: &fields, class, objective, plan: wishes.plan(file)? };

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 
-use super::screen::{Screen, table};
+use super::screen::{Screen, held, table};
 use super::{CliError, Ending};
-use crate::io::files::write_atomically;
+use crate::io::folder::Replacement;
 use crate::report::thesis2021 as thesis;
 use crate::report::yan1998::{ReproductionFile, ReproductionJson, TABLE_HEAD, files, table_rows};
 use crate::reproduce::{thesis2021, yan1998};
@@ -41,19 +41,31 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     }
 }
 
-fn write(folder: &Path, files: Vec<ReproductionFile>) -> Result<Vec<String>, CliError> {
-    let mut written = Vec::new();
-    for file in files {
-        let path = folder.join(&file.name);
-        write_atomically(&path, file.contents.as_bytes())?;
-        written.push(path.display().to_string());
-    }
-    Ok(written)
+/// Files that one of the publications leaves: in one folder the other's do not stay beside its own.
+const KINDS: &[&str] = &[
+    "README.md",
+    "table2.csv",
+    "figure2.csv",
+    "figure2.svg",
+    "figure3-#m.csv",
+    "figure3-#m.svg",
+    "comparisons.csv",
+    "record.csv",
+    "figure3-#.svg",
+    "figure3-5-6.svg",
+];
+
+fn write(folder: &Path, files: &[ReproductionFile]) -> Result<Vec<String>, CliError> {
+    let _held = held(folder, "reproduce")?;
+    let mut replacement = Replacement::of(folder);
+    files.iter().try_for_each(|file| replacement.add(&file.name, file.contents.as_bytes()))?;
+    replacement.commit(KINDS)?;
+    Ok(files.iter().map(|file| folder.join(&file.name).display().to_string()).collect())
 }
 
 fn of_thesis(folder: &Path, screen: &Screen) -> Result<Ending, CliError> {
     let reproduction = thesis2021::reproduce()?;
-    let written = write(folder, thesis::files(&reproduction, "coilwright reproduce thesis2021"))?;
+    let written = write(folder, &thesis::files(&reproduction, "coilwright reproduce thesis2021"))?;
     screen.answer(thesis::ReproductionJson::new(&reproduction, written), |body| {
         let mut text = format!("{}\n\nThe record is {}.\n\n", thesis2021::TITLE, body.record);
         text += &table(&thesis::TABLE_HEAD, thesis::table_rows(&reproduction));
@@ -68,7 +80,7 @@ fn of_thesis(folder: &Path, screen: &Screen) -> Result<Ending, CliError> {
 
 fn of_paper(folder: &Path, screen: &Screen) -> Result<Ending, CliError> {
     let reproduction = yan1998::reproduce()?;
-    let written = write(folder, files(&reproduction, "coilwright reproduce yan1998"))?;
+    let written = write(folder, &files(&reproduction, "coilwright reproduce yan1998"))?;
     screen.answer(ReproductionJson::new(&reproduction, written), |body| {
         let mut text = format!("{}\n\nTable 2, published beside computed\n", yan1998::TITLE);
         text += &table(&TABLE_HEAD, table_rows(&reproduction));

@@ -1,5 +1,6 @@
 //! Where commands write: the answer to stdout, notes to stderr.
 
+use std::ffi::OsString;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
@@ -20,11 +21,24 @@ pub struct Screen {
     progress: ProgressMode,
     /// The program's name or place, as it was called.
     pub program: PathBuf,
+    /// Files that the command line names.
+    named: Vec<PathBuf>,
 }
 
 impl Screen {
-    pub fn new(options: &OutputOptions, program: PathBuf) -> Self {
-        Self { format: options.format, quiet: options.quiet, progress: options.progress, program }
+    /// `words` are those of the command line, the program's name first.
+    pub fn new(options: &OutputOptions, words: &[OsString]) -> Self {
+        let program = words.first().map_or_else(PathBuf::new, PathBuf::from);
+        // An option may hold its value behind a sign of equality.
+        let value = |word: &OsString| word.to_str().and_then(|word| Some(PathBuf::from(word.split_once('=')?.1)));
+        let words = words.iter().skip(1).flat_map(|word| [Some(PathBuf::from(word)), value(word)]);
+        let named = words.flatten().filter(|path| path.is_file()).collect();
+        Self { format: options.format, quiet: options.quiet, progress: options.progress, program, named }
+    }
+
+    /// Files that the command line names: what a command reads must not be among what it writes over.
+    pub fn named(&self) -> impl Iterator<Item = &Path> {
+        self.named.iter().map(PathBuf::as_path)
     }
 
     pub fn is_json(&self) -> bool {
@@ -103,7 +117,12 @@ impl Screen {
 /// # Errors
 /// A folder that cannot be written, or that another run holds.
 pub fn held(folder: &Path, command: &str) -> Result<HeldFolder, CliError> {
-    Ok(HeldFolder::take(folder, &format!("coilwright {command} (process {})", std::process::id()))?)
+    Ok(HeldFolder::take(folder, &run_of(command))?)
+}
+
+/// What another run is told of this one.
+pub fn run_of(command: &str) -> String {
+    format!("coilwright {command} (process {})", std::process::id())
 }
 
 /// Begins the head of a table until it is written: a character of private use, which no font and no keyboard has.

@@ -6,7 +6,7 @@ use super::records::RecordArguments;
 use super::screen::{Screen, held};
 use super::watching::Watching;
 use super::{CliError, Ending};
-use crate::io::folder::Replacement;
+use crate::io::folder::{Replacement, check_read};
 use crate::io::read::model_file::read_model;
 use crate::io::read::profile_file::read_profile_file;
 use crate::io::write::field_table::field_table;
@@ -45,7 +45,12 @@ pub struct Arguments {
     reading: RecordArguments,
 }
 
+const FILES: [&str; 3] = ["temperatures.csv", "temperatures.svg", "rates.svg"];
+
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+    if let Some(folder) = &arguments.output {
+        check_read(folder, &FILES, screen.named())?;
+    }
     let mut file = read_model(&arguments.model)?;
     if let Some(path) = &arguments.profiles {
         file.profiles = read_profile_file(path)?;
@@ -63,10 +68,9 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     if let Some(folder) = &arguments.output {
         let _held = held(folder, "temperatures")?;
         let mut files = Replacement::of(folder);
-        let names = ["temperatures.csv", "temperatures.svg", "rates.svg"];
         let contents = [csv.clone(), temperature_chart(&body).svg(), rate_chart(&body).svg()];
-        names.iter().zip(&contents).try_for_each(|(name, content)| files.add(name, content.as_bytes()))?;
-        files.commit(&names)?;
+        FILES.iter().zip(&contents).try_for_each(|(name, content)| files.add(name, content.as_bytes()))?;
+        files.commit(&FILES)?;
         screen.note(&format!("wrote temperatures.csv, temperatures.svg and rates.svg into {}", folder.display()));
         if !screen.is_json() {
             return Ok(Ending::Done);

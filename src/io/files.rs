@@ -18,8 +18,20 @@ pub enum WriteError {
     Folder { path: PathBuf, source: std::io::Error },
     #[error("{holder} writes into {path}: wait until it has ended, or choose another folder", path = .path.display())]
     Held { path: PathBuf, holder: String },
+    #[error("{path} is read here, and a file of that name is written into its folder: choose another folder", path = .path.display())]
+    WouldReplace { path: PathBuf },
+    #[error("{path} was left there by no run, and a file of that name is written: choose another folder", path = .path.display())]
+    NotOurs { path: PathBuf },
     #[error("cannot write {path}: {source}", path = .path.display())]
     File { path: PathBuf, source: std::io::Error },
+}
+
+/// The folder in which a file of that path lies.
+pub fn folder_of(path: &Path) -> PathBuf {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
+        _ => PathBuf::from("."),
+    }
 }
 
 /// Reads a text file that is to be understood as a whole.
@@ -101,10 +113,7 @@ impl NewFile {
     /// # Errors
     /// A folder or file that cannot be written.
     pub fn create(path: &Path) -> Result<Self, WriteError> {
-        let folder = match path.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
+        let folder = &folder_of(path);
         std::fs::create_dir_all(folder).map_err(|source| WriteError::Folder { path: folder.to_owned(), source })?;
         let fail = |source| WriteError::File { path: path.to_owned(), source };
         let name = path.file_name().ok_or_else(|| fail(std::io::ErrorKind::InvalidFilename.into()))?;

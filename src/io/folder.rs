@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use super::files::{NewFile, WriteError, claimed, is_temporary};
+use super::files::{NewFile, WriteError, claimed, folder_of, is_temporary};
 
 /// The file that is locked while a run writes into a folder; it goes with the run.
 pub const LOCK_FILE: &str = ".coilwright.lock";
@@ -25,16 +25,66 @@ impl HeldFolder {
     /// # Errors
     /// A folder that cannot be written, or that another run holds.
     pub fn take(folder: &Path, who: &str) -> Result<Self, WriteError> {
+        let held = Self::take_lock(folder, folder, LOCK_FILE, who)?;
+        clear_left_behind(folder).map_err(|source| WriteError::Folder { path: folder.to_owned(), source })?;
+        Ok(held)
+    }
+
+    /// The files `PREFIX.json`, `PREFIX.h` and so on alone: runs with other prefixes may write beside them.
+    ///
+    /// # Errors
+    /// As [`HeldFolder::take`].
+    pub fn take_prefix(prefix: &Path, who: &str) -> Result<Self, WriteError> {
+        let folder = folder_of(prefix);
+        let name = prefix.file_stem().unwrap_or_default().display();
+        Self::take_lock(&folder, prefix, &format!(".{name}{LOCK_FILE}"), who)
+    }
+
+    fn take_lock(folder: &Path, held: &Path, lock: &str, who: &str) -> Result<Self, WriteError> {
         let fail = |source| WriteError::Folder { path: folder.to_owned(), source };
         std::fs::create_dir_all(folder).map_err(fail)?;
-        let path = folder.join(LOCK_FILE);
+        let path = folder.join(lock);
         let Some(mut file) = claimed(&path).map_err(fail)? else {
-            return Err(WriteError::Held { path: folder.to_owned(), holder: holder(&path) });
+            return Err(WriteError::Held { path: held.to_owned(), holder: holder(&path) });
         };
         writeln!(file, "{who}").and_then(|()| file.flush()).map_err(fail)?;
-        clear_left_behind(folder).map_err(fail)?;
         Ok(Self { path, _file: file })
     }
+}
+
+/// Refuses to write over what a command reads: a file that lies in the folder under one of the names that the command writes
+/// or takes away there.
+///
+/// # Errors
+/// As said.
+pub fn check_read<'a>(
+    folder: &Path,
+    kinds: &[&str],
+    read: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), WriteError> {
+    let Ok(place) = folder.canonicalize() else { return Ok(()) };
+    let is_replaced = |path: &Path| {
+        let name = path.file_name().and_then(|name| name.to_str());
+        name.is_some_and(|name| kinds.iter().any(|kind| is_of(name, kind)))
+            && folder_of(path).canonicalize().is_ok_and(|parent| parent == place)
+    };
+    match read.into_iter().find(|path| path.is_file() && is_replaced(path)) {
+        Some(path) => Err(WriteError::WouldReplace { path: path.to_owned() }),
+        None => Ok(()),
+    }
+}
+
+/// Refuses to write over a file of that name where none of the `marks` says that a run wrote it; a lock says so, too, which a
+/// killed run leaves.
+///
+/// # Errors
+/// As said.
+pub fn check_ours(folder: &Path, name: &str, marks: &[&str]) -> Result<(), WriteError> {
+    let path = folder.join(name);
+    if path.is_file() && !marks.iter().chain(&[LOCK_FILE]).any(|mark| folder.join(mark).is_file()) {
+        return Err(WriteError::NotOurs { path });
+    }
+    Ok(())
 }
 
 /// Takes away the temporary files that killed runs left; one that somebody still writes is locked and stays.
@@ -77,7 +127,7 @@ impl<'a> Replacement<'a> {
 
     /// # Errors
     /// A file that cannot be written.
-    pub fn add(&mut self, name: &str, contents: &[u8]) -> Result<(), WriteError> {
+    pub fn add(&mut self, name: impl AsRef<Path>, contents: &[u8]) -> Result<(), WriteError> {
         let path = self.folder.join(name);
         let mut file = NewFile::create(&path)?;
         file.write_all(contents).map_err(|source| WriteError::File { path, source })?;
@@ -189,6 +239,17 @@ mod tests {
         assert!(!folder.path().join(LOCK_FILE).exists());
         std::fs::write(folder.path().join(LOCK_FILE), "optimise (process 3)").unwrap();
         HeldFolder::take(folder.path(), "pareto (process 4)").unwrap();
+    }
+
+    #[test]
+    fn a_held_prefix_leaves_other_prefixes_free() {
+        let folder = tempfile::tempdir().unwrap();
+        let held = HeldFolder::take_prefix(&folder.path().join("a"), "compensate (process 1)").unwrap();
+        let refused = HeldFolder::take_prefix(&folder.path().join("a"), "compensate (process 2)").unwrap_err();
+        assert!(refused.to_string().contains("compensate (process 1)"), "{refused}");
+        let beside = HeldFolder::take_prefix(&folder.path().join("b"), "compensate (process 3)").unwrap();
+        drop((held, beside));
+        assert!(names(folder.path()).is_empty());
     }
 
     fn names(folder: &Path) -> Vec<String> {

@@ -22,6 +22,7 @@ mod mangled;
 mod metrics;
 mod names;
 mod once_broken;
+mod own_files;
 mod readme;
 mod remote;
 mod reproduce;

@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 
 use crate::io::fault::{Fault, Faults};
 use crate::io::files::{WriteError, read_text, read_text_up_to, write_atomically};
-use crate::io::folder::{Replacement, remove_kinds};
+use crate::io::folder::{Replacement, check_ours, check_read, remove_kinds};
 use crate::io::json::Document;
 use crate::io::json::comparison::CompareJson;
 use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow};
@@ -56,6 +56,31 @@ pub fn check_free(folder: &Path) -> Result<(), Faults> {
         return Err(Faults::of_file(folder.display().to_string(), message));
     }
     Ok(())
+}
+
+/// Refuses a folder in which the files of the command that writes `document` would take the place of what it reads, or of a
+/// model file that no run left there.
+///
+/// # Errors
+/// As said.
+pub fn check_kept<'a>(
+    folder: &Path,
+    document: &str,
+    read: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), WriteError> {
+    let has_model = document != METRICS_FILE;
+    // With another model all of it goes.
+    let kinds: Vec<&str> =
+        KINDS.iter().filter(|kinds| has_model || kinds[0] == document).copied().flatten().copied().collect();
+    // The copy of its own model that a run left may be read.
+    let marks = [COMPARISON_FILE, DIAGNOSIS_FILE];
+    let is_left = marks.iter().any(|mark| folder.join(mark).is_file());
+    let of_all: &[&str] = if has_model && !is_left { &OF_ALL } else { &["report.html"] };
+    check_read(folder, &[&kinds, of_all].concat(), read)?;
+    if !has_model {
+        return Ok(());
+    }
+    check_ours(folder, MODEL_FILE, &marks)
 }
 
 /// # Errors

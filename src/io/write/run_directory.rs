@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use crate::io::files::{WriteError, sha256_hex, write_atomically};
-use crate::io::folder::{Replacement, remove_kinds};
+use crate::io::folder::{Replacement, check_ours, check_read, remove_kinds};
 use crate::io::json::search::{BestFoundJson, OptimiseJson};
 use crate::io::json::{Document, PatternJson};
 use crate::io::model::{ModelFile, NamedPattern};
@@ -134,6 +134,18 @@ pub const KINDS: [&str; 11] = [
     "run.toml",
     "model.toml",
 ];
+
+/// Refuses a folder in which a search's files would take the place of what it reads, or of a model file that no run left
+/// there; the copy of its own model that a run left may be read.
+///
+/// # Errors
+/// As said.
+pub fn check_kept<'a>(folder: &Path, read: impl IntoIterator<Item = &'a Path>) -> Result<(), WriteError> {
+    let is_run = folder.join("run.toml").is_file();
+    let kinds: Vec<&str> = KINDS.into_iter().filter(|name| !(is_run && *name == "model.toml")).collect();
+    check_read(folder, &kinds, read)?;
+    check_ours(folder, "model.toml", &["run.toml", "summary.json"])
+}
 
 /// Takes away what a search left in a folder.
 ///
