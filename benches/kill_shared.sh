@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Two runs at once in one folder, of different models, killed with SIGKILL: at a random moment of their whole duration, or before or
 # after a rename that is drawn. After each kill every finished file must be of one run only; at the end the folder must hold what an
-# unbroken run leaves (a campaign's folder keeps the other one's cells beside its own).
+# unbroken run leaves (a campaign's folder keeps the other one's cells beside its own). Commands that write single files write them
+# under the same names: each file must be whole, and an exported compensator's two files of one run.
 # Usage: benches/kill_shared.sh COILWRIGHT [KILLS]; needs a C compiler (the rename is caught by a preloaded library). COMMANDS names
 # those to be tried.
 set -euo pipefail
@@ -42,12 +43,23 @@ for name in A B; do
   # What diagnoses is slower.
   model $name-small 4
   printf 'name = "c"\nmodels = ["%s"]\nseeds = [1, 2, 3]\nrounds = 2\nmoves_per_restart = 300\n' "$work/$name.toml" > $name-grid.toml
+  # Built coils of it: thousands of them, so that a block takes a while.
+  (cat $name.toml; printf '[tolerance]\nturns_per_layer_sd = 0.1\nsamples = 3000\n') > $name-spread.toml
+  printf 'kind = "tolerance"\nname = "c"\nmodels = ["%s"]\ncoils_per_cell = 400\n' "$work/$name-spread.toml" > $name-coils.toml
+  for kind in metrics diagnose; do
+    { printf 'kind = "%s"\nname = "c"\n' $kind
+      [ $kind = metrics ] || printf 'model = "%s"\n' "$work/$name-small.toml"
+      printf '[[gyro]]\nname = "%s"\nrecords = ["%s"]\n' 1 "$work/$name.csv" 2 "$work/$name.csv"; } > $name-fleet-$kind.toml
+  done
   # The second record is shorter, and there is one more of the first: other files, and more of them.
   rows=$([ $name = A ] && echo 300 || echo 200)
   awk -v rows=$rows -v a=$index 'BEGIN { srand(1); print "time_s,temperature_c,rate_deg_per_h"
     for (i = 0; i < rows; i++) printf "%d,%.3f,%.4f\n", 10 * i, 20 + 0.004 * i, a * sin(i / 20) + 0.05 * rand() }' > $name.csv
+  awk -v rows=$rows -v a=$index 'BEGIN { print "time_s,layer_1_c,layer_2_c,layer_3_c,layer_4_c"
+    for (i = 0; i < rows; i++) printf "%d,20,%.3f,%.3f,21\n", 10 * i, 20 + 0.01 * i, 20 + a * i / 100 }' > $name-field.csv
 done
-read -ra commands <<< "${COMMANDS:-schedule optimise pareto compare metrics temperatures diagnose improve campaign}"
+read -ra commands <<< "${COMMANDS:-schedule optimise pareto compare metrics temperatures diagnose improve campaign coils fleet \
+  fleet-diagnosis field exact explore extend compensate export evaluate reproduce}"
 # command model; each is run where its folder is to be, so that no path differs
 request() {
   local m=$work/$2
@@ -61,6 +73,17 @@ request() {
     diagnose) if [ "$2" = A ]; then echo "diagnose $m-small.toml $work/A.csv $work/B.csv -o out"; else echo "diagnose $m-small.toml $m.csv -o out"; fi ;;
     improve) if [ "$2" = A ]; then echo "improve $m-small.toml $work/A.csv $work/B.csv -o out"; else echo "improve $m-small.toml $m.csv -o out"; fi ;;
     campaign) echo "campaign $m-grid.toml --checkpoint-every 5ms -o out" ;;
+    coils) echo "campaign $m-coils.toml -o out" ;;
+    fleet) echo "campaign $m-fleet-metrics.toml -o out" ;;
+    fleet-diagnosis) echo "campaign $m-fleet-diagnose.toml -o out" ;;
+    field) echo "optimise $m-small.toml --field $m-field.csv --rounds 2 --moves-per-restart 300 -o out" ;;
+    exact) echo "exact $m-small.toml --budget 60s -o out/best.toml --samples out/samples.csv" ;;
+    explore) echo "explore $m.toml -o out/explorer.html" ;;
+    extend) echo "extend $m-small.toml --effect spool_mass --fit $m.csv -o out/extended.toml" ;;
+    compensate) echo "compensate $m-small.toml $m.csv --fit $m.csv -o out/compensated.csv" ;;
+    export) echo "compensate $m-small.toml --fit $m.csv --export out/embedded" ;;
+    evaluate) echo "evaluate $m.toml --bang-bang out/listed.toml" ;;
+    reproduce) if [ "$2" = A ]; then echo "reproduce yan1998 -o out"; else echo "reproduce thesis2021 -o out"; fi ;;
     *) echo "no such command: $1" >&2; exit 2 ;;
   esac
 }
@@ -124,8 +147,8 @@ while [ $kills -lt "$wanted" ]; do
     declare "foreign_$name="
     while IFS= read -r file; do
       case $file in
-        # Cells stand beside those of another campaign.
-        cells/*) cmp -s "$folder/$file" "whole/$command/A/out/$file" || cmp -s "$folder/$file" "whole/$command/B/out/$file" \
+        # Cells stand beside those of another campaign; samples have a name of their own.
+        cells/* | samples.csv) cmp -s "$folder/$file" "whole/$command/A/out/$file" || cmp -s "$folder/$file" "whole/$command/B/out/$file" \
           || declare "foreign_$name=$file" ;;
         *) cmp -s "$folder/$file" "whole/$command/$name/out/$file" || declare "foreign_$name=$file" ;;
       esac
@@ -138,7 +161,7 @@ while [ $kills -lt "$wanted" ]; do
 done
 for command in "${commands[@]}"; do
   (run "shared/$command" "$command" A)
-  difference=$(diff -r "whole/$command/A/out" "shared/$command/out" | grep -v "^Only in shared/campaign/out/cells" || true)
+  difference=$(diff -r "whole/$command/A/out" "shared/$command/out" | grep -v "^Only in shared/[a-z-]*/out/cells" || true)
   [ -z "$difference" ] || { echo "$command: something is left or lost: $difference"; exit 1; }
 done
 echo "$kills kills in $trials pairs of runs ($refused runs were told who holds the folder): every file whole, no folder mixed, nothing left behind"

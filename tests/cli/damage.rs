@@ -149,7 +149,15 @@ fn table(text: &str, random: &mut impl Rng) -> String {
     let at = random.random_range(1..rows.len());
     let column = random.random_range(0..rows[at].len());
     let number = |cell: &str| cell.replace(',', ".").parse::<f64>().ok();
-    match random.random_range(0..14) {
+    // Every row from the given one on is later by that.
+    let later = |rows: &mut [Vec<String>], by_s: f64| {
+        for row in rows {
+            if let Some(time) = row.first().and_then(|c| number(c)) {
+                row[0] = format!("{:?}", time + by_s);
+            }
+        }
+    };
+    match random.random_range(0..16) {
         0..3 => rows[at][column] = any_number(random),
         3 => rows[at][column] = String::new(),
         // A stamp right behind the one before, or far ahead; what follows goes on from there.
@@ -157,11 +165,7 @@ fn table(text: &str, random: &mut impl Rng) -> String {
             let step = [4e-11, 1e-7, 1e-3, 1e4, 1e9][random.random_range(0..5)];
             let before = rows[at - 1].first().and_then(|c| number(c)).unwrap_or(0.0);
             let shift = before + step - rows[at].first().and_then(|c| number(c)).unwrap_or(0.0);
-            for row in &mut rows[at..] {
-                if let Some(time) = row.first().and_then(|c| number(c)) {
-                    row[0] = format!("{:?}", time + shift);
-                }
-            }
+            later(&mut rows[at..], shift);
         }
         // Two rows that are one instant, at the beginning, where the usual interval is learned.
         6 => {
@@ -198,6 +202,19 @@ fn table(text: &str, random: &mut impl Rng) -> String {
         10 => rows[at][column] = format!("\"{}", rows[at][column]),
         11 => rows[1..].reverse(),
         12 => rows.truncate(at.min(5)),
+        // What does not vary, or by one step only, in a record with a gap: slow noise has no end there.
+        14 => {
+            let value = rows[at][column].clone();
+            let from = if random.random_range(0..2) == 0 { 1 } else { at };
+            rows[from..].iter_mut().filter(|row| column < row.len()).for_each(|row| row[column].clone_from(&value));
+            rows[1..from].iter_mut().filter(|row| column < row.len()).for_each(|row| row[column] = "1.5".to_owned());
+            later(&mut rows[at..], [1e3, 1e6, 1e9][random.random_range(0..3)]);
+        }
+        // All rows as close as no clock has them.
+        15 => {
+            let step_s = [4e-11, 1e-9, 2e-6][random.random_range(0..3)];
+            rows[at..].iter_mut().enumerate().for_each(|(i, row)| row[0] = format!("{:?}", 1e-3 + step_s * i as f64));
+        }
         _ => {
             let scale = [1e-12, 1e6, 1e30, -1.0][random.random_range(0..4)];
             for row in rows[1..].iter_mut().filter(|row| column < row.len()) {
@@ -269,8 +286,10 @@ fn document(text: &str, random: &mut impl Rng) -> String {
             _ => break,
         }
     }
-    *place = match random.random_range(0..8) {
+    *place = match random.random_range(0..10) {
         0 => Value::Null,
+        // A number that could as well stand there.
+        8 | 9 if place.is_u64() => (place.as_u64().unwrap_or(0) ^ 1).into(),
         1 => Value::from(random.random_range(-1e6..1e6)),
         2 => Value::from(one_of(&["", "x", "nothing", "</script>", "\u{1b}[2J"], random)),
         3 => Value::from(u64::MAX),

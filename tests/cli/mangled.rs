@@ -2,7 +2,7 @@
 //!
 //! A number becomes absurd, a row or a key is lost, repeated or moved, a stamp comes 4e-11 s after the one before, a quote or a
 //! bracket stands where none belongs. A panic, a NaN or infinity in an answer or in a file that is written, a run of more than
-//! [`bounds`], a control character on the terminal fails; all failures come at the end. CONTRIBUTING says how to run it for long.
+//! [`bounds`], a control character on the terminal, another result from a damaged checkpoint fails; all failures come at the end. CONTRIBUTING says how to run it for long.
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -361,7 +361,8 @@ fn no_damaged_file_makes_a_command_panic_hang_or_answer_with_what_is_no_number()
         if ran.memory_kib > largest.0 {
             largest = (ran.memory_kib, arguments.join(" "));
         }
-        if let Some(what) = fault(&ran, &given, &place.join("out")) {
+        let other = || arguments.contains(&"--resume").then(|| goes_on_elsewhere(&ran, &whole, &place)).flatten();
+        if let Some(what) = fault(&ran, &given, &place.join("out")).or_else(other) {
             failures.push(format!(
                 "run {run}: {what}: {arguments:?}\n{:.600}\n{}",
                 ran.said,
@@ -375,6 +376,14 @@ fn no_damaged_file_makes_a_command_panic_hang_or_answer_with_what_is_no_number()
     println!("longest {:.1} s of processor time: {}", slowest.0, slowest.1);
     println!("largest {} MiB: {}", largest.0 / 1024, largest.1);
     assert!(failures.is_empty(), "{} failures\n\n{}", failures.len(), failures.join("\n\n"));
+}
+
+/// A search that was taken up from a damaged checkpoint is refused, or ends as from the whole one.
+fn goes_on_elsewhere(ran: &Ran, whole: &Path, place: &Path) -> Option<String> {
+    let results = ["summary.json", "best.toml", "history.csv"];
+    let read = |folder: &Path, name: &str| std::fs::read(folder.join("run").join(name)).ok();
+    let other = results.iter().find(|name| read(whole, name) != read(place, name));
+    other.filter(|_| ran.code == Some(0)).map(|name| format!("another {name} from a damaged checkpoint"))
 }
 
 /// The lines that the damaged file has and the whole one has not.
