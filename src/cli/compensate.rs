@@ -155,8 +155,8 @@ fn interval_seconds(text: &str) -> Result<f64, String> {
         .ok_or_else(|| format!("expected a time in seconds from {LEAST_INTERVAL_S} to {LONGEST_S}, found \"{text}\""))
 }
 
-/// A day: no coil remembers longer.
-const LONGEST_S: f64 = 86_400.0;
+/// More than a day: no coil remembers longer.
+const LONGEST_S: f64 = 1e5;
 
 fn positive_seconds(text: &str) -> Result<f64, String> {
     let seconds = text.parse::<f64>().ok().filter(|s| s.is_finite() && *s > 0.0);
