@@ -286,10 +286,13 @@ fn document(text: &str, random: &mut impl Rng) -> String {
             _ => break,
         }
     }
-    *place = match random.random_range(0..10) {
+    // A number that could as well stand there is the damage that is hardest to see.
+    if place.is_u64() && random.random_range(0..2) == 0 {
+        *place = (place.as_u64().unwrap_or(0) ^ 1).into();
+        return whole.to_string();
+    }
+    *place = match random.random_range(0..8) {
         0 => Value::Null,
-        // A number that could as well stand there.
-        8 | 9 if place.is_u64() => (place.as_u64().unwrap_or(0) ^ 1).into(),
         1 => Value::from(random.random_range(-1e6..1e6)),
         2 => Value::from(one_of(&["", "x", "nothing", "</script>", "\u{1b}[2J"], random)),
         3 => Value::from(u64::MAX),
