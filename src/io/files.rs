@@ -108,6 +108,8 @@ pub struct NewFile {
 
 /// So many runs may write the same file at once; the last one to end leaves its own.
 const MOST_WRITERS: usize = 64;
+/// Seldom do more than these write the same file at once; each costs a look at the folder for every file that is written.
+const LOOKED_BEYOND: usize = 3;
 
 impl NewFile {
     /// # Errors
@@ -117,12 +119,22 @@ impl NewFile {
         std::fs::create_dir_all(folder).map_err(|source| WriteError::Folder { path: folder.to_owned(), source })?;
         let fail = |source| WriteError::File { path: path.to_owned(), source };
         let name = path.file_name().ok_or_else(|| fail(std::io::ErrorKind::InvalidFilename.into()))?;
-        for slot in 0..MOST_WRITERS {
+        let of_slot = |slot: usize| {
             let mut own = std::ffi::OsString::from(".");
             own.push(name);
             own.push(format!(".{slot}.coilwright"));
-            let temporary = folder.join(own);
+            folder.join(own)
+        };
+        for slot in 0..MOST_WRITERS {
+            let temporary = of_slot(slot);
             if let Some(file) = claimed(&temporary).map_err(fail)? {
+                // What others left that wrote the same file at the same time and were killed.
+                for left in (slot + 1..=slot + LOOKED_BEYOND).map(of_slot).filter(|left| left.is_file()) {
+                    if let Ok(Some(_locked)) = claimed(&left) {
+                        // Another run may have taken it away; what stays hinders nobody.
+                        let _ = std::fs::remove_file(&left);
+                    }
+                }
                 return Ok(Self { path: path.to_owned(), temporary, file, finished: false });
             }
         }
@@ -246,7 +258,9 @@ mod tests {
     #[test]
     fn what_a_killed_run_left_behind_is_gone_after_the_next_write_of_the_same_file() {
         let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join(".a.csv.0.coilwright"), "half of a fi").unwrap();
+        for slot in 0..3 {
+            std::fs::write(folder.path().join(format!(".a.csv.{slot}.coilwright")), "half of a fi").unwrap();
+        }
         write_atomically(&folder.path().join("a.csv"), b"whole").unwrap();
         assert_eq!(names(folder.path()), ["a.csv"]);
         assert_eq!(std::fs::read_to_string(folder.path().join("a.csv")).unwrap(), "whole");
