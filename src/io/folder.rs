@@ -88,7 +88,10 @@ pub fn check_ours(folder: &Path, name: &str, marks: &[&str]) -> Result<(), Write
 }
 
 /// Takes away the temporary files that killed runs left; one that somebody still writes is locked and stays.
-fn clear_left_behind(folder: &Path) -> std::io::Result<()> {
+///
+/// # Errors
+/// A folder that cannot be read, or a file that cannot be removed.
+pub fn clear_left_behind(folder: &Path) -> std::io::Result<()> {
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();
         if path.file_name().and_then(|name| name.to_str()).is_some_and(is_temporary)

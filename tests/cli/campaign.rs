@@ -308,6 +308,11 @@ fn every_point_of_the_front_is_a_pattern_that_schedule_takes_and_none_is_beaten_
     std::fs::write(&part, changed.to_string()).unwrap();
     assert!(coilwright(&again).status.success());
     assert_eq!(std::fs::read_to_string(&part).unwrap(), found);
+    // And what a killed run left of a part that another one has written since goes.
+    let half = parts.join(".001.json.0.coilwright");
+    std::fs::write(&half, "half").unwrap();
+    assert!(coilwright(&again).status.success());
+    assert!(!half.exists());
     assert_eq!(std::fs::read(folder.join("pareto.csv")).unwrap(), before);
     let first = written(1);
     // A part of another request is not taken for one of this.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::io::files::{WriteError, sha256_hex, write_atomically};
-use crate::io::folder::remove_numbered;
+use crate::io::folder::{clear_left_behind, remove_numbered};
 use crate::io::model::ModelFile;
 use crate::pattern::Pattern;
 use crate::text::sink::Cell;
@@ -76,12 +76,14 @@ impl Front<'_> {
         write_atomically(&self.path(number), (json + "\n").as_bytes())
     }
 
-    /// Takes away the parts of a front that had more of them.
+    /// Takes away the parts of a front that had more of them, and what killed runs left half written.
     ///
     /// # Errors
     /// A file that cannot be removed.
     pub fn keep_parts(&self, count: usize) -> Result<(), WriteError> {
-        remove_numbered(&self.folder.join("parts"), count)
+        let parts = self.folder.join("parts");
+        remove_numbered(&parts, count)?;
+        clear_left_behind(&parts).map_err(|source| WriteError::Folder { path: parts, source })
     }
 
     fn path(&self, number: usize) -> PathBuf {
