@@ -13,11 +13,13 @@ use coilwright::io::read::model_file::parse_model;
 use coilwright::numeric::piecewise::PiecewiseLinear;
 use coilwright::pattern::classic::Classic;
 use coilwright::profile::{Piece, Profile};
-use coilwright::rate::{CoilModel, RateModel};
+use coilwright::rate::{CoilModel, Past, RateModel};
+use coilwright::record::TABLE_RATE;
 use coilwright::report::plot::{Axis, Band, Chart, Series};
 use coilwright::thermal::{Drive, Extent, Instant, solve};
 use coilwright::units::{
-    REFERENCE_TEMPERATURE_K, deg_per_h_from_rad_per_s, k_per_s_from_c_per_min, min_from_s, s_from_min,
+    REFERENCE_TEMPERATURE_K, deg_per_h_from_rad_per_s, k_per_s_from_c_per_min, min_from_s, rad_per_s_from_deg_per_s,
+    s_from_min,
 };
 
 const MODEL: &str = include_str!("book/twelve-layers.toml");
@@ -25,6 +27,8 @@ const MODEL: &str = include_str!("book/twelve-layers.toml");
 /// Rate and duration of each piece.
 const PIECES: [(f64, f64); 4] = [(1.0, 10.0), (0.0, 10.0), (-1.0, 10.0), (0.0, 10.0)];
 const STEP_S: f64 = 2.0;
+/// So that some ppm are of the size of the other effects.
+const TABLE_DEG_PER_S: f64 = 0.1;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/src");
@@ -51,7 +55,7 @@ One piece of physics each. A model file names the ones that it includes; `diagno
 housings, a spool's flanges and conduction, and an unsteady start, which are fitted where they are declared or asked for. Each picture
 shows what the effect adds to the rate error of one coil, a quadrupole of twelve layers (24 m of fibre between radii of 40 mm and
 42 mm), whose outermost layer warms for ten minutes at 1 °C/min, rests, cools as fast, and rests: the error with the effect less the
-error without it, with the parameters from which a fit starts. This chapter and its pictures are written by
+error without it, with the parameters from which a fit starts. Where an effect is the scale factor's, a table turns the gyro at 0.1 °/s. This chapter and its pictures are written by
 `cargo run --release --example effect_signatures`; a test compares them.
 
 Two more effects have no picture, because a profile does not have what they read: `channel:NAME` is linear in any further column
@@ -133,7 +137,9 @@ fn rates(model: &CoilModel, course: &PiecewiseLinear, profile: &Profile) -> Resu
         instants.push(Instant::before(start_s));
     }
     let history = field.at(&instants);
-    let found = RateModel::new(model, &pattern, &[])?.series_rad_per_s(&history);
+    let rate = RateModel::new(model, &pattern, &[TABLE_RATE.to_owned()])?;
+    let (turning, mut past) = ([deg_per_h_from_rad_per_s(rad_per_s_from_deg_per_s(TABLE_DEG_PER_S))], Past::default());
+    let found = (0..history.len()).map(|row| rate.rate_error_after(&rate.state(&history, row, &turning), &mut past));
     Ok(history.times_s.iter().copied().zip(found).collect())
 }
 

@@ -218,6 +218,8 @@ pub enum Unit {
     DegPerHourSecondPerKelvin,
     DegPerHourPerUnit,
     CelsiusPerHour,
+    PartsPerMillion,
+    PartsPerMillionPerKelvin,
 }
 
 impl Unit {
@@ -241,6 +243,8 @@ impl Unit {
             Unit::DegPerHourSecondPerKelvin => "°/h per K/s",
             Unit::DegPerHourPerUnit => "°/h per unit",
             Unit::CelsiusPerHour => "°C/h",
+            Unit::PartsPerMillion => "ppm",
+            Unit::PartsPerMillionPerKelvin => "ppm/K",
         }
     }
 
@@ -274,6 +278,7 @@ impl Unit {
             | Unit::DegPerHourPerUnit => rad_per_s_from_deg_per_h(1.0),
             Unit::Millimetre => MILLI,
             Unit::CelsiusPerHour => k_per_s_from_c_per_h(1.0),
+            Unit::PartsPerMillion | Unit::PartsPerMillionPerKelvin => fraction_from_ppm(1.0),
             _ => 1.0,
         }
     }

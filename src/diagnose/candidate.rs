@@ -1,8 +1,8 @@
 //! What may be missing: the effects that a model lacks, as things to fit.
 
-use crate::effect::{CATALOGUE, DeclaredEffect, EffectSpec, NOT_SOUGHT, Nature, Subject};
+use crate::effect::{Acts, CATALOGUE, DeclaredEffect, EffectSpec, NOT_SOUGHT, Nature, Subject};
 use crate::rate::CoilModel;
-use crate::record::Record;
+use crate::record::{Record, TABLE_RATE};
 use crate::units::Unit;
 
 /// An effect to try, with the parameters to fit and the points to start from.
@@ -64,7 +64,11 @@ fn all_candidates(model: &CoilModel, records: &[&Record]) -> Vec<Candidate> {
     let present: Vec<String> = model.effects.iter().map(DeclaredEffect::kind).collect();
     let temperatures = temperature_quartiles_k(records);
     let mut all = Vec::new();
-    for spec in CATALOGUE.iter().filter(|s| !present.iter().any(|p| p == s.kind)) {
+    let is_open = |spec: &EffectSpec| match spec.acts {
+        Acts::ScaleFactor => turned(records),
+        _ => true,
+    };
+    for spec in CATALOGUE.iter().filter(|s| is_open(s) && !present.iter().any(|p| p == s.kind)) {
         let count: usize = spec.choices.iter().map(|c| c.options.len()).product();
         for index in 0..count.max(1) {
             for candidate in of_spec(spec, choices_of(spec, index), &temperatures) {
@@ -84,7 +88,8 @@ fn all_candidates(model: &CoilModel, records: &[&Record]) -> Vec<Candidate> {
                 .iter()
                 .all(|r| r.channels().iter().any(|c| c.name == channel.name && c.values.iter().all(|v| v.is_finite())));
             let declared = present.contains(&format!("channel:{}", channel.name));
-            if varies && shared && !declared {
+            // What follows the table's rate has effects of its own.
+            if varies && shared && !declared && channel.name != TABLE_RATE {
                 let start = crate::effect::CHANNEL.parameters[0];
                 let effect = DeclaredEffect::channel(channel.name.clone(), start.unit.to_si(start.start));
                 let starts = vec![effect.values().to_vec()];
@@ -93,6 +98,17 @@ fn all_candidates(model: &CoilModel, records: &[&Record]) -> Vec<Candidate> {
         }
     }
     all
+}
+
+/// Whether a table turned the gyro at several rates in every record.
+fn turned(records: &[&Record]) -> bool {
+    let several = |values: &[f64]| {
+        let finite = || values.iter().copied().filter(|v| v.is_finite());
+        let (low, high) = finite().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+        high > low && values.iter().all(|v| v.is_finite())
+    };
+    let table = |record: &Record| record.channels().iter().any(|c| c.name == TABLE_RATE && several(&c.values));
+    !records.is_empty() && records.iter().all(|record| table(record))
 }
 
 /// The candidates of one kind; of a custom effect, itself.

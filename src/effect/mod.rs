@@ -22,6 +22,9 @@ mod housing;
 mod layer_gain;
 mod layer_gap;
 mod midpoint_offset;
+mod scale_factor_asymmetry;
+mod scale_factor_error;
+mod scale_factor_temperature;
 mod self_heating;
 mod sensor_lag;
 mod spool_conduction;
@@ -35,6 +38,7 @@ mod thermo_optic;
 mod thermo_optic_temperature;
 mod turn_mismatch;
 mod unsteady_start;
+mod turning;
 
 pub use crate::numeric::expression::Memory;
 pub use declared::{DeclaredEffect, DeclaredParameter, EffectError};
@@ -71,6 +75,9 @@ pub const CATALOGUE: &[&EffectSpec] = &[
     &bias_temperature::SPEC,
     &bias_temperature_rate::SPEC,
     &bias_gradient_rate::SPEC,
+    &scale_factor_error::SPEC,
+    &scale_factor_temperature::SPEC,
+    &scale_factor_asymmetry::SPEC,
     &diffusivity::SPEC,
     &thermo_optic::SPEC,
 ];
@@ -275,6 +282,8 @@ pub enum Acts {
     Response,
     /// A rate is added that does not come from the coil.
     Outside,
+    /// A rate is added where a table turns the gyro.
+    ScaleFactor,
 }
 
 /// What kind of knowledge an effect is.

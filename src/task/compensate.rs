@@ -3,6 +3,7 @@
 use crate::compensate::learned::Learned;
 use crate::compensate::stream::{Compensated, Flag, Stream};
 use crate::compensate::{CompensateError, Compensator, Method};
+use crate::effect::{Acts, DeclaredEffect};
 use crate::io::json::Document;
 use crate::io::model::{ModelFile, NamedPattern};
 use crate::io::write::compensation_file::{BiasLineJson, CompensateJson, MeasuresJson, MethodJson, StreamSummary};
@@ -57,6 +58,11 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
     let named = pattern_or_own(request.model, request.pattern)?;
     let model = &request.model.model;
     let fitted = fitted(request, observer)?;
+    let turning = model.effects.iter().filter(|e| e.spec().acts == Acts::ScaleFactor).map(DeclaredEffect::kind);
+    let turning: Vec<String> = turning.collect();
+    if !turning.is_empty() {
+        observer.note(&format!("what depends on a table's rate is not compensated: {}", turning.join(", ")));
+    }
     let mut compensator = match (&fitted, &request.model.learned) {
         (Some(record), _) => Compensator::fit(request.method, model, &named.pattern, record)?,
         (None, Some(learned)) if request.method == Method::Physical => {

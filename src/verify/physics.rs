@@ -147,6 +147,8 @@ impl Physics {
                     p.driven_from_outside = true;
                     p.film_w_per_m2_k = Some(film);
                 }
+                // A profile has no table that turns.
+                (_, "scale_factor_error" | "scale_factor_temperature" | "scale_factor_asymmetry", _) => {}
                 // Between the coil and what a record shows; a profile is the coil's own.
                 (_, "sensor_lag", _) => {}
                 (_, "self_heating", &[power_w_per_m2, time_constant_s]) => {

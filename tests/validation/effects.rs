@@ -8,7 +8,8 @@ use coilwright::effect::{self, CATALOGUE, DeclaredEffect};
 use coilwright::numeric::piecewise::PiecewiseLinear;
 use coilwright::pattern::Pattern;
 use coilwright::pattern::classic::Classic;
-use coilwright::rate::{CoilModel, RateModel};
+use coilwright::rate::{CoilModel, Past, RateModel};
+use coilwright::record::TABLE_RATE;
 use coilwright::thermal::{
     DEFAULT_CELLS_PER_LAYER, Drive, Extent, Field, Instant, Location, Material, ThermalHistory, solve,
 };
@@ -203,6 +204,51 @@ fn biases_follow_mean_temperature_its_rate_and_the_gradients_rate() {
     let gradient = young.rates_k_per_s(0)[LAYERS - 1] - young.rates_k_per_s(0)[0];
     let found = omega(&with("bias_gradient_rate", &[100.0]), &qua(), &young) - omega(&model(vec![]), &qua(), &young);
     compare("bias_gradient_rate", found, rad_per_s_from_deg_per_h(100.0 * gradient), 1e-9);
+}
+
+/// F/S0 = (1 + ε)(I + E + D): what the gyro shows beside the table's rate is ε I, by hand.
+#[test]
+fn the_scale_factor_follows_table_temperature_and_direction_and_is_nothing_without_a_table() {
+    let pattern = qua();
+    let table = [TABLE_RATE.to_owned()];
+    let at = |effects: Vec<DeclaredEffect>, courses_c: &[f64], table_deg_per_h: f64| {
+        let rate = RateModel::new(&model(effects), &pattern, &table).unwrap();
+        let mut past = Past::default();
+        let mut last = f64::NAN;
+        for (i, temperature_c) in courses_c.iter().enumerate() {
+            let still = ThermalHistory {
+                layers: LAYERS,
+                times_s: vec![10.0 * i as f64],
+                temperature_k: vec![kelvin_from_celsius(*temperature_c); LAYERS],
+                rate_k_per_s: vec![0.0; LAYERS],
+                axial_moment_k_per_s: vec![0.0; LAYERS],
+                axial_moment_k: vec![0.0; LAYERS],
+                ambient_k: vec![kelvin_from_celsius(*temperature_c)],
+                ambient_rate_k_per_s: vec![0.0],
+            };
+            last = rate.rate_error_after(&rate.state(&still, 0, &[table_deg_per_h]), &mut past);
+        }
+        last
+    };
+    let deg_per_h = rad_per_s_from_deg_per_h;
+    let error = || vec![declared("scale_factor_error", &[250.0], &[])];
+    let slope = || vec![declared("scale_factor_temperature", &[10.0, 0.0], &[])];
+    let branches = || vec![declared("scale_factor_temperature", &[10.0, 80.0], &[])];
+    let lopsided = || vec![declared("scale_factor_asymmetry", &[60.0], &[])];
+    compare("error", at(error(), &[55.0], -36_000.0), deg_per_h(-9.0), 1e-12);
+    compare("coefficient", at(slope(), &[20.0, 55.0], -36_000.0), deg_per_h(-36_000.0 * 350e-6), 1e-9);
+    compare("after warming", at(branches(), &[20.0, 40.0, 55.0], 36_000.0), deg_per_h(36_000.0 * 390e-6), 1e-9);
+    // A degree back is the other branch, half of it none.
+    compare("after cooling", at(branches(), &[20.0, 70.0, 55.0], 36_000.0), deg_per_h(36_000.0 * 310e-6), 1e-9);
+    compare("in between", at(branches(), &[20.0, 55.5, 55.0], 36_000.0), deg_per_h(36_000.0 * 350e-6), 1e-9);
+    for sign in [-1.0, 1.0] {
+        compare("asymmetry", at(lopsided(), &[55.0], sign * 36_000.0), deg_per_h(36_000.0 * 30e-6), 1e-12);
+    }
+    let history = at_end(&model(vec![]), REFERENCE_TEMPERATURE_K, RAMP_K_PER_S, 3000.0);
+    let plain = omega(&model(vec![]), &pattern, &history);
+    for effects in [error(), branches(), lopsided()] {
+        assert_eq!(omega(&model(effects), &pattern, &history), plain);
+    }
 }
 
 #[test]

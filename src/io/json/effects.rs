@@ -56,6 +56,7 @@ impl EffectJson {
                 Acts::Sensor => "sensor",
                 Acts::Response => "response",
                 Acts::Outside => "outside",
+                Acts::ScaleFactor => "scale factor",
             },
             parameters: spec
                 .parameters

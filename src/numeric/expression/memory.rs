@@ -65,6 +65,11 @@ pub struct Memory {
 }
 
 impl Memory {
+    /// play(x, h) of an effect that remembers nothing else.
+    pub fn play(&mut self, time_s: f64, x: f64, half_width: f64) -> f64 {
+        self.at(time_s, 1).remember(Keeper::Play, 0, x, half_width)
+    }
+
     pub(super) fn at(&mut self, time_s: f64, count: usize) -> After<'_> {
         self.slots.resize(count, None);
         After { memory: self, time_s }
