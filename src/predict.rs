@@ -84,6 +84,10 @@ struct Course {
 pub enum PredictError {
     #[error("the course of the air needs at least {needed} readings of temperature, found {found}")]
     TooFew { needed: usize, found: usize },
+    #[error(
+        "column {column} is a thermometer at layer {layer}: expected a layer of the coil, 1 (innermost) to {layers}"
+    )]
+    NoSuchLayer { column: String, layer: usize, layers: usize },
     #[error("the temperature field does not fit: {message}")]
     Field { message: String },
     #[error(transparent)]

@@ -16,6 +16,13 @@ pub struct Channel {
 /// The channel of the table's rate, which a record's rates are without [°/h].
 pub const TABLE_RATE: &str = "table_rate_deg_per_h";
 
+const LAYER_CHANNEL: (&str, &str) = ("temperature_layer_", "_c");
+
+/// The channel of a thermometer at a layer [°C], counted from 1 innermost.
+pub fn layer_channel(layer: usize) -> String {
+    format!("{}{layer}{}", LAYER_CHANNEL.0, LAYER_CHANNEL.1)
+}
+
 /// One row of what every record has.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
@@ -196,6 +203,14 @@ impl Record {
 
     pub fn channels(&self) -> &[Channel] {
         &self.channels
+    }
+
+    /// Thermometers at layers, counted from 1 innermost, with what they showed [°C].
+    pub fn layer_sensors(&self) -> impl Iterator<Item = (usize, &Channel)> {
+        let of = |channel: &Channel| {
+            channel.name.strip_prefix(LAYER_CHANNEL.0)?.strip_suffix(LAYER_CHANNEL.1)?.parse::<usize>().ok()
+        };
+        self.channels.iter().filter_map(move |channel| Some((of(channel)?, channel)))
     }
 
     /// Single values of temperature and rate that do not belong to their neighbours.

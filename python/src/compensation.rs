@@ -6,9 +6,9 @@ use std::sync::{Arc, Mutex};
 use coilwright::compensate::formulas::Columns;
 use coilwright::compensate::stream::{Compensated, Reading, Stream};
 use coilwright::compensate::{Compensator, Method};
-use coilwright::io::fault::Faults;
 use coilwright::io::files::NewFile;
 use coilwright::io::json::Document;
+use coilwright::io::read::table_file::Source;
 use coilwright::io::write::compensation_file::{StreamError, compensate_lines};
 use coilwright::task::compensate::{Answer, Request, all_methods, compensate_record, run};
 use coilwright::task::measurement::Measurement;
@@ -218,8 +218,7 @@ pub fn compensate_file(
     let (answer, format) = (Arc::clone(&handle.answer), handle.format.clone());
     let worked = work(py, None, move |_| {
         let name = path.display().to_string();
-        let unreadable = |e: std::io::Error| Faults::of_file(&name, format!("cannot be read: {e}"));
-        let input = std::fs::File::open(&path).map_err(unreadable)?;
+        let input = Source::open(&path)?;
         let said = |error: StreamError| match error {
             StreamError::Header(faults) => TaskError::Faults(faults),
             other => TaskError::Unprintable(other.to_string()),

@@ -4,12 +4,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use coilwright::diagnose::Terms;
-use coilwright::io::fault::Faults;
 use coilwright::io::folder::{HeldFolder, Replacement};
 use coilwright::io::json::Document;
 use coilwright::io::json::inputs::RecordInputJson;
 use coilwright::io::model::{ModelFile, NamedPattern};
 use coilwright::io::read::schedule_reader::{parse_claim, read_claim};
+use coilwright::io::read::table_file::Source;
 use coilwright::io::write::measurement_folder::check_free;
 use coilwright::task::metrics::{Settings, measure, measure_stream};
 use coilwright::task::{self, Observer, TaskError};
@@ -315,11 +315,7 @@ pub fn metrics(
             };
             // Read as the command reads it: row by row, without holding it.
             let name = path.display().to_string();
-            let unreadable = |e: std::io::Error| Faults::of_file(&name, format!("cannot be read: {e}"));
-            let file = std::fs::File::open(path).map_err(unreadable)?;
-            if path.is_dir() {
-                return Err(Faults::of_file(&name, "expected a file, found a folder").into());
-            }
+            let file = Source::open(path)?;
             let input = RecordInputJson::new(path, "measured")?;
             Ok(measure_stream(input, &name, file, &Default::default(), &settings, &watcher)?)
         };

@@ -7,7 +7,7 @@ use super::records::{GrossErrors, RecordArguments};
 use super::screen::{Screen, held, table};
 use super::watching::Watching;
 use super::{CliError, Ending, offered};
-use crate::io::json::comparison::{CompareJson, NoisePartsJson, PartJson, RecordComparisonJson};
+use crate::io::json::comparison::{CompareJson, NoisePartsJson, PartJson, RecordComparisonJson, SensorJson};
 use crate::io::read::model_file::read_model;
 use crate::io::write::measurement_folder::{COMPARISON_FILE, check_free, check_kept};
 use crate::task::compare::{Request, run as compare};
@@ -126,6 +126,13 @@ fn text(body: &CompareJson) -> String {
             &["part of the record", "rows", "share of rows", "share of squared error", "RMSE °/h"],
             record.regimes.iter().chain(&record.temperature_bands).chain(&record.rate_bands).map(part_row),
         );
+        if !record.sensors.is_empty() {
+            text.push('\n');
+            text += &table(
+                &["thermometer", "layer", "less the model: mean °C", "rms °C", "largest °C", "at s"],
+                record.sensors.iter().map(sensor_row),
+            );
+        }
         text.push('\n');
         text += &table(
             &["residual against", "correlation"],
@@ -153,6 +160,17 @@ fn what_lacks(record: &RecordComparisonJson) -> String {
         }
         None => "the model lacks something; `coilwright diagnose` finds what".to_owned(),
     }
+}
+
+fn sensor_row(sensor: &SensorJson) -> Vec<String> {
+    vec![
+        sensor.column.clone(),
+        sensor.layer.to_string(),
+        format!("{:.4}", sensor.mean_difference_c),
+        format!("{:.4}", sensor.rms_difference_c),
+        format!("{:.4}", sensor.largest_difference_c),
+        sensor.largest_difference_time_s.to_string(),
+    ]
 }
 
 fn part_row(part: &PartJson) -> Vec<String> {

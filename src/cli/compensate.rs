@@ -1,6 +1,5 @@
 //! `compensate`: temperature and rate in, compensated rate out, as a file or as a stream.
 
-use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -17,6 +16,7 @@ use crate::io::files::{NewFile, folder_of, write_atomically};
 use crate::io::folder::{HeldFolder, Replacement};
 use crate::io::read::model_file::read_model;
 use crate::io::read::record_columns::RecordFormat;
+use crate::io::read::table_file::Source;
 use crate::io::write::compensation_file::{CompensateJson, MeasuresJson, StreamSummary, compensate_lines_from_turn_on};
 use crate::record::LEAST_INTERVAL_S;
 use crate::report::compensation::compensation_chart;
@@ -188,7 +188,10 @@ fn stream(
         let input = std::io::stdin().lock();
         compensate_lines_from_turn_on(compensator, format, "standard input", input, output, arguments.turn_on)?
     } else {
-        let input = File::open(path).map_err(|e| Faults::of_file(&name, format!("cannot be read: {e}")))?;
+        let input = Source::open(path)?;
+        for remark in input.remarks() {
+            screen.note(&format!("note: {name}: {remark}"));
+        }
         compensate_lines_from_turn_on(compensator, format, &name, input, output, arguments.turn_on)?
     };
     if let Some(file) = file {

@@ -1,6 +1,5 @@
 //! `metrics`: what a gyro's data sheet says, from records.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -8,11 +7,11 @@ use super::records::{GrossErrors, RecordArguments};
 use super::screen::{Screen, held, table};
 use super::watching::Watching;
 use super::{CliError, Ending};
-use crate::io::fault::Faults;
 use crate::io::json::inputs::RecordInputJson;
 use crate::io::json::metrics::{MetricsJson, NoiseJson, RecordMetricsJson};
 use crate::io::json::scale_factor::{EstimateJson, ScaleFactorJson};
 use crate::io::read::record_columns::RecordFormat;
+use crate::io::read::table_file::Source;
 use crate::io::write::measurement_folder::{METRICS_FILE, check_free, check_kept};
 use crate::metrics::earth::Attitude;
 use crate::task::Observer;
@@ -145,15 +144,13 @@ fn measure(path: &Path, format: &RecordFormat, settings: &Settings, watching: &W
     let name = path.display().to_string();
     if path == Path::new("-") {
         let input = RecordInputJson { file: name, sha256: None, role: "measured".to_owned() };
-        return Ok(measure_stream(input, "standard input", std::io::stdin().lock(), format, settings, watching)?);
+        let source = Source::text(std::io::stdin().lock());
+        return Ok(measure_stream(input, "standard input", source, format, settings, watching)?);
     }
-    if path.is_dir() {
-        return Err(Faults::of_file(&name, "expected a file, found a folder").into());
-    }
-    let unreadable = |e| Faults::of_file(&name, format!("cannot be read: {e}"));
-    let source = File::open(path).map_err(unreadable)?;
-    let size = source.metadata().map_or(0, |found| found.len());
-    let source = Watched { inner: source, read: 0, size, watching };
+    let source = Source::open(path)?;
+    // Of a table the size says nothing of how long its text is.
+    let size = if source.is_table() { 0 } else { std::fs::metadata(path).map_or(0, |found| found.len()) };
+    let source = source.map(|inner| Watched { inner, read: 0, size, watching });
     Ok(measure_stream(RecordInputJson::new(path, "measured")?, &name, source, format, settings, watching)?)
 }
 

@@ -25,6 +25,7 @@
 //! in [`crate::predict`].
 
 pub mod regimes;
+pub mod sensors;
 pub mod suspicion;
 pub mod verdict;
 
@@ -37,6 +38,7 @@ use crate::record::Record;
 use crate::thermal::GivenField;
 use crate::units::percent_from_fraction;
 use regimes::{Part, Regime, Regimes};
+use sensors::SensorMisfit;
 use verdict::{Finding, Verdict};
 
 /// Everything that was found out about one record and one model.
@@ -75,6 +77,8 @@ pub struct Comparison {
     pub bends_s: Vec<f64>,
     /// What readings and rates together say of model and noise; None where the rates have none.
     pub standing: Option<Standing>,
+    /// Thermometers at layers.
+    pub sensors: Vec<SensorMisfit>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -207,6 +211,7 @@ fn judged(
         film_w_per_m2_k,
         bends_s: bends.iter().map(|b| b.time_s).collect(),
         standing,
+        sensors: sensors::misfits(model, record, boundary)?,
         prediction,
     };
     (found.verdict, found.findings) = verdict::judge(&found, cut.transient_s);

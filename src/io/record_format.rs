@@ -1,5 +1,6 @@
 //! Which column of a record file is which, in which unit, and what to do with rows that are none.
 
+use crate::record::layer_channel;
 use crate::units::{
     celsius_from_fahrenheit, kelvin_from_celsius, rad_per_s_from_arcsec_per_s, rad_per_s_from_deg_per_h,
     rad_per_s_from_deg_per_s, s_from_days, s_from_h, s_from_min, s_from_ms, s_from_ns, s_from_us,
@@ -15,11 +16,65 @@ pub enum Quantity {
     AmbientTemperature,
     /// What a table turned the gyro by, about its sensitive axis.
     Table,
+    /// A further thermometer.
+    Sensor(SensorPlace),
     /// Anything else, by its name.
     Channel,
 }
 
+/// Where a further thermometer is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SensorPlace {
+    /// Counted from 1 innermost.
+    Layer(usize),
+    Flange,
+    Spool,
+    Electronics,
+    /// The light source.
+    Source,
+}
+
+impl SensorPlace {
+    const NAMED: [(&'static str, SensorPlace); 4] = [
+        ("flange", SensorPlace::Flange),
+        ("spool", SensorPlace::Spool),
+        ("electronics", SensorPlace::Electronics),
+        ("source", SensorPlace::Source),
+    ];
+
+    /// As a mapping names it: `layer_7`, `spool`.
+    pub fn named(role: &str) -> Option<Self> {
+        let of_layer = role.strip_prefix("layer_").filter(|digits| !digits.starts_with(['0', '+']));
+        match of_layer.and_then(|digits| digits.parse::<usize>().ok()) {
+            Some(layer) => Some(SensorPlace::Layer(layer)),
+            None => Self::NAMED.iter().find(|(name, _)| *name == role).map(|(_, place)| *place),
+        }
+    }
+
+    /// The record's further column that holds it, in °C.
+    pub fn channel(self) -> String {
+        match self {
+            SensorPlace::Layer(layer) => layer_channel(layer),
+            other => {
+                let named = Self::NAMED.iter().find(|(_, place)| *place == other).map_or("", |(name, _)| name);
+                format!("temperature_{named}_c")
+            }
+        }
+    }
+
+    /// The roles that a mapping may name.
+    pub(in crate::io) fn roles() -> impl Iterator<Item = &'static str> {
+        Self::NAMED.iter().map(|(name, _)| *name)
+    }
+}
+
 impl Quantity {
+    /// Of a mapping's role.
+    pub(in crate::io) fn of_role(role: &str) -> Option<Self> {
+        let known = Self::ROLES.iter().find(|(name, _)| *name == role).map(|(_, quantity)| *quantity);
+        known.or_else(|| SensorPlace::named(role).map(Quantity::Sensor))
+    }
+
     /// As a mapping names it.
     pub(in crate::io) const ROLES: [(&'static str, Quantity); 6] = [
         ("time", Quantity::Time),
@@ -41,7 +96,10 @@ impl Quantity {
     ];
 
     pub(in crate::io) fn is_temperature(self) -> bool {
-        matches!(self, Quantity::Temperature | Quantity::InnerTemperature | Quantity::AmbientTemperature)
+        matches!(
+            self,
+            Quantity::Temperature | Quantity::InnerTemperature | Quantity::AmbientTemperature | Quantity::Sensor(_)
+        )
     }
 
     pub(in crate::io) fn default_unit(self) -> &'static str {
@@ -204,8 +262,10 @@ impl RecordFormat {
             })?);
             return Ok(());
         }
-        let Some((_, quantity)) = Quantity::ROLES.iter().find(|(name, _)| *name == role) else {
-            let known: Vec<&str> = Quantity::ROLES.iter().map(|(name, _)| *name).chain(["scale"]).collect();
+        let Some(quantity) = &Quantity::of_role(role) else {
+            let sensors = ["layer_1, layer_2 and so on"].into_iter().chain(SensorPlace::roles());
+            let known: Vec<&str> =
+                Quantity::ROLES.iter().map(|(name, _)| *name).chain(sensors).chain(["scale"]).collect();
             return Err(format!("expected one of {}, found \"{role}\"", known.join(", ")));
         };
         let (name, unit) = match target.rsplit_once(':') {

@@ -1,12 +1,11 @@
 //! What a gyro's data sheet says, from records.
 
-use std::io::Read;
-
 use crate::io::json::inputs::{InputsJson, RecordInputJson};
 use crate::io::json::metrics::{GrossErrorJson, GrossErrors as Found, MetricsJson, RecordMetricsJson};
 use crate::io::json::scale_factor::PositionsJson;
 use crate::io::read::record_columns::RecordFormat;
-use crate::io::read::record_rows::{CHUNK, stream_rows};
+use crate::io::read::record_rows::{CHUNK, stream_source};
+use crate::io::read::table_file::Source;
 use crate::metrics::earth::{Attitude, positions};
 use crate::metrics::{Meter, Metrics, repeatability_rad_per_s};
 use crate::record::{Row, gross_errors_of};
@@ -90,7 +89,7 @@ impl Metering {
 pub fn measure_stream(
     input: RecordInputJson,
     shown_as: &str,
-    source: impl Read,
+    source: Source<'_>,
     format: &RecordFormat,
     settings: &Settings,
     observer: &dyn Observer,
@@ -98,7 +97,7 @@ pub fn measure_stream(
     let mut format = format.clone();
     format.compensated = true;
     let mut metering = Metering::new(settings, format.scale())?;
-    let noticed = stream_rows(shown_as, source, &format, |rows: &[Row]| metering.take(rows))?;
+    let noticed = stream_source(shown_as, source, &format, |rows: &[Row]| metering.take(rows))?;
     say_read(&input.file, noticed.skipped_rows, &noticed.remarks, observer);
     say_gross(&input.file, metering.found.count, metering.found.first.first(), metering.dropped, observer);
     metering.finish(input)

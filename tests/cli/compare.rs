@@ -109,3 +109,82 @@ fn records_that_are_none_are_refused_with_line_and_remedy() {
     assert_eq!(code(&output), 2);
     assert!(stderr(&output).contains("absent.csv"), "{}", stderr(&output));
 }
+
+/// The chamber's first day with further thermometers: at the outermost layer as the sensor itself, in kelvin; five kelvin above it at the
+/// innermost; and on the spool, in °F.
+fn with_thermometers() -> (tempfile::TempDir, String) {
+    let plain = std::fs::read_to_string(root().join("examples/chamber-day-1.csv")).unwrap();
+    let mut text = String::new();
+    for line in plain.lines().filter(|line| !line.starts_with('#')).take(160) {
+        let cells: Vec<&str> = line.split(',').collect();
+        text += &match cells[1].parse::<f64>() {
+            Ok(c) => format!("{line},{},{},{}\n", c + 273.15, c + 5.0, 1.8 * c + 32.0),
+            Err(_) => format!("{line},Tk,temperature_layer_1_c,Ts\n"),
+        };
+    }
+    let (folder, path) = folder_with("record.csv", text);
+    (folder, path.display().to_string())
+}
+
+#[test]
+fn further_thermometers_are_set_beside_their_layers_and_none_is_dropped_unsaid() {
+    let (_folder, record) = with_thermometers();
+    let columns = "--columns=layer_12=Tk:k,spool=Ts:f";
+    let model = "examples/chamber-coil.toml";
+    let output = run(&["compare", model, &record, columns, "--format", "json"]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let found: serde_json::Value = serde_json::from_str(stdout(&output)).unwrap();
+    let sensors = found["records"][0]["sensors"].as_array().unwrap();
+    let number = |sensor: &serde_json::Value, key: &str| sensor[key].as_f64().unwrap();
+    let outer = sensors.iter().find(|s| s["layer"] == 12).unwrap();
+    assert_eq!(outer["column"], "temperature_layer_12_c");
+    assert!(number(outer, "mean_difference_c").abs() < 0.02 && number(outer, "rms_difference_c") < 0.5, "{outer}");
+    let inner = sensors.iter().find(|s| s["layer"] == 1).unwrap();
+    assert!((number(inner, "mean_difference_c") - 5.0).abs() < 0.5, "{inner}");
+    let with: Vec<&str> =
+        found["records"][0]["correlations"].as_array().unwrap().iter().filter_map(|c| c["with"].as_str()).collect();
+    assert!(with.contains(&"temperature_spool_c"), "{with:?}");
+    let said = stderr(&output);
+    for words in ["column Tk is a further thermometer, temperature_layer_12_c", "column Ts is a further thermometer"] {
+        assert!(said.contains(words), "{said}");
+    }
+    let words = run(&["compare", model, &record, columns]);
+    assert!(stdout(&words).contains("thermometer"), "{}", stdout(&words));
+    let beyond = run(&["compare", model, &record, "--columns=layer_13=Tk:k"]);
+    assert!(code(&beyond) == 2 && stderr(&beyond).contains("expected a layer of the coil, 1 (innermost) to 12"));
+    let unknown = run(&["compare", model, &record, "--columns=layer_0=Tk:k"]);
+    assert!(
+        code(&unknown) == 2 && stderr(&unknown).contains("layer_1, layer_2 and so on, flange"),
+        "{}",
+        stderr(&unknown)
+    );
+}
+
+#[test]
+fn thermometers_of_a_model_file_are_columns_that_effects_read() {
+    let (folder, record) = with_thermometers();
+    let model = std::fs::read_to_string(root().join("examples/chamber-coil.toml")).unwrap();
+    let mapped = model
+        + "\n[record]\nlayer_12 = \"Tk:k\"\nspool = \"Ts:f\"\n[[effect]]\nkind = \"channel:temperature_spool_c\"\n"
+        + "gain_deg_per_h_per_unit = 0.001\n";
+    let path = folder.path().join("coil.toml");
+    std::fs::write(&path, mapped).unwrap();
+    let model = path.display().to_string();
+    let checked = run(&["check", &model]);
+    assert_eq!(code(&checked), 0, "{}", stderr(&checked));
+    // The effect reads °C, whatever the file has: the offset moves by as much as the mean temperature says.
+    let offset = |model: &str| {
+        let found = json(&["compare", model, &record]);
+        found["records"][0]["offset_deg_per_h"].as_f64().unwrap()
+    };
+    let without = std::fs::read_to_string(&path).unwrap().replace("= 0.001", "= 0.0");
+    let still = folder.path().join("still.toml");
+    std::fs::write(&still, without).unwrap();
+    let moved = offset(&model) - offset(&still.display().to_string());
+    let text = std::fs::read_to_string(&record).unwrap();
+    let temperatures: Vec<f64> = text.lines().filter_map(|l| l.split(',').nth(1)?.parse().ok()).collect();
+    let mean_c = temperatures.iter().sum::<f64>() / temperatures.len() as f64;
+    assert!((moved + 0.001 * mean_c).abs() < 0.005, "{moved} {mean_c}");
+    let passed = run(&["compensate", &model, &record]);
+    assert_eq!(code(&passed), 0, "{}", stderr(&passed));
+}

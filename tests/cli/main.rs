@@ -30,6 +30,7 @@ mod resume;
 mod schemas;
 mod sinks;
 mod stress;
+mod tables;
 mod terminal;
 mod ways;
 

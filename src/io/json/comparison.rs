@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::chamber::Noise;
 use crate::compare::Comparison;
 use crate::compare::regimes::Part;
+use crate::compare::sensors::SensorMisfit;
 use crate::compare::verdict::Verdict;
 use crate::units::deg_per_h_from_rad_per_s;
 
@@ -59,8 +60,37 @@ pub struct RecordComparisonJson {
     pub estimated_film_w_per_m2_k: Option<f64>,
     pub estimated_film_standard_error_w_per_m2_k: Option<f64>,
     pub estimated_kinks_s: Vec<f64>,
+    /// Thermometers at layers, each beside the model's layer.
+    #[serde(default)]
+    pub sensors: Vec<SensorJson>,
     pub gross_errors: Vec<GrossErrorJson>,
     pub gaps: usize,
+}
+
+/// Reading less model of one thermometer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SensorJson {
+    pub column: String,
+    pub layer: usize,
+    pub rows: usize,
+    pub mean_difference_c: f64,
+    pub rms_difference_c: f64,
+    pub largest_difference_c: f64,
+    pub largest_difference_time_s: f64,
+}
+
+impl SensorJson {
+    fn new(found: &SensorMisfit) -> Self {
+        Self {
+            column: found.column.clone(),
+            layer: found.layer,
+            rows: found.rows,
+            mean_difference_c: found.mean_k,
+            rms_difference_c: found.rms_k,
+            largest_difference_c: found.largest_k,
+            largest_difference_time_s: found.largest_time_s,
+        }
+    }
 }
 
 /// What a record's rate consists of beside the coil.
@@ -177,6 +207,7 @@ impl RecordComparisonJson {
             estimated_film_w_per_m2_k: found.film_w_per_m2_k.map(|f| f.0),
             estimated_film_standard_error_w_per_m2_k: found.film_w_per_m2_k.map(|f| f.1).filter(|e| e.is_finite()),
             estimated_kinks_s: found.bends_s.clone(),
+            sensors: found.sensors.iter().map(SensorJson::new).collect(),
             gross_errors,
             gaps,
         }

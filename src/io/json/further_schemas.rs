@@ -159,3 +159,33 @@ pub fn compensation_schema() -> Value {
     let all: Vec<Value> = std::iter::once(physical).chain(further).collect();
     with_dialect(json!({ "title": "coilwright compensator as compensate --export writes it", "anyOf": all }))
 }
+
+/// How a model file says that the columns of records are named.
+pub(super) fn record_table() -> Value {
+    let mapped = |description: &str| {
+        described("string", &format!("{description}; the file's name of the column, :UNIT behind it"))
+    };
+    let mut record = table(
+        "record: how the columns of the record files are named",
+        &[],
+        json!({
+            "time": mapped("time: s, ms, us, ns, min, h, d, iso, epoch_s, epoch_ms"),
+            "temperature": mapped("the sensor: c, k, f"),
+            "rate": mapped("deg_per_h, mdeg_per_h, deg_per_s, rad_per_s, arcsec_per_s, counts, mv, v"),
+            "inner": mapped("temperature of the bore: c, k, f"),
+            "ambient": mapped("temperature of the air: c, k, f"),
+            "table": mapped("what a rate table turned the gyro by: deg_per_s, deg_per_h, mdeg_per_h, rad_per_s, arcsec_per_s"),
+            "flange": mapped("a further thermometer: c, k, f"),
+            "spool": mapped("a further thermometer: c, k, f"),
+            "electronics": mapped("a further thermometer: c, k, f"),
+            "source": mapped("a thermometer at the light source: c, k, f"),
+            "scale": described("number", "raw units (counts, mv, v) that are one degree an hour"),
+            "bad_rows": { "enum": ["refuse", "skip"], "default": "refuse",
+                "description": "rows that lack a number, or whose stamp repeats or jumps back" },
+            "average_rows": { "type": "integer", "minimum": 1, "default": 1, "description": "rows averaged into one" },
+        }),
+    );
+    record["patternProperties"] =
+        json!({ "^layer_[1-9][0-9]*$": mapped("a thermometer at that layer, counted from 1 innermost: c, k, f") });
+    record
+}

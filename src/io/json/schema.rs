@@ -12,6 +12,7 @@ use crate::text::{MOST_NAME_CHARACTERS, NAME_PATTERN, NAME_RULE};
 use crate::units::Unit;
 
 use super::SCHEMA_VERSION;
+use super::further_schemas::record_table;
 use super::schedule::STEP_COLUMNS;
 
 const DIALECT: &str = "https://json-schema.org/draft/2020-12/schema";
@@ -91,25 +92,7 @@ pub fn model_schema() -> Value {
             "rate_mean_s": described("number", "each rate is the mean over this interval, which ends at its stamp"),
         }),
     );
-    let mapped = |description: &str| {
-        described("string", &format!("{description}; the file's name of the column, :UNIT behind it"))
-    };
-    let record = table(
-        "record: how the columns of the record files are named",
-        &[],
-        json!({
-            "time": mapped("time: s, ms, us, ns, min, h, d, iso, epoch_s, epoch_ms"),
-            "temperature": mapped("the sensor: c, k, f"),
-            "rate": mapped("deg_per_h, mdeg_per_h, deg_per_s, rad_per_s, arcsec_per_s, counts, mv, v"),
-            "inner": mapped("temperature of the bore: c, k, f"),
-            "ambient": mapped("temperature of the air: c, k, f"),
-            "table": mapped("what a rate table turned the gyro by: deg_per_s, deg_per_h, mdeg_per_h, rad_per_s, arcsec_per_s"),
-            "scale": described("number", "raw units (counts, mv, v) that are one degree an hour"),
-            "bad_rows": { "enum": ["refuse", "skip"], "default": "refuse",
-                "description": "rows that lack a number, or whose stamp repeats or jumps back" },
-            "average_rows": { "type": "integer", "minimum": 1, "default": 1, "description": "rows averaged into one" },
-        }),
-    );
+    let record = record_table();
     let search = table(
         "search",
         &[],
@@ -399,6 +382,8 @@ pub fn record_schema() -> Value {
             "^time_(ms|us|ns|min|h|d)$": { "type": "number" },
             "^time_iso$": { "type": "string" },
             "^temperature_((inner|ambient)_)?[kf]$": { "type": "number" },
+            "^temperature_(layer_[1-9][0-9]*|flange|spool|electronics|source)_[ckf]$": {
+                "type": "number", "description": "a further thermometer; layers count from 1, the innermost" },
             "^rate_(mdeg_per_h|deg_per_s|rad_per_s|arcsec_per_s)$": { "type": "number" },
             "^table_rate_(deg_per_h|mdeg_per_h|rad_per_s|arcsec_per_s)$": { "type": "number" },
         },

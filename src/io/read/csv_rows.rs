@@ -58,6 +58,7 @@ pub struct CsvRows<R> {
     lines_of_piece: u64,
     start: usize,
     bytes_of_piece: usize,
+    numbers_rows: bool,
     /// Of each column whether a cell of it may be words, and so hold a line break; empty where nothing is known of them yet.
     may_hold_words: Vec<bool>,
     buffer: Vec<u8>,
@@ -82,6 +83,7 @@ impl<R: BufRead> CsvRows<R> {
             lines_of_piece: 0,
             start: 0,
             bytes_of_piece: 0,
+            numbers_rows: false,
             may_hold_words: Vec::new(),
             buffer: Vec::new(),
             cells: String::new(),
@@ -185,6 +187,24 @@ impl<R: BufRead> CsvRows<R> {
     /// The number of the line that it begins in, counted from 1.
     pub fn line(&self) -> u64 {
         self.line
+    }
+
+    /// Rows are told by their numbers from here on, each being a line behind a header of one.
+    pub fn number_rows(&mut self) {
+        self.numbers_rows = true;
+    }
+
+    /// Whether it is another program's table, of which it is known what holds words.
+    pub fn numbers_rows(&self) -> bool {
+        self.numbers_rows
+    }
+
+    /// Where it stands, for a reader.
+    pub fn place(&self) -> String {
+        match self.numbers_rows {
+            true => format!("row {}", self.line - 1),
+            false => format!("line {}", self.line),
+        }
     }
 
     /// Where it stands, in bytes from the text's beginning (of an input that is in memory).

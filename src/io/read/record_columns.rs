@@ -5,19 +5,24 @@
 
 use crate::io::fault::Fault;
 use crate::io::record_format::{Conversion, Kind, UNITS, Unit, accepted_names};
-pub use crate::io::record_format::{Quantity, RecordFormat};
-use crate::units::{rad_per_s_from_deg_per_h, s_from_ns};
+pub use crate::io::record_format::{Quantity, RecordFormat, SensorPlace};
+use crate::units::{celsius_from_kelvin, rad_per_s_from_deg_per_h, s_from_h, s_from_min, s_from_ns};
 
 use super::toml_reader::{Limits, TableReader, TomlReader, nearest};
 
 /// The `[record]` table of a model file: roles as keys, `scale`, `bad_rows`, `average_rows`.
 pub(super) fn read_format(r: &mut TomlReader, table: &mut TableReader<'_>) -> RecordFormat {
     let mut format = RecordFormat::default();
-    for (role, _) in Quantity::ROLES {
-        if let Some(target) = table.text(r, role)
-            && let Err(message) = format.map(role, target)
-        {
-            r.fault(Fault::new(format!("record.{message}"), table.span_of(role)));
+    let mut stated: Vec<(String, &str)> = Vec::new();
+    for role in Quantity::ROLES.iter().map(|(role, _)| *role).chain(SensorPlace::roles()) {
+        stated.extend(table.text(r, role).map(|target| (role.to_owned(), target)));
+    }
+    for role in table.keys().into_iter().filter(|key| matches!(SensorPlace::named(key), Some(SensorPlace::Layer(_)))) {
+        stated.extend(table.numbered_text(r, &role).map(|target| (role, target)));
+    }
+    for (role, target) in stated {
+        if let Err(message) = format.map(&role, target) {
+            r.fault(Fault::new(format!("record.{message}"), table.span_of(&role)));
         }
     }
     if let Some(scale) = table.number(r, "scale", Limits::between(-1e300, 1e300)) {
@@ -54,7 +59,7 @@ impl Quantity {
     fn bounds(self) -> (f64, &'static str) {
         match self {
             Quantity::Time => (1e11, "1e11 s from zero"),
-            Quantity::Temperature | Quantity::InnerTemperature | Quantity::AmbientTemperature => {
+            Quantity::Temperature | Quantity::InnerTemperature | Quantity::AmbientTemperature | Quantity::Sensor(_) => {
                 (1e9, "any temperature")
             }
             Quantity::Rate | Quantity::Table => (1e6, "any rate: 1e6 rad/s, 2e11 °/h"),
@@ -75,6 +80,15 @@ impl Column {
                 None => bracketed.and_then(|b| kind.unit(b)).map(|u| (*quantity, u)),
             }
         });
+        let of_sensor = || {
+            let (place, unit) = match bracketed {
+                Some(unit) => (bare.strip_prefix("temperature_")?, unit),
+                None => bare.strip_prefix("temperature_")?.rsplit_once('_')?,
+            };
+            let unit = Kind::Temperature.unit(unit).filter(|u| bracketed.is_some() || u.key == unit)?;
+            Some((Quantity::Sensor(SensorPlace::named(place)?), unit))
+        };
+        let of_name = of_name.or_else(of_sensor);
         // A quantity that is mapped elsewhere does not come from this name.
         let of_name =
             of_name.filter(|(quantity, _)| mapped.is_some() || format.mapped.iter().all(|m| m.quantity != *quantity));
@@ -123,7 +137,8 @@ impl Column {
             false => format!("\"{}\"", field.chars().take(40).collect::<String>()),
         };
         if self.conversion.is_stamp() || (self.quantity == Quantity::Time && field.contains(':')) {
-            return seconds_of_stamp(field).ok_or_else(|| format!("no date and time: {}", found()));
+            let stated = if self.decimal_comma { field.replace(',', ".") } else { field.to_owned() };
+            return seconds_of_stamp(&stated).ok_or_else(&found);
         }
         let number = if self.decimal_comma && field.matches(',').count() == 1 && !field.contains('.') {
             field.replace(',', ".").parse::<f64>()
@@ -140,6 +155,16 @@ impl Column {
         if si.abs() <= most { Ok(si) } else { Err(format!("{value:e}, beyond {words}")) }
     }
 
+    /// What its cells must be, in words.
+    pub fn expected(&self) -> &'static str {
+        if self.holds_stamps() { STAMPS } else { "expected a finite number" }
+    }
+
+    /// Whether its cells are dates and times.
+    pub fn holds_stamps(&self) -> bool {
+        self.conversion.is_stamp()
+    }
+
     /// Whether it must hold a number in every row.
     pub fn is_needed(&self) -> bool {
         matches!(self.quantity, Quantity::Time | Quantity::Temperature | Quantity::Rate)
@@ -147,6 +172,20 @@ impl Column {
 
     pub fn is_temperature(&self) -> bool {
         self.quantity.is_temperature()
+    }
+
+    /// Under which name a record keeps it as a further column, if it does.
+    pub fn channel(&self) -> Option<String> {
+        match self.quantity {
+            Quantity::Channel => Some(self.name.clone()),
+            Quantity::Sensor(place) => Some(place.channel()),
+            _ => None,
+        }
+    }
+
+    /// A value in SI as that column holds it.
+    pub fn in_channel(&self, value: f64) -> f64 {
+        if self.is_temperature() { celsius_from_kelvin(value) } else { value }
     }
 
     /// The unit that was taken because nothing stated one.
@@ -167,19 +206,51 @@ fn unbracketed(name: &str) -> (&str, Option<&str>) {
     (name, None)
 }
 
-/// Seconds since 1970 of an ISO 8601 stamp; without a zone it is taken as UTC, which cancels in a record.
-fn seconds_of_stamp(field: &str) -> Option<f64> {
-    let nanoseconds = match field.parse::<jiff::Timestamp>() {
-        Ok(stamp) => stamp.as_nanosecond(),
-        Err(_) => field
-            .parse::<jiff::civil::DateTime>()
-            .ok()?
-            .to_zoned(jiff::tz::TimeZone::UTC)
-            .ok()?
-            .timestamp()
-            .as_nanosecond(),
+/// What a stamp may look like.
+const STAMPS: &str = "expected a stamp such as 2026-03-01T10:00:00.5Z, 2026-03-01 10:00:00, 01.03.2026 10:00:00, 2026/03/01 10:00:00 or a time of day 10:00:00.5";
+
+/// Seconds of a time of day; past midnight they begin again.
+fn seconds_of_day(field: &str) -> Option<f64> {
+    let mut parts = field.split(':');
+    let (hours, minutes, seconds) = (parts.next()?, parts.next()?, parts.next().unwrap_or("0"));
+    let is_digits = |part: &str| (1..=2).contains(&part.len()) && part.bytes().all(|b| b.is_ascii_digit());
+    if parts.next().is_some()
+        || !is_digits(hours)
+        || !is_digits(minutes)
+        || !seconds.starts_with(|c: char| c.is_ascii_digit())
+    {
+        return None;
+    }
+    let whole = |part: &str, below: f64| part.parse::<f64>().ok().filter(|v| (0.0..below).contains(v));
+    // Hours of a stop watch go beyond a day's.
+    Some(s_from_h(whole(hours, 100.0)?) + s_from_min(whole(minutes, 60.0)?) + whole(seconds, 61.0)?)
+}
+
+/// With the date as ISO 8601 has it: of day, month and year between dots, and of what slashes divide where the year comes first.
+fn with_iso_date(field: &str) -> Option<String> {
+    let (date, time) = field.split_once([' ', 'T'])?;
+    let parts = |sign: char| -> Option<[&str; 3]> { date.split(sign).collect::<Vec<_>>().try_into().ok() };
+    let (year, month, day) = match (parts('.'), parts('/')) {
+        (Some([day, month, year]), _) => (year, month, day),
+        (None, Some([year, month, day])) => (year, month, day),
+        _ => return None,
     };
-    Some(s_from_ns(nanoseconds as f64))
+    (year.len() == 4).then(|| format!("{year}-{month:0>2}-{day:0>2}T{}", time.trim()))
+}
+
+/// Seconds since 1970 of a stamp, or since midnight; without a zone it is taken as UTC, which cancels in a record.
+fn seconds_of_stamp(field: &str) -> Option<f64> {
+    if let Some(seconds) = seconds_of_day(field) {
+        return Some(seconds);
+    }
+    let other = with_iso_date(field);
+    let field = other.as_deref().unwrap_or(field);
+    let stamp = match field.parse::<jiff::Timestamp>() {
+        Ok(stamp) => stamp,
+        Err(_) => field.parse::<jiff::civil::DateTime>().ok()?.to_zoned(jiff::tz::TimeZone::UTC).ok()?.timestamp(),
+    };
+    // Whole seconds stay whole.
+    Some(stamp.as_second() as f64 + s_from_ns(f64::from(stamp.subsec_nanosecond())))
 }
 
 /// How a file's cells are divided.
@@ -328,6 +399,15 @@ mod tests {
         let at = |text: &str| value("stamp", "time=stamp:iso", text);
         assert_eq!(at("2026-01-02T00:00:00Z") - at("2026-01-01T23:59:58.5Z"), 1.5);
         assert_eq!(at("2026-01-02 01:00:00+01:00"), at("2026-01-02T00:00:00"));
+        assert_eq!(at("02.01.2026 00:00:00,5"), at("2026-01-02T00:00:00.5"));
+        assert_eq!(at("2026/1/2 00:00:01"), at("2026-01-02T00:00:01Z"));
+        assert_eq!((at("10:00:00.5"), at("7:05")), (36_000.5, 25_500.0));
+        let format = &mut RecordFormat::default();
+        format.map_all("time=stamp:iso").unwrap();
+        // Which of the two is the month, nobody knows.
+        for unknown in ["03/01/2026 10:00:00", "1:2:3:4", "10:61:00", "yesterday"] {
+            assert!(Column::new("stamp", format, false).unwrap().value(unknown).is_err(), "{unknown}");
+        }
     }
 
     #[test]

@@ -3,6 +3,7 @@
 //! Every number must be there and finite, and the times must increase strictly: a sensor that failed is a row that is
 //! left out, which the rest of the program sees as a gap. Gross errors that are numbers are read as they are.
 
+use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 
@@ -15,6 +16,7 @@ use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s};
 use super::csv_rows::{CsvRows, Piece};
 use super::record_columns::{Column, FLAGS, Quantity, RecordFormat, read_header};
 use super::record_rows::{Cells, CellsRead, NO_HEADER, PLAUSIBLE_C, assumptions, average, implausible, suspicions};
+use super::table_file::Source;
 
 /// Ten million rows of three columns or so.
 const LARGEST_RECORD_BYTES: u64 = 512 * 1024 * 1024;
@@ -43,8 +45,28 @@ pub fn read_record(path: &Path) -> Result<Record, Faults> {
 /// # Errors
 /// All faults of the file at once, with line and column.
 pub fn read_record_as(path: &Path, format: &RecordFormat) -> Result<ReadRecord, Faults> {
-    let source = read_text_up_to(path, LARGEST_RECORD_BYTES)?;
-    parse_record_as(&path.display().to_string(), &source, format)
+    read_record_named(path, &path.display().to_string(), format)
+}
+
+/// As [`read_record_as`], of a file that faults call otherwise than by its path.
+///
+/// # Errors
+/// All faults of the file at once, with line or row, and column.
+pub fn read_record_named(path: &Path, name: &str, format: &RecordFormat) -> Result<ReadRecord, Faults> {
+    let Some(table) = Source::open_other(path)? else {
+        return parse_record_as(name, &read_text_up_to(path, LARGEST_RECORD_BYTES)?, format);
+    };
+    let (remarks, is_table) = (table.remarks().to_vec(), table.is_table());
+    let mut text = String::new();
+    let read = table.take(LARGEST_RECORD_BYTES + 1).read_to_string(&mut text);
+    read.map_err(|e| Faults::of_file(name, format!("cannot be read: {e}")))?;
+    if text.len() as u64 > LARGEST_RECORD_BYTES {
+        let message = format!("expected a record of at most {LARGEST_RECORD_BYTES} bytes as CSV, found more");
+        return Err(Faults::of_file(name, message));
+    }
+    let mut read = Reading { is_table, ..Reading::new(name, &text, format) }.record()?;
+    read.remarks.splice(0..0, remarks);
+    Ok(read)
 }
 
 /// As [`read_record_as`], of a text that was read already.
@@ -70,11 +92,13 @@ struct Reading<'s> {
     faults: Vec<Fault>,
     uncounted: usize,
     skipped: usize,
+    /// Another program's, of which the text is only what was made of it.
+    is_table: bool,
 }
 
 impl<'s> Reading<'s> {
     fn new(file: &'s str, source: &'s str, format: &'s RecordFormat) -> Self {
-        Self { file, source, format, faults: Vec::new(), uncounted: 0, skipped: 0 }
+        Self { file, source, format, faults: Vec::new(), uncounted: 0, skipped: 0, is_table: false }
     }
 
     fn fault(&mut self, fault: Fault) {
@@ -85,8 +109,16 @@ impl<'s> Reading<'s> {
         }
     }
 
+    /// Whether further columns may hold words.
+    fn lax(&self) -> bool {
+        self.format.has_mapping() || self.is_table
+    }
+
     fn record(mut self) -> Result<ReadRecord, Faults> {
         let mut rows = CsvRows::new(self.source.as_bytes());
+        if self.is_table {
+            rows.number_rows();
+        }
         // A text in memory does not fail.
         let Ok(Some((piece, division))) = rows.header(|_| {}) else {
             return self.end(None, NO_HEADER);
@@ -149,7 +181,7 @@ impl<'s> Reading<'s> {
         let mut remarks = assumptions(&columns, division);
         let averaged = average(&columns, values, self.format.average_rows);
         let skipped_rows = self.skipped;
-        let built = build(self.file, self.format, &columns, averaged);
+        let built = build(self.file, self.lax(), &columns, averaged);
         match built {
             Ok(record) => {
                 remarks.extend(suspicions(record.times_s(), record.temperature_k()));
@@ -173,18 +205,19 @@ impl<'s> Reading<'s> {
     /// A column that holds no number at all is one fault, not one a row.
     fn gather_empty_columns(&mut self, columns: &[Column], values: &[Vec<f64>], header: &Range<usize>) {
         for (column, values) in columns.iter().zip(values) {
-            let may_hold_words =
-                column.quantity == Quantity::Channel && (self.format.has_mapping() || column.name == FLAGS);
+            let may_hold_words = column.quantity == Quantity::Channel && (self.lax() || column.name == FLAGS);
             if values.len() < MIN_ROWS || values.iter().any(|v| v.is_finite()) || may_hold_words {
                 continue;
             }
-            let own = format!(", column {}: expected a finite number", column.name);
+            let own = format!(", column {}: {}", column.name, column.expected());
             let before = self.faults.len();
             self.faults.retain(|f| !f.message.contains(&own));
             let shown = before - self.faults.len();
             self.uncounted = self.uncounted.saturating_sub(values.len() - shown);
-            let message = format!("column {} holds no finite number in any of its {} rows", column.name, values.len());
+            let what = if column.holds_stamps() { "stamp that is understood" } else { "finite number" };
+            let message = format!("column {} holds no {what} in any of its {} rows", column.name, values.len());
             let note = match column.quantity {
+                Quantity::Time if column.holds_stamps() => column.expected(),
                 Quantity::Time | Quantity::Temperature | Quantity::Rate => "the sensor failed: measure again",
                 _ => "leave the column out",
             };
@@ -202,16 +235,15 @@ impl<'s> Reading<'s> {
         if self.uncounted > 0 {
             self.faults.push(Fault::new(format!("{} further faults of the same kinds", self.uncounted), None));
         }
-        Err(Faults { file: self.file.to_owned(), source: self.source.to_owned(), faults: self.faults })
+        if self.is_table {
+            self.faults.iter_mut().for_each(|fault| fault.span = None);
+        }
+        let source = if self.is_table { String::new() } else { self.source.to_owned() };
+        Err(Faults { file: self.file.to_owned(), source, faults: self.faults })
     }
 }
 
-fn build(
-    file: &str,
-    format: &RecordFormat,
-    columns: &[Column],
-    mut values: Vec<Vec<f64>>,
-) -> Result<Record, RecordError> {
+fn build(file: &str, lax: bool, columns: &[Column], mut values: Vec<Vec<f64>>) -> Result<Record, RecordError> {
     let mut take = |quantity: Quantity| {
         columns.iter().position(|c| c.quantity == quantity).map(|place| std::mem::take(&mut values[place]))
     };
@@ -234,9 +266,10 @@ fn build(
         record = record.with_channel(Channel { name: TABLE_RATE.to_owned(), values })?;
     }
     for (column, values) in columns.iter().zip(values) {
-        let holds_words = (format.has_mapping() || column.name == FLAGS) && values.iter().all(|v| !v.is_finite());
-        if column.quantity == Quantity::Channel && !holds_words {
-            record = record.with_channel(Channel { name: column.name.clone(), values })?;
+        let holds_words = (lax || column.name == FLAGS) && values.iter().all(|v| !v.is_finite());
+        if let Some(name) = column.channel().filter(|_| column.is_temperature() || !holds_words) {
+            let values = values.into_iter().map(|value| column.in_channel(value)).collect();
+            record = record.with_channel(Channel { name, values })?;
         }
     }
     Ok(record)

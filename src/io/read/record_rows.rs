@@ -9,7 +9,8 @@ use crate::record::{LEAST_INTERVAL_S, MIN_ROWS, RecordError, Row, usual_interval
 use crate::units::celsius_from_kelvin;
 
 use super::csv_rows::{CsvRows, Piece};
-use super::record_columns::{Column, Division, FLAGS, Quantity, RecordFormat, read_header};
+use super::record_columns::{Column, Division, FLAGS, Quantity, RecordFormat, SensorPlace, read_header};
+use super::table_file::Source;
 
 /// A coil that is mostly outside of this is in other units than its header says.
 pub(super) const PLAUSIBLE_C: Range<f64> = -150.0..200.0;
@@ -74,20 +75,19 @@ impl<'c> Cells<'c> {
     /// What was read last of a text.
     pub(super) fn read(&mut self, piece: Piece, row: &CsvRows<impl BufRead>) -> CellsRead {
         self.numbers.clear();
-        let line = row.line();
         if let Piece::Broken(why) = piece {
             if self.skips {
                 return CellsRead::Skipped;
             }
-            let fault = CellFault { message: format!("line {line}: {why}"), place: None, note: None };
+            let fault = CellFault { message: format!("{}: {why}", row.place()), place: None, note: None };
             return CellsRead::Faults(vec![fault]);
         }
         if row.len() != self.columns.len() {
             if self.skips {
                 return CellsRead::Skipped;
             }
-            let message =
-                format!("line {line}: expected {} columns as in the header, found {}", self.columns.len(), row.len());
+            let (place, wanted) = (row.place(), self.columns.len());
+            let message = format!("{place}: expected {wanted} columns as in the header, found {}", row.len());
             return CellsRead::Faults(vec![CellFault { message, place: None, note: None }]);
         }
         let mut faults = Vec::new();
@@ -98,7 +98,8 @@ impl<'c> Cells<'c> {
                     Err(before_s) => {
                         faults.push(CellFault {
                             message: format!(
-                                "line {line}, column {}: times must increase strictly, found {field} after {before_s} s",
+                                "{}, column {}: times must increase strictly, found {field} after {before_s} s",
+                                row.place(),
                                 column.name
                             ),
                             place: Some(place),
@@ -108,12 +109,19 @@ impl<'c> Cells<'c> {
                     }
                 },
                 Ok(value) => value,
-                Err(_) if column.quantity == Quantity::Channel && (self.lax || column.name == FLAGS) => f64::NAN,
+                Err(_)
+                    if column.quantity == Quantity::Channel
+                        && (self.lax || row.numbers_rows() || column.name == FLAGS) =>
+                {
+                    f64::NAN
+                }
                 Err(found) => {
                     faults.push(CellFault {
                         message: format!(
-                            "line {line}, column {}: expected a finite number, found {found}",
-                            column.name
+                            "{}, column {}: {}, found {found}",
+                            row.place(),
+                            column.name,
+                            column.expected()
                         ),
                         place: Some(place),
                         note: Some("leave out rows in which a sensor failed, or skip them: --bad-rows skip"),
@@ -180,6 +188,16 @@ pub(super) fn assumptions(columns: &[Column], division: Division) -> Vec<String>
         ));
     }
     for column in columns {
+        if let (Quantity::Sensor(place), Some(name)) = (column.quantity, column.channel()) {
+            let use_of_it = match place {
+                SensorPlace::Layer(_) => "`compare` sets it beside the model's layer",
+                _ => "the model's heat does not read it",
+            };
+            said.push(format!(
+                "column {} is a further thermometer, {name} to effects and formulas; {use_of_it}",
+                column.name
+            ));
+        }
         if let Some(unit) = column.assumed_unit() {
             said.push(format!("column {} states no unit: taken as {unit}", column.name));
         }
@@ -234,9 +252,26 @@ pub fn stream_rows(
     name: &str,
     input: impl Read,
     format: &RecordFormat,
+    sink: impl FnMut(&[Row]),
+) -> Result<StreamNoticed, Faults> {
+    stream_source(name, Source::text(input), format, sink)
+}
+
+/// As [`stream_rows`], of a text or of another program's table.
+///
+/// # Errors
+/// All faults of the input at once, with line or row, and column.
+pub fn stream_source(
+    name: &str,
+    source: Source<'_>,
+    format: &RecordFormat,
     mut sink: impl FnMut(&[Row]),
 ) -> Result<StreamNoticed, Faults> {
-    let mut rows = CsvRows::new(BufReader::with_capacity(1 << 18, input));
+    let (is_table, remarks) = (source.is_table(), source.remarks().to_vec());
+    let mut rows = CsvRows::new(BufReader::with_capacity(1 << 18, source));
+    if is_table {
+        rows.number_rows();
+    }
     let unreadable = |e: std::io::Error| Faults::of_file(name, format!("cannot be read: {e}"));
     let Some((piece, division)) = rows.header(|_| {}).map_err(unreadable)? else {
         return Err(Faults::of_file(name, NO_HEADER));
@@ -247,7 +282,8 @@ pub fn stream_rows(
     let (time, temperature, rate) = (place(Quantity::Time), place(Quantity::Temperature), place(Quantity::Rate));
     let table = columns.iter().position(|c| c.quantity == Quantity::Table);
     let mut cells = Cells::new(&columns, format);
-    let mut noticed = StreamNoticed { remarks: assumptions(&columns, division), ..StreamNoticed::default() };
+    let remarks = remarks.into_iter().chain(assumptions(&columns, division)).collect();
+    let mut noticed = StreamNoticed { remarks, ..StreamNoticed::default() };
     let (mut faults, mut uncounted) = (Vec::new(), 0);
     let mut chunk: Vec<Row> = Vec::with_capacity(CHUNK);
     loop {

@@ -9,6 +9,8 @@ use toml_edit::{Document, Item, TableLike, Value};
 use crate::io::fault::{Fault, Faults};
 use crate::text;
 
+pub use super::nearest::nearest;
+
 /// What a number may be.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
@@ -37,6 +39,8 @@ pub struct TableReader<'d> {
     table: Option<&'d dyn TableLike>,
     span: Option<Range<usize>>,
     known: Vec<&'static str>,
+    /// Keys with a number in them.
+    numbered: Vec<String>,
     missing: Vec<Missing>,
 }
 
@@ -68,6 +72,7 @@ impl TomlReader {
             table: Some(document.as_table()),
             span: None,
             known: Vec::new(),
+            numbered: Vec::new(),
             missing: Vec::new(),
         }
     }
@@ -117,7 +122,7 @@ fn type_name(item: &Item) -> &'static str {
 impl<'d> TableReader<'d> {
     /// An absent table: everything asked of it is absent too, without a fault.
     fn absent(prefix: String) -> Self {
-        Self { prefix, table: None, span: None, known: Vec::new(), missing: Vec::new() }
+        Self { prefix, table: None, span: None, known: Vec::new(), numbered: Vec::new(), missing: Vec::new() }
     }
 
     /// Nothing left to read.
@@ -243,6 +248,17 @@ impl<'d> TableReader<'d> {
             return None;
         };
         Some(value.value())
+    }
+
+    /// A string under a key with a number in it.
+    pub fn numbered_text(&mut self, reader: &mut TomlReader, key: &str) -> Option<&'d str> {
+        self.numbered.push(key.to_owned());
+        let item = self.table?.get(key)?;
+        let found = item.as_str();
+        if found.is_none() {
+            self.wrong_type(reader, key, "a string", item);
+        }
+        found
     }
 
     /// A name that must be there: one that can be seen as it is, of a length that fits on a page.
@@ -389,7 +405,14 @@ impl<'d> TableReader<'d> {
         match item.as_table_like() {
             Some(table) => {
                 let span = item.span().or_else(|| self.span.clone());
-                TableReader { prefix, table: Some(table), span, known: Vec::new(), missing: Vec::new() }
+                TableReader {
+                    prefix,
+                    table: Some(table),
+                    span,
+                    known: Vec::new(),
+                    numbered: Vec::new(),
+                    missing: Vec::new(),
+                }
             }
             None => {
                 self.wrong_type(reader, key, "a table", item);
@@ -414,6 +437,7 @@ impl<'d> TableReader<'d> {
             table: Some(table),
             span,
             known: Vec::new(),
+            numbered: Vec::new(),
             missing: Vec::new(),
         };
         match item {
@@ -442,7 +466,7 @@ impl<'d> TableReader<'d> {
     pub fn finish(mut self, reader: &mut TomlReader) {
         let Some(table) = self.table else { return };
         for (key, item) in table.iter() {
-            if self.known.contains(&key) {
+            if self.known.contains(&key) || self.numbered.iter().any(|numbered| numbered == key) {
                 continue;
             }
             let span = table.key(key).and_then(|k| k.span()).or_else(|| item.span()).or_else(|| self.span.clone());
@@ -476,20 +500,4 @@ fn one_of(words: &[&str]) -> String {
         [one] => one.clone(),
         _ => format!("one of {}", quoted.join(", ")),
     }
-}
-
-/// The word that a misspelling most likely stands for.
-pub fn nearest<'w>(found: &str, words: &[&'w str]) -> Option<&'w str> {
-    // A name without its unit: `gain` for `gain_deg_per_h_per_unit`.
-    let beginning = words.iter().find(|w| found.len() > 2 && w.strip_prefix(found).is_some_and(|r| r.starts_with('_')));
-    if let Some(word) = beginning {
-        return Some(word);
-    }
-    words
-        .iter()
-        .map(|w| (strsim::jaro_winkler(found, w), *w))
-        .filter(|_| found.len() > 2)
-        .filter(|(score, _)| *score > 0.87)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, w)| w)
 }

@@ -205,12 +205,12 @@ fn places(
     let names = compensator.channel_names();
     let needed = |c: &Column| match c.quantity {
         Quantity::Time | Quantity::Temperature | Quantity::Rate | Quantity::InnerTemperature => true,
-        Quantity::Channel => names.contains(&c.name.as_str()),
+        Quantity::Channel | Quantity::Sensor(_) => c.channel().is_some_and(|name| names.contains(&name.as_str())),
         Quantity::AmbientTemperature | Quantity::Table => false,
     };
     let columns: Vec<(usize, Column)> = columns.into_iter().enumerate().filter(|(_, c)| needed(c)).collect();
     let place = |wanted: &&str| {
-        let found = columns.iter().position(|(_, c)| c.name == *wanted);
+        let found = columns.iter().position(|(_, c)| c.channel().as_deref() == Some(*wanted));
         found.ok_or_else(|| Faults::of_file(name, format!("the model reads the column {wanted}, which is not there")))
     };
     let channels = names.iter().map(place).collect::<Result<_, _>>()?;
@@ -244,7 +244,7 @@ fn reading<'r>(
                 Quantity::Temperature => found.temperature_k = value,
                 Quantity::Rate => found.rate_rad_per_s = value,
                 Quantity::InnerTemperature => found.inner_k = value,
-                Quantity::Channel => channels[next] = value,
+                Quantity::Channel | Quantity::Sensor(_) => channels[next] = value.map(|v| column.in_channel(v)),
                 Quantity::AmbientTemperature | Quantity::Table => {}
             }
             next += 1;

@@ -1,12 +1,10 @@
 //! A campaign's gyros: what each costs, and what its records say.
 
-use std::fs::File;
-
-use crate::io::fault::Faults;
 use crate::io::json::campaign::GyroJson;
 use crate::io::json::inputs::RecordInputJson;
 use crate::io::read::campaign_file::Kind;
 use crate::io::read::campaign_file::fleet::{Gyro, StatedFile};
+use crate::io::read::table_file::Source;
 use crate::task::measurement::GrossErrors;
 use crate::task::metrics::{self, Settings, measure_stream};
 use crate::task::{Observer, TaskError};
@@ -35,8 +33,7 @@ pub fn measure_gyro(id: &str, gyro: &Gyro, observer: &dyn Observer) -> Result<Gy
     let settings = Settings { average_s: gyro.settings.average_s, gross_errors: GrossErrors::Keep, attitude: None };
     let mut measured = Vec::with_capacity(gyro.records.len());
     for file in &gyro.records {
-        let unreadable = |e| Faults::of_file(file.path.display().to_string(), format!("cannot be read: {e}"));
-        let source = File::open(&file.path).map_err(unreadable)?;
+        let source = Source::open(&file.path)?;
         let input =
             RecordInputJson { file: file.stated.clone(), sha256: file.sha256.clone(), role: "measured".to_owned() };
         match measure_stream(input, &file.stated, source, &gyro.format, &settings, observer) {
@@ -61,9 +58,9 @@ fn failed(id: &str, kind: &str, gyro: &Gyro, error: &TaskError) -> GyroJson {
 mod diagnosed {
     use super::{GyroJson, Kind, Observer, TaskError, failed, nothing};
     use crate::diagnose::Terms;
-    use crate::io::files::read_text;
     use crate::io::read::campaign_file::fleet::{Gyro, StatedFile};
-    use crate::io::read::record_file::parse_record_as;
+    use crate::io::read::record_file::read_record_named;
+    use crate::io::read::table_file::Source;
     use crate::task::diagnose::{Request, run};
     use crate::task::measurement::Measurement;
 
@@ -73,21 +70,20 @@ mod diagnosed {
     /// A record that cannot be opened; a gyro without a model.
     pub fn diagnose_gyro(id: &str, gyro: &Gyro, observer: &dyn Observer) -> Result<GyroJson, TaskError> {
         let Some(file) = &gyro.file else { return Err(TaskError::PatternMissing) };
-        let taken = |files: &[StatedFile]| -> Result<Vec<(String, String)>, TaskError> {
-            files.iter().map(|file| Ok((file.stated.clone(), read_text(&file.path)?))).collect()
-        };
-        let (records, holdout) = (taken(&gyro.records)?, taken(&gyro.holdout)?);
-        let sha256 = |files: &[StatedFile]| files.iter().map(|file| file.sha256.clone()).collect::<Vec<_>>();
-        let understood = |texts: &[(String, String)], sha256: Vec<Option<String>>| {
-            let measurement = |((stated, text), sha256): (&(String, String), Option<String>)| {
-                let read = parse_record_as(stated, text, &gyro.format)?;
+        for file in gyro.records.iter().chain(&gyro.holdout) {
+            Source::open(&file.path)?;
+        }
+        let understood = |files: &[StatedFile]| {
+            let measurement = |file: &StatedFile| {
+                let read = read_record_named(&file.path, &file.stated, &gyro.format)?;
                 let (skipped_rows, remarks) = (read.skipped_rows, read.remarks);
-                Ok(Measurement { record: read.record, file: stated.clone(), sha256, skipped_rows, remarks })
+                let (file, sha256) = (file.stated.clone(), file.sha256.clone());
+                Ok(Measurement { record: read.record, file, sha256, skipped_rows, remarks })
             };
-            texts.iter().zip(sha256).map(measurement).collect::<Result<Vec<_>, TaskError>>()
+            files.iter().map(measurement).collect::<Result<Vec<_>, TaskError>>()
         };
-        let found = understood(&records, sha256(&gyro.records)).and_then(|measurements| {
-            let holdout = understood(&holdout, sha256(&gyro.holdout))?;
+        let found = understood(&gyro.records).and_then(|measurements| {
+            let holdout = understood(&gyro.holdout)?;
             let terms = match gyro.settings.terms.as_deref() {
                 None => Terms::All,
                 Some([none]) if none == "none" => Terms::None,
