@@ -18,7 +18,7 @@ TARGET = ROOT / "python" / "THIRD-PARTY-LICENCES.md"
 def packages() -> list[dict]:
     """What the Python module is built of besides this repository, sorted; what only tests or builds need left out."""
     done = subprocess.run(
-        ["cargo", "metadata", "--format-version", "1", "--locked", "--manifest-path", str(ROOT / "python" / "Cargo.toml")],
+        ["cargo", "metadata", "--format-version", "1", "--locked", "--all-features", "--manifest-path", str(ROOT / "python" / "Cargo.toml")],
         check=True,
         capture_output=True,
         text=True,
