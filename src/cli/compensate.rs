@@ -11,7 +11,6 @@ use super::screen::{Screen, run_of, table};
 use super::watching::Watching;
 use super::{CliError, Ending, offered};
 use crate::compensate::{Compensator, Method};
-use crate::io::fault::Faults;
 use crate::io::files::{NewFile, folder_of, write_atomically};
 use crate::io::folder::{HeldFolder, Replacement};
 use crate::io::read::model_file::read_model;

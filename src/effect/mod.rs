@@ -37,8 +37,8 @@ mod thermal_stress;
 mod thermo_optic;
 mod thermo_optic_temperature;
 mod turn_mismatch;
-mod unsteady_start;
 mod turning;
+mod unsteady_start;
 
 pub use crate::numeric::expression::Memory;
 pub use declared::{DeclaredEffect, DeclaredParameter, EffectError};
