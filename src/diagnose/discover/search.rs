@@ -365,8 +365,9 @@ impl Tools<'_, '_> {
         let fit = &set.explanation.fit;
         let chamber = self.question.chamber;
         let (Ok(scorer), Ok(regression)) = (chamber.scorer(fit), chamber.regression(fit)) else { return Vec::new() };
-        // Whether there is anything is asked beneath the wander that was fitted, what it is without it.
-        if self.most_worth(&scorer, fit) < 0.0 {
+        // Whether there is anything is asked beneath the wander that was fitted, what it is without it. Where the gyro wanders more than gyros
+        // do there is something, and a slow term looks like that wander until it is fitted.
+        if !set.explanation.is_outside() && self.most_worth(&scorer, fit) < 0.0 {
             return Vec::new();
         }
         let promises = self.promises(&regression, fit);
