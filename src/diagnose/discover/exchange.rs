@@ -3,8 +3,12 @@
 
 use rayon::prelude::*;
 
-use super::search::{LISTED_TRIED, Set, Tools, WITHIN_REACH, WORTH_LISTED};
+use super::search::{Set, Tools, WITHIN_REACH, WORTH_LISTED};
 use crate::diagnose::joint::proposals;
+
+/// Effects of the catalogue that follow the pack's mean rate and so look alike in ramps: mismatch, surplus at either end with either lead, the
+/// empirical ones.
+const ALIKE: usize = 6;
 
 impl Tools<'_, '_> {
     /// The set with each of its listed effects exchanged for what else promises much in its place.
@@ -15,7 +19,7 @@ impl Tools<'_, '_> {
             let Ok(mut others) = proposals(self.question, &fewer.explanation) else { continue };
             others.retain(|p| p.gain > WORTH_LISTED && p.member != set.explanation.members[place]);
             others.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-            others.truncate(LISTED_TRIED);
+            others.truncate(ALIKE);
             let sets: Vec<Set> = others.par_iter().filter_map(|p| self.with_listed(&fewer, p)).collect();
             let near = sets.into_iter().filter(|s| s.merit > set.merit - WITHIN_REACH);
             all.extend(

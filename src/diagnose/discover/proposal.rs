@@ -6,7 +6,7 @@ use super::{Discovered, Question};
 use crate::chamber::{Fit, Place};
 use crate::diagnose::answer::{Settled, names, noises};
 use crate::diagnose::describe::{findings, unexplained};
-use crate::diagnose::joint::Found;
+use crate::diagnose::joint::{Explanation, Found};
 use crate::diagnose::{DiagnoseError, Diagnosis, Rung, Share, Verdict};
 use crate::effect::DeclaredEffect;
 use crate::numeric::statistics::rms;
@@ -128,7 +128,9 @@ pub(in crate::diagnose) fn amend(
     frozen.fit.assumed.inputs.iter_mut().for_each(|input| input.deviation = 0.0);
     let settled = Settled { explanation: &frozen, held_out: discovered.days.clone() };
     let first = Settled::new(question, declared)?;
-    diagnosis.effects = findings(question, found, &settled, &first, &[])?;
+    // Sets that do as well with another listed effect in the place of one.
+    let equals: Vec<&Explanation> = discovered.alternatives.iter().map(|(set, _)| &set.explanation).collect();
+    diagnosis.effects = findings(question, found, &settled, &first, &equals)?;
     diagnosis.verdict = Verdict::Unexplained;
     diagnosis.suggested_experiment = None;
     let noise = noises(question, &best.explanation)?;

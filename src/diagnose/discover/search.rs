@@ -68,7 +68,7 @@ pub const MOST_TERMS: usize = 4;
 const REFINED: usize = 12;
 const TRIED: usize = 4;
 /// Listed effects that are fitted beside them.
-pub const LISTED_TRIED: usize = 2;
+const LISTED_TRIED: usize = 2;
 /// … if they promise so much; terms, if they promise this share of what the first does.
 pub const WORTH_LISTED: f64 = 8.0;
 const WORTH_BESIDE: f64 = 0.25;
