@@ -125,6 +125,10 @@ pub fn families(variables: &[Variable], allowed: &Allowed) -> Vec<Family> {
 
 impl Family {
     fn new(form: &'static Form, x: &Variable, y: Option<&Variable>) -> Option<Self> {
+        // The size of what never changes its sign is that itself, for which there is a plainer form.
+        if form.template.contains("abs({x})") && (x.low >= 0.0 || x.high <= 0.0) {
+            return None;
+        }
         // Powers and products of a temperature are counted from 20 °C, what remembers and thresholds as it is read.
         let shifted = form.inner.is_empty();
         let text_of = |v: &Variable| match v.class {
@@ -341,6 +345,8 @@ mod tests {
         ] {
             assert!(texts.contains(&wanted), "{wanted} is not among {texts:?}");
         }
+        // A current that never changes its direction is its own size.
+        assert!(!texts.iter().any(|text| text.contains("abs(heater_a)")), "{texts:?}");
         let mut once = texts.clone();
         once.sort_unstable();
         once.dedup();
