@@ -72,7 +72,15 @@ pub(in crate::diagnose) fn discover(
         }
     }
     let from_listed = !sets.is_empty();
-    sets.extend(tools.search(umbrella(&tools, found, declared), MOST_TERMS, &|share| progress(0.4 + 0.4 * share)));
+    let beneath = umbrella(&tools, found, declared);
+    let wanders = beneath.explanation.is_outside();
+    sets.extend(tools.search(beneath, MOST_TERMS, &|share| progress(0.4 + 0.4 * share)));
+    let most =
+        |sets: &[Set]| sets.iter().filter(|s| !s.terms.is_empty()).map(Set::total).fold(f64::NEG_INFINITY, f64::max);
+    if wanders && most(&sets) < best_listed + BEATS {
+        // A wander may have taken up a slow term, and the gyro's noise with it: begin without.
+        sets.extend(tools.search(tools.plain(declared), MOST_TERMS, &|_| ()));
+    }
     let best_yet = sets.iter().map(Set::total).fold(f64::NEG_INFINITY, f64::max);
     if let Some(listed) = listed.filter(|e| !from_listed && e.total() + BEATS > best_yet) {
         sets.extend(tools.search(tools.plain(listed), MOST_TERMS, &|_| ()));
