@@ -438,6 +438,7 @@ fn vacuum_and_gas_gaps_have_the_conductances_of_their_closed_forms() {
         let coil = coilwright::coil::Coil::new(coilwright::coil::CoilSpec {
             fibre: coilwright::coil::Fibre {
                 refractive_index: 1.45,
+                group_index: None,
                 thermo_optic_per_k: 1e-5,
                 thermal_expansion_per_k: 0.0,
                 wavelength_m: 1.55e-6,
