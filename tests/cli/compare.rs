@@ -138,7 +138,8 @@ fn further_thermometers_are_set_beside_their_layers_and_none_is_dropped_unsaid()
     let number = |sensor: &serde_json::Value, key: &str| sensor[key].as_f64().unwrap();
     let outer = sensors.iter().find(|s| s["layer"] == 12).unwrap();
     assert_eq!(outer["column"], "temperature_layer_12_c");
-    assert!(number(outer, "mean_difference_c").abs() < 0.02 && number(outer, "rms_difference_c") < 0.5, "{outer}");
+    // A layer's temperature is that of the middle of the time that a rate is a mean over: 5 s of a ramp before the reading.
+    assert!(number(outer, "mean_difference_c").abs() < 0.05 && number(outer, "rms_difference_c") < 0.5, "{outer}");
     let inner = sensors.iter().find(|s| s["layer"] == 1).unwrap();
     assert!((number(inner, "mean_difference_c") - 5.0).abs() < 0.5, "{inner}");
     let with: Vec<&str> =
