@@ -271,7 +271,7 @@ impl Physical {
         Some(seen(now, before, record.times_s()[row] - record.times_s()[last], self.rate_mean_s))
     }
 
-    /// The time that a rate is a mean over [s].
+    /// The time that a rate is a mean over \[s\].
     pub fn rate_mean_s(&self) -> f64 {
         self.rate_mean_s
     }
