@@ -21,6 +21,7 @@ pub mod experiment;
 mod joint;
 pub mod plain;
 mod standing;
+mod terms;
 #[cfg(test)]
 mod tests;
 mod together;
@@ -44,6 +45,7 @@ use joint::Question;
 pub use candidate::{is_declared_number, is_empirical};
 pub use plain::{Plain, Shape};
 pub use standing::{Standing, is_adequate, standing};
+pub use terms::Terms;
 pub use together::{Together, declared_with, extend_together};
 
 /// What is asked.
@@ -57,28 +59,6 @@ pub struct Request<'a> {
     pub holdout: &'a [Record],
     /// Whether formulas are sought for what no listed effect explains, and among which.
     pub terms: Terms<'a>,
-}
-
-/// Whether and among which terms an unlisted effect is sought.
-#[derive(Debug, Clone, Copy, Default)]
-pub enum Terms<'a> {
-    #[default]
-    All,
-    /// Of these forms and variables only.
-    Among(&'a [String]),
-    None,
-}
-
-impl<'a> Terms<'a> {
-    /// As a user says it: nothing said or the word `all`, no words, or some.
-    pub fn asked(words: Option<&'a [String]>) -> Self {
-        match words {
-            None => Self::All,
-            Some([]) => Self::None,
-            Some([all]) if all == "all" => Self::All,
-            Some(words) => Self::Among(words),
-        }
-    }
 }
 
 /// The answer in one word.

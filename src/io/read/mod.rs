@@ -11,6 +11,7 @@ mod fibre_table;
 mod field_columns;
 pub mod field_file;
 mod kind_of_file;
+mod limits;
 pub mod materials_table;
 pub mod model_file;
 mod nearest;

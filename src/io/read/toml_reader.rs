@@ -9,20 +9,8 @@ use toml_edit::{Document, Item, TableLike, Value};
 use crate::io::fault::{Fault, Faults};
 use crate::text;
 
+pub use super::limits::Limits;
 pub use super::nearest::nearest;
-
-/// What a number may be.
-#[derive(Debug, Clone, Copy)]
-pub struct Limits {
-    pub lower: f64,
-    pub upper: f64,
-}
-
-impl Limits {
-    pub const fn between(lower: f64, upper: f64) -> Self {
-        Self { lower, upper }
-    }
-}
 
 /// The faults found so far in one document.
 #[derive(Debug)]
