@@ -293,25 +293,25 @@ pub fn metrics(
     gross: &str,
     output: Option<PathBuf>,
 ) -> PyResult<Answered> {
-    enum Source {
+    enum Measured {
         Held(Box<task::measurement::Measurement>),
         File(PathBuf),
     }
     let settings = Settings { average_s, gross_errors: gross_errors(py, gross)?, attitude: None };
-    let sources: Vec<Source> = records
+    let sources: Vec<Measured> = records
         .iter()
         .map(|record| match record {
-            RecordArgument::Held(held) => Source::Held(Box::new((*held.measurement).clone())),
-            RecordArgument::File(path) => Source::File(path.clone()),
+            RecordArgument::Held(held) => Measured::Held(Box::new((*held.measurement).clone())),
+            RecordArgument::File(path) => Measured::File(path.clone()),
         })
         .collect();
     let worked = work(py, None, move |watcher| {
         let _held = held(output.as_ref(), "metrics")?;
         output.as_ref().map_or(Ok(()), |folder| check_free(folder))?;
-        let one = |source: &Source| -> Result<_, Failure> {
+        let one = |source: &Measured| -> Result<_, Failure> {
             let path = match source {
-                Source::Held(measurement) => return Ok(measure(measurement, &settings, &watcher)?),
-                Source::File(path) => path,
+                Measured::Held(measurement) => return Ok(measure(measurement, &settings, &watcher)?),
+                Measured::File(path) => path,
             };
             // Read as the command reads it: row by row, without holding it.
             let name = path.display().to_string();

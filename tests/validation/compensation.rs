@@ -91,7 +91,9 @@ fn a_channel_of_the_model_is_taken_from_its_column_and_held_where_it_drops_out()
     for i in 0..100 {
         let volts = 5.0 + 0.01 * f64::from(i);
         let column = if i == 50 { String::new() } else { volts.to_string() };
-        writeln!(input, "{},20.0,{},{column}", 10 * i, 0.5 + 2.0 * volts).unwrap();
+        // A rate is the mean over the ten seconds before it, and so is what the column adds.
+        let seen = if i > 0 { volts - 0.005 } else { volts };
+        writeln!(input, "{},20.0,{},{column}", 10 * i, 0.5 + 2.0 * seen).unwrap();
     }
     let mut output = Vec::new();
     let summary = compensate_lines(&compensator, &RecordFormat::default(), "x", input.as_bytes(), &mut output).unwrap();
@@ -99,7 +101,8 @@ fn a_channel_of_the_model_is_taken_from_its_column_and_held_where_it_drops_out()
     for (row, line) in String::from_utf8(output).unwrap().lines().skip(1).enumerate() {
         let fields: Vec<&str> = line.split(',').collect();
         let rate: f64 = fields[4].parse().unwrap();
-        let expected = if row == 50 { 0.5 + 2.0 * 0.01 } else { 0.5 };
+        // Held at the drop-out, and a straight line from there to the next value.
+        let expected = if row == 50 || row == 51 { 0.5 + 2.0 * 0.005 } else { 0.5 };
         assert!((rate - expected).abs() < 1e-7, "{line}");
     }
     let lacking = compensate_lines(
