@@ -1,10 +1,9 @@
 //! Campaigns, publications, pages and templates: what is neither design nor measurement of one coil.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use coilwright::io::files::write_atomically;
 use coilwright::io::json::campaign::WorkflowJson;
 use coilwright::io::json::further_schemas::{campaign_schema, compensation_schema};
 use coilwright::io::json::schema::{model_schema, pattern_schema, record_schema, schedule_schema};
@@ -164,14 +163,10 @@ fn of_thesis(error: ThesisError) -> TaskError {
     }
 }
 
-fn written(folder: Option<&Path>, files: Vec<ReproductionFile>) -> Result<Vec<String>, TaskError> {
-    let Some(folder) = folder else { return Ok(Vec::new()) };
-    let one = |file: ReproductionFile| {
-        let path = folder.join(&file.name);
-        write_atomically(&path, file.contents.as_bytes())?;
-        Ok(path.display().to_string())
-    };
-    files.into_iter().map(one).collect()
+fn written(folder: Option<&PathBuf>, files: &[ReproductionFile]) -> Result<Vec<String>, Failure> {
+    let Some(path) = folder else { return Ok(Vec::new()) };
+    let _held = held(folder, "reproduce")?;
+    Ok(task::reproduce::write(path, files)?)
 }
 
 /// A publication's results beside the computed ones; files only where a folder is given.
@@ -183,12 +178,12 @@ pub fn reproduce(py: Python, publication: String, output: Option<PathBuf>) -> Py
         match publication.as_str() {
             "yan1998" => {
                 let found = yan1998::reproduce()?;
-                let files = written(output.as_deref(), paper_page::files(&found, &command))?;
+                let files = written(output.as_ref(), &paper_page::files(&found, &command))?;
                 Ok(document(paper_page::ReproductionJson::new(&found, files))?)
             }
             "thesis2021" => {
                 let found = thesis2021::reproduce().map_err(of_thesis)?;
-                let files = written(output.as_deref(), thesis_page::files(&found, &command))?;
+                let files = written(output.as_ref(), &thesis_page::files(&found, &command))?;
                 Ok(document(thesis_page::ReproductionJson::new(&found, files))?)
             }
             found => {

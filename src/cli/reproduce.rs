@@ -6,10 +6,10 @@ use clap::ValueEnum;
 
 use super::screen::{Screen, held, table};
 use super::{CliError, Ending};
-use crate::io::folder::Replacement;
 use crate::report::thesis2021 as thesis;
 use crate::report::yan1998::{ReproductionFile, ReproductionJson, TABLE_HEAD, files, table_rows};
 use crate::reproduce::{thesis2021, yan1998};
+use crate::task;
 use crate::text::sink::Line;
 
 /// A publication's results, as printed beside as computed, with every discrepancy named
@@ -41,26 +41,9 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     }
 }
 
-/// Files that one of the publications leaves: in one folder the other's do not stay beside its own.
-const KINDS: &[&str] = &[
-    "README.md",
-    "table2.csv",
-    "figure2.csv",
-    "figure2.svg",
-    "figure3-#m.csv",
-    "figure3-#m.svg",
-    "comparisons.csv",
-    "record.csv",
-    "figure3-#.svg",
-    "figure3-5-6.svg",
-];
-
 fn write(folder: &Path, files: &[ReproductionFile]) -> Result<Vec<String>, CliError> {
     let _held = held(folder, "reproduce")?;
-    let mut replacement = Replacement::of(folder);
-    files.iter().try_for_each(|file| replacement.add(&file.name, file.contents.as_bytes()))?;
-    replacement.commit(KINDS)?;
-    Ok(files.iter().map(|file| folder.join(&file.name).display().to_string()).collect())
+    Ok(task::reproduce::write(folder, files)?)
 }
 
 fn of_thesis(folder: &Path, screen: &Screen) -> Result<Ending, CliError> {

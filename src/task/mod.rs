@@ -35,6 +35,8 @@ pub mod page;
 #[cfg(feature = "report")]
 pub mod proposal;
 #[cfg(feature = "report")]
+pub mod reproduce;
+#[cfg(feature = "report")]
 mod steps;
 #[cfg(feature = "report")]
 pub mod verify;
