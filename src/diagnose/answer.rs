@@ -31,16 +31,16 @@ impl<'e> Settled<'e> {
     }
 }
 
-/// The chamber with every record's kinks at the times that the likeliest set has them at: what is said of predictions needs
-/// them sharper than the search does.
-pub(super) fn with_timed_kinks<'a>(question: &Question<'a>, found: &Found) -> Result<Chamber<'a>, DiagnoseError> {
+/// The chamber with every record's kinks at the times that a fit, if there is one, has them at: what is said of predictions
+/// needs them sharper than the search does.
+pub(super) fn with_timed_kinks<'a>(question: &Question<'a>, best: Option<&Fit>) -> Result<Chamber<'a>, DiagnoseError> {
     let mut timed = question.chamber.clone();
-    let Some(best) = found.explanations.first() else { return Ok(timed) };
+    let Some(best) = best else { return Ok(timed) };
     for &record in &question.fitted {
-        timed.time_kinks(&best.fit, record)?;
+        timed.time_kinks(best, record)?;
     }
     for &record in &question.held_out {
-        let day = question.chamber.held_out(&best.fit, record)?;
+        let day = question.chamber.held_out(best, record)?;
         timed.time_kinks(&day, record)?;
     }
     Ok(timed)

@@ -422,7 +422,7 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
     };
     let chamber = question.chamber;
     progress(0.6);
-    let timed = answer::with_timed_kinks(&question, &found)?;
+    let timed = answer::with_timed_kinks(&question, found.likeliest())?;
     let mut diagnosis = answer::answer(&Question { chamber: &timed, ..question.clone() }, &found, &records)?;
     beyond(request, &question, &timed, &found, &mut diagnosis, &|share| progress(0.6 + 0.2 * share))?;
     // Where what is to be fitted shows nothing, the other records may; the former then confirm it.
@@ -433,7 +433,7 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
         let day = chamber.fit(&declared.fit.assumed, &[], &other.fitted, Some(&declared.fit), Effort::FULL)?;
         if joint::promise(&other, &day)? > PROMISING {
             let found = joint::search(&other, day, &|share| progress(0.8 + 0.2 * share))?;
-            let timed = answer::with_timed_kinks(&other, &found)?;
+            let timed = answer::with_timed_kinks(&other, found.likeliest())?;
             let mut elsewhere = answer::answer(&Question { chamber: &timed, ..other.clone() }, &found, &records)?;
             beyond(request, &other, &timed, &found, &mut elsewhere, &|_| ())?;
             if elsewhere.verdict != Verdict::Adequate {
@@ -462,10 +462,15 @@ fn beyond(
         Terms::Among(words) => discover::Allowed { words: words.to_vec() },
         Terms::None => return Ok(()),
     };
-    if let Some(discovered) = discover::discover(question, found, &allowed, progress)? {
-        discover::amend(&Question { chamber: timed, ..question.clone() }, found, &discovered, diagnosis)?;
-    }
-    Ok(())
+    let Some((discovered, elsewhere)) = discover::discover(question, found, &allowed, progress)? else { return Ok(()) };
+    let own = match &elsewhere {
+        Some(chamber) => {
+            Some(answer::with_timed_kinks(&Question { chamber, ..question.clone() }, Some(discovered.fit()))?)
+        }
+        None => None,
+    };
+    let timed = own.as_ref().unwrap_or(timed);
+    discover::amend(&Question { chamber: timed, ..question.clone() }, found, &discovered, diagnosis)
 }
 
 /// What a diagnosis leaves to be told apart by an experiment.

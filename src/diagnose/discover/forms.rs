@@ -195,7 +195,8 @@ pub const FORMS: &[Form] = &[
         "a threshold that sets in gradually: a polymer that stiffens below a transition",
         GLASS_SOURCE,
     ),
-    form("lagged", "lag({x}, tau_s)", &[TimeConstant], &[Difference, Rate, Column], LAG, None),
+    // The lag of a temperature's rate is the temperature's relaxation, but for a factor of tau.
+    form("lagged", "lag({x}, tau_s)", &[TimeConstant], &[Difference, Column], LAG, None),
     form("relaxation", "{x} - lag({x}, tau_s)", &[TimeConstant], &[Temperature], RELAXATION, CREEP_SOURCE),
     form(
         "relaxation",

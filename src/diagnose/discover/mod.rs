@@ -7,6 +7,7 @@
 //! # Source
 //! The score test as in [`crate::chamber`]; forms and prices as in the book's chapter on what is missing.
 
+mod anew;
 mod courses;
 mod exchange;
 mod forms;
@@ -14,8 +15,8 @@ mod grammar;
 mod proposal;
 mod search;
 
-use crate::chamber::{ChamberError, Effort, Fit};
-use crate::diagnose::joint::{Explanation, Found, Member, Question};
+use crate::chamber::{Chamber, ChamberError, Effort, Fit};
+use crate::diagnose::joint::{Explanation, Found, Member, Question, Winding};
 
 pub use forms::FORMS;
 pub use grammar::Allowed;
@@ -41,22 +42,31 @@ pub(in crate::diagnose) struct Discovered {
     pub courses: Courses,
 }
 
+impl Discovered {
+    /// The best set's, as it was fitted.
+    pub fn fit(&self) -> &Fit {
+        &self.best.explanation.fit
+    }
+}
+
 /// A set with terms must be better than everything listed by so much (natural logarithm).
 const BEATS: f64 = 3.0;
 /// Sets within so much of the best stay beside it.
 const NEAR: f64 = 6.0;
-/// Looks for terms beside what the search over listed effects found; None where nothing beats it.
+/// Looks for terms beside what the search over listed effects found; None where nothing beats it. Where they were judged in
+/// another chamber than the question's, that comes with them.
 ///
 /// # Errors
 /// A declared model that cannot be solved for these records.
-pub(in crate::diagnose) fn discover(
-    question: &Question,
+pub(in crate::diagnose) fn discover<'a>(
+    question: &Question<'a>,
     found: &Found,
     allowed: &Allowed,
     progress: &(dyn Fn(f64) + Sync),
-) -> Result<Option<Discovered>, ChamberError> {
+) -> Result<Option<(Discovered, Option<Chamber<'a>>)>, ChamberError> {
     let Some(declared) = found.declared() else { return Ok(None) };
-    let Some(tools) = tools(question, found, declared, allowed)? else { return Ok(None) };
+    let fit = &found.explanations.first().unwrap_or(declared).fit;
+    let Some(tools) = tools(question, &found.windings, fit, allowed)? else { return Ok(None) };
     let is_listed = |e: &&Explanation| {
         !e.members.is_empty() && e.members.iter().all(|m| matches!(m, Member::Effect(_) | Member::Refitted(_)))
     };
@@ -90,13 +100,29 @@ pub(in crate::diagnose) fn discover(
     let exchanged = sets.first().map(|best| tools.exchanged(best)).unwrap_or_default();
     sets.extend(exchanged.into_iter().filter(|s| s.total().is_finite()));
     sets.sort_by(|a, b| b.total().total_cmp(&a.total()));
+    let listed: Vec<f64> = found.explanations.iter().map(Explanation::total).collect();
+    let contender = sets.iter().max_by(|a, b| a.merit.total_cmp(&b.merit)).cloned();
+    if let Some(discovered) = concluded(&tools, sets, &listed, BEATS)? {
+        progress(1.0);
+        return Ok(Some((discovered, None)));
+    }
+    let fitted = found.explanations.iter().map(|e| e.merit).fold(f64::NEG_INFINITY, f64::max);
+    let Some(contender) = contender.filter(|set| set.merit > fitted + BEATS) else { return Ok(None) };
+    let anew = anew::anew(question, found, allowed, &contender, best_listed - contender.total())?;
+    Ok(anew.map(|(discovered, chamber)| (discovered, Some(chamber))))
+}
+
+/// The best of sets in their order, if it is better than everything listed by at least so much and the held-out records confirm it.
+fn concluded(tools: &Tools, sets: Vec<Set>, listed: &[f64], least: f64) -> Result<Option<Discovered>, ChamberError> {
+    let question = tools.question;
     let Some(best) = sets.first().cloned() else { return Ok(None) };
     let confirmed = question.held_out.is_empty() || best.held_out_gain.is_none_or(|gain| gain > 0.0);
-    if best.total() < best_listed + BEATS || !confirmed {
+    let best_listed = listed.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if best.terms.is_empty() || best.total() < best_listed + least || !confirmed {
         return Ok(None);
     }
     let mut near: Vec<Set> = Vec::new();
-    for set in sets.into_iter().filter(|s| s.total() > best.total() - NEAR) {
+    for set in sets.into_iter().filter(|s| !s.terms.is_empty() && s.total() > best.total() - NEAR) {
         let same = |o: &Set| {
             o.explanation.key() == set.explanation.key()
                 && o.terms.len() == set.terms.len()
@@ -106,36 +132,35 @@ pub(in crate::diagnose) fn discover(
             near.push(set);
         }
     }
-    let listed: f64 = found.explanations.iter().map(|e| (e.total() - best.total()).exp()).sum();
+    let listed: f64 = listed.iter().map(|total| (total - best.total()).exp()).sum();
     let sum: f64 = near.iter().map(|s| (s.total() - best.total()).exp()).sum::<f64>() + listed;
     let probability = 1.0 / sum;
     let alternatives =
         near.into_iter().skip(1).map(|s| ((s.total() - best.total()).exp() / sum, s)).map(|(p, s)| (s, p)).collect();
-    let (settled, inner_errors) = settled(&tools, &best);
+    let (settled, inner_errors) = settled(tools, &best);
     let mut frozen = best.explanation.fit.clone();
     frozen.assumed.inputs.iter_mut().for_each(|i| i.deviation = 0.0);
     let days: Result<Vec<Fit>, ChamberError> =
         question.held_out.iter().map(|&r| question.chamber.held_out(&frozen, r)).collect();
-    progress(1.0);
-    Ok(Some(Discovered { best, settled, inner_errors, probability, alternatives, days: days?, courses: tools.courses }))
+    let courses = tools.courses.clone();
+    Ok(Some(Discovered { best, settled, inner_errors, probability, alternatives, days: days?, courses }))
 }
 
-/// None where no term can be made of these records.
+/// The variables are those of a fit; None where no term can be made of these records.
 fn tools<'q, 'a>(
     question: &'q Question<'a>,
-    found: &'q Found,
-    declared: &Explanation,
+    windings: &'q [Winding],
+    fit: &Fit,
     allowed: &Allowed,
 ) -> Result<Option<Tools<'q, 'a>>, ChamberError> {
-    let best = found.explanations.first().unwrap_or(declared);
-    let day = |&r: &usize| question.chamber.held_out(&best.fit, r);
+    let day = |&r: &usize| question.chamber.held_out(fit, r);
     let days: Result<Vec<Fit>, ChamberError> = question.held_out.iter().map(day).collect();
-    let coil = best.fit.assumed.model.wound_coil()?;
-    let courses = Courses::new(question.chamber, &best.fit, &days?, coil.layer_lengths_m())?;
+    let coil = fit.assumed.model.wound_coil()?;
+    let courses = Courses::new(question.chamber, fit, &days?, coil.layer_lengths_m())?;
     let families = grammar::families(&grammar::variables(&courses), allowed);
     let longest_s = courses.longest_s();
     let candidates = families.iter().map(|f| f.grid(longest_s).len()).sum();
-    let tools = Tools { question, windings: &found.windings, courses, families, candidates };
+    let tools = Tools { question, windings, courses, families, candidates };
     Ok((candidates > 0).then_some(tools))
 }
 

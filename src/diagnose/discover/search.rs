@@ -232,6 +232,19 @@ impl Tools<'_, '_> {
         Some(self.set(found, terms))
     }
 
+    /// A set that was fitted in another chamber, in this one.
+    pub fn refitted(&self, set: &Set) -> Option<Set> {
+        let fit = &set.explanation.fit;
+        let mut assumed = fit.assumed.clone();
+        let first = set.first_input();
+        for (place, term) in set.terms.iter().enumerate() {
+            assumed.inputs[first + place] = self.input(term, set.amplitude(place));
+        }
+        let begin = (assumed, fit.free.clone());
+        let found = fitted(self.question, self.windings, set.explanation.members.clone(), &begin, fit, Effort::FULL)?;
+        Some(self.followed(self.set(found, set.terms.clone())))
+    }
+
     pub fn with_listed(&self, set: &Set, proposal: &Proposal) -> Option<Set> {
         let begin = with(self.question, self.windings, &set.explanation.fit, proposal.member, proposal.values.clone())?;
         let mut members = set.explanation.members.clone();

@@ -57,6 +57,11 @@ impl Found {
     pub fn declared(&self) -> Option<&Explanation> {
         self.explanations.iter().find(|e| e.members.is_empty())
     }
+
+    /// The fit of the likeliest set.
+    pub fn likeliest(&self) -> Option<&Fit> {
+        self.explanations.first().map(|e| &e.fit)
+    }
 }
 
 pub(in crate::diagnose) type Outcome<T> = Result<T, ChamberError>;
