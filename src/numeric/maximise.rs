@@ -11,7 +11,12 @@ pub struct Maximum {
 ///
 /// Stops when the bracket is shorter than 1e-10 of its own start, or than rounding at its place lets it become; a
 /// maximum's value is then off by the square of that, so by rounding only. Returns the best point that was evaluated.
-pub fn golden_section(mut f: impl FnMut(f64) -> f64, low: f64, high: f64) -> Maximum {
+pub fn golden_section(f: impl FnMut(f64) -> f64, low: f64, high: f64) -> Maximum {
+    golden_section_within(f, low, high, 1e-10)
+}
+
+/// The same until the bracket is shorter than a share of its start.
+pub fn golden_section_within(mut f: impl FnMut(f64) -> f64, low: f64, high: f64, share: f64) -> Maximum {
     let ratio = (5.0_f64.sqrt() - 1.0) / 2.0;
     let (mut a, mut b) = (low, high);
     let mut left = Maximum { at: b - ratio * (b - a), value: 0.0 };
@@ -19,7 +24,7 @@ pub fn golden_section(mut f: impl FnMut(f64) -> f64, low: f64, high: f64) -> Max
     left.value = f(left.at);
     right.value = f(right.at);
     // A short bracket far from zero cannot shrink below the spacing of the numbers there.
-    let tolerance = ((high - low) * 1e-10).max(8.0 * f64::EPSILON * low.abs().max(high.abs()));
+    let tolerance = ((high - low) * share).max(8.0 * f64::EPSILON * low.abs().max(high.abs()));
     while b - a > tolerance {
         if left.value >= right.value {
             b = right.at;
@@ -44,6 +49,17 @@ mod tests {
     fn a_short_bracket_far_from_zero_comes_to_an_end() {
         let found = golden_section(|x| -(x - 6000.001).powi(2), 6000.0, 6000.002);
         assert!((found.at - 6000.001).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_search_to_a_share_ends_within_it() {
+        let mut calls = 0;
+        let f = |x: f64| {
+            calls += 1;
+            -(x - 1.3).powi(2)
+        };
+        let found = golden_section_within(f, 0.0, 2.0, 0.02);
+        assert!((found.at - 1.3).abs() < 0.02 * 2.0 && calls < 12, "{} in {calls}", found.at);
     }
 
     #[test]

@@ -13,12 +13,14 @@
 
 use rayon::prelude::*;
 
+use super::NEAR;
 use super::courses::Courses;
 use super::grammar::{Family, Term};
 use crate::chamber::{Column, Effort, Fit, Input, Scored, Scorer};
 use crate::diagnose::joint::{
     EFFECT, Explanation, Member, Outcome, Proposal, Question, Winding, fitted, proposals, rates, with, without,
 };
+use crate::numeric::maximise::golden_section_within;
 
 /// A set of listed effects and unlisted terms, fitted.
 #[derive(Debug, Clone)]
@@ -67,13 +69,16 @@ pub const MOST_TERMS: usize = 4;
 /// Families that are refined after each score test, and fitted as far as they promise enough.
 const REFINED: usize = 12;
 const TRIED: usize = 4;
+/// A share of a grid's step that is less than the numbers' errors; fits follow them further.
+const REFINED_SHARE: f64 = 0.02;
 /// Listed effects that are fitted beside them.
 const LISTED_TRIED: usize = 2;
 /// … if they promise so much; terms, if they promise this share of what the first does.
 pub const WORTH_LISTED: f64 = 8.0;
 const WORTH_BESIDE: f64 = 0.25;
-/// Sets whose held-out records are looked at after each stage.
+/// Sets whose held-out records are looked at after each stage, and with them those that the fitted records hardly tell from the best.
 const HELD_OUT_TRIED: usize = 2;
+const ALIKE_TRIED: usize = 6;
 /// A step must gain so much more than it costs, and the held-out records anything at all.
 const WORTH_A_STEP: f64 = 2.0;
 /// A first term that is further behind than this is given up: the window of the search over listed effects.
@@ -175,7 +180,8 @@ impl Tools<'_, '_> {
                     term
                 };
                 let gain = |v: f64| scorer.score(&self.courses.column(&moved(v))).gain().0;
-                let at = near_largest(gain, (here - width).max(to(low)), (here + width).min(to(high)));
+                let (from, to) = ((here - width).max(to(low)), (here + width).min(to(high)));
+                let at = golden_section_within(gain, from, to, REFINED_SHARE).at;
                 let term = moved(at);
                 let scored = scorer.score(&self.courses.column(&term));
                 let there = self.promise(term, &scored, rows);
@@ -394,12 +400,15 @@ impl Tools<'_, '_> {
             }
             Err(_) => Vec::new(),
         };
-        let tried: Vec<&Promise> =
-            promises.iter().filter(|p| p.worth > 0.0 && p.gain > WORTH_BESIDE * first).take(TRIED).collect();
+        let worthy = promises.iter().filter(|p| p.worth > 0.0 && p.gain > WORTH_BESIDE * first).take(ALIKE_TRIED);
+        let tried = worthy.enumerate().filter(|(place, p)| *place < TRIED || p.gain > first - NEAR);
+        let tried: Vec<&Promise> = tried.map(|(_, p)| p).collect();
         let mut next: Vec<Set> = tried.par_iter().filter_map(|promise| self.with_term(set, promise)).collect();
         next.extend(listed.par_iter().filter_map(|p| self.with_listed(set, p)).collect::<Vec<_>>());
         next.sort_by(|a, b| b.merit.total_cmp(&a.merit));
-        next.truncate(HELD_OUT_TRIED);
+        let near = next.first().map_or(f64::NEG_INFINITY, |best| best.merit - NEAR);
+        let alike = next.iter().take(ALIKE_TRIED).filter(|s| s.merit > near).count();
+        next.truncate(alike.max(HELD_OUT_TRIED));
         let mut next: Vec<Set> = next.into_par_iter().map(|s| self.judged(self.followed(s))).collect();
         next.sort_by(|a, b| b.total().total_cmp(&a.total()));
         next
@@ -470,28 +479,4 @@ impl Tools<'_, '_> {
         let found = fitted(self.question, self.windings, members, &begin, fit, Effort::QUICK)?;
         Some(self.set(found, terms))
     }
-}
-
-/// Halvings, by the golden ratio, of the bracket in which a gain's largest value is looked for: what is left of it is less than
-/// the numbers' errors, and fits follow it further.
-const GOLDEN_STEPS: usize = 8;
-
-/// About where a function with one maximum is largest.
-fn near_largest(f: impl Fn(f64) -> f64, low: f64, high: f64) -> f64 {
-    let ratio = 0.5 * (5f64.sqrt() - 1.0);
-    let (mut a, mut b) = (low, high);
-    let (mut x, mut y) = (b - ratio * (b - a), a + ratio * (b - a));
-    let (mut at_x, mut at_y) = (f(x), f(y));
-    for _ in 0..GOLDEN_STEPS {
-        if at_x >= at_y {
-            (b, y, at_y) = (y, x, at_x);
-            x = b - ratio * (b - a);
-            at_x = f(x);
-        } else {
-            (a, x, at_x) = (x, y, at_y);
-            y = a + ratio * (b - a);
-            at_y = f(y);
-        }
-    }
-    if at_x >= at_y { x } else { y }
 }
