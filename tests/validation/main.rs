@@ -18,3 +18,4 @@ mod paper;
 mod records;
 mod stress;
 mod truth;
+mod unlisted;

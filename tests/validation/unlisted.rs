@@ -1,0 +1,47 @@
+//! Reference: two records with a term that no list has, from an independent simulator, copied to `tests/data/records-beyond`:
+//! b1 hides 0.012 °/h (T_m − lag(T_m, 900 s)), b3 hides 0.016 °/h · dT_m/dt [K/min] · (T_m − 20 °C); `test.csv` (steps of a
+//! thermoelectric stage) is for judging only.
+//! Tolerance: the form, its numbers within 10 %, and the third record within 1.15 of its noise.
+
+use std::path::{Path, PathBuf};
+
+use coilwright::compare::compare;
+use coilwright::diagnose::{Request, Terms, diagnose};
+use coilwright::io::read::model_file::read_model;
+use coilwright::io::read::record_file::read_record;
+
+fn folder(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/records-beyond").join(name)
+}
+
+fn assert_found(name: &str, form: &str, numbers: &[(&str, f64)], noise_deg_per_h: f64) {
+    let file = read_model(&folder(name).join("coil.toml")).unwrap();
+    let pattern = file.pattern.unwrap().pattern;
+    let record = |part: &str| read_record(&folder(name).join(part)).unwrap();
+    let (records, holdout) = ([record("calibration.csv")], [record("validation.csv")]);
+    let terms = Terms::default();
+    let request = Request { model: &file.model, pattern: &pattern, records: &records, holdout: &holdout, terms };
+    let found = diagnose(&request, &|_| ()).unwrap();
+    let best = &found.proposals[0];
+    println!("{name}: {} {:?}", best.formula, best.alternatives);
+    assert_eq!((best.terms.len(), best.terms[0].form, best.predicts), (1, form, true), "{name}");
+    for (key, truth) in numbers {
+        let found = best.terms[0].parameters.iter().find(|p| p.key == *key).unwrap().value;
+        assert!((found / truth - 1.0).abs() < 0.1, "{name}: {key} {found}, true {truth}");
+    }
+    let judged = compare(&best.proposed, &pattern, &record("test.csv")).unwrap();
+    let noises = coilwright::units::deg_per_h_from_rad_per_s(judged.rmse_rad_per_s) / noise_deg_per_h;
+    println!("{name}: the third record within {noises:.3} noises");
+    assert!(noises < 1.15, "{name}: {noises}");
+}
+
+#[test]
+fn a_relaxation_is_found_though_a_listed_effect_with_a_wander_looked_better() {
+    assert_found("b1-relaxation", "relaxation", &[("a", 0.012), ("tau_s", 900.0)], 0.03794733192202055);
+}
+
+#[test]
+fn a_rate_times_a_temperature_is_told_from_a_gradient_times_a_temperature() {
+    // 0.016 per K/min and K, per K/s.
+    assert_found("b3-product", "product", &[("a", 0.96)], 0.03794733192202055);
+}
