@@ -22,6 +22,7 @@
 //! 654 (1980). The sign is the paper's: positive Ω for a positive phase as written.
 
 mod builder;
+mod laid;
 mod materials;
 mod past;
 
@@ -37,6 +38,7 @@ use crate::thermal::{Extent, HeatPath, Location, Material, PackShape, ThermalHis
 use crate::units::{LIGHT_SPEED_M_PER_S, REFERENCE_TEMPERATURE_K};
 
 pub use builder::CoilModelBuilder;
+pub use laid::{Laid, LaidPiece};
 pub use past::Past;
 
 /// A coil, how it is heated, and which physics is taken into account; everything but the pattern.
@@ -62,6 +64,10 @@ pub enum RateError {
     Layers { pattern: usize, coil: usize },
     #[error(transparent)]
     Coil(#[from] CoilError),
+    #[error(
+        "{change} turns at end {end} leave layer {layer} nothing: it has {turns} turns, leave off fewer than it has"
+    )]
+    EndTurns { end: Half, change: i32, layer: usize, turns: f64 },
     #[error("the formula \"{formula}\" has no value at {time_s} s: {fault}")]
     Formula { formula: String, time_s: f64, fault: EvaluationError },
     #[error(
@@ -138,7 +144,7 @@ pub struct LayerWeights {
     pub half_a_m2: Vec<f64>,
     /// The part with z > L/2 \[m²\].
     pub half_b_m2: Vec<f64>,
-    /// 2 d_j l_j², the weight of the axial moment \[m²\].
+    /// 2 d_j l_j² of whole layers, the weight of the axial moment \[m²\].
     pub axial_m2: Vec<f64>,
 }
 
@@ -152,24 +158,22 @@ impl LayerWeights {
     /// # Errors
     /// A pattern of another layer count.
     pub fn new(coil: &Coil, pattern: &Pattern) -> Result<Self, RateError> {
-        if coil.layers() != pattern.layers() {
-            return Err(RateError::Layers { pattern: pattern.layers(), coil: coil.layers() });
+        Ok(Self::of(&Laid::new(coil, pattern)?))
+    }
+
+    pub fn of(laid: &Laid) -> Self {
+        let layers = laid.coil.layers();
+        let length_m = laid.coil.length_m();
+        let mut weights =
+            Self { half_a_m2: vec![0.0; layers], half_b_m2: vec![0.0; layers], axial_m2: vec![0.0; layers] };
+        for piece in &laid.pieces {
+            let (half_a_m2, half_b_m2) = segment_weights_m2(piece.from_m, piece.to_m, length_m);
+            weights.half_a_m2[piece.layer] += half_a_m2;
+            weights.half_b_m2[piece.layer] += half_b_m2;
+            weights.axial_m2[piece.layer] += 12.0 * piece.middle * (half_a_m2 + half_b_m2)
+                + 2.0 * piece.direction * piece.share * piece.length_m.powi(2);
         }
-        let lengths_m = coil.layer_lengths_m();
-        let length_m = coil.length_m();
-        let mut weights = Self {
-            half_a_m2: vec![0.0; lengths_m.len()],
-            half_b_m2: vec![0.0; lengths_m.len()],
-            axial_m2: vec![0.0; lengths_m.len()],
-        };
-        let mut from_m = 0.0;
-        for layer in pattern.layers_by_segment() {
-            let to_m = from_m + lengths_m[layer];
-            (weights.half_a_m2[layer], weights.half_b_m2[layer]) = segment_weights_m2(from_m, to_m, length_m);
-            weights.axial_m2[layer] = 2.0 * pattern.axial_direction(layer) * lengths_m[layer].powi(2);
-            from_m = to_m;
-        }
-        Ok(weights)
+        weights
     }
 
     /// w_j, both halves together \[m²\].
@@ -225,8 +229,9 @@ impl RateModel {
     /// # Errors
     /// A pattern of another layer count; effects that leave a layer no turns.
     pub fn new(model: &CoilModel, pattern: &Pattern, channels: &[String]) -> Result<Self, RateError> {
-        let coil = model.wound_coil()?;
-        let weights = LayerWeights::new(&coil, pattern)?;
+        let laid = Laid::new(&model.wound_coil()?, pattern)?;
+        let weights = LayerWeights::of(&laid);
+        let coil = laid.coil;
         let effects = model.bind_all(&coil, channels);
         let surplus = effects.iter().filter_map(|e| e.surplus_fibre()).collect();
         let formulas = model.effects.iter().map(past::formula_of).collect();

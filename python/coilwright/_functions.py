@@ -119,6 +119,8 @@ def optimise(
     compare_with: PatternLike | None = None,
     prove_s: float | None = None,
     cutting_planes: bool = False,
+    trim_turns: int = 0,
+    split_layer: bool = False,
     diagnosis: DiagnoseResult | PathLike | None = None,
     output: PathLike | None = None,
     progress: bool | Progress | None = None,
@@ -136,6 +138,8 @@ def optimise(
         compare_with: a former pattern, or the folder of a search.
         prove_s: tries for so long to prove that the best pattern is the best of its class.
         cutting_planes: lets the worst admissible profiles of what is found join the searched ones.
+        trim_turns: chooses up to so many whole turns that are left off at an end of the fibre.
+        split_layer: lets the outermost layer be split between the two ends of the fibre.
         diagnosis: the diagnosis that the model comes from, or its file: every set of explanations counts by its probability.
         output: a folder for the run's results, as ``optimise -o`` leaves it.
         progress: True for a bar, or a callable that takes the share done and words.
@@ -166,6 +170,7 @@ def optimise(
             optional_path(output),
             cutting_planes,
             _diagnosis_text(diagnosis),
+            (trim_turns, split_layer),
             at,
         )
     return result_of(OptimiseResult, answered)

@@ -83,7 +83,7 @@ def _named(pattern: Pattern) -> str:
         known = _coilwright.classic(pattern.name, pattern.layers)
     except RequestError:
         known = []
-    if known == list(pattern):
+    if known == list(pattern) and pattern.end_turns == (0, 0):
         return pattern.name
     raise RequestError(
         f"pattern: a model names a classic winding or a pattern file, and {pattern.name} is neither: write it, and give the path"
@@ -224,7 +224,7 @@ class Model:
     def pattern(self) -> Pattern | None:
         """The declared winding."""
         found = self._handle.pattern
-        return None if found is None else Pattern(found[1], name=found[0])
+        return None if found is None else Pattern(found[1], name=found[0], end_turns=found[2])
 
     @property
     def effects(self) -> list[str]:
@@ -283,17 +283,17 @@ PatternLike = Pattern | str | os.PathLike[str] | Sequence[int] | npt.NDArray[np.
 """A pattern, its classic name, the path of a pattern file, or its segments."""
 
 
-def pattern_argument(stated: PatternLike) -> str | tuple[str, list[int]]:
+def pattern_argument(stated: PatternLike) -> str | tuple[str, list[int], tuple[int, int]]:
     """As the extension module takes it."""
     if isinstance(stated, str):
         return stated
     if isinstance(stated, os.PathLike):
         return os.fspath(stated)
     pattern = stated if isinstance(stated, Pattern) else Pattern(stated)
-    return (pattern.name, pattern.segments.tolist())
+    return (pattern.name, pattern.segments.tolist(), pattern.end_turns)
 
 
-def pattern_arguments(stated: PatternLike | Sequence[Any] | None) -> list[str | tuple[str, list[int]]]:
+def pattern_arguments(stated: PatternLike | Sequence[Any] | None) -> list[str | tuple[str, list[int], tuple[int, int]]]:
     """One pattern or several."""
     if stated is None:
         return []

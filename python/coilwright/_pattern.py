@@ -50,7 +50,9 @@ class WindingGraph:
 class Pattern(Sequence[int]):
     """Which segment of the fibre lies in which layer: P(1) … P(N), innermost layer first, counted from 1.
 
-    A pattern is always a permutation of 1 … N for an even N, and never changes.
+    A pattern is always a permutation of 1 … N for an even N, and never changes. ``end_turns`` are whole turns more (or, below zero,
+    fewer) than whole layers at end A and at end B of the fibre; those above zero lie on the outermost layer, where the other end
+    leaves room for them.
 
     >>> import coilwright as cw
     >>> p = cw.Pattern([2, 3, 4, 1])
@@ -60,12 +62,14 @@ class Pattern(Sequence[int]):
     2
     """
 
-    __slots__ = ("_segments", "name")
+    __slots__ = ("_end_turns", "_segments", "name")
 
     name: str
     """The name under which results show it."""
 
-    def __init__(self, segments: Iterable[int], *, name: str | None = None) -> None:
+    def __init__(
+        self, segments: Iterable[int], *, name: str | None = None, end_turns: tuple[int, int] = (0, 0)
+    ) -> None:
         whole = np.asarray(segments if isinstance(segments, np.ndarray) else list(segments))
         if whole.ndim != 1 or not (np.issubdtype(whole.dtype, np.integer) or not whole.size):
             from ._errors import RequestError
@@ -76,9 +80,11 @@ class Pattern(Sequence[int]):
 
             raise RequestError(f"segments: expected numbers from 1, found {whole.min()}")
         array = whole.astype(np.int64)
-        _coilwright.check_pattern(array.tolist())
+        ends = (int(end_turns[0]), int(end_turns[1]))
+        _coilwright.check_pattern(array.tolist(), ends)
         array.flags.writeable = False
         object.__setattr__(self, "_segments", array)
+        object.__setattr__(self, "_end_turns", ends)
         object.__setattr__(self, "name", name if name is not None else f"pattern-{array.size}")
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -91,18 +97,26 @@ class Pattern(Sequence[int]):
         Raises:
             FileError: all faults of the file at once.
         """
-        name, segments = _coilwright.read_pattern(os.fspath(path))
-        return cls(segments, name=name)
+        name, segments, end_turns = _coilwright.read_pattern(os.fspath(path))
+        return cls(segments, name=name, end_turns=end_turns)
 
     def write(self, path: str | os.PathLike[str], *, comments: Sequence[str] = ()) -> None:
         """Writes a pattern file, whole or not at all; comments stand at its head."""
-        _coilwright.print_pattern(os.fspath(path), self.name, self.segments.tolist(), list(comments))
+        _coilwright.print_pattern(
+            os.fspath(path), self.name, self.segments.tolist(), self.end_turns, list(comments)
+        )
 
     @property
     def segments(self) -> npt.NDArray[np.int64]:
         """P(j), innermost layer first: a read-only array, the same one each time."""
         array: npt.NDArray[np.int64] = object.__getattribute__(self, "_segments")
         return array
+
+    @property
+    def end_turns(self) -> tuple[int, int]:
+        """Turns more or fewer than whole layers at end A and at end B."""
+        ends: tuple[int, int] = object.__getattribute__(self, "_end_turns")
+        return ends
 
     @property
     def layers(self) -> int:
@@ -121,18 +135,26 @@ class Pattern(Sequence[int]):
 
     def reversed(self) -> Pattern:
         """The fibre counted from its other end: N + 1 − P(j)."""
-        return Pattern(self.layers + 1 - self.segments, name=self.name)
+        return Pattern(self.layers + 1 - self.segments, name=self.name, end_turns=self.end_turns[::-1])
 
     def windability(self) -> Windability:
         """What it asks of the winding shop: class, reels, captive runs, largest climb."""
-        return Windability(json.loads(_coilwright.windability(self.segments.tolist())))
+        return Windability(json.loads(_coilwright.windability(self.segments.tolist(), self.end_turns)))
 
     def winding_graph(self) -> WindingGraph:
         """The winding step by step, and the crossovers."""
-        steps, captive_run = _coilwright.winding_graph(self.segments.tolist())
+        steps, captive_run = _coilwright.winding_graph(self.segments.tolist(), self.end_turns)
         layers = self.layers_by_segment().tolist()
+        wound = [(i + 1, int(s)) for i, s in enumerate(self.segments)]
+        # What is added at an end is wound last, on the outermost layer.
+        if self.end_turns[0] > 0:
+            wound.append((self.layers, 1))
+            layers.insert(0, self.layers)
+        if self.end_turns[1] > 0:
+            wound.append((self.layers, self.layers))
+            layers.append(self.layers)
         return WindingGraph(
-            tuple(WindingStep(i + 1, int(s), *step) for i, (s, step) in enumerate(zip(self.segments, steps))),
+            tuple(WindingStep(*piece, *step) for piece, step in zip(wound, steps)),
             captive_run,
             tuple(zip(layers, layers[1:])),
         )
@@ -152,17 +174,22 @@ class Pattern(Sequence[int]):
         return found.tolist() if isinstance(index, slice) else int(found)
 
     def __eq__(self, other: object) -> bool:
-        """Patterns are equal if their segments are, whatever they are called."""
-        return isinstance(other, Pattern) and np.array_equal(self.segments, other.segments)
+        """Patterns are equal if their segments and ends are, whatever they are called."""
+        return (
+            isinstance(other, Pattern)
+            and np.array_equal(self.segments, other.segments)
+            and self.end_turns == other.end_turns
+        )
 
     def __hash__(self) -> int:
-        return hash(self.segments.tobytes())
+        return hash((self.segments.tobytes(), self.end_turns))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return (_restored, (self.segments.tolist(), self.name))
+        return (_restored, (self.segments.tolist(), self.name, self.end_turns))
 
     def __repr__(self) -> str:
-        return f"Pattern({self.segments.tolist()}, name={self.name!r})"
+        ends = "" if self.end_turns == (0, 0) else f", end_turns={self.end_turns}"
+        return f"Pattern({self.segments.tolist()}, name={self.name!r}{ends})"
 
     def _repr_html_(self) -> str:
         found = self.windability()
@@ -175,8 +202,8 @@ class Pattern(Sequence[int]):
         )
 
 
-def _restored(segments: list[int], name: str) -> Pattern:
-    return Pattern(segments, name=name)
+def _restored(segments: list[int], name: str, end_turns: tuple[int, int] = (0, 0)) -> Pattern:
+    return Pattern(segments, name=name, end_turns=end_turns)
 
 
 def classic(name: str, layers: int) -> Pattern:

@@ -52,7 +52,8 @@ class PatternResult(Result):
         """The pattern itself."""
         from ._pattern import Pattern
 
-        return Pattern(self._data["segments"], name=self._data["name"])
+        ends = (self._data.get("end_a_turns", 0), self._data.get("end_b_turns", 0))
+        return Pattern(self._data["segments"], name=self._data["name"], end_turns=ends)
 
     def _headline(self) -> str:
         return str(self._data.get("name", ""))
@@ -119,8 +120,26 @@ class Recommendation(Result):
     reasons: list[str]
 
 
+class Ends(Result):
+    """The best with turns of its own at the ends of the fibre, beside the same order of whole layers."""
+
+    __slots__ = ()
+    most_left_off_turns: int
+    shares_outermost_layer: bool
+    best: PatternResult
+    best_objective_deg_per_h: float
+    whole_layers: str
+    whole_layers_objective_deg_per_h: float
+    statement: str
+
+    _parts = {"best": PatternResult}
+
+
 class OptimiseResult(Result):
-    """What a search found."""
+    """What a search found.
+
+    ``ends`` is there where turns at the ends were to be chosen (``trim_turns``, ``split_layer``).
+    """
 
     __slots__ = ()
     model: str
@@ -144,6 +163,7 @@ class OptimiseResult(Result):
         "proof": Proof,
         "recommendation": Recommendation,
         "compared_with": PatternResult,
+        "ends": Ends,
     }
     _columns = _PATTERN_COLUMNS
 

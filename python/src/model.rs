@@ -117,9 +117,10 @@ impl ModelHandle {
     }
 
     #[getter]
-    fn pattern(&self) -> Option<(String, Vec<usize>)> {
+    fn pattern(&self) -> Option<(String, Vec<usize>, (i32, i32))> {
         let named = self.file.pattern.as_ref()?;
-        Some((named.name.clone(), named.pattern.segments().to_vec()))
+        let ends = named.pattern.end_turns();
+        Some((named.name.clone(), named.pattern.segments().to_vec(), (ends.a, ends.b)))
     }
 
     #[getter]

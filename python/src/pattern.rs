@@ -7,6 +7,7 @@ use coilwright::io::json::{ClassicJson, WindabilityJson};
 use coilwright::io::model::NamedPattern;
 use coilwright::io::read::pattern_file;
 use coilwright::io::read::pattern_file::resolve_pattern;
+use coilwright::pattern::EndTurns;
 use coilwright::pattern::windability::WindingGraph;
 use coilwright::text::sink::TomlComment;
 use coilwright::{Classic, Pattern};
@@ -15,10 +16,10 @@ use pyo3::prelude::*;
 use crate::error::{raise, wrong};
 use crate::tasks::json;
 
-/// A pattern as an argument: a winding's name or a pattern file, or a name with segments.
+/// A pattern as an argument: a winding's name or a pattern file, or a name with segments and the turns more or fewer at the ends.
 #[derive(Debug, FromPyObject)]
 pub enum PatternArgument {
-    Given(String, Vec<usize>),
+    Given(String, Vec<usize>, (i32, i32)),
     Stated(String),
 }
 
@@ -26,8 +27,8 @@ impl PatternArgument {
     pub fn named(&self, py: Python, layers: usize) -> PyResult<NamedPattern> {
         match self {
             PatternArgument::Stated(stated) => resolve_pattern(stated, layers, None).map_err(|e| raise(py, e)),
-            PatternArgument::Given(name, segments) => {
-                let pattern = checked(py, segments.clone())?;
+            PatternArgument::Given(name, segments, end_turns) => {
+                let pattern = checked(py, segments.clone(), *end_turns)?;
                 if pattern.layers() != layers {
                     let found = pattern.layers();
                     return Err(wrong(
@@ -46,13 +47,19 @@ pub fn all_named(py: Python, stated: &[PatternArgument], layers: usize) -> PyRes
     stated.iter().map(|one| one.named(py, layers)).collect()
 }
 
-fn checked(py: Python, segments: Vec<usize>) -> PyResult<Pattern> {
-    Pattern::new(segments).map_err(|e| wrong(py, e.to_string()))
+fn checked(py: Python, segments: Vec<usize>, (a, b): (i32, i32)) -> PyResult<Pattern> {
+    let whole = Pattern::new(segments);
+    whole.and_then(|whole| whole.with_end_turns(EndTurns { a, b })).map_err(|e| wrong(py, e.to_string()))
+}
+
+fn ends_of(pattern: &Pattern) -> (i32, i32) {
+    let EndTurns { a, b } = pattern.end_turns();
+    (a, b)
 }
 
 #[pyfunction]
-pub fn check_pattern(py: Python, segments: Vec<usize>) -> PyResult<()> {
-    checked(py, segments).map(|_| ())
+pub fn check_pattern(py: Python, segments: Vec<usize>, end_turns: (i32, i32)) -> PyResult<()> {
+    checked(py, segments, end_turns).map(|_| ())
 }
 
 #[pyfunction]
@@ -78,8 +85,8 @@ pub fn classics(py: Python, layers: usize) -> PyResult<String> {
 }
 
 #[pyfunction]
-pub fn windability(py: Python, segments: Vec<usize>) -> PyResult<String> {
-    json(py, &WindabilityJson::of(&checked(py, segments)?))
+pub fn windability(py: Python, segments: Vec<usize>, end_turns: (i32, i32)) -> PyResult<String> {
+    json(py, &WindabilityJson::of(&checked(py, segments, end_turns)?))
 }
 
 type Step = (usize, usize, usize, Option<usize>, Option<usize>);
@@ -87,16 +94,16 @@ type Step = (usize, usize, usize, Option<usize>, Option<usize>);
 /// The winding step by step: reels, captive runs, climb, and the layers that the segment's ends are joined to; and in words the
 /// first run that is captive.
 #[pyfunction]
-pub fn winding_graph(py: Python, segments: Vec<usize>) -> PyResult<(Vec<Step>, Option<String>)> {
-    let graph = WindingGraph::new(&checked(py, segments)?);
+pub fn winding_graph(py: Python, segments: Vec<usize>, end_turns: (i32, i32)) -> PyResult<(Vec<Step>, Option<String>)> {
+    let graph = WindingGraph::new(&checked(py, segments, end_turns)?);
     let steps = graph.steps().into_iter().map(|s| (s.reels, s.captive, s.climb, s.joined_low, s.joined_high)).collect();
     Ok((steps, graph.first_captive_run().map(|run| run.to_string())))
 }
 
 #[pyfunction]
-pub fn read_pattern(py: Python, path: PathBuf) -> PyResult<(String, Vec<usize>)> {
+pub fn read_pattern(py: Python, path: PathBuf) -> PyResult<(String, Vec<usize>, (i32, i32))> {
     let named = pattern_file::read_pattern(&path).map_err(|e| raise(py, e))?;
-    Ok((named.name, named.pattern.segments().to_vec()))
+    Ok((named.name, named.pattern.segments().to_vec(), ends_of(&named.pattern)))
 }
 
 #[pyfunction]
@@ -105,9 +112,10 @@ pub fn print_pattern(
     path: PathBuf,
     name: String,
     segments: Vec<usize>,
+    end_turns: (i32, i32),
     comments: Vec<String>,
 ) -> PyResult<()> {
-    let named = NamedPattern { name, pattern: checked(py, segments)? };
+    let named = NamedPattern { name, pattern: checked(py, segments, end_turns)? };
     let comments: Vec<TomlComment> = comments.iter().map(TomlComment::of).collect();
     let text = pattern_file::print_pattern(&named, &comments);
     write_atomically(&path, text.as_bytes()).map_err(|e| raise(py, e))

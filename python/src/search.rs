@@ -16,6 +16,7 @@ use coilwright::pattern::windability::WindabilityClass;
 use coilwright::search;
 use coilwright::search::anneal::rounds::Rounds;
 use coilwright::search::cost::objective::Objective;
+use coilwright::search::end_turns::EndChoice;
 use coilwright::search::proof;
 use coilwright::search::run::Halt;
 use coilwright::task::optimise::{DRAWN_MODELS, Wishes};
@@ -193,12 +194,13 @@ impl SearchOptions {
             moves_per_restart: positive("moves_per_restart", self.moves_per_restart)?,
             start: None,
             cutting_planes: false,
+            ends: EndChoice::default(),
         })
     }
 }
 
 #[pyfunction]
-#[pyo3(signature = (model, options, init=None, compare_with=None, prove_s=None, output=None, cutting_planes=false, diagnosis=None, progress=None))]
+#[pyo3(signature = (model, options, init=None, compare_with=None, prove_s=None, output=None, cutting_planes=false, diagnosis=None, ends=(0, false), progress=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn optimise(
     py: Python,
@@ -210,6 +212,7 @@ pub fn optimise(
     output: Option<PathBuf>,
     cutting_planes: bool,
     diagnosis: Option<String>,
+    ends: (u32, bool),
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Answered> {
     let file = Arc::new((*model.file).clone().for_search());
@@ -228,7 +231,8 @@ pub fn optimise(
         other => one_pattern(py, other.as_ref(), &file)?.or_else(|| start.clone()),
     };
     let (budget, prove) = (duration_of(py, "budget_s", options.budget_s)?, duration_of(py, "prove_s", prove_s)?);
-    let wishes = Wishes { start, cutting_planes, ..options.wishes(py)? };
+    let ends = EndChoice { most_left_off: ends.0, shares_outermost: ends.1 };
+    let wishes = Wishes { start, cutting_planes, ends, ..options.wishes(py)? };
     let worked = work(py, progress, move |watcher| {
         for advice in &file.advice {
             watcher.note(&format!("note: {advice}"));

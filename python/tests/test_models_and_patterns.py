@@ -94,3 +94,15 @@ def test_a_pattern_file_is_read_as_it_was_written(tmp_path: Path) -> None:
     again = cw.Pattern.read(tmp_path / "p.toml")
     assert again == pattern and again.name == "four"
     assert "# by hand" in (tmp_path / "p.toml").read_text(encoding="utf-8")
+
+
+def test_turns_at_the_ends_are_part_of_a_pattern(tmp_path: Path) -> None:
+    shared = cw.Pattern(cw.classic("qua", 8).segments, name="shared", end_turns=(-3, 2))
+    assert shared != cw.classic("qua", 8) and shared.reversed().end_turns == (2, -3)
+    assert pickle.loads(pickle.dumps(shared)) == shared
+    shared.write(tmp_path / "shared.toml")
+    assert cw.Pattern.read(tmp_path / "shared.toml") == shared
+    steps = shared.winding_graph().steps
+    assert len(steps) == 9 and steps[-1].layer == 8 and steps[-1].segment == 8
+    with pytest.raises(cw.RequestError, match="outermost layer"):
+        cw.Pattern(shared.segments, end_turns=(2, -3))

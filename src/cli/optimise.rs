@@ -25,6 +25,7 @@ use crate::search;
 use crate::search::anneal::rounds::{DEFAULT_RESTARTS_PER_ROUND, State};
 use crate::search::answer::Ended;
 use crate::search::cost::objective::Objective;
+use crate::search::end_turns::EndChoice;
 use crate::search::run::RunError;
 use crate::task::optimise::{self, DRAWN_MODELS, Wishes};
 
@@ -65,13 +66,20 @@ pub struct Arguments {
     /// agree; for the objectives worst-rate and worst-phase
     #[arg(long)]
     cutting_planes: bool,
+    /// Chooses up to so many whole turns that are left off at an end of the fibre, beside the order of whole layers
+    #[arg(long, value_name = "TURNS", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    trim_turns: Option<u32>,
+    /// Lets the outermost layer be split between the two ends of the fibre: turns that one end leaves there are wound with the
+    /// other end
+    #[arg(long)]
+    split_layer: bool,
     /// The diagnosis that the model comes from (diagnosis.json): every set of explanations counts by its probability and
     /// every parameter with its error, and the recommended winding is the one that is best over all of them
     #[arg(long, value_name = "FILE")]
     diagnosis: Option<PathBuf>,
     /// Temperatures of the layers that were computed elsewhere (CSV: time_s, layer_1_c, …, or time_s, layer, temperature_c), used
     /// instead of the profiles; may be repeated, each file is a case
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["resume", "fresh", "compare_with", "cutting_planes", "diagnosis", "prove"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["resume", "fresh", "compare_with", "cutting_planes", "diagnosis", "prove", "trim_turns", "split_layer"])]
     pub(super) field: Vec<PathBuf>,
     /// Tries for so long to prove that the best pattern is the best of its class
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
@@ -157,6 +165,7 @@ impl SearchOptions {
             moves_per_restart: self.moves_per_restart,
             start: pattern_asked(file, self.init.as_deref())?,
             cutting_planes: false,
+            ends: EndChoice::default(),
         })
     }
 }
@@ -176,7 +185,8 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     }
     let options = &arguments.search;
     let budget = options.budget()?;
-    let wishes = Wishes { cutting_planes: arguments.cutting_planes, ..options.wishes(&file)? };
+    let ends = EndChoice { most_left_off: arguments.trim_turns.unwrap_or(0), shares_outermost: arguments.split_layer };
+    let wishes = Wishes { cutting_planes: arguments.cutting_planes, ends, ..options.wishes(&file)? };
     let former = arguments.compare_with.as_ref().or(options.init.as_ref());
     let former = former.map(|stated| former_pattern(stated, file.model.coil.layers())).transpose()?;
     let mut searched = wishes.request(&file, arguments.prove.is_some(), former)?;
@@ -321,8 +331,9 @@ fn text(answer: &OptimiseJson) -> String {
         let segments = joined(&recommendation.segments);
         format!("{}\n{reasons}  segments, innermost layer first: {segments}\n\n", recommendation.sentence)
     });
+    let ends = answer.ends.as_ref().map_or_else(String::new, |ends| format!("{}\n", ends.statement));
     format!(
-        "{recommendation}{}{}\n{}\n{}\nbest pattern, innermost layer first: {}\n{} moves judged in {} rounds, ended by: {}{}\n",
+        "{recommendation}{}{}\n{ends}{}\n{}\nbest pattern, innermost layer first: {}\n{} moves judged in {} rounds, ended by: {}{}\n",
         answer.predicted_gain.as_ref().map_or_else(String::new, |gain| gain.words() + "\n"),
         answer.statement,
         answer.compared_with.as_ref().map_or_else(String::new, |former| former.statement.clone() + "\n"),

@@ -6,7 +6,7 @@
 
 use thiserror::Error;
 
-use super::{Half, Pattern};
+use super::{EndTurns, Half, Pattern};
 
 /// A winding that has a name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -128,7 +128,7 @@ impl Classic {
             Classic::SymText => (1..=h).rev().chain(h + 1..=layers).collect(),
             Classic::Dip | Classic::Qua | Classic::Oct | Classic::Hex => from_word(self.word().unwrap_or(&[]), layers),
         };
-        Ok(Pattern { segments })
+        Ok(Pattern { segments, end_turns: EndTurns::default() })
     }
 }
 

@@ -1,17 +1,34 @@
 //! Winding patterns: which segment of the fibre lies in which layer.
 
 pub mod classic;
+pub mod ends;
 pub mod windability;
 
 use thiserror::Error;
 
+pub use ends::{EndTurns, WoundPiece};
+
 /// A permutation layer → segment, innermost layer first.
 ///
 /// Segments are numbered 1 … N in the order of arclength from end A; half A is 1 … N/2. Layers are indexed from
-/// 0, the innermost. The type can hold nothing but a permutation of an even number of segments.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+/// 0, the innermost. The type can hold nothing but a permutation of an even number of segments, and turns more or fewer at the
+/// ends only where there is room for them.
+#[derive(Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Pattern {
     segments: Vec<usize>,
+    end_turns: EndTurns,
+}
+
+/// Without turns at the ends as before there were any: cells of campaigns are told by it.
+impl std::fmt::Debug for Pattern {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut shown = f.debug_struct("Pattern");
+        shown.field("segments", &self.segments);
+        if !self.end_turns.is_none() {
+            shown.field("end_turns", &self.end_turns);
+        }
+        shown.finish()
+    }
 }
 
 /// A half of the fibre, by arclength: A is z < L/2.
@@ -19,6 +36,15 @@ pub struct Pattern {
 pub enum Half {
     A,
     B,
+}
+
+impl Half {
+    pub fn other(self) -> Self {
+        match self {
+            Half::A => Half::B,
+            Half::B => Half::A,
+        }
+    }
 }
 
 impl std::fmt::Display for Half {
@@ -40,6 +66,14 @@ pub enum PatternError {
         "segment {segment} lies on layer {first} and again on layer {second}: each segment lies on exactly one layer"
     )]
     Duplicate { segment: usize, first: usize, second: usize },
+    #[error(
+        "{added} turns more at end {end} have no place: they go on the outermost layer, which must hold the other end's segment"
+    )]
+    NoRoom { end: Half, added: i32 },
+    #[error(
+        "{added} turns more at end {end} need as many fewer at the other end, which leaves room for {room} on the outermost layer"
+    )]
+    TooLittleRoom { end: Half, added: i32, room: i32 },
 }
 
 impl Pattern {
@@ -59,7 +93,7 @@ impl Pattern {
                 return Err(PatternError::Duplicate { segment, first, second: layer + 1 });
             }
         }
-        Ok(Self { segments })
+        Ok(Self { segments, end_turns: EndTurns::default() })
     }
 
     /// N.
@@ -93,7 +127,8 @@ impl Pattern {
     /// The same coil with its ends exchanged: s → N+1−s. Flips the sign of the rate error.
     pub fn reversed(&self) -> Self {
         let layers = self.layers();
-        Self { segments: self.segments.iter().map(|s| layers + 1 - s).collect() }
+        let end_turns = EndTurns { a: self.end_turns.b, b: self.end_turns.a };
+        Self { segments: self.segments.iter().map(|s| layers + 1 - s).collect(), end_turns }
     }
 
     /// Whether arclength z grows away from the first flange (where layer 1 starts) on a layer: +1, or −1.
@@ -128,6 +163,9 @@ impl std::fmt::Display for Pattern {
                 f.write_str(" ")?;
             }
             write!(f, "{segment}")?;
+        }
+        if !self.end_turns.is_none() {
+            write!(f, " ({})", self.end_turns)?;
         }
         Ok(())
     }

@@ -109,17 +109,17 @@ impl Windability {
 
 impl WindingGraph {
     pub fn new(pattern: &Pattern) -> Self {
-        let mut graph = UnGraph::with_capacity(pattern.layers(), pattern.layers() - 1);
-        let layers = pattern.layers_by_segment();
-        let nodes: Vec<NodeIndex> = layers
+        let pieces = pattern.pieces();
+        let mut graph = UnGraph::with_capacity(pieces.len(), pieces.len() - 1);
+        let nodes: Vec<NodeIndex> = pieces
             .iter()
-            .enumerate()
-            .map(|(s, &layer)| graph.add_node(Placement { segment: s + 1, layer: layer + 1 }))
+            .map(|piece| graph.add_node(Placement { segment: piece.segment, layer: piece.layer + 1 }))
             .collect();
         for s in 1..nodes.len() {
-            graph.add_edge(nodes[s - 1], nodes[s], Crossover { climb: layers[s].abs_diff(layers[s - 1]) });
+            let climb = pieces[s].layer.abs_diff(pieces[s - 1].layer);
+            graph.add_edge(nodes[s - 1], nodes[s], Crossover { climb });
         }
-        let order = pattern.segments().iter().map(|s| nodes[s - 1]).collect();
+        let order = pattern.winding_order().into_iter().map(|piece| nodes[piece]).collect();
         Self { graph, order }
     }
 

@@ -24,7 +24,9 @@ pub fn traveller_page(document: &ScheduleJson, pattern: &Pattern) -> String {
         (reels(document))
         p {
             "Start: mark the fibre at " b { (metres(document.start_mark_m)) } " from end A (without the allowance) and fix the mark at the first flange. "
-            @if document.expected_trim_m.abs() < 5e-4 {
+            @if document.end_a_turns.is_some() {
+                (words::OF_ENDS)
+            } @else if document.expected_trim_m.abs() < 5e-4 {
                 "The halves are of equal length: no trim is expected."
             } @else {
                 "Expected trim: " b { (metres(document.expected_trim_m.abs())) } " from end " (if document.expected_trim_m > 0.0 { "A" } else { "B" })

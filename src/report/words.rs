@@ -4,6 +4,10 @@ use maud::{Markup, html};
 
 use crate::pattern::classic::Classic;
 
+/// What a traveller says instead of a trim where the ends have turns of their own. `verify` holds its own copy against this one.
+pub(super) const OF_ENDS: &str =
+    "The pattern says how many turns either end has: wind every step as it stands, and trim neither end.";
+
 /// What worst, guaranteed, class, captive and climb mean, and what the classics' short names stand for.
 pub(super) fn of_windings() -> Markup {
     html! {

@@ -7,7 +7,8 @@
 //! A layer continues the fibre of a neighbouring segment where one is wound already. Else it begins a new island: with
 //! the fibre's own end if it is the first or last segment, with the end nearer to the fibre's middle otherwise (so a
 //! standard winding begins at the midpoint). Which way the carriage then travels follows from
-//! [`Pattern::axial_direction`].
+//! [`Pattern::axial_direction`]. Turns that are added at an end of the fibre are a step of their own, the last, on the outermost
+//! layer.
 //!
 //! Leaves out: the length of the crossovers themselves, the helix' slant, and fibre beyond the pack.
 
@@ -17,7 +18,7 @@ mod reels;
 use crate::coil::Coil;
 use crate::pattern::windability::WindingGraph;
 use crate::pattern::{Half, Pattern};
-use crate::rate::RateError;
+use crate::rate::{Laid, RateError};
 use crate::thermal::Flange;
 pub use reels::{Reel, ReelName};
 use reels::{Reels, Start};
@@ -36,6 +37,11 @@ pub struct Step {
     /// How the spool turns, seen from the first flange, so that all fibre circulates the same way along arclength.
     pub rotation: Rotation,
     pub turns: f64,
+    /// Turns that would fit between the first flange and where the layer's turns begin; 0 but for a layer with turns left off.
+    pub free_turns: f64,
+    /// Turns left free between the flange at which the layer starts and its first turn: above 0 only where the fibre's own end,
+    /// with turns left off, is wound first.
+    pub start_gap_turns: f64,
     /// Arclength from end A: the segment's low end, whichever end is wound first.
     pub fibre_from_m: f64,
     pub fibre_to_m: f64,
@@ -100,60 +106,62 @@ impl Schedule {
     /// # Errors
     /// A pattern of another layer count than the coil's.
     pub fn new(coil: &Coil, pattern: &Pattern) -> Result<Self, RateError> {
-        if coil.layers() != pattern.layers() {
-            return Err(RateError::Layers { pattern: pattern.layers(), coil: coil.layers() });
-        }
-        let lengths_m = coil.layer_lengths_m();
-        let layers_by_segment = pattern.layers_by_segment();
+        let Laid { pieces, .. } = Laid::new(coil, pattern)?;
         let mut ends_m = vec![0.0];
-        for &layer in &layers_by_segment {
-            ends_m.push(ends_m[ends_m.len() - 1] + lengths_m[layer]);
-        }
+        ends_m.extend(pieces.iter().map(|piece| piece.to_m));
+        let order = pattern.winding_order();
         let graph_steps = WindingGraph::new(pattern).steps();
-        let mut reels = Reels::new(pattern, &ends_m);
+        let first_start = island_start(pattern, 0);
+        let mut reels = Reels::new(order[0] + 1, first_start, &ends_m);
         let mut balance_m = 0.0;
-        let mut steps = Vec::with_capacity(pattern.layers());
-        for (layer, graph_step) in graph_steps.iter().enumerate() {
-            let segment = pattern.segment(layer);
+        let mut steps = Vec::with_capacity(order.len());
+        for (number, (&at, graph_step)) in order.iter().zip(&graph_steps).enumerate() {
+            let piece = &pieces[at];
             let start = match (graph_step.joined_low, graph_step.joined_high) {
                 (Some(_), _) => Start::Low,
                 (None, Some(_)) => Start::High,
-                (None, None) => island_start(pattern, layer),
+                (None, None) => island_start(pattern, piece.layer),
             };
-            let (low_flange, high_flange) = if pattern.axial_direction(layer) > 0.0 {
-                (Flange::First, Flange::Second)
-            } else {
-                (Flange::Second, Flange::First)
-            };
+            let (low_flange, high_flange) =
+                if piece.direction > 0.0 { (Flange::First, Flange::Second) } else { (Flange::Second, Flange::First) };
             let crossing = |joined: Option<usize>, neighbour: usize, flange: Flange| {
-                joined.map(|climb| Crossing { flange, from_layer: layers_by_segment[neighbour - 1] + 1, climb })
+                let from_layer = pieces.get(neighbour)?.layer + 1;
+                joined.map(|climb| Crossing { flange, from_layer, climb })
             };
-            // Layer 0 is never asked for: an end without a neighbour is not joined.
+            // An end without a neighbour is not joined.
             let mut crossovers: Vec<Crossing> = [
-                crossing(graph_step.joined_low, segment.max(2) - 1, low_flange),
-                crossing(graph_step.joined_high, (segment + 1).min(pattern.layers()), high_flange),
+                crossing(graph_step.joined_low, at.wrapping_sub(1), low_flange),
+                crossing(graph_step.joined_high, at + 1, high_flange),
             ]
             .into_iter()
             .flatten()
             .collect();
             let from_flange = if start == Start::Low { low_flange } else { high_flange };
+            let whole_turns = coil.turns()[piece.layer];
+            let start_gap_turns = match from_flange {
+                _ if piece.share >= 1.0 => 0.0,
+                Flange::First => piece.free_turns,
+                Flange::Second => whole_turns - piece.free_turns - piece.turns,
+            };
             crossovers.sort_by_key(|c| c.flange != from_flange);
-            let (supply_reel, cumulative_m) = reels.wind(layer + 1, segment, start);
-            let half = pattern.half(layer);
-            balance_m += if half == Half::A { lengths_m[layer] } else { -lengths_m[layer] };
+            let (supply_reel, cumulative_m) = reels.wind(number + 1, at + 1, start);
+            let half = piece.added_at.unwrap_or_else(|| pattern.half(piece.layer));
+            balance_m += if half == Half::A { piece.length_m } else { -piece.length_m };
             steps.push(Step {
-                step: layer + 1,
-                layer: layer + 1,
+                step: number + 1,
+                layer: piece.layer + 1,
                 half,
-                segment,
+                segment: piece.segment,
                 supply_reel,
                 from_flange,
                 rotation: if start == Start::Low { Rotation::Clockwise } else { Rotation::Counterclockwise },
-                turns: coil.turns()[layer],
-                fibre_from_m: ends_m[segment - 1],
-                fibre_to_m: ends_m[segment],
-                length_m: lengths_m[layer],
-                radius_m: coil.layer_radius_m(layer),
+                turns: piece.turns,
+                free_turns: piece.free_turns,
+                start_gap_turns,
+                fibre_from_m: piece.from_m,
+                fibre_to_m: piece.to_m,
+                length_m: piece.length_m,
+                radius_m: coil.layer_radius_m(piece.layer),
                 climb: graph_step.climb,
                 crossovers,
                 cumulative_m,
@@ -162,15 +170,15 @@ impl Schedule {
                 captive_left: graph_step.captive,
             });
         }
-        let start_mark_m = match island_start(pattern, 0) {
-            Start::Low => ends_m[pattern.segment(0) - 1],
-            Start::High => ends_m[pattern.segment(0)],
+        let start_mark_m = match first_start {
+            Start::Low => pieces[order[0]].from_m,
+            Start::High => pieces[order[0]].to_m,
         };
         Ok(Self {
             pattern: pattern.clone(),
             steps,
             reels: reels.into_list(),
-            length_m: ends_m[pattern.layers()],
+            length_m: ends_m[pieces.len()],
             start_mark_m,
         })
     }
@@ -207,8 +215,11 @@ impl Schedule {
     }
 
     /// Segments of half A less those of half B: this much must be trimmed from end A (or, below zero, end B) for the
-    /// joint of the halves to be the middle of the fibre.
+    /// joint of the halves to be the middle of the fibre. Nothing where the pattern itself says how many turns its ends have.
     pub fn expected_trim_m(&self) -> f64 {
+        if !self.pattern.end_turns().is_none() {
+            return 0.0;
+        }
         self.steps.last().map_or(0.0, |s| s.balance_m)
     }
 }

@@ -1,7 +1,5 @@
 //! Which reel holds which run of the unwound fibre.
 
-use crate::pattern::Pattern;
-
 /// A supply reel's name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ReelName {
@@ -43,7 +41,7 @@ pub(super) enum Start {
     High,
 }
 
-/// A run of unwound segments on its reel.
+/// A run of unwound pieces on its reel; pieces count from 1 in the order of arclength.
 #[derive(Debug, Clone, Copy)]
 struct Run {
     first: usize,
@@ -60,13 +58,13 @@ pub(super) struct Reels<'a> {
 }
 
 impl<'a> Reels<'a> {
-    /// The fibre before winding: on one reel if its own end is wound first, else on two that part where layer 1 begins.
-    pub(super) fn new(pattern: &Pattern, ends_m: &'a [f64]) -> Self {
-        let count = pattern.layers();
-        let first = pattern.segment(0);
+    /// The fibre before winding: on one reel if its own end is wound first, else on two that part where layer 1 begins. `first` is
+    /// the piece that is wound first.
+    pub(super) fn new(first: usize, start: Start, ends_m: &'a [f64]) -> Self {
+        let count = ends_m.len() - 1;
         let mut reels = Self { ends_m, list: Vec::new(), drawn_m: Vec::new(), runs: Vec::new() };
-        // Up to which segment reel A holds the fibre.
-        let split = match super::island_start(pattern, 0) {
+        // Up to which piece reel A holds the fibre.
+        let split = match start {
             Start::Low => first - 1,
             Start::High => first,
         };
@@ -108,7 +106,7 @@ impl<'a> Reels<'a> {
         self.prepare(ReelName::Captive(number), step, taken_from, first, last)
     }
 
-    /// Takes a segment off its reel, spooling over first what this makes captive. The reel, and what it has given so far.
+    /// Takes a piece off its reel, spooling over first what this makes captive. The reel, and what it has given so far.
     pub(super) fn wind(&mut self, step: usize, segment: usize, start: Start) -> (ReelName, f64) {
         let at =
             self.runs.iter().position(|r| r.first <= segment && segment <= r.last).expect("each segment is wound once");

@@ -3,6 +3,7 @@
 use super::anneal::rounds::{State, Stop};
 use super::aside::GridCheck;
 use super::cutting::Cuts;
+use super::end_turns::WithEnds;
 use super::evaluator::Judged;
 use super::outlook::OtherBoundary;
 use super::proof::{Certificate, Status};
@@ -146,6 +147,8 @@ pub struct Answer {
     pub boundary: Option<OtherBoundary>,
     /// None unless worst admissible profiles were to join the searched ones.
     pub cuts: Option<Cuts>,
+    /// None unless turns at the ends were to be chosen, and where the search was interrupted.
+    pub ends: Option<WithEnds>,
 }
 
 impl Answer {

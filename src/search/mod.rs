@@ -8,6 +8,7 @@ pub mod compile;
 pub mod cost;
 pub mod custom;
 pub mod cutting;
+pub mod end_turns;
 pub mod evaluator;
 pub mod outlook;
 pub mod pareto;

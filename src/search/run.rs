@@ -12,6 +12,7 @@ use super::cost::objective::Objective;
 use super::cost::tolerance::ToleranceSpec;
 use super::cost::worst_case::{SearchError, SolvedProfiles};
 use super::cutting::run_with_cuts;
+use super::end_turns::{EndChoice, WithEnds};
 use super::evaluator::{EQUALLY_GOOD, Evaluator, JudgeError, Judged, improvement_over_qua};
 use super::proof::{self, Progress, Status, prove};
 use super::recommendation::{Advised, Context};
@@ -43,6 +44,8 @@ pub struct Request<'a> {
     pub cuts: bool,
     /// Models that may be the true one, all as likely; empty: the model is known.
     pub uncertain: &'a [CoilModel],
+    /// Turns at the ends of the fibre that may be chosen beside the order of whole layers.
+    pub ends: EndChoice,
 }
 
 /// Why an observer ends a search.
@@ -175,7 +178,7 @@ pub fn run(request: &Request, observer: &mut dyn Observer) -> Result<Option<Answ
         proof.beside_grid(aside.margin.of_any(evaluator.steepest_k_per_s())?)
     };
     let first = search.state().first_with_best().map_or(0, |record| record.evaluations);
-    Ok(Some(Answer {
+    let mut answer = Answer {
         improvement_over_qua: improvement_over_qua(&best, &baselines),
         statement,
         grid_check,
@@ -196,9 +199,15 @@ pub fn run(request: &Request, observer: &mut dyn Observer) -> Result<Option<Answ
         outlook,
         boundary,
         cuts: None,
+        ends: None,
         best,
         baselines,
-    }))
+    };
+    if request.ends.is_any() && !is_over {
+        let ends = evaluator.with_ends(request.ends, class, &answer, &|| observer.goes_on())?;
+        answer.ends = Some(WithEnds { judged: evaluator.completed(&aside, ends.judged)?, ..ends });
+    }
+    Ok(Some(answer))
 }
 
 impl<'a> Request<'a> {

@@ -7,6 +7,7 @@ use crate::pattern::windability::WindabilityClass;
 use crate::search;
 use crate::search::anneal::rounds::{DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Plan, Rules};
 use crate::search::cost::objective::Objective;
+use crate::search::end_turns::EndChoice;
 use crate::units::rad_per_s_from_deg_per_h;
 
 use super::TaskError;
@@ -34,6 +35,8 @@ pub struct Wishes {
     pub start: Option<NamedPattern>,
     /// Whether worst admissible profiles join the searched ones.
     pub cutting_planes: bool,
+    /// Turns at the ends of the fibre that may be chosen beside the order of whole layers.
+    pub ends: EndChoice,
 }
 
 /// Models that are drawn from a diagnosis.
@@ -116,6 +119,7 @@ impl Wishes {
             recommend: true,
             cuts: self.cutting_planes,
             uncertain: &[],
+            ends: self.ends,
         })
     }
 }
@@ -127,11 +131,13 @@ mod folder {
     use super::{ModelFile, NamedPattern, TaskError};
     use crate::io::files::write_atomically;
     use crate::io::json::search::OptimiseJson;
+    use crate::io::read::pattern_file::print_pattern;
     use crate::io::write::model_edit::with_ramps;
     use crate::io::write::run_directory::write_results;
     use crate::search::Answer;
     use crate::task::page::{REPORT_FILE, write_report};
     use crate::task::schedule;
+    use crate::text::sink::TomlComment;
 
     /// Writes what a search has found: the pattern, tables, the schedule and the page.
     ///
@@ -143,6 +149,16 @@ mod folder {
         let schedule = schedule::run(&schedule::Request { model: file, pattern: Some(&named) })?;
         for (name, text) in schedule.tables()? {
             write_atomically(&folder.join(name), text.as_bytes())?;
+        }
+        if let Some(ends) = answer.ends.as_ref().filter(|ends| !ends.judged.pattern.end_turns().is_none()) {
+            let named = NamedPattern { name: ends.judged.name.clone(), pattern: ends.judged.pattern.clone() };
+            let comments = [format!("coil: {}", file.model.name), ends.statement.clone()];
+            let text = print_pattern(&named, &comments.each_ref().map(TomlComment::of));
+            write_atomically(&folder.join("ends.toml"), text.as_bytes())?;
+            let schedule = schedule::run(&schedule::Request { model: file, pattern: Some(&named) })?;
+            for (name, text) in schedule.tables()? {
+                write_atomically(&folder.join(format!("ends-{name}")), text.as_bytes())?;
+            }
         }
         if let Some(cuts) = answer.cuts.as_ref().filter(|cuts| !cuts.joined.is_empty()) {
             // The worst profile that is stated may be one that joined.

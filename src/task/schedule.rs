@@ -91,7 +91,7 @@ mod shop_floor {
                 ("traveller.html", traveller_page(&traveller, &self.pattern.pattern)),
                 ("traveller.csv", csv(&traveller)?),
                 ("traveller.json", json(&traveller)?),
-                ("program.gcode", gcode(&program)),
+                ("program.gcode", gcode(&program, &self.schedule)),
                 ("program.csv", csv(&program)?),
                 ("cross-section.svg", cross_section(&title, &self.pattern.pattern)),
             ]);

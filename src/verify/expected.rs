@@ -1,46 +1,10 @@
 //! Works a winding out again from nothing but the order of the segments, and compares.
 
 use super::physics::wound_turns;
+use super::winding::{Piece, Winding};
 use super::{Claim, Findings, Printed, Truth};
 use crate::coil::LayerLength;
 use crate::units::{nm_from_m, um_from_m};
-
-const COUNT_FROM_ONE: &str = "keep one row a layer, innermost first, numbered from 1";
-const WIND_ONCE: &str = "every segment is wound exactly once: correct the segment or the missing row";
-
-/// The order of the segments, if the rows are a winding of this coil at all.
-pub(super) fn permutation(truth: &Truth, claim: &Claim, findings: &mut Findings) -> Option<Vec<usize>> {
-    let layers = truth.model.coil.layers();
-    findings.checks += 1;
-    let mut clean = claim.rows.len() == layers;
-    if !clean {
-        findings.add(None, "rows", layers.to_string(), claim.rows.len().to_string(), COUNT_FROM_ONE);
-    }
-    let mut wound_on = vec![0usize; layers + 1];
-    for (i, row) in claim.rows.iter().enumerate() {
-        let here = Some(i + 1);
-        for (field, found) in [("step", row.step), ("layer", row.layer)] {
-            findings.checks += 1;
-            if found != i as i64 + 1 {
-                findings.add(here, field, (i + 1).to_string(), found.to_string(), COUNT_FROM_ONE);
-            }
-        }
-        findings.checks += 1;
-        match usize::try_from(row.segment).ok().filter(|s| (1..=layers).contains(s)) {
-            None => {
-                clean = false;
-                findings.add(here, "segment", format!("from 1 to {layers}"), row.segment.to_string(), WIND_ONCE);
-            }
-            Some(segment) if wound_on[segment] > 0 => {
-                clean = false;
-                let expected = format!("a segment that is not wound yet (it is in row {})", wound_on[segment]);
-                findings.add(here, "segment", expected, segment.to_string(), WIND_ONCE);
-            }
-            Some(segment) => wound_on[segment] = i + 1,
-        }
-    }
-    clean.then(|| claim.rows.iter().map(|row| row.segment as usize).collect())
-}
 
 /// l_j again: from radius and turns, or equal shares.
 pub(super) fn layer_lengths_m(truth: &Truth) -> Vec<f64> {
@@ -59,16 +23,6 @@ pub(super) fn layer_lengths_m(truth: &Truth) -> Vec<f64> {
         .collect()
 }
 
-/// The arclength at which each segment begins, and the fibre's end.
-pub(super) fn starts_m(lengths_m: &[f64], segments: &[usize]) -> Vec<f64> {
-    let mut starts_m = vec![0.0; segments.len() + 1];
-    for s in 1..=segments.len() {
-        let layer = segments.iter().position(|&found| found == s).unwrap_or(0);
-        starts_m[s] = starts_m[s - 1] + lengths_m[layer];
-    }
-    starts_m
-}
-
 /// Whether arclength grows from the first flange to the second, a layer: segments alternate along the fibre.
 pub(super) fn runs_outbound(segments: &[usize]) -> Vec<bool> {
     let count = segments.len();
@@ -77,7 +31,7 @@ pub(super) fn runs_outbound(segments: &[usize]) -> Vec<bool> {
 }
 
 /// A segment that continues nothing begins with the fibre's own end, else with the end nearer to the middle.
-fn begins_low(segment: usize, count: usize) -> bool {
+pub(super) fn begins_low(segment: usize, count: usize) -> bool {
     segment == 1 || (segment < count && 2 * segment > count)
 }
 
@@ -94,12 +48,13 @@ struct Supply {
 }
 
 impl Supply {
-    fn follow(segments: &[usize]) -> (Self, Vec<usize>, Vec<bool>) {
-        let count = segments.len();
+    /// `order` counts pieces from 1.
+    fn follow(order: &[usize], begins_low: &[bool]) -> (Self, Vec<usize>, Vec<bool>) {
+        let count = order.len();
         let mut supply =
             Self { holder: vec![None; count + 1], loaded: Vec::new(), captive_now: Vec::new(), reels_now: Vec::new() };
-        let first = segments[0];
-        let last_of_a = if begins_low(first, count) { first - 1 } else { first };
+        let first = order[0];
+        let last_of_a = if begins_low[0] { first - 1 } else { first };
         let single = last_of_a == 0 || last_of_a == count;
         for (name, from, to) in [("A", 1, last_of_a), ("B", last_of_a + 1, count)] {
             if from <= to {
@@ -112,10 +67,10 @@ impl Supply {
             }
         }
         let (mut fed_by, mut from_low) = (Vec::new(), Vec::new());
-        for (i, &segment) in segments.iter().enumerate() {
+        for (i, &segment) in order.iter().enumerate() {
             let wound = |s: usize| s >= 1 && s <= count && supply.holder[s].is_none();
             let (low_joined, high_joined) = (segment > 1 && wound(segment - 1), segment < count && wound(segment + 1));
-            let low = if low_joined { true } else { !high_joined && begins_low(segment, count) };
+            let low = if low_joined { true } else { !high_joined && begins_low[i] };
             let (mut a, mut b) = (segment, segment);
             while a > 1 && supply.holder[a - 1].is_some() && supply.same_run(a - 1, a) {
                 a -= 1;
@@ -182,67 +137,74 @@ impl Supply {
 }
 
 /// Compares every field of every row, and what is claimed of the whole.
-pub(super) fn check(truth: &Truth, claim: &Claim, segments: &[usize], findings: &mut Findings) {
+pub(super) fn check(truth: &Truth, claim: &Claim, winding: &Winding, findings: &mut Findings) {
+    let Winding { segments, pieces, order, .. } = winding;
     let count = segments.len();
     let coil = &truth.model.coil;
-    let lengths_m = layer_lengths_m(truth);
-    let starts_m = starts_m(&lengths_m, segments);
-    let turns = wound_turns(truth.model);
-    let outbound = runs_outbound(segments);
-    let (supply, fed_by, from_low) = Supply::follow(segments);
-    let mut layer_of = vec![0usize; count + 2];
-    for (layer, &segment) in segments.iter().enumerate() {
-        layer_of[segment] = layer + 1;
+    let numbers: Vec<usize> = order.iter().map(|place| place + 1).collect();
+    let low: Vec<bool> = order.iter().map(|place| pieces[*place].begins_low).collect();
+    let (supply, fed_by, from_low) = Supply::follow(&numbers, &low);
+    let mut step_of = vec![0usize; pieces.len()];
+    for (i, place) in order.iter().enumerate() {
+        step_of[*place] = i;
     }
     let mut drawn_m = vec![0.0; supply.loaded.len()];
     let mut balance_m = 0.0;
     let mut max_climb = 0;
-    for (i, (row, &segment)) in claim.rows.iter().zip(segments).enumerate() {
+    for (i, (row, &place)) in claim.rows.iter().zip(order).enumerate() {
         let here = Some(i + 1);
-        let layer = i + 1;
-        let half = if 2 * segment <= count { "A" } else { "B" };
+        let piece = &pieces[place];
+        let layer = piece.layer + 1;
+        let half = if piece.is_of_half_a { "A" } else { "B" };
         findings.same(here, "half", &half.to_owned(), &row.half);
         findings.same(here, "supply_reel", &supply.loaded[fed_by[i]].0, &row.supply_reel);
-        let starts_at_first = outbound[i] == from_low[i];
+        let starts_at_first = piece.outbound == from_low[i];
         let (first_to_second, second_to_first) = ("first-to-second", "second-to-first");
         let direction = if starts_at_first { first_to_second } else { second_to_first };
         findings.same(here, "direction", &direction.to_owned(), &row.direction);
-        findings.near(here, "turns", turns[i], row.turns, Printed::Plain);
-        findings.near(here, "fibre_from_m", starts_m[segment - 1], row.fibre_from_m, Printed::Metres);
-        findings.near(here, "fibre_to_m", starts_m[segment], row.fibre_to_m, Printed::Metres);
-        findings.near(here, "length_m", lengths_m[i], row.length_m, Printed::Metres);
-        let radius_m = coil.bore_radius_m() + coil.radial_pitch_m() * (i as f64 + 0.5);
+        findings.near(here, "turns", piece.turns, row.turns, Printed::Plain);
+        findings.near(here, "fibre_from_m", piece.from_m, row.fibre_from_m, Printed::Metres);
+        findings.near(here, "fibre_to_m", piece.to_m, row.fibre_to_m, Printed::Metres);
+        findings.near(here, "length_m", piece.length_m, row.length_m, Printed::Metres);
+        let radius_m = coil.bore_radius_m() + coil.radial_pitch_m() * (piece.layer as f64 + 0.5);
         findings.near(here, "radius_mm", radius_m, row.radius_m, Printed::Millimetres);
-        // Crossovers to layers that are wound already, the one at the start of this layer first.
+        let free_m = piece.free_turns * coil.axial_pitch_m();
+        findings.near_if(here, "the place along the axis", free_m, row.free_m, Printed::Millimetres);
+        // Crossovers to pieces that are wound already, the one at the start of this one first.
         let mut joints: Vec<(bool, usize)> = Vec::new();
-        for (neighbour, at_low) in [(segment.wrapping_sub(1), true), (segment + 1, false)] {
-            let wound_before = (1..=count).contains(&neighbour) && layer_of[neighbour] < layer;
-            if wound_before {
-                joints.push((at_low, layer_of[neighbour]));
+        for (neighbour, at_low) in [(place.wrapping_sub(1), true), (place + 1, false)] {
+            if pieces.get(neighbour).is_some_and(|_| step_of[neighbour] < i) {
+                joints.push((at_low, pieces[neighbour].layer + 1));
             }
         }
         joints.sort_by_key(|(at_low, _)| *at_low != from_low[i]);
-        let climb = joints.iter().map(|(_, from)| layer - from).max().unwrap_or(0);
+        let climb = joints.iter().map(|(_, from)| layer.abs_diff(*from)).max().unwrap_or(0);
         max_climb = max_climb.max(climb);
         findings.same(here, "climb", &(climb as i64), &row.climb);
-        drawn_m[fed_by[i]] += lengths_m[i];
+        drawn_m[fed_by[i]] += piece.length_m;
         findings.near(here, "cumulative_m", drawn_m[fed_by[i]], row.cumulative_m, Printed::Metres);
-        balance_m += if half == "A" { lengths_m[i] } else { -lengths_m[i] };
+        balance_m += if piece.is_of_half_a { piece.length_m } else { -piece.length_m };
         findings.near_if(here, "balance_m", balance_m, row.balance_m, Printed::Metres);
-        let words: Vec<String> = joints
-            .iter()
-            .map(|(at_low, from)| {
-                let flange = if *at_low == outbound[i] { "first" } else { "second" };
-                let plural = if layer - from == 1 { "" } else { "s" };
-                format!("{flange} flange, from layer {from}, {} layer{plural}", layer - from)
-            })
-            .collect();
+        let gap_turns =
+            if starts_at_first { piece.free_turns } else { piece.whole_turns - piece.free_turns - piece.turns };
+        let from_flange = if starts_at_first { "first" } else { "second" };
+        let begins = (gap_turns > Printed::Plain.tolerance()).then(|| {
+            let gap_turns = (gap_turns * 1e4).round() / 1e4;
+            format!("begin {gap_turns} turns from the {from_flange} flange")
+        });
+        let crossovers = joints.iter().map(|(at_low, from)| {
+            let flange = if *at_low == piece.outbound { "first" } else { "second" };
+            let climb = layer.abs_diff(*from);
+            let plural = if climb == 1 { "" } else { "s" };
+            format!("{flange} flange, from layer {from}, {climb} layer{plural}")
+        });
+        let words: Vec<String> = begins.into_iter().chain(crossovers).collect();
         findings.same_if(here, "crossover", &words.join("; "), row.crossover.as_ref());
         let rotation = if from_low[i] { "cw" } else { "ccw" };
         findings.same_if(here, "rotation", &rotation.to_owned(), row.rotation.as_ref());
         findings.near_if(here, "axial_pitch_mm", coil.axial_pitch_m(), row.axial_pitch_m, Printed::Millimetres);
         let shop = truth.shop;
-        let tension_n = shop.tension_n * (1.0 - shop.tension_taper_per_layer * i as f64).max(0.0);
+        let tension_n = shop.tension_n * (1.0 - shop.tension_taper_per_layer * piece.layer as f64).max(0.0);
         findings.near_if(here, "tension_n", tension_n, row.tension_n, Printed::Plain);
         for (field, sign, found) in
             [("tension_min_n", -1.0, row.tension_min_n), ("tension_max_n", 1.0, row.tension_max_n)]
@@ -254,7 +216,8 @@ pub(super) fn check(truth: &Truth, claim: &Claim, segments: &[usize], findings: 
         let changed = i == 0 || fed_by[i] != fed_by[i - 1];
         findings.same_if(here, "reel_change", &changed, row.reel_change.as_ref());
         let every = shop.potting_every_layers;
-        let potting = layer == count || (every > 0 && layer as i64 % every == 0);
+        let goes_on = order.get(i + 1).is_some_and(|next| pieces[*next].layer == piece.layer);
+        let potting = !goes_on && (layer == count || (every > 0 && layer as i64 % every == 0));
         findings.same_if(here, "potting", &potting, row.potting.as_ref());
     }
     let claimed: Vec<i64> = segments.iter().map(|&s| s as i64).collect();
@@ -268,26 +231,29 @@ pub(super) fn check(truth: &Truth, claim: &Claim, segments: &[usize], findings: 
             super::EMIT_AGAIN,
         );
     }
+    check_ends(claim, winding.ends, findings);
     check_name(claim, segments, findings);
     check_whole(claim, &supply, max_climb, findings);
-    check_reels(truth, claim, &supply, &starts_m, findings);
-    findings.near_if(None, "length_m", starts_m[count], claim.length_m, Printed::Metres);
+    check_reels(truth, claim, &supply, pieces, findings);
+    let length_m = pieces.last().map_or(0.0, |piece| piece.to_m);
+    findings.near_if(None, "length_m", length_m, claim.length_m, Printed::Metres);
     let fibre = coil.fibre();
     let (coated_um, wave_nm) = (um_from_m(fibre.outer_diameter_m), nm_from_m(fibre.wavelength_m));
     let fibre = format!("{coated_um:.1} µm over the coating, n {} at {wave_nm:.0} nm", fibre.refractive_index);
     findings.same_if(None, "fibre", &fibre, claim.fibre.as_ref());
-    let middle_m = 0.5 * starts_m[count];
+    let middle_m = 0.5 * length_m;
     findings.near_if(None, "midpoint_m", middle_m, claim.midpoint_m, Printed::Metres);
-    // Exactly between two segments, up to rounding, the layer that is wound first.
-    let holds = |segment: usize| {
-        let slack_m = 1e-10 * starts_m[count];
-        (starts_m[segment - 1] - slack_m..=starts_m[segment] + slack_m).contains(&middle_m)
-    };
-    let of_middle = segments.iter().position(|&segment| holds(segment)).map_or(0, |layer| layer as i64 + 1);
+    // Exactly between two pieces, up to rounding, the one that is wound first.
+    let slack_m = 1e-10 * length_m;
+    let holds = |place: &usize| (pieces[*place].from_m - slack_m..=pieces[*place].to_m + slack_m).contains(&middle_m);
+    let of_middle = order.iter().find(|place| holds(place)).map_or(0, |place| pieces[*place].layer as i64 + 1);
     findings.same_if(None, "midpoint_layer", &of_middle, claim.midpoint_layer.as_ref());
-    let start = if begins_low(segments[0], count) { segments[0] - 1 } else { segments[0] };
-    findings.near_if(None, "start_mark_m", starts_m[start], claim.start_mark_m, Printed::Metres);
-    findings.near_if(None, "expected_trim_m", balance_m, claim.expected_trim_m, Printed::Metres);
+    let first = &pieces[order[0]];
+    let start_m = if first.begins_low { first.from_m } else { first.to_m };
+    findings.near_if(None, "start_mark_m", start_m, claim.start_mark_m, Printed::Metres);
+    // Ends with turns of their own are as long as they shall be.
+    let trim_m = if winding.ends == [0, 0] { balance_m } else { 0.0 };
+    findings.near_if(None, "expected_trim_m", trim_m, claim.expected_trim_m, Printed::Metres);
     if let Some(found) = &claim.shop {
         check_shop(truth, found, findings);
     }
@@ -303,7 +269,19 @@ fn check_whole(claim: &Claim, supply: &Supply, max_climb: usize, findings: &mut 
     findings.same_if(None, "windability.max_climb", &(max_climb as i64), claim.max_climb.as_ref());
 }
 
-fn check_reels(truth: &Truth, claim: &Claim, supply: &Supply, starts_m: &[f64], findings: &mut Findings) {
+/// What a document says of the ends must be what its rows wind; without any it says nothing.
+fn check_ends(claim: &Claim, ends: [i64; 2], findings: &mut Findings) {
+    if !claim.is_document {
+        return;
+    }
+    let shown = |turns: Option<i64>| turns.map_or("nothing".to_owned(), |turns| turns.to_string());
+    for ((field, turns), found) in ["end_a_turns", "end_b_turns"].into_iter().zip(ends).zip(claim.end_turns) {
+        let expected = (ends != [0, 0]).then_some(turns);
+        findings.same(None, field, &shown(expected), &shown(found));
+    }
+}
+
+fn check_reels(truth: &Truth, claim: &Claim, supply: &Supply, pieces: &[Piece], findings: &mut Findings) {
     let Some(reels) = &claim.supply else { return };
     findings.same(None, "reels", &supply.loaded.len(), &reels.len());
     for (i, (reel, (name, step, from, first, last))) in reels.iter().zip(&supply.loaded).enumerate() {
@@ -313,10 +291,10 @@ fn check_reels(truth: &Truth, claim: &Claim, supply: &Supply, starts_m: &[f64], 
         findings.same(None, &field("prepared_before_step"), &(*step as i64), &reel.prepared_before_step);
         let shown = |from: &Option<String>| from.clone().unwrap_or_else(|| "none".to_owned());
         findings.same(None, &field("taken_from"), &shown(from), &shown(&reel.taken_from));
-        findings.near(None, &field("from_m"), starts_m[first - 1], reel.from_m, Printed::Metres);
-        findings.near(None, &field("to_m"), starts_m[*last], reel.to_m, Printed::Metres);
+        findings.near(None, &field("from_m"), pieces[first - 1].from_m, reel.from_m, Printed::Metres);
+        findings.near(None, &field("to_m"), pieces[*last - 1].to_m, reel.to_m, Printed::Metres);
         let allowance_m = if name.starts_with('C') { 0.0 } else { truth.shop.allowance_m };
-        let load_m = starts_m[*last] - starts_m[first - 1] + allowance_m;
+        let load_m = pieces[*last - 1].to_m - pieces[first - 1].from_m + allowance_m;
         findings.near_if(None, &field("load_m"), load_m, reel.load_m, Printed::Metres);
     }
 }

@@ -130,10 +130,10 @@ fn check_names(claim: &Claim, findings: &mut Findings) {
         findings.add(None, "pattern", "a name".to_owned(), format!("one that {fault}"), EMIT_AGAIN);
     }
     if let (Some(name), Some(segments), Some(found)) = (&claim.pattern, &claim.segments, &claim.pattern_sha256)
-        && *found != pattern_sha256(name, segments)
+        && *found != pattern_sha256(name, segments, claim.end_turns)
     {
         let remedy = "the pattern's name or its segments are not those that the file was made with: emit it again";
-        findings.add(None, "pattern_sha256", pattern_sha256(name, segments), found.clone(), remedy);
+        findings.add(None, "pattern_sha256", pattern_sha256(name, segments, claim.end_turns), found.clone(), remedy);
     }
 }
 
@@ -144,10 +144,14 @@ fn is_program(text: &str) -> bool {
     parts.len() >= 3 && parts.iter().all(plain) && parts[0].chars().all(|c| c.is_ascii_digit())
 }
 
-/// Of the name, a line break, and the segments with spaces between.
-fn pattern_sha256(name: &str, segments: &[i64]) -> String {
+/// Of the name, a line break, and the segments with spaces between; turns at the ends follow on a line of their own.
+fn pattern_sha256(name: &str, segments: &[i64], end_turns: [Option<i64>; 2]) -> String {
     let segments: Vec<String> = segments.iter().map(ToString::to_string).collect();
-    let digest = Sha256::digest(format!("{name}\n{}", segments.join(" ")).as_bytes());
+    let mut text = format!("{name}\n{}", segments.join(" "));
+    if let [Some(a), Some(b)] = end_turns {
+        text += &format!("\n{a} {b}");
+    }
+    let digest = Sha256::digest(text.as_bytes());
     digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 

@@ -23,6 +23,7 @@ mod program;
 mod rate;
 mod stepping;
 mod strain;
+mod winding;
 
 use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;
@@ -45,6 +46,8 @@ pub struct Claim {
     /// Of the pattern's name and segments.
     pub pattern_sha256: Option<String>,
     pub segments: Option<Vec<i64>>,
+    /// Turns more or fewer at end A and at end B.
+    pub end_turns: [Option<i64>; 2],
     pub class: Option<String>,
     pub reels: Option<i64>,
     pub captive: Option<i64>,
@@ -91,6 +94,8 @@ pub struct Row {
     pub supply_reel: String,
     pub direction: String,
     pub turns: f64,
+    /// From the first flange to the nearest turn, where a program says so.
+    pub free_m: Option<f64>,
     pub fibre_from_m: f64,
     pub fibre_to_m: f64,
     pub length_m: f64,
@@ -299,16 +304,17 @@ pub fn verify(truth: &Truth, claim: &Claim) -> Verification {
         let Findings { violations, checks } = findings;
         return Verification { violations, checks, rate_check: RateCheck::None, recomputed, taken_as_given };
     }
-    let segments = expected::permutation(truth, claim, &mut findings);
+    let winding = winding::read(truth, claim, &mut findings);
     if let Some(html) = &claim.page {
-        page::check(claim, truth.assets, html, segments.as_deref(), &mut findings);
+        let segments = winding.as_ref().map(|winding| winding.segments.as_slice());
+        page::check(claim, truth.assets, html, segments, &mut findings);
     }
     let mut rate_check = RateCheck::None;
-    if let Some(segments) = &segments {
-        expected::check(truth, claim, segments, &mut findings);
-        rate_check = rate::check(truth, claim, segments, &mut findings);
+    if let Some(winding) = &winding {
+        expected::check(truth, claim, winding, &mut findings);
+        rate_check = rate::check(truth, claim, winding, &mut findings);
     }
-    let (recomputed, taken_as_given) = scope(truth, claim, segments.is_some(), rate_check);
+    let (recomputed, taken_as_given) = scope(truth, claim, winding.is_some(), rate_check);
     let Findings { violations, checks } = findings;
     Verification { violations, checks, rate_check, recomputed, taken_as_given }
 }

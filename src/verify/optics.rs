@@ -11,6 +11,7 @@
 use super::heat::State;
 use super::physics::{Bias, Physics};
 use super::strain::Strain;
+use super::winding::Piece;
 use crate::coil::Coil;
 use crate::units::{REFERENCE_TEMPERATURE_K, celsius_from_kelvin, deg_per_h_from_rad_per_s, rad_per_s_from_deg_per_h};
 
@@ -35,27 +36,25 @@ pub(super) struct Optics {
 }
 
 impl Optics {
-    /// `outbound`: whether arclength grows away from the first flange, a layer.
-    pub fn new(
-        coil: &Coil,
-        physics: &Physics,
-        segments: &[usize],
-        turns: &[f64],
-        lengths_m: &[f64],
-        outbound: &[bool],
-    ) -> Self {
-        let length_m: f64 = lengths_m.iter().sum();
+    /// `pieces` in the order of arclength.
+    pub fn new(coil: &Coil, physics: &Physics, pieces: &[Piece]) -> Self {
+        let layers = coil.layers();
+        let length_m = pieces.iter().map(|piece| piece.length_m).sum::<f64>();
         let middle_m = 0.5 * length_m;
-        let mut weights_m2 = vec![[0.0; 2]; segments.len()];
-        let mut axial_m2 = vec![0.0; segments.len()];
-        let mut start_m = 0.0;
-        for segment in 1..=segments.len() {
-            let Some(layer) = segments.iter().position(|&s| s == segment) else { continue };
-            let pieces = turns[layer].ceil().clamp(1.0, MOST_PIECES);
-            let turn_m = lengths_m[layer] / pieces;
-            let direction = if outbound[layer] { 1.0 } else { -1.0 };
-            let zeta = |z_m: f64| direction * ((z_m - start_m) / lengths_m[layer] - 0.5);
-            for turn in 0..pieces as usize {
+        let mut lengths_m = vec![0.0; layers];
+        let mut weights_m2 = vec![[0.0; 2]; layers];
+        let mut axial_m2 = vec![0.0; layers];
+        for piece in pieces {
+            let (layer, start_m) = (piece.layer, piece.from_m);
+            lengths_m[layer] += piece.length_m;
+            let parts = piece.turns.ceil().clamp(1.0, MOST_PIECES);
+            let turn_m = piece.length_m / parts;
+            let zeta = |z_m: f64| {
+                let wound = piece.turns * (z_m - start_m) / piece.length_m;
+                let from_low_end = if piece.outbound { wound } else { piece.turns - wound };
+                (piece.free_turns + from_low_end) / piece.whole_turns - 0.5
+            };
+            for turn in 0..parts as usize {
                 let (a_m, b_m) = (start_m + turn as f64 * turn_m, start_m + (turn + 1) as f64 * turn_m);
                 let cut_m = middle_m.clamp(a_m, b_m);
                 weights_m2[layer][0] += (cut_m - a_m) * (a_m + cut_m - length_m);
@@ -66,22 +65,21 @@ impl Optics {
                     axial_m2[layer] += 0.5 * (b_m - a_m) * (2.0 * z_m - length_m) * 12.0 * zeta(z_m);
                 }
             }
-            start_m += lengths_m[layer];
         }
         let (bore_m, pitch_m) = (coil.bore_radius_m(), coil.radial_pitch_m());
         let inverse_square = |j: usize| (bore_m + pitch_m * (j as f64 + 0.5)).powi(-2);
-        let mean = (0..segments.len()).map(|j| inverse_square(j) * lengths_m[j]).sum::<f64>() / length_m;
-        let peak = (0..segments.len()).map(|j| (inverse_square(j) - mean).abs()).fold(0.0, f64::max);
+        let mean = (0..layers).map(|j| inverse_square(j) * lengths_m[j]).sum::<f64>() / length_m;
+        let peak = (0..layers).map(|j| (inverse_square(j) - mean).abs()).fold(0.0, f64::max);
         let fibre = coil.fibre();
-        let diameter_m = 2.0 * bore_m + segments.len() as f64 * pitch_m;
+        let diameter_m = 2.0 * bore_m + layers as f64 * pitch_m;
         Self {
             kappa_per_k: fibre.thermo_optic_per_k + fibre.refractive_index * fibre.thermal_expansion_per_k,
             // The beams meet a change at times that differ by n_g (2z − L)/c.
             scale_per_m2: fibre.group_index.unwrap_or(fibre.refractive_index) / (length_m * diameter_m),
-            lengths_m: lengths_m.to_vec(),
+            lengths_m,
             weights_m2,
             axial_m2,
-            stress: (0..segments.len()).map(|j| (inverse_square(j) - mean) / peak).collect(),
+            stress: (0..layers).map(|j| (inverse_square(j) - mean) / peak).collect(),
             physics: physics.clone(),
             strain: physics.materials.as_ref().map(|materials| Strain::new(materials, coil)),
         }

@@ -247,10 +247,11 @@ impl Run {
         row.rotation = Some(if turns > 0.0 { "cw" } else { "ccw" }.to_owned());
         row.turns = (turns - self.machine.spool_turns).abs();
         row.turns_per_min = Some(speed);
-        // From a flange to the other: the way of the carriage is the turns times the pitch.
+        // The way of the carriage is the turns times the pitch; where it begins is held against the coil.
         let way_mm = (to_mm - from_mm).abs();
         let pitch_mm = crate::units::mm_from_m(row.axial_pitch_m?);
-        let fits = (way_mm - row.turns * pitch_mm).abs() < 5.001e-5 && to_mm.min(from_mm) == 0.0 && row.turns > 0.0;
+        row.free_m = Some(m_from_mm(to_mm.min(from_mm)));
+        let fits = (way_mm - row.turns * pitch_mm).abs() < 5.001e-5 && row.turns > 0.0;
         self.machine.carriage_mm = to_mm;
         self.machine.spool_turns = turns;
         fits.then_some(Place::Layer { may_stop: true })

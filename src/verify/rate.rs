@@ -8,10 +8,10 @@
 use rayon::prelude::*;
 
 use super::along::Along;
-use super::expected::{layer_lengths_m, runs_outbound};
 use super::heat::{Heat, Moment, State};
 use super::optics::Optics;
 use super::physics::{Physics, wound_turns};
+use super::winding::Winding;
 use super::{Claim, Findings, Printed, RateCheck, Truth};
 use crate::profile::Profile;
 
@@ -42,7 +42,7 @@ const WORTH_STEPPING: f64 = 0.8;
 const PRINTED_TIME_S: f64 = 1e-6;
 const TIME_PARTS: i32 = 5;
 
-pub(super) fn check(truth: &Truth, claim: &Claim, segments: &[usize], findings: &mut Findings) -> RateCheck {
+pub(super) fn check(truth: &Truth, claim: &Claim, winding: &Winding, findings: &mut Findings) -> RateCheck {
     let Some(claimed) = claim.worst_rate_rad_per_s else { return RateCheck::None };
     // What a formula remembers is not worked out a second time: the rate error then stands as it is given.
     if truth.model.remembers() {
@@ -60,14 +60,7 @@ pub(super) fn check(truth: &Truth, claim: &Claim, segments: &[usize], findings: 
     if physics.is_beyond {
         return RateCheck::None;
     }
-    let optics = Optics::new(
-        &truth.model.coil,
-        &physics,
-        segments,
-        &wound_turns(truth.model),
-        &layer_lengths_m(truth),
-        &runs_outbound(segments),
-    );
+    let optics = Optics::new(&truth.model.coil, &physics, &winding.pieces);
     let profiles = truth.profiles.profiles();
     let longest_s = profiles.iter().map(Profile::duration_s).fold(1.0, f64::max);
     let height_m = truth.model.coil.axial_pitch_m() * wound_turns(truth.model).iter().copied().fold(0.0, f64::max);

@@ -195,3 +195,31 @@ fn a_group_index_scales_every_rate_error_by_how_much_longer_light_takes() {
         assert_eq!(super::code(&done), 0, "{}{}", String::from_utf8_lossy(&done.stdout), super::stderr(&done));
     }
 }
+
+#[test]
+fn turns_at_the_ends_and_a_split_layer_are_chosen_scheduled_and_verified() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = folder.path().join("run");
+    let shop = folder.path().join("shop");
+    let (run, shop) = (run.to_str().unwrap(), shop.to_str().unwrap());
+    let model = "examples/paper-200m.toml";
+    let quick = ["--rounds", "1", "--moves-per-restart", "200"];
+    let chosen = [&["optimise", model, "--trim-turns", "3", "--split-layer", "-o", run], &quick[..]].concat();
+    let found = json(&chosen);
+    let ends = &found["ends"];
+    let (a, b) = (ends["best"]["end_a_turns"].as_i64().unwrap(), ends["best"]["end_b_turns"].as_i64().unwrap());
+    // With the outermost layer's temperature prescribed, what both ends share of it cancels.
+    assert!(a * b < 0 && (-3..=0).contains(&(a + b)), "{a} {b}");
+    let of = |value: &serde_json::Value| value["worst_rate_deg_per_h"].as_f64().unwrap();
+    assert!(of(&ends["best"]) < 0.5 * of(&found["best"]), "{ends}");
+    assert_eq!(ends["best"]["windability"]["captive"], 0);
+    let pattern = format!("{run}/ends.toml");
+    let again = json(&["evaluate", model, "--pattern", &pattern]);
+    assert_eq!(of(&again["patterns"][0]), of(&ends["best"]));
+    json(&["schedule", model, "--pattern", &pattern, "-o", shop]);
+    for file in ["schedule.csv", "traveller.html", "traveller.csv", "program.gcode"] {
+        let verified = json(&["verify", model, &format!("{shop}/{file}")]);
+        assert_eq!(verified["violations"].as_array().unwrap().len(), 0, "{file}");
+    }
+    json(&["verify", model, &format!("{run}/ends-schedule.json")]);
+}

@@ -131,6 +131,6 @@ pub fn forms(file: &ModelFile, named: &NamedPattern) -> Vec<(&'static str, Strin
         ("traveller.json", serde_json::to_string_pretty(&traveller).unwrap()),
         ("traveller.html", traveller_page(&traveller, &named.pattern)),
         ("program.csv", program.csv().unwrap()),
-        ("program.gcode", gcode(&program)),
+        ("program.gcode", gcode(&program, &schedule)),
     ]
 }

@@ -10,6 +10,7 @@ use coilwright::pattern::classic::Classic;
 use coilwright::units::deg_per_h_from_rad_per_s;
 use coilwright::verify::RateCheck;
 
+mod ends;
 mod forms;
 mod tampering;
 
@@ -22,14 +23,14 @@ fn schedules_of_classic_and_arbitrary_windings_hold_in_every_form() {
         let layers = file.model.coil.layers();
         let classics = Classic::ALL.into_iter().filter_map(|c| classic(c, layers));
         for named in classics.chain((0..6).map(|seed| shuffled(layers, seed))) {
-            let (_, document) = plan(&file, &named);
+            let (schedule, document) = plan(&file, &named);
             let full = program(&file, &named);
             let forms = [
                 ("json", serde_json::to_string_pretty(&document).unwrap()),
                 ("csv", document.csv().unwrap()),
                 ("program json", serde_json::to_string(&full).unwrap()),
                 ("program csv", full.csv().unwrap()),
-                ("g-code", gcode(&full)),
+                ("g-code", gcode(&full, &schedule)),
             ];
             for (form, text) in forms {
                 let found = judged(&file, &text).unwrap_or_else(|| panic!("{} {form} is not understood", named.name));

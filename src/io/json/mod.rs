@@ -80,6 +80,11 @@ impl WindabilityJson {
 pub struct PatternJson {
     pub name: String,
     pub segments: Vec<usize>,
+    /// Whole turns more (or, below zero, fewer) than whole layers at either end of the fibre; absent without any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub end_a_turns: Option<i32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub end_b_turns: Option<i32>,
     pub worst_rate_deg_per_h: f64,
     pub worst_phase_rad: f64,
     pub worst_profile: String,
@@ -108,9 +113,12 @@ impl PatternJson {
         phase_rad: f64,
         guaranteed_rad_per_s: Option<f64>,
     ) -> Self {
+        let ends = Some(pattern.end_turns()).filter(|ends| !ends.is_none());
         Self {
             name: name.to_owned(),
             segments: pattern.segments().to_vec(),
+            end_a_turns: ends.map(|ends| ends.a),
+            end_b_turns: ends.map(|ends| ends.b),
             worst_rate_deg_per_h: deg_per_h_from_rad_per_s(worst.rate_rad_per_s.abs()),
             worst_phase_rad: phase_rad.abs(),
             worst_profile: worst.profile.clone(),

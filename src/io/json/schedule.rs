@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use crate::coil::Fibre;
 use crate::io::files::sha256_hex;
 use crate::io::model::{ModelFile, NamedPattern};
-use crate::pattern::Half;
 use crate::pattern::windability::WindingGraph;
+use crate::pattern::{EndTurns, Half};
 use crate::schedule::production::Production;
 use crate::schedule::{Rotation, Schedule, Step};
 use crate::search::cost::worst_case::WorstCase;
@@ -60,6 +60,11 @@ pub struct ScheduleJson {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pattern_sha256: Option<String>,
     pub segments: Vec<i64>,
+    /// Whole turns more (or, below zero, fewer) than whole layers at either end of the fibre; absent without any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub end_a_turns: Option<i32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub end_b_turns: Option<i32>,
     pub windability: ClaimedWindability,
     pub worst_rate_deg_per_h: f64,
     pub worst_profile: String,
@@ -194,6 +199,7 @@ impl ScheduleJson {
     /// The schedule of a pattern with what is claimed about it.
     pub fn new(file: &ModelFile, named: &NamedPattern, schedule: &Schedule, worst: &WorstCase) -> Self {
         let windability = WindingGraph::new(&named.pattern).windability();
+        let ends = Some(named.pattern.end_turns()).filter(|ends| !ends.is_none());
         Self {
             schema_version: SCHEMA_VERSION,
             document: "schedule".to_owned(),
@@ -203,6 +209,8 @@ impl ScheduleJson {
             pattern: named.name.clone(),
             pattern_sha256: Some(pattern_sha256(named)),
             segments: named.pattern.segments().iter().map(|&s| s as i64).collect(),
+            end_a_turns: ends.map(|ends| ends.a),
+            end_b_turns: ends.map(|ends| ends.b),
             windability: ClaimedWindability {
                 class: windability.class().to_string(),
                 reels: windability.reels as i64,
@@ -298,10 +306,12 @@ impl StepJson {
     }
 }
 
-/// Of the name, a line break, and the segments with spaces between.
+/// Of the name, a line break, and the segments with spaces between; with turns at the ends these follow on a line of their own.
 fn pattern_sha256(named: &NamedPattern) -> String {
     let segments: Vec<String> = named.pattern.segments().iter().map(ToString::to_string).collect();
-    sha256_hex(&format!("{}\n{}", named.name, segments.join(" ")))
+    let EndTurns { a, b } = named.pattern.end_turns();
+    let ends = if named.pattern.end_turns().is_none() { String::new() } else { format!("\n{a} {b}") };
+    sha256_hex(&format!("{}\n{}{ends}", named.name, segments.join(" ")))
 }
 
 /// What the header says of the fibre: `250.0 µm over the coating, n 1.447 at 1300 nm`.
@@ -312,15 +322,15 @@ fn fibre_words(fibre: &Fibre) -> String {
 
 /// What the operator reads about the crossovers that a step completes: `second flange, from layer 3, 2 layers`.
 pub fn crossover_words(step: &Step) -> String {
-    let words: Vec<String> = step
-        .crossovers
-        .iter()
-        .map(|c| {
-            let layers = if c.climb == 1 { "layer" } else { "layers" };
-            format!("{} flange, from layer {}, {} {layers}", flange_word(c.flange), c.from_layer, c.climb)
-        })
-        .collect();
-    words.join("; ")
+    let begins = (step.start_gap_turns > 0.0).then(|| {
+        let gap = rounded(step.start_gap_turns, TURNS_DECIMALS);
+        format!("begin {gap} turns from the {} flange", flange_word(step.from_flange))
+    });
+    let crossovers = step.crossovers.iter().map(|c| {
+        let layers = if c.climb == 1 { "layer" } else { "layers" };
+        format!("{} flange, from layer {}, {} {layers}", flange_word(c.flange), c.from_layer, c.climb)
+    });
+    begins.into_iter().chain(crossovers).collect::<Vec<String>>().join("; ")
 }
 
 pub fn rotation_word(rotation: Rotation) -> &'static str {

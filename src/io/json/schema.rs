@@ -240,6 +240,8 @@ pub fn pattern_schema() -> Value {
                 "uniqueItems": true,
                 "items": { "type": "integer", "minimum": 1 },
             },
+            "end_a_turns": described("integer", "whole turns more or, below zero, fewer than whole layers at end A; 0 unless stated"),
+            "end_b_turns": described("integer", "the same at end B; turns added at one end need as many fewer at the other, whose segment is on the outermost layer"),
         }),
     ))
 }
@@ -346,6 +348,8 @@ pub fn schedule_schema() -> Value {
             "pattern": word("the winding's name"),
             "pattern_sha256": word("of the pattern's name and segments"),
             "segments": { "type": "array", "items": { "type": "integer", "minimum": 1 } },
+            "end_a_turns": whole("turns more or, below zero, fewer than whole layers at end A; absent without any at either end"),
+            "end_b_turns": whole("the same at end B"),
             "windability": windability,
             "worst_rate_deg_per_h": number("over the model's profiles and all times"),
             "worst_profile": word("under which it occurs"),

@@ -8,6 +8,7 @@ use crate::search::Request;
 use crate::search::answer::{Answer, Former, FoundBy, Outlook};
 use crate::search::aside::GridCheck;
 use crate::search::cutting::Cuts;
+use crate::search::end_turns::WithEnds;
 use crate::search::evaluator::Judged;
 use crate::search::outlook::OtherBoundary;
 use crate::search::prospect::{Gain, Prospect};
@@ -63,6 +64,9 @@ pub struct OptimiseJson {
     pub proof: ProofJson,
     /// Null unless worst admissible profiles were to join the searched ones.
     pub cutting_planes: Option<CutsJson>,
+    /// Absent unless turns at the ends were to be chosen.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ends: Option<EndsJson>,
     pub evaluations: u64,
     /// On the screen only: files don't depend on the clock.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -76,6 +80,36 @@ pub struct OptimiseJson {
     pub stopped_by: String,
     /// False where the clock or a signal ended the search: the same request may then end elsewhere.
     pub reproducible: bool,
+}
+
+/// The best with turns of its own at the ends of the fibre.
+#[derive(Debug, Clone, Serialize)]
+pub struct EndsJson {
+    /// What might be chosen.
+    pub most_left_off_turns: u32,
+    pub shares_outermost_layer: bool,
+    /// Without `end_a_turns` and `end_b_turns` where none make it better.
+    pub best: PatternJson,
+    pub best_objective_deg_per_h: f64,
+    /// The same order of whole layers.
+    pub whole_layers: String,
+    pub whole_layers_objective_deg_per_h: f64,
+    pub statement: String,
+}
+
+impl EndsJson {
+    pub fn of(ends: &WithEnds) -> Self {
+        let WithEnds { choice, judged, whole, statement } = ends;
+        Self {
+            most_left_off_turns: choice.most_left_off,
+            shares_outermost_layer: choice.shares_outermost,
+            best: PatternJson::of(judged),
+            best_objective_deg_per_h: deg_per_h_from_rad_per_s(judged.objective_rad_per_s),
+            whole_layers: whole.0.clone(),
+            whole_layers_objective_deg_per_h: deg_per_h_from_rad_per_s(whole.1),
+            statement: statement.clone(),
+        }
+    }
 }
 
 /// What windings would cost with the boundary that the model has not.
@@ -347,6 +381,7 @@ impl OptimiseJson {
             compared_with: answer.compared_with.as_ref().map(|former| FormerJson::of(former, &answer.best)),
             proof: ProofJson::of(&answer.proof),
             cutting_planes: answer.cuts.as_ref().map(CutsJson::of),
+            ends: answer.ends.as_ref().map(EndsJson::of),
             evaluations: answer.evaluations,
             evaluations_per_s: Some(answer.evaluations_now as f64 / seconds),
             seconds: Some(seconds),

@@ -7,8 +7,8 @@ use thiserror::Error;
 use crate::io::fault::{Fault, Faults};
 use crate::io::files::read_text;
 use crate::io::model::NamedPattern;
-use crate::pattern::Pattern;
 use crate::pattern::classic::{Classic, ClassicError};
+use crate::pattern::{EndTurns, Pattern};
 use crate::text::sink::TomlComment;
 
 use super::kind_of_file::FileKind;
@@ -28,6 +28,9 @@ pub enum ResolveError {
     #[error("the pattern file has faults:\n{0}")]
     File(Faults),
 }
+
+/// No layer has more turns.
+const MOST_END_TURNS: i64 = 1_000_000;
 
 /// A pattern by the name of a classic winding or by the path of a pattern file.
 ///
@@ -97,6 +100,9 @@ pub fn parse_pattern(file: &str, source: &str) -> Result<NamedPattern, Faults> {
     let segments = root.needed_integers(r, "segments");
     let segments_span = root.span_of("segments");
     let layers_span = root.span_of("layers");
+    let [a, b] = ["end_a_turns", "end_b_turns"]
+        .map(|key| root.integer(r, key, -MOST_END_TURNS, MOST_END_TURNS).unwrap_or(0) as i32);
+    let ends_span = root.span_of("end_a_turns").or(root.span_of("end_b_turns"));
     root.finish(r);
     if let (Some(layers), Some(segments)) = (layers, &segments)
         && layers as usize != segments.len()
@@ -124,10 +130,13 @@ pub fn parse_pattern(file: &str, source: &str) -> Result<NamedPattern, Faults> {
         if !clean {
             return None;
         }
-        match Pattern::new(stated.into_iter().map(|(s, _)| s as usize).collect()) {
+        let whole = Pattern::new(stated.into_iter().map(|(s, _)| s as usize).collect());
+        let whole = whole.map_err(|error| (error, segments_span));
+        let built = whole.and_then(|p| p.with_end_turns(EndTurns { a, b }).map_err(|error| (error, ends_span)));
+        match built {
             Ok(pattern) => Some(pattern),
-            Err(error) => {
-                r.fault(Fault::new(error.to_string(), segments_span));
+            Err((error, span)) => {
+                r.fault(Fault::new(error.to_string(), span));
                 None
             }
         }
@@ -145,6 +154,12 @@ pub fn print_pattern(named: &NamedPattern, comments: &[TomlComment]) -> String {
     let mut segments = toml_edit::Value::from(segments);
     segments.decor_mut().set_suffix("   # innermost layer first");
     document["segments"] = toml_edit::Item::Value(segments);
+    let EndTurns { a, b } = named.pattern.end_turns();
+    for (key, turns) in [("end_a_turns", a), ("end_b_turns", b)] {
+        if turns != 0 {
+            document[key] = toml_edit::value(i64::from(turns));
+        }
+    }
     let head: String = comments.iter().map(|c| format!("# {c}\n")).collect();
     head + &document.to_string()
 }

@@ -35,9 +35,9 @@ pub fn machine_program(
         let allowance_m = if reel.captive { 0.0 } else { production.allowance_m };
         row.load_m = Some(rounded(reel.to_m - reel.from_m + allowance_m, LENGTH_DECIMALS));
     }
-    let layers = schedule.steps().len();
+    let layers = schedule.pattern().layers();
     let mut previous = None;
-    for (row, step) in document.steps.iter_mut().zip(schedule.steps()) {
+    for (i, (row, step)) in document.steps.iter_mut().zip(schedule.steps()).enumerate() {
         row.crossover = Some(crossover_words(step));
         row.rotation = Some(rotation_word(step.rotation).to_owned());
         row.axial_pitch_mm = Some(rounded(mm_from_m(axial_pitch_m), MM_DECIMALS));
@@ -46,7 +46,8 @@ pub fn machine_program(
         [row.tension_min_n, row.tension_max_n] = limits_n.map(Some);
         row.turns_per_min = Some(rounded(production.winding_speed_turns_per_min, TURNS_DECIMALS));
         row.reel_change = Some(previous != Some(step.supply_reel));
-        row.potting = Some(production.pots_after(step.layer, layers));
+        let is_layer_full = schedule.steps().get(i + 1).is_none_or(|next| next.layer != step.layer);
+        row.potting = Some(is_layer_full && production.pots_after(step.layer, layers));
         previous = Some(step.supply_reel);
     }
     document
@@ -60,8 +61,9 @@ fn reel_number(name: &str) -> i64 {
     }
 }
 
-/// The program as G-code; each datum stands in it once, as a word or, where no word has it, in a comment.
-pub fn gcode(document: &ScheduleJson) -> String {
+/// The program as G-code; each datum stands in it once, as a word or, where no word has it, in a comment. `schedule` as the
+/// document was made from.
+pub fn gcode(document: &ScheduleJson, schedule: &Schedule) -> String {
     let head = ScheduleJson { steps: Vec::new(), ..document.clone() };
     let mut out = format!("; coilwright winding program, version {PROGRAM_VERSION}\n");
     out.push_str("; X carriage in mm from the first flange, C spool in turns, clockwise seen from the first flange\n");
@@ -69,11 +71,12 @@ pub fn gcode(document: &ScheduleJson) -> String {
     let json = serde_json::to_string(&head).unwrap_or_default();
     out.push_str(&format!("; head {}\n", JsonText::embedded(&json)));
     out.push_str("G21\nG90\n");
-    for step in &document.steps {
+    for (step, planned) in document.steps.iter().zip(schedule.steps()) {
         let pitch_mm = step.axial_pitch_mm.unwrap_or(0.0);
-        let height_mm = rounded(step.turns * pitch_mm, MM_DECIMALS);
+        let low_mm = rounded(planned.free_turns * pitch_mm, MM_DECIMALS);
+        let high_mm = rounded(low_mm + step.turns * pitch_mm, MM_DECIMALS);
         let outbound = step.direction == "first-to-second";
-        let (from_mm, to_mm) = if outbound { (0.0, height_mm) } else { (height_mm, 0.0) };
+        let (from_mm, to_mm) = if outbound { (low_mm, high_mm) } else { (high_mm, low_mm) };
         let sign = if step.rotation.as_deref() == Some("cw") { "" } else { "-" };
         // What the words below say is left out of the comment.
         out.push_str(&format!(

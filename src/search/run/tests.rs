@@ -31,6 +31,7 @@ fn request<'a>(
         recommend: true,
         cuts: false,
         uncertain: &[],
+        ends: EndChoice::default(),
     }
 }
 

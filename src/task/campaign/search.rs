@@ -7,6 +7,7 @@ use crate::pattern::windability::WindabilityClass;
 use crate::search::anneal::rounds::{DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Plan, Rules, State};
 use crate::search::answer::{Answer, Ended};
 use crate::search::cost::objective::Objective;
+use crate::search::end_turns::EndChoice;
 use crate::search::run::RunError;
 use crate::search::{self, Observer};
 use crate::units::deg_per_h_from_rad_per_s;
@@ -73,6 +74,7 @@ pub fn search_cell(
         recommend: false,
         cuts: false,
         uncertain: &[],
+        ends: EndChoice::default(),
     };
     match search::run(&request, observer) {
         Ok(answer) => answer.filter(|answer| answer.ended != Ended::Signal).map(|answer| found(id, cell, &answer)),

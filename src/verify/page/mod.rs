@@ -21,6 +21,9 @@ const WORDS: &str = "Class standard is wound with no captive run, class captive:
     this reel are on the coil already, so the reel must travel around the coil. A crossover over several layers climbs past those between. \
     Windings by their short names: zyl cylindrical winding, sym symmetric winding (Eq. 14), sym-text symmetric winding (as described in \
     words), dip dipole, qua quadrupole, oct octupole, hex 16-pole.";
+/// Instead of a trim where the ends have turns of their own.
+const OF_ENDS: &str =
+    "The pattern says how many turns either end has: wind every step as it stands, and trim neither end.";
 const BLANK: &str = "________________";
 /// The attributes of a picture may differ by the last bits of their numbers.
 const DRAWN_PX: f64 = 1e-6;
@@ -310,7 +313,9 @@ impl Expected<'_> {
         self.element(None, field, "<b>", &metres(claim.start_mark_m.unwrap_or(0.0)));
         let fix = " from end A (without the allowance) and fix the mark at the first flange. ";
         let trim_m = claim.expected_trim_m.unwrap_or(0.0);
-        if trim_m.abs() < 5e-4 {
+        if claim.end_turns[0].is_some() {
+            self.text(None, field, &format!("{fix}{OF_ENDS}"));
+        } else if trim_m.abs() < 5e-4 {
             self.text(None, field, &format!("{fix}The halves are of equal length: no trim is expected."));
         } else {
             self.text(None, field, &format!("{fix}Expected trim: "));
