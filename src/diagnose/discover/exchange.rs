@@ -1,5 +1,5 @@
-//! Listed effects of a set exchanged for others: a search that goes forward takes what promises most first, which need not be what is
-//! best beside the terms that follow.
+//! Members of a set exchanged for others: a search that goes forward takes what promises most first, which need not be what is best
+//! beside the terms that follow, and two that stand for one (a straight line and a mirrored bend for a bend) stay two.
 
 use rayon::prelude::*;
 
@@ -16,6 +16,7 @@ impl Tools<'_, '_> {
         let mut all = Vec::new();
         for place in 0..set.explanation.members.len() {
             let Some(fewer) = self.without(set, place) else { continue };
+            all.extend(self.other_terms(set, &fewer));
             let Ok(mut others) = proposals(self.question, &fewer.explanation) else { continue };
             others.retain(|p| p.gain > WORTH_LISTED && p.member != set.explanation.members[place]);
             others.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -30,6 +31,22 @@ impl Tools<'_, '_> {
             );
         }
         all
+    }
+
+    /// Other terms in the place of all of a set's, beside fewer of its listed effects.
+    fn other_terms(&self, set: &Set, fewer: &Set) -> Vec<Set> {
+        let mut bare = fewer.clone();
+        while !bare.terms.is_empty() {
+            let Some(next) = self.without(&bare, bare.len() - 1) else { return Vec::new() };
+            bare = next;
+        }
+        let bare = self.judged(bare);
+        let confirmed = |mut other: Set| {
+            other.held_out_gain = other.held_out.zip(bare.held_out).map(|(with, without)| with - without);
+            other
+        };
+        let near = |s: &Set| s.terms.len() == 1 && s.merit > set.merit - WITHIN_REACH;
+        self.onwards(&bare).into_iter().filter(near).map(confirmed).collect()
     }
 
     /// What the held-out records gained with the other set's last member, and what they gained or lost by the exchange.

@@ -380,7 +380,7 @@ impl Tools<'_, '_> {
     }
 
     /// The next sets from one, best first; all of them were fitted. None beyond the set itself is worth more: empty.
-    fn onwards(&self, set: &Set) -> Vec<Set> {
+    pub fn onwards(&self, set: &Set) -> Vec<Set> {
         let fit = &set.explanation.fit;
         let chamber = self.question.chamber;
         let (Ok(scorer), Ok(regression)) = (chamber.scorer(fit), chamber.regression(fit)) else { return Vec::new() };
