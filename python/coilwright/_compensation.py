@@ -156,12 +156,9 @@ class Compensator:
         return equation
 
     def export(self, prefix: PathLike, interval_s: float | None = None) -> None:
-        """Writes the difference equation as PREFIX.json and PREFIX.h."""
-        text, header = self._handle.difference_equation(interval_s)
+        """Writes the compensator for an embedded target as PREFIX.json and PREFIX.h, as ``compensate --export`` does."""
         stem = os.fspath(prefix)
-        for suffix, content in ((".json", text), (".h", header)):
-            with open(stem + suffix, "w", encoding="utf-8", newline="\n") as file:
-                file.write(content)
+        self._handle.export(stem + ".json", stem + ".h", interval_s)
 
     def __reduce__(self) -> tuple[Any, ...]:
         # What it is made of says it all: the same fit gives the same compensator.

@@ -213,11 +213,8 @@ def bang_bang(
     ['paper', 'bang-bang-qua']
     """
     asked = model_of(model)
-    source = _coilwright.bang_bang(asked._handle, pattern_arguments(patterns))
-    listed = Model.parse(source, path=asked.path if output is None else os.fspath(output))
-    if output is not None:
-        listed.write(output)
-    return listed
+    source = _coilwright.bang_bang(asked._handle, pattern_arguments(patterns), optional_path(output))
+    return Model.parse(source, path=asked.path if output is None else os.fspath(output))
 
 
 def schema(kind: str) -> dict[str, Any]:

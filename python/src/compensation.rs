@@ -7,10 +7,12 @@ use coilwright::compensate::formulas::Columns;
 use coilwright::compensate::stream::{Compensated, Reading, Stream};
 use coilwright::compensate::{Compensator, Method};
 use coilwright::io::files::NewFile;
+use coilwright::io::folder::{HeldFolder, check_file};
 use coilwright::io::json::Document;
 use coilwright::io::read::table_file::Source;
 use coilwright::io::write::compensation_file::{StreamError, compensate_lines};
-use coilwright::task::compensate::{Answer, Request, all_methods, compensate_record, run};
+use coilwright::record::LEAST_INTERVAL_S;
+use coilwright::task::compensate::{Answer, LONGEST_S, Request, all_methods, compensate_record, run, write_exported};
 use coilwright::task::measurement::Measurement;
 use coilwright::task::{self, TaskError};
 use coilwright::units::{deg_per_h_from_rad_per_s, kelvin_from_celsius, rad_per_s_from_deg_per_h};
@@ -21,6 +23,7 @@ use self_cell::self_cell;
 use crate::error::{raise, wrong};
 use crate::model::{ModelHandle, option};
 use crate::pattern::PatternArgument;
+use crate::reads::Reads;
 use crate::record::{RecordArgument, RecordHandle};
 use crate::tasks::{Answered, document, one_pattern};
 use crate::worker::work;
@@ -31,6 +34,18 @@ pub struct CompensatorHandle {
     answer: Arc<Answer>,
     compensator: Arc<Compensator>,
     format: coilwright::io::read::record_columns::RecordFormat,
+    reads: Arc<Reads>,
+}
+
+/// Bounds of an export's interval, as of the command.
+fn check_interval(py: Python, interval_s: Option<f64>) -> PyResult<()> {
+    match interval_s.filter(|s| !(LEAST_INTERVAL_S..=LONGEST_S).contains(s)) {
+        None => Ok(()),
+        Some(found) => {
+            let message = format!("expected a time in seconds from {LEAST_INTERVAL_S} to {LONGEST_S}, found {found}");
+            Err(raise(py, option("interval_s", message)))
+        }
+    }
 }
 
 fn method_of(py: Python, stated: &str) -> PyResult<Method> {
@@ -52,8 +67,10 @@ pub fn compensator(
     delay_s: Option<f64>,
 ) -> PyResult<(CompensatorHandle, Vec<String>)> {
     let file = Arc::clone(&model.file);
-    let (method, pattern) = (method_of(py, method)?, one_pattern(py, pattern.as_ref(), &file)?);
+    let stated = pattern.as_ref();
+    let (method, pattern) = (method_of(py, method)?, one_pattern(py, stated, &file)?);
     let fit: Option<Measurement> = fit.map(|fit| fit.measurement(py, &file.record)).transpose()?;
+    let reads = Arc::new(Reads::of(&file).patterns(stated).records(&fit));
     let format = file.record.clone();
     let worked = work(py, None, move |watcher| {
         let request =
@@ -62,7 +79,7 @@ pub fn compensator(
     })?;
     let answer = Arc::new(worked.answer);
     let compensator = Arc::new(answer.compensator.clone());
-    Ok((CompensatorHandle { answer, compensator, format }, worked.notes))
+    Ok((CompensatorHandle { answer, compensator, format, reads }, worked.notes))
 }
 
 type Batch<'py> = (Bound<'py, PyArray1<f64>>, Vec<(usize, Vec<&'static str>)>, Answered);
@@ -103,6 +120,7 @@ impl CompensatorHandle {
     /// The difference equation, as JSON and as a C header.
     #[pyo3(signature = (interval_s=None))]
     fn difference_equation(&self, py: Python, interval_s: Option<f64>) -> PyResult<(String, String)> {
+        check_interval(py, interval_s)?;
         let Some(equation) = self.answer.difference_equation(interval_s) else {
             return Err(wrong(
                 py,
@@ -113,6 +131,26 @@ impl CompensatorHandle {
         let header = equation.c_header();
         let text = serde_json::to_string_pretty(&Document::new(equation)).map_err(|e| raise(py, TaskError::from(e)))?;
         Ok((text + "\n", header))
+    }
+
+    /// Any method, as JSON and as a C header, both of one run.
+    #[pyo3(signature = (json, header, interval_s=None))]
+    fn export(&self, py: Python, json: PathBuf, header: PathBuf, interval_s: Option<f64>) -> PyResult<()> {
+        check_interval(py, interval_s)?;
+        let (answer, reads) = (Arc::clone(&self.answer), Arc::clone(&self.reads));
+        work(py, None, move |_| {
+            let paths = [json, header];
+            paths.iter().try_for_each(|path| check_file(path, reads.paths()))?;
+            let Some(texts) = answer.exported(interval_s)? else {
+                let message = "nothing can be exported without an interval, nor a model with a bias over temperature: give \
+                               interval_s or fit";
+                return Err(option("interval_s", message.to_owned()).into());
+            };
+            let holder = format!("coilwright compensate (process {})", std::process::id());
+            let _held = HeldFolder::take_prefix(&paths[0], &holder)?;
+            Ok(write_exported(&paths, texts)?)
+        })?;
+        Ok(())
     }
 
     fn stream(&self) -> StreamHandle {
@@ -215,7 +253,7 @@ pub fn compensate_file(
     path: PathBuf,
     output: Option<PathBuf>,
 ) -> PyResult<(Answered, Option<Vec<u8>>)> {
-    let (answer, format) = (Arc::clone(&handle.answer), handle.format.clone());
+    let (answer, format, reads) = (Arc::clone(&handle.answer), handle.format.clone(), Arc::clone(&handle.reads));
     let worked = work(py, None, move |_| {
         let name = path.display().to_string();
         let input = Source::open(&path)?;
@@ -226,6 +264,7 @@ pub fn compensate_file(
         let mut lines = Vec::new();
         let summary = match &output {
             Some(output) => {
+                check_file(output, reads.paths().chain([path.as_path()]))?;
                 let mut file = NewFile::create(output)?;
                 let summary = compensate_lines(&answer.compensator, &format, &name, input, &mut file).map_err(said)?;
                 file.finish()?;

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use coilwright::io::files::write_atomically;
+use coilwright::io::folder::check_file;
 use coilwright::io::json::campaign::WorkflowJson;
 use coilwright::io::json::further_schemas::{campaign_schema, compensation_schema};
 use coilwright::io::json::schema::{model_schema, pattern_schema, record_schema, schedule_schema};
@@ -18,13 +20,14 @@ use coilwright::reproduce::thesis2021::ThesisError;
 use coilwright::reproduce::{thesis2021, yan1998};
 use coilwright::task::campaign::Part;
 use coilwright::task::campaign::carrying_out::{Face, compute, merge};
-use coilwright::task::page::{REPORT_FILE, write_report};
+use coilwright::task::page::{REPORT_FILE, is_in, write_report};
 use coilwright::task::{self, Observer, TaskError};
 use pyo3::prelude::*;
 
 use crate::error::raise;
 use crate::model::{ModelHandle, option};
 use crate::pattern::{PatternArgument, all_named};
+use crate::reads::Reads;
 use crate::search::duration_of;
 use crate::tasks::{Answered, answered, document, held};
 use crate::worker::{Failure, Watcher, work};
@@ -201,6 +204,7 @@ pub fn reproduce(py: Python, publication: String, output: Option<PathBuf>) -> Py
 pub fn report(py: Python, folder: PathBuf, output: Option<PathBuf>) -> PyResult<Answered> {
     let worked = work(py, None, move |_| {
         let path = output.unwrap_or_else(|| folder.join(REPORT_FILE));
+        let _held = if is_in(&folder, &path) { held(Some(&folder), "report")? } else { None };
         let bytes = write_report(&folder, &path)?;
         Ok(document(ReportJson { report: path.display().to_string(), bytes })?)
     })?;
@@ -211,24 +215,36 @@ pub fn report(py: Python, folder: PathBuf, output: Option<PathBuf>) -> PyResult<
 #[pyfunction]
 pub fn explore(py: Python, model: &ModelHandle, patterns: Vec<PatternArgument>, output: PathBuf) -> PyResult<Answered> {
     let file = Arc::clone(&model.file);
+    let reads = Reads::of(&file).patterns(&patterns);
     let patterns = all_named(py, &patterns, file.model.coil.layers())?;
     let worked = work(py, None, move |watcher| {
+        check_file(&output, reads.paths())?;
         file.advice.iter().for_each(|advice| watcher.note(&format!("note: {advice}")));
         Ok(document(task::explore_page::write(&file, &patterns, &output)?)?)
     })?;
     Ok(answered(worked))
 }
 
-/// The text of the model in which the profiles that attain the guaranteed worst cases are listed.
+/// The text of the model in which the profiles that attain the guaranteed worst cases are listed, also as a file.
 #[pyfunction]
-pub fn bang_bang(py: Python, model: &ModelHandle, patterns: Vec<PatternArgument>) -> PyResult<String> {
+#[pyo3(signature = (model, patterns, output=None))]
+pub fn bang_bang(
+    py: Python,
+    model: &ModelHandle,
+    patterns: Vec<PatternArgument>,
+    output: Option<PathBuf>,
+) -> PyResult<String> {
     let file = Arc::clone(&model.file);
+    let reads = Reads::of(&file).patterns(&patterns);
     let patterns = all_named(py, &patterns, file.model.coil.layers())?;
     let worked = work(py, None, move |watcher| {
+        output.as_ref().map_or(Ok(()), |path| check_file(path, reads.paths()))?;
         let design = (*file).clone().for_search();
         let request = task::evaluate::Request { model: &design, patterns: &patterns };
         let extremes = task::evaluate::run(&request, &watcher)?.extremes?;
-        Ok(with_ramps(&file.path.display().to_string(), &file.source, &extremes)?)
+        let listed = with_ramps(&file.path.display().to_string(), &file.source, &extremes)?;
+        output.as_ref().map_or(Ok(()), |path| write_atomically(path, listed.as_bytes()))?;
+        Ok(listed)
     })?;
     Ok(worked.answer)
 }

@@ -12,6 +12,7 @@ mod field;
 mod further;
 mod model;
 mod pattern;
+mod reads;
 mod record;
 mod search;
 mod tasks;

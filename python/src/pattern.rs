@@ -24,6 +24,14 @@ pub enum PatternArgument {
 }
 
 impl PatternArgument {
+    /// The pattern file, if it is one.
+    pub fn file(&self) -> Option<PathBuf> {
+        match self {
+            PatternArgument::Stated(stated) => pattern_file::file_of_pattern(stated, None),
+            PatternArgument::Given(..) => None,
+        }
+    }
+
     pub fn named(&self, py: Python, layers: usize) -> PyResult<NamedPattern> {
         match self {
             PatternArgument::Stated(stated) => resolve_pattern(stated, layers, None).map_err(|e| raise(py, e)),

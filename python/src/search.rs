@@ -11,7 +11,8 @@ use coilwright::io::json::search::OptimiseJson;
 use coilwright::io::read::pattern_file::resolve_pattern;
 use coilwright::io::read::posterior::drawn_models;
 use coilwright::io::write::checkpoint::write_checkpoint;
-use coilwright::io::write::run_directory::{Request as Run, write_request};
+use coilwright::io::write::pareto_parts;
+use coilwright::io::write::run_directory::{self, Request as Run, write_request};
 use coilwright::pattern::windability::WindabilityClass;
 use coilwright::search;
 use coilwright::search::anneal::rounds::Rounds;
@@ -27,6 +28,7 @@ use pyo3::prelude::*;
 use crate::error::raise;
 use crate::model::{ModelHandle, option};
 use crate::pattern::{PatternArgument, all_named};
+use crate::reads::Reads;
 use crate::tasks::{Answered, answered, document, held, one_pattern};
 use crate::worker::{Failure, Watcher, work};
 
@@ -221,6 +223,7 @@ pub fn optimise(
             let message = format!("line {}: cannot be understood: {error}; give what diagnose answers", error.line());
             raise(py, option("diagnosis", message))
         })?;
+    let reads = Reads::of(&file).patterns(init.iter().chain(&compare_with));
     let start = one_pattern(py, init.as_ref(), &file)?;
     let former = match &compare_with {
         // The folder of a search stands for its best pattern.
@@ -237,6 +240,7 @@ pub fn optimise(
         for advice in &file.advice {
             watcher.note(&format!("note: {advice}"));
         }
+        output.as_ref().map_or(Ok(()), |folder| run_directory::check_kept(folder, reads.paths()))?;
         let _held = held(output.as_ref(), "optimise")?;
         let mut request = wishes.request(&file, prove.is_some(), former)?;
         let plan = request.plan.clone();
@@ -316,6 +320,7 @@ pub fn pareto(
     }
     let file = Arc::clone(&model.file);
     let worked = work(py, progress, move |watcher| {
+        output.as_ref().map_or(Ok(()), |folder| pareto_parts::check_kept(folder, file.files()))?;
         let _held = held(output.as_ref(), "pareto")?;
         let usual = task::pareto::Request::new(&file);
         let request = task::pareto::Request {

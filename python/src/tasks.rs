@@ -4,13 +4,15 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use coilwright::diagnose::Terms;
-use coilwright::io::folder::{HeldFolder, Replacement};
+use coilwright::io::folder::{HeldFolder, Replacement, check_file, check_read};
 use coilwright::io::json::Document;
 use coilwright::io::json::inputs::RecordInputJson;
 use coilwright::io::model::{ModelFile, NamedPattern};
 use coilwright::io::read::schedule_reader::{parse_claim, read_claim};
 use coilwright::io::read::table_file::Source;
-use coilwright::io::write::measurement_folder::check_free;
+use coilwright::io::write::measurement_folder::{
+    COMPARISON_FILE, DIAGNOSIS_FILE, METRICS_FILE, check_free, check_kept,
+};
 use coilwright::task::metrics::{Settings, measure, measure_stream};
 use coilwright::task::{self, Observer, TaskError};
 use coilwright::units::{deg_per_h_from_rad_per_s, rad_per_s_from_deg_per_h};
@@ -21,6 +23,7 @@ use serde::Serialize;
 use crate::error::raise;
 use crate::model::{ModelHandle, option};
 use crate::pattern::{PatternArgument, all_named};
+use crate::reads::Reads;
 use crate::record::{RecordArgument, gross_errors, measurements};
 use crate::worker::{Failure, Worked, work};
 
@@ -105,9 +108,11 @@ pub fn schedule(
     output: Option<PathBuf>,
 ) -> PyResult<Answered> {
     let file = Arc::clone(&model.file);
+    let reads = Reads::of(&file).patterns(&pattern);
     let pattern = one_pattern(py, pattern.as_ref(), &file)?;
     let worked = work(py, None, move |watcher| {
         let answer = task::schedule::run(&task::schedule::Request { model: &file, pattern: pattern.as_ref() })?;
+        output.as_ref().map_or(Ok(()), |folder| check_read(folder, &task::schedule::FILES, reads.paths()))?;
         let _held = held(output.as_ref(), "schedule")?;
         if let Some(folder) = &output {
             let files = answer.files(&file)?;
@@ -152,10 +157,13 @@ pub fn compare<'py>(
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<(Answered, Vec<Curve<'py>>)> {
     let file = Arc::clone(&model.file);
-    let pattern = one_pattern(py, pattern.as_ref(), &file)?;
+    let stated = pattern.as_ref();
+    let pattern = one_pattern(py, stated, &file)?;
     let gross_errors = gross_errors(py, gross)?;
     let taken = measurements(py, &records, &file.record)?;
+    let reads = Reads::of(&file).patterns(stated).records(&taken);
     let worked = work(py, progress, move |watcher| {
+        output.as_ref().map_or(Ok(()), |folder| check_kept(folder, COMPARISON_FILE, reads.paths()))?;
         let _held = held(output.as_ref(), "compare")?;
         output.as_ref().map_or(Ok(()), |folder| check_free(folder))?;
         let request = task::compare::Request {
@@ -201,9 +209,12 @@ pub fn diagnose(
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<(Answered, Option<String>, Option<String>)> {
     let file = Arc::clone(&model.file);
-    let pattern = one_pattern(py, pattern.as_ref(), &file)?;
+    let stated = pattern.as_ref();
+    let pattern = one_pattern(py, stated, &file)?;
     let (taken, held_out) = (measurements(py, &records, &file.record)?, measurements(py, &holdout, &file.record)?);
+    let reads = Reads::of(&file).patterns(stated).records(taken.iter().chain(&held_out));
     let worked = work(py, progress, move |watcher| {
+        output.as_ref().map_or(Ok(()), |folder| check_kept(folder, DIAGNOSIS_FILE, reads.paths()))?;
         let _held = held(output.as_ref(), "diagnose")?;
         output.as_ref().map_or(Ok(()), |folder| check_free(folder))?;
         let request = task::diagnose::Request {
@@ -242,9 +253,12 @@ pub fn extend(
     proposal: Option<PathBuf>,
 ) -> PyResult<(Answered, String)> {
     let file = Arc::clone(&model.file);
-    let pattern = one_pattern(py, pattern.as_ref(), &file)?;
+    let stated = pattern.as_ref();
+    let pattern = one_pattern(py, stated, &file)?;
     let (fit, holdout) = (measurements(py, &fit, &file.record)?, measurements(py, &holdout, &file.record)?);
+    let reads = Reads::of(&file).patterns(stated).records(fit.iter().chain(&holdout)).files(&proposal);
     let worked = work(py, None, move |watcher| {
+        output.as_ref().map_or(Ok(()), |path| check_file(path, reads.paths()))?;
         let place = output.clone().unwrap_or_default();
         if let Some(path) = &proposal {
             let proposed = task::proposal::read_proposal(path, &file)?;
@@ -306,6 +320,13 @@ pub fn metrics(
         })
         .collect();
     let worked = work(py, None, move |watcher| {
+        let read = |source: &Measured| match source {
+            Measured::Held(measurement) => measurement.sha256.is_some().then(|| PathBuf::from(&measurement.file)),
+            Measured::File(path) => Some(path.clone()),
+        };
+        let read: Vec<PathBuf> = sources.iter().filter_map(read).collect();
+        let reads = Reads::default().files(&read);
+        output.as_ref().map_or(Ok(()), |folder| check_kept(folder, METRICS_FILE, reads.paths()))?;
         let _held = held(output.as_ref(), "metrics")?;
         output.as_ref().map_or(Ok(()), |folder| check_free(folder))?;
         let one = |source: &Measured| -> Result<_, Failure> {
@@ -343,9 +364,12 @@ pub fn improve(
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Answered> {
     let file = Arc::clone(&model.file);
-    let pattern = one_pattern(py, pattern.as_ref(), &file)?;
+    let stated = pattern.as_ref();
+    let pattern = one_pattern(py, stated, &file)?;
     let (taken, held_out) = (measurements(py, &records, &file.record)?, measurements(py, &holdout, &file.record)?);
+    let reads = Reads::of(&file).patterns(stated).records(taken.iter().chain(&held_out));
     let worked = work(py, progress, move |watcher| {
+        check_read(&output, &task::improve::FILES, reads.paths())?;
         let _held = held(Some(&output), "improve")?;
         let request = task::improve::Request {
             model: &file,

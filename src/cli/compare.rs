@@ -49,7 +49,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
     if let Some(folder) = &arguments.output {
-        check_kept(folder, COMPARISON_FILE, screen.named())?;
+        check_kept(folder, COMPARISON_FILE, screen.named().chain(file.files()))?;
     }
     let _held = arguments.output.as_deref().map(|folder| held(folder, "compare")).transpose()?;
     if let Some(folder) = &arguments.output {

@@ -11,15 +11,17 @@ use super::screen::{Screen, run_of, table};
 use super::watching::Watching;
 use super::{CliError, Ending, offered};
 use crate::compensate::{Compensator, Method};
-use crate::io::files::{NewFile, folder_of, write_atomically};
-use crate::io::folder::{HeldFolder, Replacement};
+use crate::io::files::{NewFile, write_atomically};
+use crate::io::folder::{HeldFolder, check_file};
 use crate::io::read::model_file::read_model;
 use crate::io::read::record_columns::RecordFormat;
 use crate::io::read::table_file::Source;
 use crate::io::write::compensation_file::{CompensateJson, MeasuresJson, StreamSummary, compensate_lines_from_turn_on};
 use crate::record::LEAST_INTERVAL_S;
 use crate::report::compensation::compensation_chart;
-use crate::task::compensate::{Answer, Request, all_methods as try_all, run as compensator_for};
+use crate::task::compensate::{
+    Answer, LONGEST_S, Request, all_methods as try_all, run as compensator_for, write_exported,
+};
 use crate::task::measurement::Measurement;
 
 /// Temperature and rate in, compensated rate out, as a file or as a stream
@@ -92,6 +94,11 @@ impl From<Way> for Method {
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
+    let exported = arguments.export.iter().flat_map(|prefix| export_paths(prefix));
+    for written in arguments.output.iter().cloned().chain(exported) {
+        let records = arguments.record.iter().chain(&arguments.fit).map(PathBuf::as_path);
+        check_file(&written, file.files().chain(records).chain(arguments.pattern.iter().map(Path::new)))?;
+    }
     let format = arguments.reading.format(Some(&file))?;
     let pattern = pattern_asked(&file, arguments.pattern.as_deref())?;
     let fit = arguments.fit.as_ref().map(|path| Measurement::read(path, &format)).transpose()?;
@@ -154,9 +161,6 @@ fn interval_seconds(text: &str) -> Result<f64, String> {
         .ok_or_else(|| format!("expected a time in seconds from {LEAST_INTERVAL_S} to {LONGEST_S}, found \"{text}\""))
 }
 
-/// More than a day: no coil remembers longer.
-const LONGEST_S: f64 = 1e5;
-
 fn positive_seconds(text: &str) -> Result<f64, String> {
     let seconds = text.parse::<f64>().ok().filter(|s| s.is_finite() && *s > 0.0);
     seconds.ok_or_else(|| format!("expected a time in seconds above zero, found \"{text}\""))
@@ -199,16 +203,15 @@ fn stream(
     Ok(summary)
 }
 
+/// Of coefficients and of the program in C.
+fn export_paths(prefix: &Path) -> [PathBuf; 2] {
+    ["json", "h"].map(|extension| prefix.with_extension(extension))
+}
+
 fn export(answer: &Answer, interval_s: Option<f64>, prefix: &Path, screen: &Screen) -> Result<(), CliError> {
-    let [json, header] = answer.exported(interval_s)?.ok_or(CliError::NoExport)?;
-    let folder = folder_of(prefix);
-    let mut replacement = Replacement::of(&folder);
-    let paths = ["json", "h"].map(|extension| prefix.with_extension(extension));
-    let names = paths.each_ref().map(|path| path.file_name().unwrap_or_default());
-    names.iter().zip([json, header]).try_for_each(|(name, text)| replacement.add(name, text.as_bytes()))?;
-    // Of the two files none stays that is another run's.
-    let kinds = names.map(|name| name.to_string_lossy().into_owned());
-    replacement.commit(&kinds.each_ref().map(String::as_str))?;
+    let texts = answer.exported(interval_s)?.ok_or(CliError::NoExport)?;
+    let paths = export_paths(prefix);
+    write_exported(&paths, texts)?;
     paths.iter().for_each(|path| screen.note(&format!("wrote {}", path.display())));
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! `diagnose`: which effect a model lacks, judged by records.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::pattern_asked::pattern_asked;
 use super::records::RecordArguments;
@@ -9,6 +9,7 @@ use super::terms::TermArguments;
 use super::watching::Watching;
 use super::{CliError, Ending, offered};
 use crate::io::files::write_atomically;
+use crate::io::folder::check_file;
 use crate::io::json::diagnosis::{DiagnosisJson, FindingJson};
 use crate::io::read::model_file::read_model;
 use crate::io::write::measurement_folder::{DIAGNOSIS_FILE, check_free, check_kept};
@@ -59,7 +60,11 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
     if let Some(folder) = &arguments.output {
-        check_kept(folder, DIAGNOSIS_FILE, screen.named())?;
+        check_kept(folder, DIAGNOSIS_FILE, screen.named().chain(file.files()))?;
+    }
+    if let Some(written) = &arguments.experiment {
+        let records = arguments.records.iter().chain(&arguments.holdout).map(PathBuf::as_path);
+        check_file(written, file.files().chain(records).chain(arguments.pattern.iter().map(Path::new)))?;
     }
     let _held = arguments.output.as_deref().map(|folder| held(folder, "diagnose")).transpose()?;
     if let Some(folder) = &arguments.output {

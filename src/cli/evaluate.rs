@@ -1,12 +1,13 @@
 //! `evaluate`: what the rate error of given windings is at worst.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::pattern_asked::patterns_asked;
 use super::screen::{Screen, table};
 use super::watching::Watching;
 use super::{CliError, Ending, offered};
 use crate::io::files::write_atomically;
+use crate::io::folder::check_file;
 use crate::io::json::EvaluateJson;
 use crate::io::read::model_file::read_design;
 use crate::io::read::profile_file::read_profile_file;
@@ -41,6 +42,10 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let mut file = read_design(&arguments.model)?;
+    if let Some(written) = &arguments.bang_bang {
+        let further = arguments.profiles.iter().map(PathBuf::as_path);
+        check_file(written, file.files().chain(further).chain(arguments.pattern.iter().map(Path::new)))?;
+    }
     if let Some(path) = &arguments.profiles {
         file.profiles = read_profile_file(path)?;
     }

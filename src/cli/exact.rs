@@ -1,6 +1,6 @@
 //! `exact`: the best winding with a proof.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use super::budget::parse_duration;
@@ -10,6 +10,7 @@ use super::screen::Screen;
 use super::watching::Watching;
 use super::{CliError, Ending, offered};
 use crate::io::files::write_atomically;
+use crate::io::folder::check_file;
 use crate::io::json::ExactJson;
 use crate::io::model::NamedPattern;
 use crate::io::read::model_file::read_design;
@@ -58,6 +59,9 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let started = Instant::now();
     let file = read_design(&arguments.model)?;
+    for written in arguments.output.iter().chain(&arguments.samples) {
+        check_file(written, file.files().chain(arguments.pattern.iter().map(Path::new)))?;
+    }
     let class = arguments.windability.unwrap_or(file.search.windability);
     let request = Request {
         class,

@@ -1,10 +1,11 @@
 //! `explore`: a page in which windings of a model can be tried by hand.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::pattern_asked::patterns_asked;
 use super::screen::Screen;
 use super::{CliError, Ending, offered};
+use crate::io::folder::check_file;
 use crate::io::read::model_file::read_model;
 use crate::task::explore_page::{EXPLORER_FILE, write};
 use crate::text::sink::Line;
@@ -27,6 +28,7 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
+    check_file(&arguments.output, file.files().chain(arguments.patterns.iter().map(Path::new)))?;
     for advice in &file.advice {
         screen.note(&format!("note: {advice}"));
     }

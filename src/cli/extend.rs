@@ -1,12 +1,13 @@
 //! `extend`: a model file with one more effect, fitted to records.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::pattern_asked::pattern_asked;
 use super::records::RecordArguments;
 use super::screen::{Screen, table};
 use super::watching::Watching;
 use super::{CliError, Ending, offered};
+use crate::io::folder::check_file;
 use crate::io::json::comparison::{PartJson, RecordComparisonJson};
 use crate::io::json::diagnosis::ExtendJson;
 use crate::io::json::proposals::ProposalExtendJson;
@@ -61,6 +62,8 @@ fn named_value(stated: &str) -> Result<(String, f64), String> {
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
+    let further = arguments.fit.iter().chain(&arguments.holdout).chain(&arguments.proposal).map(PathBuf::as_path);
+    check_file(&arguments.output, file.files().chain(further).chain(arguments.pattern.iter().map(Path::new)))?;
     let pattern = pattern_asked(&file, arguments.pattern.as_deref())?;
     let fit = arguments.reading.read(&arguments.fit, Some(&file))?;
     let holdout = arguments.reading.read(&arguments.holdout, Some(&file))?;

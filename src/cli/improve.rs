@@ -52,7 +52,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let stop = StopFlag::listen();
     let file = read_model(&arguments.model)?;
     let pattern = pattern_asked(&file, arguments.pattern.as_deref())?;
-    check_read(&arguments.output, &FILES, screen.named())?;
+    check_read(&arguments.output, &FILES, screen.named().chain(file.files()))?;
     let _held = held(&arguments.output, "improve")?;
     let read = |paths: &[PathBuf]| -> Result<Vec<Measurement>, CliError> {
         paths.iter().map(|path: &PathBuf| Ok(Measurement::read(Path::new(path), &file.record)?)).collect()

@@ -209,7 +209,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     };
     searched.uncertain = &uncertain;
     let folder = arguments.output.as_deref();
-    folder.map_or(Ok(()), |folder| check_kept(folder, screen.named()))?;
+    folder.map_or(Ok(()), |folder| check_kept(folder, screen.named().chain(file.files())))?;
     let _held = folder.map(|folder| held(folder, "optimise")).transpose()?;
     searched.saved = match folder {
         Some(folder) => saved_state(arguments, folder, &request, screen)?,

@@ -32,7 +32,7 @@ pub(super) fn run(
     let wishes = Wishes { objective: Some(objective), ..options.wishes(file)? };
     let fields = arguments.field.iter().map(|path| FieldFile::read(path)).collect::<Result<Vec<_>, _>>()?;
     let folder = arguments.output.as_deref();
-    folder.map_or(Ok(()), |folder| check_kept(folder, screen.named()))?;
+    folder.map_or(Ok(()), |folder| check_kept(folder, screen.named().chain(file.files())))?;
     let _held = folder.map(|folder| held(folder, "optimise")).transpose()?;
     let class = wishes.class(file);
     let request = Search { model: file, fields: &fields, class, objective, plan: wishes.plan(file)? };

@@ -8,6 +8,7 @@ use super::watching::Watching;
 use super::{CliError, Ending};
 use crate::io::json::pareto::{ParetoJson, PointJson};
 use crate::io::read::model_file::read_design;
+use crate::io::write::pareto_parts::check_kept;
 use crate::task::pareto::{DEFAULT_MOST_CAPTIVE, DEFAULT_ROUNDS, Request, run as weigh};
 
 /// The front of worst-case error against windability and robustness
@@ -40,6 +41,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let stop = StopFlag::listen();
     let file = read_design(&arguments.model)?;
     let folder = arguments.output.as_deref();
+    folder.map_or(Ok(()), |folder| check_kept(folder, screen.named().chain(file.files())))?;
     let _held = folder.map(|folder| held(folder, "pareto")).transpose()?;
     let request = Request {
         model: &file,

@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use super::pattern_asked::pattern_asked;
 use super::screen::{Screen, held, table};
 use super::{CliError, Ending, offered};
-use crate::io::folder::Replacement;
+use crate::io::folder::{Replacement, check_read};
 use crate::io::json::schedule::{ScheduleJson, crossover_words};
 use crate::io::read::model_file::read_design;
 use crate::schedule::Schedule;
-use crate::task::schedule::{Request, run as plan};
+use crate::task::schedule::{FILES, Request, run as plan};
 
 /// The winding of a coil step by step, from the inside out
 #[derive(Debug, clap::Args)]
@@ -33,6 +33,7 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let pattern = pattern_asked(&file, arguments.pattern.as_deref())?;
     let answer = plan(&Request { model: &file, pattern: pattern.as_ref() })?;
     if let Some(folder) = &arguments.output {
+        check_read(folder, &FILES, screen.named().chain(file.files()))?;
         let _held = held(folder, "schedule")?;
         let files = answer.files(&file)?;
         Replacement::all(folder, &files)?;

@@ -48,10 +48,10 @@ pub struct Arguments {
 const FILES: [&str; 3] = ["temperatures.csv", "temperatures.svg", "rates.svg"];
 
 pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
-    if let Some(folder) = &arguments.output {
-        check_read(folder, &FILES, screen.named())?;
-    }
     let mut file = read_model(&arguments.model)?;
+    if let Some(folder) = &arguments.output {
+        check_read(folder, &FILES, screen.named().chain(file.files()))?;
+    }
     if let Some(path) = &arguments.profiles {
         file.profiles = read_profile_file(path)?;
     }

@@ -20,6 +20,8 @@ pub enum WriteError {
     Held { path: PathBuf, holder: String },
     #[error("{path} is read here, and a file of that name is written into its folder: choose another folder", path = .path.display())]
     WouldReplace { path: PathBuf },
+    #[error("{path} is read here: choose another name for what is written", path = .path.display())]
+    WouldReplaceItself { path: PathBuf },
     #[error("{path} was left there by no run, and a file of that name is written: choose another folder", path = .path.display())]
     NotOurs { path: PathBuf },
     #[error("cannot write {path}: {source}", path = .path.display())]

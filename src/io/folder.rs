@@ -74,6 +74,19 @@ pub fn check_read<'a>(
     }
 }
 
+/// As [`check_read`], of one file that is written.
+///
+/// # Errors
+/// A file that the command reads.
+pub fn check_file<'a>(written: &Path, read: impl IntoIterator<Item = &'a Path>) -> Result<(), WriteError> {
+    let Ok(place) = written.canonicalize() else { return Ok(()) };
+    let is_written = |path: &Path| path.is_file() && path.canonicalize().is_ok_and(|found| found == place);
+    match read.into_iter().find(|path| is_written(path)) {
+        Some(path) => Err(WriteError::WouldReplaceItself { path: path.to_owned() }),
+        None => Ok(()),
+    }
+}
+
 /// Refuses to write over a file of that name where none of the `marks` says that a run wrote it; a lock says so, too, which a
 /// killed run leaves.
 ///

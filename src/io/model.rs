@@ -1,7 +1,7 @@
 //! What a model file states, understood: read by `read`, answered about by `json` and `write`.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::chamber::{Estimate, Learned};
 use crate::effect::DeclaredEffect;
@@ -25,6 +25,8 @@ pub struct ModelFile {
     pub model: CoilModel,
     /// The declared pattern and its name.
     pub pattern: Option<NamedPattern>,
+    /// The file that the declared pattern stands in, where it is no winding's name.
+    pub pattern_file: Option<PathBuf>,
     pub profiles: ProfileSpec,
     pub search: SearchSettings,
     pub production: Production,
@@ -41,6 +43,11 @@ pub struct ModelFile {
 }
 
 impl ModelFile {
+    /// The files that it was read from: itself, and its pattern's.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        std::iter::once(&self.path).chain(&self.pattern_file).map(PathBuf::as_path)
+    }
+
     /// As a search sees it: profiles are courses of the air, which reaches the coil through the film that records showed.
     pub fn for_search(mut self) -> Self {
         if let Some(film) = self.learned_film() {

@@ -1,9 +1,13 @@
 //! Takes the predictable part out of a gyro's rate: a compensator as it was asked for, and all methods beside each other.
 
+use std::path::PathBuf;
+
 use crate::compensate::learned::Learned;
 use crate::compensate::stream::{Compensated, Flag, Stream};
 use crate::compensate::{CompensateError, Compensator, Method};
 use crate::effect::{Acts, DeclaredEffect};
+use crate::io::files::{WriteError, folder_of};
+use crate::io::folder::Replacement;
 use crate::io::json::Document;
 use crate::io::model::{ModelFile, NamedPattern};
 use crate::io::write::compensation_file::{BiasLineJson, CompensateJson, MeasuresJson, MethodJson, StreamSummary};
@@ -139,6 +143,23 @@ impl Answer {
         let Compensator::Physical(physical) = &self.compensator else { return None };
         DifferenceEquation::new(&self.model, physical, interval_s, self.compensator.delay_rows(interval_s))
     }
+}
+
+/// No coil remembers longer: an interval or a delay beyond is none.
+pub const LONGEST_S: f64 = 1e5;
+
+/// Writes the two files of an export in place of what an earlier one left: both are of one run.
+///
+/// # Errors
+/// Files that cannot be written.
+pub fn write_exported(paths: &[PathBuf; 2], texts: [String; 2]) -> Result<(), WriteError> {
+    let folder = folder_of(&paths[0]);
+    let mut replacement = Replacement::of(&folder);
+    let names = paths.each_ref().map(|path| path.file_name().unwrap_or_default());
+    names.iter().zip(texts).try_for_each(|(name, text)| replacement.add(name, text.as_bytes()))?;
+    // Of the two files none stays that is another run's.
+    let kinds = names.map(|name| name.to_string_lossy().into_owned());
+    replacement.commit(&kinds.each_ref().map(String::as_str))
 }
 
 /// A record, compensated row by row.

@@ -1,8 +1,9 @@
 //! The page of a folder of results.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use crate::io::files::write_atomically;
+use crate::io::files::{folder_of, write_atomically};
+use crate::io::folder::check_file;
 use crate::io::model::NamedPattern;
 use crate::io::read::run_reader::{Run, read_run};
 use crate::io::write::measurement_folder::{holds_measurements, read_measurements};
@@ -27,17 +28,31 @@ fn tried(run: &Run) -> Result<Vec<NamedPattern>, ReportError> {
     stated.map(|(name, segments)| named(name, segments)).collect()
 }
 
+/// Whether a file stands, or is to stand, in a folder itself.
+pub fn is_in(folder: &Path, path: &Path) -> bool {
+    let of = |path: &Path| path.canonicalize().ok();
+    of(folder).is_some_and(|folder| of(&folder_of(path)) == Some(folder))
+}
+
+/// What stands in a folder and is no page: a page is made of it.
+fn results(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten();
+    let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
+    paths.filter(|path| path.extension().is_none_or(|extension| extension != "html")).collect()
+}
+
 /// Makes the page of a folder, and with a search's page, where it goes into that folder, the explorer's; the page's size in
 /// bytes.
 ///
 /// # Errors
-/// A folder that holds no results, or cannot be read or written.
+/// A folder that holds no results, or cannot be read or written; a page in the place of one of them.
 pub fn write_report(folder: &Path, path: &Path) -> Result<usize, TaskError> {
+    check_file(path, results(folder).iter().map(PathBuf::as_path))?;
     let page = if holds_measurements(folder) {
         measurement_page(&read_measurements(folder)?)
     } else {
         let run = read_run(folder)?;
-        let beside = path.parent() == Some(folder);
+        let beside = is_in(folder, path);
         if beside {
             explore_page::write(&run.file, &tried(&run)?, &folder.join(EXPLORER_FILE))?;
         }

@@ -25,6 +25,17 @@ fn no_result_takes_the_place_of_what_the_command_reads() {
     copy("record.csv", "allan-1.svg");
     copy("pattern.toml", "best.toml");
     copy("model.toml", "extended.toml");
+    copy("model.toml", "schedule.csv");
+    copy("model.toml", "qua.toml");
+    copy("record.csv", "summary.csv");
+    let fleet = "kind = \"metrics\"\nname = \"f\"\n[[gyro]]\nname = \"1\"\nrecords = [\"summary.csv\"]\n";
+    std::fs::write(folder.path().join("fleet.toml"), fleet).unwrap();
+    std::fs::create_dir(folder.path().join("named")).unwrap();
+    copy("pattern.toml", "named/best.toml");
+    let model = std::fs::read_to_string(folder.path().join("model.toml")).unwrap();
+    let named = model.replace("pattern = \"qua\"", "pattern = \"best.toml\"");
+    std::fs::write(folder.path().join("named/coil.toml"), named).unwrap();
+    let same_model = "shop/../model.toml";
     let before = files(folder.path());
     let optimise = [&["optimise", "model.toml"][..], &SHORT, &["-o", "."]].concat();
     let (same, absolute) = ("shop/../record-1.csv", folder.path().display().to_string());
@@ -37,6 +48,21 @@ fn no_result_takes_the_place_of_what_the_command_reads() {
         (&["metrics", "allan-1.svg", "-o", "."], "allan-1.svg"),
         (&["temperatures", "model.toml", "temperatures.csv", "-o", "."], "temperatures.csv"),
         (&["improve", "extended.toml", "record.csv", "-o", "."], "extended.toml"),
+        (&["schedule", "schedule.csv", "-o", "."], "schedule.csv"),
+        (&["pareto", "qua.toml", "-o", "."], "qua.toml"),
+        (&["campaign", "fleet.toml", "-o", "."], "summary.csv"),
+        (&["exact", "model.toml", "-o", "model.toml"], "model.toml"),
+        (&["exact", "model.toml", "-p", "best.toml", "--samples", "./best.toml"], "best.toml"),
+        (&["explore", "model.toml", "-o", same_model], "model.toml"),
+        (&["extend", "model.toml", "--effect", "layer_gap", "-o", "model.toml"], "model.toml"),
+        (&["extend", "model.toml", "--effect", "layer_gap", "--fit", "record.csv", "-o", "record.csv"], "record.csv"),
+        (&["evaluate", "model.toml", "--bang-bang", "model.toml"], "model.toml"),
+        (&["compensate", "model.toml", "day.csv", "-o", "day.csv"], "day.csv"),
+        (&["compensate", "model.toml", "day.csv", "--fit", "record.csv", "-o", "record.csv"], "record.csv"),
+        (&["diagnose", "model.toml", "record.csv", "--experiment", "record.csv"], "record.csv"),
+        (&["report", "run", "-o", "run/summary.json"], "summary.json"),
+        // The model names the pattern that it reads.
+        (&[&["optimise", "named/coil.toml"][..], &SHORT, &["-o", "named"]].concat(), "best.toml"),
         (&[&optimise[..], &["--init=best.toml"]].concat(), "model.toml"),
         (&[&optimise[..], &["--field", "field.csv"]].concat(), "model.toml"),
     ] {

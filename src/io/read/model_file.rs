@@ -3,7 +3,7 @@
 //! A file is read whole; all its faults come at once, with the source line and key of each.
 
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::coil::{Coil, CoilError, CoilSpec, Fibre, LayerLength};
 use crate::effect::{self, DeclaredEffect, Subject};
@@ -21,7 +21,7 @@ use super::effect_tables::read_effects;
 use super::fibre_table::read_fibre;
 use super::kind_of_file::FileKind;
 use super::materials_table::{made_of, read_materials};
-use super::pattern_file::{ResolveError, resolve_pattern};
+use super::pattern_file::{ResolveError, file_of_pattern, resolve_pattern};
 use super::production_table::read_production;
 use super::profile_tables::{read_profiles, too_many_ramps};
 use super::record_columns::read_format;
@@ -90,7 +90,7 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
         Some(_) if winding.has("length_m") => winding.number(r, "length_m", Limits::between(0.1, 1e6)),
         _ => None,
     };
-    let pattern = read_pattern(r, &mut winding, layers, path);
+    let (pattern, pattern_file) = read_pattern(r, &mut winding, layers, path).unzip();
     winding.finish(r);
     let thermal_parts = read_thermal(r, &mut thermal);
     let cells = thermal.integer(r, "cells_per_layer", 1, MOST_CELLS_PER_LAYER);
@@ -165,6 +165,7 @@ pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
             source: source.to_owned(),
             model,
             pattern,
+            pattern_file: pattern_file.flatten(),
             profiles,
             search,
             production,
@@ -289,11 +290,11 @@ fn read_pattern(
     table: &mut TableReader,
     layers: Option<usize>,
     path: &Path,
-) -> Option<NamedPattern> {
+) -> Option<(NamedPattern, Option<PathBuf>)> {
     let stated = table.text(r, "pattern")?;
     let span = table.span_of("pattern");
     match resolve_pattern(stated, layers?, path.parent()) {
-        Ok(named) => Some(named),
+        Ok(named) => Some((named, file_of_pattern(stated, path.parent()))),
         Err(ResolveError::File(faults)) => {
             let shown = faults.faults.iter().map(|fault| fault.message.as_str()).collect::<Vec<_>>().join("; ");
             let message = format!("the pattern file {} has faults", faults.file);

@@ -32,6 +32,15 @@ pub enum ResolveError {
 /// No layer has more turns.
 const MOST_END_TURNS: i64 = 1_000_000;
 
+/// The file that [`resolve_pattern`] reads; none for a winding's name.
+pub fn file_of_pattern(stated: &str, base: Option<&Path>) -> Option<PathBuf> {
+    if Classic::from_key(stated).is_ok() {
+        return None;
+    }
+    let beside = base.map(|b| b.join(stated)).filter(|p| p.is_file());
+    Some(beside.unwrap_or_else(|| PathBuf::from(stated)))
+}
+
 /// A pattern by the name of a classic winding or by the path of a pattern file.
 ///
 /// A path is tried from `base` (the model file's folder), then from the working directory.
@@ -42,8 +51,7 @@ pub fn resolve_pattern(stated: &str, layers: usize, base: Option<&Path>) -> Resu
     if let Ok(classic) = Classic::from_key(stated) {
         return Ok(NamedPattern { name: classic.key().to_owned(), pattern: classic.pattern(layers)? });
     }
-    let beside = base.map(|b| b.join(stated)).filter(|p| p.is_file());
-    let path = beside.unwrap_or_else(|| PathBuf::from(stated));
+    let path = file_of_pattern(stated, base).unwrap_or_default();
     let looks_like_a_path = stated.ends_with(".toml") || stated.contains(std::path::MAIN_SEPARATOR);
     if !path.exists() && !looks_like_a_path {
         return Err(ClassicError::Unknown { found: format!("\"{stated}\"") }.into());

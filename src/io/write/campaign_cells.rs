@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map, Value};
 
 use crate::io::files::{WriteError, sha256_hex, write_atomically};
-use crate::io::folder::Replacement;
+use crate::io::folder::{Replacement, check_read};
 use crate::io::json::campaign::{BlockJson, CellDocument, CellJson, GyroJson};
 use crate::io::read::campaign_file::{Cell, Work};
 use crate::search::cost::objective::Objective;
@@ -78,6 +78,23 @@ pub fn forget_unfinished(folder: &Path) {
     let _ = std::fs::remove_dir(folder.join("unfinished"));
 }
 
+/// Refuses a folder in which the table or a picture would take the place of what the campaign reads.
+///
+/// # Errors
+/// As said.
+pub fn check_kept<'a>(folder: &Path, read: impl IntoIterator<Item = &'a Path>) -> Result<(), WriteError> {
+    let pictures = pictures_of_objectives();
+    let kinds: Vec<&str> = OF_ALL.into_iter().chain(pictures.iter().map(String::as_str)).collect();
+    check_read(folder, &kinds, read)
+}
+
+/// What every campaign's table comes with, or came with.
+const OF_ALL: [&str; 3] = ["summary.csv", "report.html", "summary.svg"];
+
+fn pictures_of_objectives() -> Vec<String> {
+    Objective::ALL.iter().map(|objective| format!("summary-{}.svg", objective.key())).collect()
+}
+
 /// Writes the table and pictures of a complete campaign, as a whole.
 ///
 /// # Errors
@@ -91,8 +108,7 @@ pub fn write_table(folder: &Path, table: &[u8], further: &[(String, String)]) ->
     let names: Vec<&str> =
         std::iter::once("summary.csv").chain(further.iter().map(|(name, _)| name.as_str())).collect();
     // Pictures of objectives that are no longer asked for go as well.
-    let former: Vec<String> =
-        Objective::ALL.iter().map(|objective| format!("summary-{}.svg", objective.key())).collect();
+    let former = pictures_of_objectives();
     let names: Vec<&str> = names.into_iter().chain(former.iter().map(String::as_str)).chain(["summary.svg"]).collect();
     files.commit(&names)
 }

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::io::files::{WriteError, sha256_hex, write_atomically};
-use crate::io::folder::{clear_left_behind, remove_numbered};
+use crate::io::folder::{check_read, clear_left_behind, remove_numbered};
 use crate::io::model::ModelFile;
 use crate::pattern::Pattern;
+use crate::pattern::classic::Classic;
 use crate::text::sink::Cell;
 
 /// What all parts of one front have in common and what a part must agree with to be kept.
@@ -49,6 +50,17 @@ pub fn files_of_front(folder: &Path) -> Vec<String> {
     }
     names.push("pareto.csv".to_owned());
     names
+}
+
+/// Refuses a folder in which a front's files would take the place of what the command reads, or in which an earlier front's
+/// go that it reads.
+///
+/// # Errors
+/// As said.
+pub fn check_kept<'a>(folder: &Path, read: impl IntoIterator<Item = &'a Path>) -> Result<(), WriteError> {
+    let classics = Classic::ALL.iter().map(|classic| format!("{}.toml", classic.key()));
+    let names: Vec<String> = files_of_front(folder).into_iter().chain(classics).collect();
+    check_read(folder, &names.iter().map(String::as_str).collect::<Vec<_>>(), read)
 }
 
 impl Front<'_> {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::io::files::{WriteError, sha256_hex};
-use crate::io::folder::Replacement;
+use crate::io::folder::{Replacement, check_read};
 use crate::io::read::campaign_file::ID_DIGITS;
 use crate::text::sink::{JsonText, ShellWord};
 use crate::units::min_from_s;
@@ -134,6 +134,7 @@ impl Workflow<'_> {
             ],
         };
         let names: Vec<&'static str> = files.iter().map(|(name, _)| *name).collect();
+        check_read(folder, &names, self.inputs.iter().map(PathBuf::as_path).chain([self.campaign]))?;
         let mut replacement = Replacement::of(folder);
         for (name, text) in &files {
             replacement.add(name, text.as_bytes())?;

@@ -7,7 +7,9 @@ use crate::io::files::WriteError;
 use crate::io::json::campaign::{CampaignJson, CellJson};
 use crate::io::read::campaign_file::grid::{Search, SearchGrid};
 use crate::io::read::campaign_file::{Cell, Kind, Work};
-use crate::io::write::campaign_cells::{forget_unfinished, is_done, read_cell, state_folder, write_cell, write_table};
+use crate::io::write::campaign_cells::{
+    check_kept, forget_unfinished, is_done, read_cell, state_folder, write_cell, write_table,
+};
 use crate::io::write::checkpoint::{read_checkpoint, write_checkpoint};
 use crate::report::built_coils::built_coils_page;
 use crate::report::campaign::{campaign_page, charts};
@@ -36,6 +38,7 @@ pub trait Face: Observer {
 /// # Errors
 /// A record that cannot be opened, a result that cannot be written.
 pub fn compute(part: &Part, folder: &Path, face: &dyn Face) -> Result<Option<usize>, TaskError> {
+    part.check_kept(folder)?;
     let mut computed = 0;
     let cells = part.cells.len();
     for (place, cell) in part.cells.iter().enumerate() {
@@ -65,6 +68,7 @@ pub fn compute(part: &Part, folder: &Path, face: &dyn Face) -> Result<Option<usi
 /// # Errors
 /// A folder that cannot be written.
 pub fn merge(whole: &Part, folder: &Path, searched: usize, observer: &dyn Observer) -> Result<CampaignJson, TaskError> {
+    whole.check_kept(folder)?;
     let (answer, table) = whole.merged(folder, searched);
     if let Some(table) = table {
         write_table(folder, &table.csv, &pages(&whole.campaign.kind, &answer, &table))?;
@@ -74,6 +78,17 @@ pub fn merge(whole: &Part, folder: &Path, searched: usize, observer: &dyn Observ
         observer.note(&missing_words(&answer));
     }
     Ok(answer)
+}
+
+impl Part<'_> {
+    /// Refuses a folder in which the campaign's table or pictures would take the place of what it reads.
+    ///
+    /// # Errors
+    /// As said.
+    fn check_kept(&self, folder: &Path) -> Result<(), WriteError> {
+        let inputs = self.campaign.inputs();
+        check_kept(folder, inputs.iter().map(PathBuf::as_path))
+    }
 }
 
 /// Which cells are missing, in a line.
