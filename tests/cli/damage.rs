@@ -210,10 +210,11 @@ fn table(text: &str, random: &mut impl Rng) -> String {
             rows[1..from].iter_mut().filter(|row| column < row.len()).for_each(|row| row[column] = "1.5".to_owned());
             later(&mut rows[at..], [1e3, 1e6, 1e9][random.random_range(0..3)]);
         }
-        // All rows as close as no clock has them.
+        // All rows as close as no clock has them, or those from one on.
         15 => {
             let step_s = [4e-11, 1e-9, 2e-6][random.random_range(0..3)];
-            rows[at..].iter_mut().enumerate().for_each(|(i, row)| row[0] = format!("{:?}", 1e-3 + step_s * i as f64));
+            let from = if random.random_range(0..2) == 0 { 1 } else { at };
+            rows[from..].iter_mut().enumerate().for_each(|(i, row)| row[0] = format!("{:?}", 1e-3 + step_s * i as f64));
         }
         _ => {
             let scale = [1e-12, 1e6, 1e30, -1.0][random.random_range(0..4)];
