@@ -5,6 +5,7 @@ mod compensation;
 mod conductivity;
 mod diagnosis;
 mod effects;
+mod every_pattern;
 mod exact_integers;
 mod exhaustive;
 mod flange;
