@@ -199,14 +199,20 @@ def _of_lines(lines: bytes) -> tuple[Array | None, Array, dict[int, list[str]]]:
     flags: dict[int, list[str]] = {}
     separator = ","
     header_seen = False
+    units_may_follow = False
     for line in lines.decode("utf-8", "replace").splitlines():
         if not line or line.startswith("#"):
             continue
         if not header_seen:
-            header_seen = True
+            header_seen = units_may_follow = True
             separator = line[: -len("flags")][-1]
             continue
         _, rate, flagged = line.rsplit(separator, 2)
+        if units_may_follow and rate == "deg_per_h":
+            # The row of units that the record has below its names.
+            units_may_follow = False
+            continue
+        units_may_follow = False
         if flagged:
             flags[len(rates)] = flagged.split("|")
         rates.append(float(rate) if rate else float("nan"))

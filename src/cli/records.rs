@@ -41,7 +41,8 @@ pub enum BadRows {
 #[command(next_help_heading = "Record files")]
 pub struct RecordArguments {
     /// Which column is which, and its unit: time=Zeit:min,temperature=T1,rate=Omega:deg_per_s; roles are time, temperature,
-    /// rate, inner, ambient, table, layer_1, layer_2 and so on, flange, spool, electronics, source; scale=N raw units a degree an hour
+    /// rate, inner, ambient, table, date (beside a time of day), layer_1, layer_2 and so on, flange, spool, electronics, source;
+    /// scale=N raw units a degree an hour
     #[arg(long, value_name = "ROLE=COLUMN[:UNIT],...")]
     columns: Option<String>,
     /// What to do with rows that lack a number or go back in time; without it, refuse

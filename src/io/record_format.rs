@@ -9,6 +9,8 @@ use crate::units::{
 /// What a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
+    /// The day of a time of day that stands in a column of its own.
+    Date,
     Time,
     Temperature,
     Rate,
@@ -76,13 +78,14 @@ impl Quantity {
     }
 
     /// As a mapping names it.
-    pub(in crate::io) const ROLES: [(&'static str, Quantity); 6] = [
+    pub(in crate::io) const ROLES: [(&'static str, Quantity); 7] = [
         ("time", Quantity::Time),
         ("temperature", Quantity::Temperature),
         ("rate", Quantity::Rate),
         ("inner", Quantity::InnerTemperature),
         ("ambient", Quantity::AmbientTemperature),
         ("table", Quantity::Table),
+        ("date", Quantity::Date),
     ];
 
     /// The names before the unit that a header may have without a mapping.
@@ -107,7 +110,7 @@ impl Quantity {
             Quantity::Time => "s",
             Quantity::Rate => "deg_per_h",
             Quantity::Table => "deg_per_s",
-            Quantity::Channel => "",
+            Quantity::Date | Quantity::Channel => "",
             _ => "c",
         }
     }
@@ -193,7 +196,7 @@ impl Kind {
         match quantity {
             Quantity::Time => Some(Kind::Time),
             Quantity::Rate | Quantity::Table => Some(Kind::Rate),
-            Quantity::Channel => None,
+            Quantity::Date | Quantity::Channel => None,
             _ => Some(Kind::Temperature),
         }
     }
@@ -270,6 +273,9 @@ impl RecordFormat {
         };
         let (name, unit) = match target.rsplit_once(':') {
             Some((name, unit)) if Kind::of(*quantity).is_some_and(|k| k.unit(unit).is_some()) => (name, Some(unit)),
+            Some(_) if *quantity == Quantity::Date => {
+                return Err(format!("{role}: expected a column's name without a unit, found \"{target}\""));
+            }
             Some((_, unit)) => {
                 let accepted = Kind::of(*quantity).map(Kind::accepted).unwrap_or_default();
                 return Err(format!("{role}: expected a unit of {accepted} behind the colon, found \"{unit}\""));

@@ -146,3 +146,57 @@ fn a_file_that_this_build_does_not_read_is_named_with_what_to_do() {
         }
     }
 }
+
+/// The rows of the plain file as a logger writes them: behind notes of its own, with a row of units, with date and time of day apart.
+fn as_loggers_write(date_from_s: f64) -> [(&'static str, String); 3] {
+    let plain = std::fs::read_to_string(file("plain.csv")).unwrap();
+    let rows: Vec<[&str; 4]> =
+        plain.lines().skip(1).map(|l| l.split(',').collect::<Vec<_>>().try_into().unwrap()).collect();
+    let joined = |row: &dyn Fn(&[&str; 4]) -> String| rows.iter().map(|r| row(r) + "\n").collect::<String>();
+    let notes = format!("Chamber logger 7\r\n\r\nSerial number;4711\nstarted, by NN,,\n{plain}");
+    let comma = |cells: &[&str]| cells.join(";").replace('.', ",");
+    let units = "Anlage 3\n\nt;Status;T1;Omega;supply_mv\n[s];;°C;deg/h;mV\n".to_owned()
+        + &joined(&|[t, c, rate, mv]| comma(&[t, "OK", c, rate, mv]));
+    let stamped = "date,time,temperature_c,rate_deg_per_h,supply_mv\n".to_owned()
+        + &joined(&|[t, c, rate, mv]| {
+            let seconds = date_from_s + t.parse::<f64>().unwrap();
+            let (day, of_day) = (1 + (seconds / 86_400.0) as u32, seconds % 86_400.0);
+            let (hours, minutes) = ((of_day / 3600.0) as u32, (of_day % 3600.0 / 60.0) as u32);
+            format!("{day:02}.03.2026,{hours:02}:{minutes:02}:{:04.1},{c},{rate},{mv}", of_day % 60.0)
+        });
+    [("--columns=", notes), ("--columns=time=t,temperature=T1,rate=Omega", units), ("--columns=", stamped)]
+}
+
+#[test]
+fn what_loggers_write_around_and_beside_the_rows_changes_no_number() {
+    let of = |arguments: &[&str]| {
+        let out = coilwright(&[&["metrics", "--format", "json"], arguments].concat());
+        assert_eq!(code(&out), 0, "{}", stderr(&out));
+        let mut document: Value = serde_json::from_str(stdout(&out)).unwrap();
+        document["records"][0]["file"] = Value::Null;
+        document["inputs"] = Value::Null;
+        (document, stderr(&out).to_owned())
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let (other, left, model) =
+        (folder.path().join("log.csv"), folder.path().join("left.csv"), path("examples/chamber-coil.toml"));
+    let (other, left) = (other.to_str().unwrap(), left.to_str().unwrap());
+    let compensated = |record: &str, columns: &str| {
+        let fit = ["--fit", record, "--method", "piecewise", "-o", left];
+        let out = coilwright(&[&["compensate", &model, record, columns][..], &fit].concat());
+        assert_eq!(code(&out), 0, "{}", stderr(&out));
+        // What comes out is a record again, with everything that stood around its rows; its rate is the compensated one.
+        of(&[left, &columns.replace(",rate=Omega", "")]).0
+    };
+    let (expected, _) = of(&[&file("plain.csv")]);
+    let expected_left = compensated(&file("plain.csv"), "--columns=");
+    // Over midnight.
+    let remarks = ["the head is line 5; the 3 lines of text above it are notes", "line 4 states units", ""];
+    for ((columns, text), remark) in as_loggers_write(86_000.0).into_iter().zip(remarks) {
+        std::fs::write(other, &text).unwrap();
+        let (found, said) = of(&[other, columns]);
+        assert_eq!(found, expected, "{text:.300}");
+        assert!(said.contains(remark), "{said}");
+        assert_eq!(compensated(other, columns), expected_left, "{text:.300}");
+    }
+}

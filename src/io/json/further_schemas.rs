@@ -169,6 +169,7 @@ pub(super) fn record_table() -> Value {
         "record: how the columns of the record files are named",
         &[],
         json!({
+            "date": described("string", "the day, where the time of day stands in a column of its own; the file's name of the column"),
             "time": mapped("time: s, ms, us, ns, min, h, d, iso, epoch_s, epoch_ms"),
             "temperature": mapped("the sensor: c, k, f"),
             "rate": mapped("deg_per_h, mdeg_per_h, deg_per_s, rad_per_s, arcsec_per_s, counts, mv, v"),

@@ -38,9 +38,9 @@ const NO_TEXT: &str = "expected text in UTF-8, found other bytes: is it the righ
 
 /// A line with what ended it.
 #[derive(Debug, Clone)]
-struct PhysicalLine {
-    bytes: Vec<u8>,
-    is_whole: bool,
+pub(super) struct PhysicalLine {
+    pub(super) bytes: Vec<u8>,
+    pub(super) is_whole: bool,
 }
 
 /// Goes through a text; what was read last is asked for by [`CsvRows::text`] and [`CsvRows::cells`].
@@ -262,7 +262,12 @@ impl<R: BufRead> CsvRows<R> {
         self.ahead.is_empty() && self.input.is_drained()
     }
 
-    fn begin_piece(&mut self) {
+    /// Lines that were looked at are still to be read.
+    pub(super) fn put_back(&mut self, lines: Vec<PhysicalLine>) {
+        lines.into_iter().rev().for_each(|line| self.ahead.push_front(line));
+    }
+
+    pub(super) fn begin_piece(&mut self) {
         self.line += self.lines_of_piece;
         self.start += self.bytes_of_piece;
         self.lines_of_piece = 0;
@@ -272,7 +277,7 @@ impl<R: BufRead> CsvRows<R> {
         self.count = 0;
     }
 
-    fn take(&mut self, line: &PhysicalLine) {
+    pub(super) fn take(&mut self, line: &PhysicalLine) {
         self.bytes_of_piece += line.bytes.len();
         self.lines_of_piece += u64::from(line.is_whole);
         match std::str::from_utf8(&line.bytes) {
@@ -330,7 +335,7 @@ impl<R: BufRead> CsvRows<R> {
     }
 
     /// The next line with its line break; a carriage return alone is one, too.
-    fn next_line(&mut self) -> io::Result<Option<PhysicalLine>> {
+    pub(super) fn next_line(&mut self) -> io::Result<Option<PhysicalLine>> {
         if let Some(line) = self.ahead.pop_front() {
             return Ok(Some(line));
         }
@@ -389,7 +394,7 @@ impl<R: io::Read> Buffered for io::BufReader<R> {
     }
 }
 
-fn is_aside(line: &str) -> bool {
+pub(super) fn is_aside(line: &str) -> bool {
     line.starts_with('#') || line.trim().is_empty()
 }
 

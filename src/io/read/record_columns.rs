@@ -1,13 +1,14 @@
 //! What the columns of a record hold: which quantity, in which unit, under which name, with which decimal sign.
 //!
-//! A name's ending says its unit (`temperature_k`), and so does a unit in brackets (`Omega [deg/s]`, `T1 (°F)`); a mapping
-//! (`time=Zeit:min,rate=Omega`, or `[record]` in a model file) says which column is which and overrides both.
+//! A name's ending says its unit (`temperature_k`), and so does a unit in brackets (`Omega [deg/s]`, `T1 (°F)`) or in a row below the
+//! names; a mapping (`time=Zeit:min,rate=Omega`, or `[record]` in a model file) says which column is which and overrides all of them.
 
 use crate::io::fault::Fault;
 use crate::io::record_format::{Conversion, Kind, UNITS, Unit, accepted_names};
 pub use crate::io::record_format::{Quantity, RecordFormat, SensorPlace};
-use crate::units::{celsius_from_kelvin, rad_per_s_from_deg_per_h, s_from_h, s_from_min, s_from_ns};
+use crate::units::{celsius_from_kelvin, rad_per_s_from_deg_per_h};
 
+use super::stamps::{DATES, STAMPS, is_stamp_pattern, seconds_of_date, seconds_of_stamp};
 use super::toml_reader::{Limits, TableReader, TomlReader, nearest};
 
 /// The `[record]` table of a model file: roles as keys, `scale`, `bad_rows`, `average_rows`.
@@ -69,23 +70,29 @@ impl Quantity {
 }
 
 impl Column {
-    fn new(name: &str, format: &RecordFormat, decimal_comma: bool) -> Result<Self, String> {
+    /// Of a name, and of the cell of a units' row below it.
+    fn new(name: &str, below: Option<&str>, format: &RecordFormat, decimal_comma: bool) -> Result<Self, String> {
         let mapped = format.mapped.iter().find(|m| m.name == name);
         let (bare, bracketed) = unbracketed(name);
+        let beside = bracketed.or(below.map(unit_in_cell));
         let of_name = Quantity::STEMS.iter().find_map(|(stem, quantity)| {
             let ending = bare.strip_prefix(stem)?.strip_prefix('_');
             let kind = Kind::of(*quantity)?;
             match ending {
                 Some(ending) => kind.unit(ending).filter(|u| u.key == ending).map(|u| (*quantity, u)),
-                None => bracketed.and_then(|b| kind.unit(b)).map(|u| (*quantity, u)),
+                None => beside.and_then(|b| unit_beside(kind, b)).map(|u| (*quantity, u)),
             }
         });
         let of_sensor = || {
-            let (place, unit) = match bracketed {
-                Some(unit) => (bare.strip_prefix("temperature_")?, unit),
-                None => bare.strip_prefix("temperature_")?.rsplit_once('_')?,
+            let ended = || {
+                let (place, unit) = bare.strip_prefix("temperature_")?.rsplit_once('_')?;
+                Some((place, Kind::Temperature.unit(unit).filter(|u| u.key == unit)?))
             };
-            let unit = Kind::Temperature.unit(unit).filter(|u| bracketed.is_some() || u.key == unit)?;
+            let stated = |unit| Some((bare.strip_prefix("temperature_")?, Kind::Temperature.unit(unit)?));
+            let (place, unit) = match bracketed {
+                Some(unit) => stated(unit)?,
+                None => ended().or_else(|| stated(beside?))?,
+            };
             Some((Quantity::Sensor(SensorPlace::named(place)?), unit))
         };
         let of_name = of_name.or_else(of_sensor);
@@ -102,7 +109,17 @@ impl Column {
                     let fits = |u: &&Unit| u.of == kind && bare.ends_with(&format!("_{}", u.key));
                     UNITS.iter().filter(fits).max_by_key(|u| u.key.len())
                 };
-                let known = stated.or_else(|| bracketed.and_then(|b| kind.unit(b))).or_else(ending);
+                let own = bracketed.and_then(|b| kind.unit(b)).or_else(ending);
+                let row = below.and_then(|cell| unit_beside(kind, unit_in_cell(cell)));
+                if let (None, Some(own), Some(row)) = (stated, own, row)
+                    && own.key != row.key
+                {
+                    return Err(format!(
+                        "column {name} is in {} by its name and in {} by the row below it: leave one out, or say which with a unit in --columns",
+                        own.key, row.key
+                    ));
+                }
+                let known = stated.or(own).or(row);
                 if known.is_none() {
                     assumed = Some(quantity.default_unit());
                 }
@@ -136,6 +153,9 @@ impl Column {
             true => "nothing".to_owned(),
             false => format!("\"{}\"", field.chars().take(40).collect::<String>()),
         };
+        if self.quantity == Quantity::Date {
+            return seconds_of_date(field).ok_or_else(&found);
+        }
         if self.conversion.is_stamp() || (self.quantity == Quantity::Time && field.contains(':')) {
             let stated = if self.decimal_comma { field.replace(',', ".") } else { field.to_owned() };
             return seconds_of_stamp(&stated).ok_or_else(&found);
@@ -157,17 +177,21 @@ impl Column {
 
     /// What its cells must be, in words.
     pub fn expected(&self) -> &'static str {
-        if self.holds_stamps() { STAMPS } else { "expected a finite number" }
+        match self.quantity {
+            Quantity::Date => DATES,
+            _ if self.conversion.is_stamp() => STAMPS,
+            _ => "expected a finite number",
+        }
     }
 
-    /// Whether its cells are dates and times.
+    /// Whether its cells are dates or times.
     pub fn holds_stamps(&self) -> bool {
-        self.conversion.is_stamp()
+        self.conversion.is_stamp() || self.quantity == Quantity::Date
     }
 
     /// Whether it must hold a number in every row.
     pub fn is_needed(&self) -> bool {
-        matches!(self.quantity, Quantity::Time | Quantity::Temperature | Quantity::Rate)
+        matches!(self.quantity, Quantity::Date | Quantity::Time | Quantity::Temperature | Quantity::Rate)
     }
 
     pub fn is_temperature(&self) -> bool {
@@ -194,6 +218,57 @@ impl Column {
     }
 }
 
+/// A unit as a row below the names states it.
+fn unit_in_cell(cell: &str) -> &str {
+    let cell = cell.trim();
+    let inside =
+        [('[', ']'), ('(', ')')].into_iter().find_map(|(open, close)| cell.strip_prefix(open)?.strip_suffix(close));
+    inside.unwrap_or(cell).trim()
+}
+
+/// Of a kind; a pattern of stamps (`hh:mm:ss`) is a unit of times.
+fn unit_beside(kind: Kind, text: &str) -> Option<&'static Unit> {
+    kind.unit(text).or_else(|| kind.unit("iso").filter(|_| is_stamp_pattern(text)))
+}
+
+/// The unit of a time of day that has its date in a column of its own, both under these names.
+fn of_day<'c>(name: &str, fields: &[&str]) -> Option<&'c str> {
+    (name == "time" && fields.contains(&"date")).then_some("iso")
+}
+
+/// Whether a row below names states the units of the columns, and is none of numbers.
+pub(super) fn states_units(names: &[&str], cells: &[&str], format: &RecordFormat, division: Division) -> bool {
+    let mut stated = 0;
+    let is_one = |(name, cell): (&&str, &&str)| {
+        let cell = unit_in_cell(cell);
+        let column = Column::new(name, None, format, division.decimal_comma);
+        let column = column.ok().filter(|c| c.quantity != Quantity::Channel);
+        let quantity = column.or_else(|| Column::new(name, Some(cell), format, division.decimal_comma).ok());
+        match quantity.and_then(|c| Kind::of(c.quantity)) {
+            Some(kind) if unit_beside(kind, cell).is_some() => {
+                stated += 1;
+                true
+            }
+            Some(_) => ["", "-"].contains(&cell),
+            None => {
+                cell.parse::<f64>().is_err()
+                    && (!division.decimal_comma || cell.replace(',', ".").parse::<f64>().is_err())
+            }
+        }
+    };
+    names.len() == cells.len() && names.iter().zip(cells).all(is_one) && stated > 0
+}
+
+/// Whether cells are a row of numbers and stamps, above which the names must have been.
+pub(super) fn are_numbers(cells: &[&str], division: Division) -> bool {
+    let is_number = |cell: &str| {
+        let pointed = if division.decimal_comma { cell.replace(',', ".") } else { cell.to_owned() };
+        pointed.parse::<f64>().is_ok() || seconds_of_stamp(&pointed).is_some() || seconds_of_date(cell).is_some()
+    };
+    let mut filled = cells.iter().filter(|cell| !cell.is_empty()).peekable();
+    filled.peek().is_some() && cells.len() > 1 && filled.all(|cell| is_number(cell))
+}
+
 /// A name without a unit in brackets at its end, and that unit.
 fn unbracketed(name: &str) -> (&str, Option<&str>) {
     for (open, close) in [('[', ']'), ('(', ')')] {
@@ -204,53 +279,6 @@ fn unbracketed(name: &str) -> (&str, Option<&str>) {
         }
     }
     (name, None)
-}
-
-/// What a stamp may look like.
-const STAMPS: &str = "expected a stamp such as 2026-03-01T10:00:00.5Z, 2026-03-01 10:00:00, 01.03.2026 10:00:00, 2026/03/01 10:00:00 or a time of day 10:00:00.5";
-
-/// Seconds of a time of day; past midnight they begin again.
-fn seconds_of_day(field: &str) -> Option<f64> {
-    let mut parts = field.split(':');
-    let (hours, minutes, seconds) = (parts.next()?, parts.next()?, parts.next().unwrap_or("0"));
-    let is_digits = |part: &str| (1..=2).contains(&part.len()) && part.bytes().all(|b| b.is_ascii_digit());
-    if parts.next().is_some()
-        || !is_digits(hours)
-        || !is_digits(minutes)
-        || !seconds.starts_with(|c: char| c.is_ascii_digit())
-    {
-        return None;
-    }
-    let whole = |part: &str, below: f64| part.parse::<f64>().ok().filter(|v| (0.0..below).contains(v));
-    // Hours of a stop watch go beyond a day's.
-    Some(s_from_h(whole(hours, 100.0)?) + s_from_min(whole(minutes, 60.0)?) + whole(seconds, 61.0)?)
-}
-
-/// With the date as ISO 8601 has it: of day, month and year between dots, and of what slashes divide where the year comes first.
-fn with_iso_date(field: &str) -> Option<String> {
-    let (date, time) = field.split_once([' ', 'T'])?;
-    let parts = |sign: char| -> Option<[&str; 3]> { date.split(sign).collect::<Vec<_>>().try_into().ok() };
-    let (year, month, day) = match (parts('.'), parts('/')) {
-        (Some([day, month, year]), _) => (year, month, day),
-        (None, Some([year, month, day])) => (year, month, day),
-        _ => return None,
-    };
-    (year.len() == 4).then(|| format!("{year}-{month:0>2}-{day:0>2}T{}", time.trim()))
-}
-
-/// Seconds since 1970 of a stamp, or since midnight; without a zone it is taken as UTC, which cancels in a record.
-fn seconds_of_stamp(field: &str) -> Option<f64> {
-    if let Some(seconds) = seconds_of_day(field) {
-        return Some(seconds);
-    }
-    let other = with_iso_date(field);
-    let field = other.as_deref().unwrap_or(field);
-    let stamp = match field.parse::<jiff::Timestamp>() {
-        Ok(stamp) => stamp,
-        Err(_) => field.parse::<jiff::civil::DateTime>().ok()?.to_zoned(jiff::tz::TimeZone::UTC).ok()?.timestamp(),
-    };
-    // Whole seconds stay whole.
-    Some(stamp.as_second() as f64 + s_from_ns(f64::from(stamp.subsec_nanosecond())))
 }
 
 /// How a file's cells are divided.
@@ -274,16 +302,17 @@ impl Division {
     }
 }
 
-/// What the header of a record says, faults included.
+/// What the header of a record says, faults included; `units` are the cells of a row below it, where there is one.
 ///
 /// # Errors
 /// Every fault of the header, as a message and a remedy.
 pub fn read_header(
     fields: &[&str],
+    units: &[String],
     format: &RecordFormat,
     division: Division,
 ) -> Result<Vec<Column>, Vec<(String, Option<String>)>> {
-    columns_of(fields, format, division)
+    columns_of(fields, units, format, division)
         .map_err(|faults| if is_toml(fields) { vec![(MODEL_GIVEN.to_owned(), None)] } else { faults })
 }
 
@@ -297,19 +326,27 @@ fn is_toml(fields: &[&str]) -> bool {
 
 fn columns_of(
     fields: &[&str],
+    units: &[String],
     format: &RecordFormat,
     division: Division,
 ) -> Result<Vec<Column>, Vec<(String, Option<String>)>> {
     let mut faults = Vec::new();
     let mut columns: Vec<Column> = Vec::with_capacity(fields.len());
-    for field in fields {
-        match Column::new(field, format, division.decimal_comma) {
+    let is_mapped = |quantity| format.mapped.iter().any(|m| m.quantity == quantity);
+    let has_date = !is_mapped(Quantity::Time) && !is_mapped(Quantity::Date);
+    for (place, field) in fields.iter().enumerate() {
+        let below = units.get(place).map(String::as_str);
+        let of_day = of_day(field, fields).filter(|_| has_date);
+        match Column::new(field, of_day.or(below), format, division.decimal_comma) {
             Ok(column) => columns.push(column),
             Err(message) => faults.push((message, None)),
         }
     }
     if !faults.is_empty() {
         return Err(faults);
+    }
+    if has_date && let Some(date) = columns.iter_mut().find(|c| c.name == "date" && fields.contains(&"time")) {
+        date.quantity = Quantity::Date;
     }
     if format.compensated && format.mapped.iter().all(|m| m.quantity != Quantity::Rate) {
         prefer_compensated(&mut columns);
@@ -380,7 +417,7 @@ mod tests {
     fn value(header: &str, mapping: &str, cell: &str) -> f64 {
         let mut format = RecordFormat::default();
         format.map_all(mapping).unwrap();
-        Column::new(header, &format, true).unwrap().value(cell).unwrap()
+        Column::new(header, None, &format, true).unwrap().value(cell).unwrap()
     }
 
     #[test]
@@ -406,7 +443,7 @@ mod tests {
         format.map_all("time=stamp:iso").unwrap();
         // Which of the two is the month, nobody knows.
         for unknown in ["03/01/2026 10:00:00", "1:2:3:4", "10:61:00", "yesterday"] {
-            assert!(Column::new("stamp", format, false).unwrap().value(unknown).is_err(), "{unknown}");
+            assert!(Column::new("stamp", None, format, false).unwrap().value(unknown).is_err(), "{unknown}");
         }
     }
 
@@ -424,6 +461,7 @@ mod tests {
         assert!(
             Column::new(
                 "F [mV]",
+                None,
                 &{
                     let mut f = RecordFormat::default();
                     f.map_all("rate=F [mV]").unwrap();

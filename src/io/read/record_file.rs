@@ -120,16 +120,16 @@ impl<'s> Reading<'s> {
             rows.number_rows();
         }
         // A text in memory does not fail.
-        let Ok(Some((piece, division))) = rows.header(|_| {}) else {
+        let Ok(Some(head)) = rows.record_head(self.format, |_| {}) else {
             return self.end(None, NO_HEADER);
         };
         let header_span = rows.span();
-        if let Piece::Broken(why) = piece {
+        if let Piece::Broken(why) = head.piece {
             self.fault(Fault::new(format!("line {}: {why}", rows.line()), Some(header_span)));
             return self.end(None, "");
         }
         let fields: Vec<&str> = rows.names().collect();
-        let columns = match read_header(&fields, self.format, division) {
+        let columns = match read_header(&fields, &head.units, self.format, head.division) {
             Ok(columns) => columns,
             Err(faults) => {
                 for (message, note) in faults {
@@ -138,6 +138,7 @@ impl<'s> Reading<'s> {
                 return self.end(None, "");
             }
         };
+        let _ = rows.units_row(&head);
         rows.expect(columns.iter().map(|c| c.quantity == Quantity::Channel));
         let mut values: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
         let mut cells = Cells::new(&columns, self.format);
@@ -178,7 +179,8 @@ impl<'s> Reading<'s> {
         if !self.faults.is_empty() {
             return self.end(None, "");
         }
-        let mut remarks = assumptions(&columns, division);
+        let mut remarks = head.remarks();
+        remarks.extend(assumptions(&columns, head.division));
         let averaged = average(&columns, values, self.format.average_rows);
         let skipped_rows = self.skipped;
         let built = build(self.file, self.lax(), &columns, averaged);
@@ -214,10 +216,16 @@ impl<'s> Reading<'s> {
             self.faults.retain(|f| !f.message.contains(&own));
             let shown = before - self.faults.len();
             self.uncounted = self.uncounted.saturating_sub(values.len() - shown);
-            let what = if column.holds_stamps() { "stamp that is understood" } else { "finite number" };
+            let what = if column.quantity == Quantity::Date {
+                "date that is understood"
+            } else if column.holds_stamps() {
+                "stamp that is understood"
+            } else {
+                "finite number"
+            };
             let message = format!("column {} holds no {what} in any of its {} rows", column.name, values.len());
             let note = match column.quantity {
-                Quantity::Time if column.holds_stamps() => column.expected(),
+                Quantity::Date | Quantity::Time if column.holds_stamps() => column.expected(),
                 Quantity::Time | Quantity::Temperature | Quantity::Rate => "the sensor failed: measure again",
                 _ => "leave the column out",
             };

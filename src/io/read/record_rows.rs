@@ -10,6 +10,7 @@ use crate::units::celsius_from_kelvin;
 
 use super::csv_rows::{CsvRows, Piece};
 use super::record_columns::{Column, Division, FLAGS, Quantity, RecordFormat, SensorPlace, read_header};
+use super::record_head::Head;
 use super::table_file::Source;
 
 /// A coil that is mostly outside of this is in other units than its header says.
@@ -22,6 +23,8 @@ const FASTEST_K_PER_S: f64 = 0.5;
 const LEAST_SWING_K: f64 = 5.0;
 /// Times above this are seconds of a calendar; they count from the first row.
 const CALENDAR_S: f64 = 1e8;
+/// Of a day, with what a clock's change and a leap second may add.
+const DAY_S: Range<f64> = 0.0..90_001.0;
 /// Rows of a stream that are handed on together.
 pub const CHUNK: usize = 65_536;
 const MOST_FAULTS: usize = 50;
@@ -51,7 +54,8 @@ pub(super) struct Cells<'c> {
     lax: bool,
     numbers: Vec<f64>,
     last_s: Option<f64>,
-    origin_s: Option<f64>,
+    /// Of the times, and the date where they have one.
+    origin_s: Option<(f64, f64)>,
 }
 
 impl<'c> Cells<'c> {
@@ -91,9 +95,24 @@ impl<'c> Cells<'c> {
             return CellsRead::Faults(vec![CellFault { message, place: None, note: None }]);
         }
         let mut faults = Vec::new();
+        let date_s = self.date_of(row.cells());
         for (place, (column, field)) in self.columns.iter().zip(row.cells()).enumerate() {
             let number = match column.value(field) {
-                Ok(value) if column.quantity == Quantity::Time => match self.time(value) {
+                // Without its date no time of day is one; the date's own cell is the fault.
+                Ok(_) if column.quantity == Quantity::Time && date_s == Some(Err(())) => f64::NAN,
+                Ok(value) if column.quantity == Quantity::Time && date_s.is_some() && !DAY_S.contains(&value) => {
+                    faults.push(CellFault {
+                        message: format!(
+                            "{}, column {}: expected a time of day beside the date, found {field}",
+                            row.place(),
+                            column.name
+                        ),
+                        place: Some(place),
+                        note: Some("a column that holds date and time needs no other for the date"),
+                    });
+                    f64::NAN
+                }
+                Ok(value) if column.quantity == Quantity::Time => match self.time(value, date_s.and_then(Result::ok)) {
                     Ok(value) => value,
                     Err(before_s) => {
                         faults.push(CellFault {
@@ -140,10 +159,19 @@ impl<'c> Cells<'c> {
         CellsRead::Row
     }
 
+    /// Seconds since 1970 at the midnight of the row's date; none where dates have no column of their own.
+    fn date_of<'r>(&self, mut cells: impl Iterator<Item = &'r str>) -> Option<Result<f64, ()>> {
+        let (place, column) = self.columns.iter().enumerate().find(|(_, c)| c.quantity == Quantity::Date)?;
+        Some(column.value(cells.nth(place)?).map_err(|_| ()))
+    }
+
     /// Since the first row where it is a calendar's; the time before where it does not increase.
-    fn time(&mut self, value: f64) -> Result<f64, f64> {
-        let origin_s = *self.origin_s.get_or_insert(if value > CALENDAR_S { value } else { 0.0 });
-        let value = value - origin_s;
+    fn time(&mut self, value: f64, date_s: Option<f64>) -> Result<f64, f64> {
+        let calendar = if value > CALENDAR_S { value } else { 0.0 };
+        let (origin_s, first_date_s) =
+            *self.origin_s.get_or_insert(date_s.map_or((calendar, 0.0), |date_s| (value, date_s)));
+        // Whole days first, so that the fractions of a second stay what they are.
+        let value = date_s.map_or(0.0, |date_s| date_s - first_date_s) + value - origin_s;
         let before = self.last_s.filter(|before| value <= *before);
         if !self.skips {
             self.last_s = Some(value);
@@ -273,16 +301,17 @@ pub fn stream_source(
         rows.number_rows();
     }
     let unreadable = |e: std::io::Error| Faults::of_file(name, format!("cannot be read: {e}"));
-    let Some((piece, division)) = rows.header(|_| {}).map_err(unreadable)? else {
+    let Some(head) = rows.record_head(format, |_| {}).map_err(unreadable)? else {
         return Err(Faults::of_file(name, NO_HEADER));
     };
-    let columns = header_columns(name, piece, &rows, format, division)?;
+    let columns = header_columns(name, &head, &rows, format)?;
+    rows.units_row(&head).map_err(unreadable)?;
     rows.expect(columns.iter().map(|c| c.quantity == Quantity::Channel));
     let place = |quantity: Quantity| columns.iter().position(|c| c.quantity == quantity).unwrap_or(0);
     let (time, temperature, rate) = (place(Quantity::Time), place(Quantity::Temperature), place(Quantity::Rate));
     let table = columns.iter().position(|c| c.quantity == Quantity::Table);
     let mut cells = Cells::new(&columns, format);
-    let remarks = remarks.into_iter().chain(assumptions(&columns, division)).collect();
+    let remarks = remarks.into_iter().chain(head.remarks()).chain(assumptions(&columns, head.division)).collect();
     let mut noticed = StreamNoticed { remarks, ..StreamNoticed::default() };
     let (mut faults, mut uncounted) = (Vec::new(), 0);
     let mut chunk: Vec<Row> = Vec::with_capacity(CHUNK);
@@ -383,19 +412,19 @@ pub(in crate::io) const NO_HEADER: &str =
 /// All faults of the header at once.
 pub(in crate::io) fn header_columns(
     name: &str,
-    piece: Piece,
+    head: &Head,
     header: &CsvRows<impl BufRead>,
     format: &RecordFormat,
-    division: Division,
 ) -> Result<Vec<Column>, Faults> {
     let source = header.text();
     let fault = |(message, note)| Fault { message, span: Some(0..source.len()), note };
     let all = |faults: Vec<Fault>| Faults { file: name.to_owned(), source: source.to_owned(), faults };
-    if let Piece::Broken(why) = piece {
+    if let Piece::Broken(why) = head.piece {
         return Err(all(vec![fault((format!("line {}: {why}", header.line()), None))]));
     }
     let fields: Vec<&str> = header.names().collect();
-    read_header(&fields, format, division).map_err(|faults| all(faults.into_iter().map(fault).collect()))
+    read_header(&fields, &head.units, format, head.division)
+        .map_err(|faults| all(faults.into_iter().map(fault).collect()))
 }
 
 #[cfg(test)]

@@ -11,7 +11,8 @@ use crate::compensate::stream::{Compensated, Flag, Reading, Stream};
 use crate::io::fault::Faults;
 use crate::io::json::metrics::{GrossErrors, RecordMetricsJson};
 use crate::io::read::csv_rows::{CsvRows, Piece};
-use crate::io::read::record_columns::{COMPENSATED, Column, Division, FLAGS, Quantity, RecordFormat};
+use crate::io::read::record_columns::{COMPENSATED, Column, FLAGS, Quantity, RecordFormat};
+use crate::io::read::record_head::Head;
 use crate::io::read::record_rows::{NO_HEADER, header_columns};
 use crate::io::table::PassedRow;
 use crate::metrics::Metrics;
@@ -141,10 +142,14 @@ pub fn compensate_lines_from_turn_on(
     let mut sink = Sink::new(std::io::BufWriter::with_capacity(1 << 16, output));
     sink.turn_on = turn_on_s.map(|for_s| TurnOn { for_s, first_s: None, sum_rad_per_s: 0.0, rows: 0 });
     let mut asides = Vec::new();
-    let Some((piece, division)) = rows.header(|line| asides.push(line.to_owned())).map_err(StreamError::Read)? else {
+    let is_comment = |line: &str| line.starts_with('#') || line.trim().is_empty();
+    // What a logger says above its columns stays, as comments.
+    let kept = |line: &str| if is_comment(line) { line.to_owned() } else { format!("# {line}") };
+    let Some(head) = rows.record_head(format, |line| asides.push(kept(line))).map_err(StreamError::Read)? else {
         return Err(Faults::of_file(name, NO_HEADER).into());
     };
-    let (places, may_hold_words) = places(name, piece, &rows, format, division, compensator)?;
+    let division = head.division;
+    let (places, may_hold_words) = places(name, &head, &rows, format, compensator)?;
     let passed_row = PassedRow { separator: division.separator, decimal_comma: division.decimal_comma };
     sink.separator = char::from(division.separator);
     asides.iter().for_each(|line| sink.plain(&passed_row.aside(line)));
@@ -152,6 +157,10 @@ pub fn compensate_lines_from_turn_on(
     rows.expect(may_hold_words.into_iter());
     let separator = sink.separator;
     sink.plain(&format!("{header}{separator}{COMPENSATED}{separator}{FLAGS}"));
+    if rows.units_row(&head).map_err(StreamError::Read)? {
+        let units = passed_row.cells(rows.text(), rows.cells());
+        sink.plain(&format!("{units}{separator}deg_per_h{separator}"));
+    }
     let mut channels = vec![None; places.columns.len()];
     let mut stream: Stream<Passed> = Stream::new(compensator);
     while let Some(piece) = rows.next().map_err(StreamError::Read)? {
@@ -186,13 +195,12 @@ pub fn compensate_lines_from_turn_on(
 /// With them, of each column whether it may hold words.
 fn places(
     name: &str,
-    piece: Piece,
+    head: &Head,
     header: &CsvRows<impl BufRead>,
     format: &RecordFormat,
-    division: Division,
     compensator: &Compensator,
 ) -> Result<(Places, Vec<bool>), Faults> {
-    let columns = header_columns(name, piece, header, format, division)?;
+    let columns = header_columns(name, head, header, format)?;
     if let Some(own) = columns.iter().find(|c| [COMPENSATED, FLAGS].contains(&c.name.as_str())) {
         let message = format!(
             "column {} is what compensating adds: expected a record that has not been compensated yet; leave the column out",
@@ -204,7 +212,7 @@ fn places(
     let count = columns.len();
     let names = compensator.channel_names();
     let needed = |c: &Column| match c.quantity {
-        Quantity::Time | Quantity::Temperature | Quantity::Rate | Quantity::InnerTemperature => true,
+        Quantity::Date | Quantity::Time | Quantity::Temperature | Quantity::Rate | Quantity::InnerTemperature => true,
         Quantity::Channel | Quantity::Sensor(_) => c.channel().is_some_and(|name| names.contains(&name.as_str())),
         Quantity::AmbientTemperature | Quantity::Table => false,
     };
@@ -232,6 +240,7 @@ fn reading<'r>(
         columns: Columns::default(),
         rate_rad_per_s: None,
     };
+    let mut date_s = 0.0;
     let mut count = 0;
     let mut next = 0;
     for cell in cells {
@@ -240,6 +249,7 @@ fn reading<'r>(
         {
             let value = column.value(cell).ok();
             match column.quantity {
+                Quantity::Date => date_s = value?,
                 Quantity::Time => found.time_s = value?,
                 Quantity::Temperature => found.temperature_k = value,
                 Quantity::Rate => found.rate_rad_per_s = value,
@@ -251,6 +261,7 @@ fn reading<'r>(
         }
         count += 1;
     }
+    found.time_s += date_s;
     if let Compensator::Physical(physical) = compensator {
         found.channel_rad_per_s = physical.channel_bias_rad_per_s(places.channels.iter().map(|c| channels[*c]));
         // The columns of formulas stand behind those of the channels' own effects.
