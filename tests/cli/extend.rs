@@ -45,6 +45,68 @@ fn before_and_after_are_comparisons_of_every_record_given() {
     assert!(written.contains("\n[[effect]]\nkind = \"finite_pack\"\n\n# Learned from a record."), "{written}");
 }
 
+/// A record in which nothing is hidden, as counts of a gyro on a table whose scale factor is 300 ppm off and drifts by so much a kelvin.
+fn counts_on_a_table(drift_ppm_per_k: f64) -> String {
+    let plain = std::fs::read_to_string(super::root().join(CONTROL).join("calibration.csv")).unwrap();
+    let mut text = "t,T1,F,Table\n".to_owned();
+    for (row, line) in plain.lines().skip(1).enumerate() {
+        let cells: Vec<f64> = line.split(',').take(3).map(|cell| cell.parse().unwrap()).collect();
+        let [time_s, temperature_c, rate_deg_per_h] = cells[..] else { panic!("{line}") };
+        let table_deg_per_s = [0.0, 1.0, -1.0][row / 40 % 3];
+        let error = 300e-6 + 1e-6 * drift_ppm_per_k * (temperature_c - 20.0);
+        let counts = 12.5 * (1.0 + error) * (3600.0 * table_deg_per_s + rate_deg_per_h);
+        text += &format!("{time_s},{temperature_c},{counts:.4},{table_deg_per_s}\n");
+    }
+    text
+}
+
+const CONTROL: &str = "tests/data/records/g-control-zyl";
+
+/// From raw output and table rate to a model that holds: what is hidden is the scale factor's error, which is named with its size
+/// and, once declared, leaves hardly more than the record without it: the rows in which the table starts, one in forty, are
+/// means over both of its rates.
+#[test]
+fn a_hidden_error_of_the_scale_factor_is_named_and_goes_with_the_model_that_declares_it() {
+    let (folder, path) = super::folder_with("table.csv", counts_on_a_table(0.0));
+    let (model, record) = (format!("{CONTROL}/coil.toml"), path.display().to_string());
+    let columns = "--columns=time=t:s,temperature=T1:c,rate=F:counts,scale=12.5,table=Table:deg_per_s";
+    let rmse = |found: &serde_json::Value| found["records"][0]["rmse_deg_per_h"].as_f64().unwrap();
+    let plain = rmse(&super::json(&["compare", &model, &format!("{CONTROL}/calibration.csv"), "-q"]));
+
+    let found = super::json(&["diagnose", &model, &record, columns, "-q"]);
+    let named: Vec<&str> = found["effects"].as_array().unwrap().iter().filter_map(|e| e["kind"].as_str()).collect();
+    assert_eq!((found["verdict"].as_str(), named.as_slice()), (Some("missing"), &["scale_factor_error"][..]));
+    let error = &found["effects"][0]["parameters"]["error_ppm"];
+    let [value, deviation] = ["value", "standard_error"].map(|key| error[key].as_f64().unwrap());
+    assert!((value - 300.0).abs() < 4.0 * deviation && deviation < 3.0, "{error}");
+
+    let new = folder.path().join("extended.toml").display().to_string();
+    let answer =
+        super::json(&["extend", &model, "--effect", "scale_factor_error", "--fit", &record, columns, "-o", &new]);
+    let (before, after) = (rmse(&answer["before"]), rmse(&answer["after"]));
+    assert!(before > 6.0 * plain && after < 1.2 * plain, "{before} to {after}, without it {plain}");
+    let again = rmse(&super::json(&["compare", &new, &record, columns, "-q"]));
+    assert!((again / after - 1.0).abs() < 0.01, "{again} {after}");
+}
+
+/// The same of one that follows the temperature, by two effects one after the other; each takes its part.
+#[test]
+fn a_scale_factor_that_follows_the_temperature_is_fitted_from_counts_and_table() {
+    let (folder, path) = super::folder_with("table.csv", counts_on_a_table(20.0));
+    let (model, record) = (format!("{CONTROL}/coil.toml"), path.display().to_string());
+    let columns = "--columns=time=t:s,temperature=T1:c,rate=F:counts,scale=12.5,table=Table:deg_per_s";
+    let rmse = |found: &serde_json::Value| found["records"][0]["rmse_deg_per_h"].as_f64().unwrap();
+    let [first, both] = ["error.toml", "both.toml"].map(|name| folder.path().join(name).display().to_string());
+    let extended = |model: &str, effect: &str, new: &str| {
+        super::json(&["extend", model, "--effect", effect, "--fit", &record, columns, "-o", new])
+    };
+    let answer = extended(&model, "scale_factor_error", &first);
+    let before = rmse(&answer["before"]);
+    let between = rmse(&answer["after"]);
+    let after = rmse(&extended(&first, "scale_factor_temperature", &both)["after"]);
+    assert!(between < before && after < before / 6.0, "{before} to {between} to {after}");
+}
+
 /// What a search makes of the extended model is what it makes of a model that declares the learned film, and not what it
 /// makes of a prescribed outermost layer.
 #[test]
