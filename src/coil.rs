@@ -39,6 +39,16 @@ pub enum LayerLength {
     Actual,
 }
 
+/// Which diameter stands in the Sagnac scale factor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SagnacDiameter {
+    /// The mean of the innermost and the outermost layer's (the paper).
+    #[default]
+    Mean,
+    /// Σ l_j 2 r_j / L: each layer's own weighs its length, so that L D is four times the area that the turns enclose.
+    ByLength,
+}
+
 /// What is needed to build a [`Coil`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoilSpec {
@@ -66,6 +76,8 @@ pub struct Coil {
     layer_length: LayerLength,
     turns: Vec<f64>,
     layer_lengths_m: Vec<f64>,
+    crossover_turns: f64,
+    sagnac: SagnacDiameter,
 }
 
 /// A stated and a computed length may differ by this much: windings are never quite full.
@@ -93,6 +105,14 @@ impl Coil {
     /// # Errors
     /// An odd or too small layer count, lengths that are missing or disagree, dimensions that are not positive.
     pub fn new(spec: CoilSpec) -> Result<Self, CoilError> {
+        Self::with_crossovers(spec, 0.0)
+    }
+
+    /// As [`Coil::new`], where each layer takes so much of a turn's fibre more to change sides: half of it at either end of the layer.
+    ///
+    /// # Errors
+    /// As [`Coil::new`]; crossovers that take all of a stated length.
+    pub fn with_crossovers(spec: CoilSpec, crossover_turns: f64) -> Result<Self, CoilError> {
         if spec.layers < 2 || !spec.layers.is_multiple_of(2) {
             return Err(CoilError::Layers { found: spec.layers });
         }
@@ -112,9 +132,18 @@ impl Coil {
         let turns_per_layer = match (spec.turns_per_layer, spec.layer_length, spec.length_m) {
             (Some(turns), _, _) => turns,
             (None, LayerLength::Actual, _) => return Err(CoilError::TurnsMissing),
-            (None, LayerLength::Equal, Some(length_m)) => length_m / (spec.layers as f64 * mean_turn_m),
+            (None, LayerLength::Equal, Some(length_m)) => {
+                length_m / (spec.layers as f64 * mean_turn_m) - crossover_turns
+            }
             (None, LayerLength::Equal, None) => return Err(CoilError::LengthMissing),
         };
+        for (quantity, found) in
+            [("1 + winding.crossover_turns", 1.0 + crossover_turns), ("the turns of a layer", turns_per_layer)]
+        {
+            if !(found > 0.0 && found.is_finite()) {
+                return Err(CoilError::NotPositive { quantity, found });
+            }
+        }
         let mut coil = Self {
             fibre: spec.fibre,
             bore_radius_m: spec.bore_radius_m,
@@ -123,6 +152,8 @@ impl Coil {
             layer_length: spec.layer_length,
             turns: vec![turns_per_layer; spec.layers],
             layer_lengths_m: Vec::new(),
+            crossover_turns,
+            sagnac: SagnacDiameter::Mean,
         };
         coil.layer_lengths_m = coil.lengths_of(&coil.turns);
         if let Some(stated_m) = spec.length_m {
@@ -147,7 +178,7 @@ impl Coil {
                     LayerLength::Equal => mean_radius_m,
                     LayerLength::Actual => self.layer_radius_m(layer),
                 };
-                std::f64::consts::TAU * radius_m * turns
+                std::f64::consts::TAU * radius_m * (turns + self.crossover_turns)
             })
             .collect()
     }
@@ -168,9 +199,21 @@ impl Coil {
             .iter()
             .zip(&self.turns)
             .zip(&turns)
-            .map(|((length_m, old), new)| length_m * new / old)
+            .map(|((length_m, old), new)| length_m * (new + self.crossover_turns) / (old + self.crossover_turns))
             .collect();
         Ok(Self { turns, layer_lengths_m, ..self.clone() })
+    }
+
+    /// The same coil with layers of other lengths, each by its factor, and as many turns.
+    pub fn with_lengths_scaled(&self, factors: &[f64]) -> Self {
+        let mut coil = self.clone();
+        coil.layer_lengths_m.iter_mut().zip(factors).for_each(|(length_m, factor)| *length_m *= factor);
+        coil
+    }
+
+    /// The same coil with another diameter in its Sagnac scale factor.
+    pub fn with_sagnac(&self, sagnac: SagnacDiameter) -> Self {
+        Self { sagnac, ..self.clone() }
     }
 
     /// The same coil with another radial pitch; radii and actual lengths follow, the bore stays.
@@ -218,6 +261,15 @@ impl Coil {
         &self.layer_lengths_m
     }
 
+    /// Fibre that each layer takes to change sides \[turns\].
+    pub fn crossover_turns(&self) -> f64 {
+        self.crossover_turns
+    }
+
+    pub fn sagnac(&self) -> SagnacDiameter {
+        self.sagnac
+    }
+
     /// L.
     pub fn length_m(&self) -> f64 {
         self.layer_lengths_m.iter().sum()
@@ -255,8 +307,40 @@ impl Coil {
         self.bore_radius_m + 0.5 * self.layers() as f64 * self.radial_pitch_m
     }
 
-    /// D, the diameter in the Sagnac scale factor.
+    /// Between the innermost and the outermost layer's.
     pub fn mean_diameter_m(&self) -> f64 {
         2.0 * self.mean_radius_m()
+    }
+
+    /// D, the diameter in the Sagnac scale factor.
+    pub fn sagnac_diameter_m(&self) -> f64 {
+        match self.sagnac {
+            SagnacDiameter::Mean => self.mean_diameter_m(),
+            SagnacDiameter::ByLength => {
+                let lengths = self.layer_lengths_m.iter().enumerate();
+                lengths.map(|(layer, length_m)| 2.0 * self.layer_radius_m(layer) * length_m).sum::<f64>()
+                    / self.length_m()
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::coil::SagnacDiameter;
+    use crate::rate::CoilModel;
+
+    #[test]
+    fn a_diameter_by_length_makes_length_times_diameter_four_times_the_area_of_all_turns() {
+        let model = CoilModel::builder("x", 24).mean_diameter_m(0.08).turns_per_layer(50.0).build().unwrap();
+        let coil = model.coil.with_sagnac(SagnacDiameter::ByLength);
+        let area_m2: f64 = (0..24).map(|j| 50.0 * std::f64::consts::PI * coil.layer_radius_m(j).powi(2)).sum();
+        assert!((coil.length_m() * coil.sagnac_diameter_m() / (4.0 * area_m2) - 1.0).abs() < 1e-13);
+        // 1 + Var(r)/r², of radii that are spread evenly.
+        let relative = 24.0 * 250e-6 / 12f64.sqrt() / 0.04 * (1.0 - 1.0 / 576.0_f64).sqrt();
+        assert!((coil.sagnac_diameter_m() / coil.mean_diameter_m() - 1.0 - relative.powi(2)).abs() < 1e-12);
+        let equal = CoilModel::builder("x", 24).mean_diameter_m(0.08).length_m(300.0).build().unwrap().coil;
+        let by_length = equal.with_sagnac(SagnacDiameter::ByLength);
+        assert!((by_length.sagnac_diameter_m() / equal.mean_diameter_m() - 1.0).abs() < 1e-14);
     }
 }

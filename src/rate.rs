@@ -266,7 +266,7 @@ impl RateModel {
 
     /// n_g/(L D) [1/m²].
     pub fn scale_per_m2(&self) -> f64 {
-        self.coil.fibre().transit_index() / (self.coil.length_m() * self.coil.mean_diameter_m())
+        self.coil.fibre().transit_index() / (self.coil.length_m() * self.coil.sagnac_diameter_m())
     }
 
     /// κ times the effects' factors [1/K].
@@ -369,7 +369,7 @@ impl RateModel {
 
     /// Δφ for a rate error: Δφ = Ω 2πLD/(λ c0) \[rad\].
     pub fn phase_rad(&self, rate_rad_per_s: f64) -> f64 {
-        rate_rad_per_s * std::f64::consts::TAU * self.coil.length_m() * self.coil.mean_diameter_m()
+        rate_rad_per_s * std::f64::consts::TAU * self.coil.length_m() * self.coil.sagnac_diameter_m()
             / (self.coil.fibre().wavelength_m * LIGHT_SPEED_M_PER_S)
     }
 
@@ -377,7 +377,7 @@ impl RateModel {
     pub fn hard_bound_rad_per_s(&self, rate_k_per_s: f64) -> f64 {
         let fibre = self.coil.fibre();
         fibre.transit_index() * fibre.path_per_k() * rate_k_per_s * self.coil.length_m()
-            / (4.0 * self.coil.mean_diameter_m())
+            / (4.0 * self.coil.sagnac_diameter_m())
     }
 
     /// The state of row `row` of a history; `channels` as named when the model was made.

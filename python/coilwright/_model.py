@@ -33,6 +33,8 @@ _TABLES = {
         "axial_pitch_um",
         "layer_length",
         "length_m",
+        "crossover_turns",
+        "sagnac_diameter",
         "pattern",
     ),
     "thermal": (

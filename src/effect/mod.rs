@@ -116,6 +116,8 @@ pub const OFFSET_OF_MIDDLE: Address = Address { spec: &midpoint_offset::SPEC, pa
 pub const DIFFUSIVITY_FACTOR: Address = Address { spec: &diffusivity::SPEC, parameter: 0, neutral: 1.0 };
 /// The film coefficient at the pack's outer surface.
 pub const FILM: Address = Address { spec: &surface_film::SPEC, parameter: 0, neutral: 0.0 };
+/// The film at a heated flange; one effect a flange.
+pub const FLANGE_FILM: Address = Address { spec: &axial_gradient::SPEC, parameter: 0, neutral: 0.0 };
 /// The heat capacity of the spool at the bore; without one nothing is held there.
 pub const SPOOL: Address = Address { spec: &spool_mass::SPEC, parameter: 0, neutral: 0.0 };
 /// The relative difference of the fibre's halves.

@@ -58,9 +58,18 @@ impl Laid {
             return Err(RateError::Layers { pattern: pattern.layers(), coil: coil.layers() });
         }
         let ends = pattern.end_turns();
-        let built = if ends.is_none() { coil.clone() } else { coil.with_turns(turns_of(coil, pattern)?)? };
+        let mut built = if ends.is_none() { coil.clone() } else { coil.with_turns(turns_of(coil, pattern)?)? };
         let added = pattern.added_turns().map_or(0.0, |(_, turns)| f64::from(turns));
         let outermost = coil.layers() - 1;
+        let crossover = coil.crossover_turns();
+        let per_turn_m = coil.layer_lengths_m()[outermost] / (coil.turns()[outermost] + crossover);
+        if added > 0.0 {
+            // Both pieces of a shared layer change sides.
+            let mut factors = vec![1.0; coil.layers()];
+            let turns = built.turns()[outermost];
+            factors[outermost] = (turns + 2.0 * crossover) / (turns + crossover);
+            built = built.with_lengths_scaled(&factors);
+        }
         let mut from_m = 0.0;
         let mut pieces = Vec::with_capacity(coil.layers() + 1);
         for piece in pattern.pieces() {
@@ -69,8 +78,8 @@ impl Laid {
             let is_shared = layer == outermost && added > 0.0;
             let (turns, length_m) = match (is_shared, piece.added_at) {
                 (false, _) => (all_turns, all_m),
-                (true, Some(_)) => (added, all_m * (added / all_turns)),
-                (true, None) => (all_turns - added, all_m * (1.0 - added / all_turns)),
+                (true, Some(_)) => (added, per_turn_m * (added + crossover)),
+                (true, None) => (all_turns - added, per_turn_m * (all_turns - added + crossover)),
             };
             let whole = coil.turns()[layer];
             let share = turns / whole;

@@ -137,7 +137,7 @@ mod tests {
     use crate::search::cost::columns::Work;
     use crate::search::cost::samples::tests::{model, profiles};
     use crate::search::cost::signs::segments_of_signs;
-    use crate::search::cost::tolerance::{Coils, ToleranceSpec};
+    use crate::search::cost::tolerance::{AsBuilt, Coils, ToleranceSpec};
     use crate::search::cost::worst_case::SolvedProfiles;
 
     fn profile_spec() -> ProfileSpec {
@@ -153,6 +153,7 @@ mod tests {
             diffusivity_sd: 0.1,
             film_sd: 0.2,
             mismatch_sd,
+            as_built: AsBuilt::default(),
             samples,
             seed: 5,
             limit_rad_per_s: None,

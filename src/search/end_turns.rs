@@ -4,6 +4,10 @@
 //! objective that is a norm of Ω is then all but convex in turns, and one minimum along a line of them is the smallest. Each pattern
 //! is tried along two lines, turns left off at either end and turns moved from one end to the other on the outermost layer; from the
 //! smallest on them neighbours in both ends' turns are followed downhill. All values are the reference's.
+//!
+//! # Source
+//! Turns that are added to or left off the ends of a coil against its thermal error: Goettsche and Bergh, US 5 506 923 (1996);
+//! Goettsche, EP 0 866 946 B1 (2006), "negative trimming".
 
 use std::collections::HashMap;
 

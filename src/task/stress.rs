@@ -90,7 +90,7 @@ impl Steady {
         let coil = model.wound_coil()?;
         let weights_m2 = LayerWeights::new(&coil, pattern)?.total_m2();
         let sum: f64 = weights_m2.iter().zip(paths).map(|(w, kappa)| w * kappa).sum();
-        let (length_m, diameter_m) = (coil.length_m(), coil.mean_diameter_m());
+        let (length_m, diameter_m) = (coil.length_m(), coil.sagnac_diameter_m());
         let mean = paths.iter().zip(coil.layer_lengths_m()).map(|(p, l)| p * l).sum::<f64>() / length_m;
         Ok(Self {
             rate_per_k: coil.fibre().transit_index() / (length_m * diameter_m) * sum,

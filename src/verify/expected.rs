@@ -11,13 +11,13 @@ pub(super) fn layer_lengths_m(truth: &Truth) -> Vec<f64> {
     let raw = &truth.model.coil;
     let wound = wound_turns(truth.model);
     let layers = raw.layers();
-    let share_m = raw.length_m() / layers as f64;
+    let (share_m, crossover) = (raw.length_m() / layers as f64, raw.crossover_turns());
     (0..layers)
         .map(|j| match raw.layer_length() {
-            LayerLength::Equal => share_m * wound[j] / raw.turns()[j],
+            LayerLength::Equal => share_m * (wound[j] + crossover) / (raw.turns()[j] + crossover),
             LayerLength::Actual => {
                 let radius_m = raw.bore_radius_m() + raw.radial_pitch_m() * (j as f64 + 0.5);
-                2.0 * std::f64::consts::PI * radius_m * wound[j]
+                2.0 * std::f64::consts::PI * radius_m * (wound[j] + crossover)
             }
         })
         .collect()

@@ -12,7 +12,7 @@ use super::heat::State;
 use super::physics::{Bias, Physics};
 use super::strain::Strain;
 use super::winding::Piece;
-use crate::coil::Coil;
+use crate::coil::{Coil, SagnacDiameter};
 use crate::units::{REFERENCE_TEMPERATURE_K, celsius_from_kelvin, deg_per_h_from_rad_per_s, rad_per_s_from_deg_per_h};
 
 /// Layers with more turns are summed in so many pieces.
@@ -71,7 +71,13 @@ impl Optics {
         let mean = (0..layers).map(|j| inverse_square(j) * lengths_m[j]).sum::<f64>() / length_m;
         let peak = (0..layers).map(|j| (inverse_square(j) - mean).abs()).fold(0.0, f64::max);
         let fibre = coil.fibre();
-        let diameter_m = 2.0 * bore_m + layers as f64 * pitch_m;
+        let diameter_m = match coil.sagnac() {
+            SagnacDiameter::Mean => 2.0 * bore_m + layers as f64 * pitch_m,
+            SagnacDiameter::ByLength => {
+                let of = |piece: &Piece| 2.0 * (bore_m + pitch_m * (piece.layer as f64 + 0.5)) * piece.length_m;
+                pieces.iter().map(of).sum::<f64>() / length_m
+            }
+        };
         Self {
             kappa_per_k: fibre.thermo_optic_per_k + fibre.refractive_index * fibre.thermal_expansion_per_k,
             // The beams meet a change at times that differ by n_g (2z − L)/c.

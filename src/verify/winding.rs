@@ -75,6 +75,7 @@ pub(super) fn read(truth: &Truth, claim: &Claim, findings: &mut Findings) -> Opt
         ends[end] = stated.clamp(0, room);
     }
     let lengths_m = layer_lengths_m(truth);
+    let crossover = truth.model.coil.crossover_turns();
     let outbound = runs_outbound(&segments);
     let piece = |layer: usize, segment: usize, turns: f64, outbound: bool| {
         // End A's fibre hangs on the rest by its high end, end B's by its low end.
@@ -89,7 +90,7 @@ pub(super) fn read(truth: &Truth, claim: &Claim, findings: &mut Findings) -> Opt
             free_turns: if is_at_second { whole[layer] - turns } else { 0.0 },
             from_m: 0.0,
             to_m: 0.0,
-            length_m: lengths_m[layer] * turns / whole[layer],
+            length_m: lengths_m[layer] * (turns + crossover) / (whole[layer] + crossover),
             outbound,
             begins_low: begins_low(segment, count),
         }

@@ -74,6 +74,35 @@ fn their_rate_error_is_found_again_turn_by_turn_with_effects_that_weigh_layers_a
 }
 
 #[test]
+fn crossovers_and_a_diameter_by_length_are_worked_out_again_with_whole_layers_and_with_split_ones() {
+    let extra = "crossover_turns = 0.6\nsagnac_diameter = \"by_length\"\nlayer_length";
+    for text in [WARM, PAPER] {
+        let (plain, file) = (model(text), model(&text.replace("layer_length", extra)));
+        let layers = file.model.coil.layers();
+        let whole = classic(Classic::Qua, layers).unwrap();
+        let all = [vec![whole.clone()], with_ends(&whole)].concat();
+        for built in all {
+            let (_, document) = plan(&file, &built);
+            let found = judged(&file, &serde_json::to_string(&document).unwrap()).unwrap();
+            assert_eq!(found.violations, [], "{}", built.pattern);
+            assert!(matches!(found.rate_check, RateCheck::Independent { .. }));
+            // Each layer, and each piece of a shared one, is 0.6 turns longer, unless the whole length is stated.
+            let per_turn_m =
+                |d: &ScheduleJson, i: usize| d.steps[i].length_m / (2e-3 * std::f64::consts::PI * d.steps[i].radius_mm);
+            let last = document.steps.len() - 1;
+            if file.model.coil.layer_length() == coilwright::coil::LayerLength::Actual {
+                for i in [0, last] {
+                    assert!((per_turn_m(&document, i) - document.steps[i].turns - 0.6).abs() < 1e-4);
+                }
+            } else {
+                let (_, without) = plan(&plain, &built);
+                assert!((document.steps[0].length_m - without.steps[0].length_m).abs() < 1e-6);
+            }
+        }
+    }
+}
+
+#[test]
 fn ends_that_were_altered_are_violations() {
     let file = model(LONG);
     let named = classic(Classic::Qua, 40).unwrap();

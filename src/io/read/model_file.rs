@@ -5,7 +5,7 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use crate::coil::{Coil, CoilError, CoilSpec, Fibre, LayerLength};
+use crate::coil::{Coil, CoilError, CoilSpec, Fibre, LayerLength, SagnacDiameter};
 use crate::effect::{self, DeclaredEffect, Subject};
 use crate::io::fault::{Fault, Faults};
 use crate::io::files::read_text;
@@ -216,6 +216,11 @@ fn read_coil(r: &mut TomlReader, table: &mut TableReader, layers: Option<usize>,
     let axial_pitch_um = table.number(r, "axial_pitch_um", pitch);
     let layer_length = table.needed_word(r, "layer_length", &["actual", "equal"]);
     let length_m = table.number(r, "length_m", Limits::between(0.1, 1e6));
+    let crossover_turns = table.number(r, "crossover_turns", Limits::between(0.0, 10.0)).unwrap_or(0.0);
+    let sagnac = match table.word(r, "sagnac_diameter", &["mean", "by_length"]) {
+        Some(1) => SagnacDiameter::ByLength,
+        _ => SagnacDiameter::Mean,
+    };
     let diameters_stated = (table.has("inner_diameter_mm"), table.has("mean_diameter_mm"));
     if diameters_stated == (false, false) {
         let expected = "a number between 1 and 10000 (or mean_diameter_mm)";
@@ -272,8 +277,8 @@ fn read_coil(r: &mut TomlReader, table: &mut TableReader, layers: Option<usize>,
         r.fault(Fault::new(message, table.span_of("radial_pitch_um")));
         return None;
     }
-    match Coil::new(spec) {
-        Ok(coil) => Some(coil),
+    match Coil::with_crossovers(spec, crossover_turns) {
+        Ok(coil) => Some(coil.with_sagnac(sagnac)),
         Err(error) => {
             let span = match error {
                 CoilError::LengthDisagrees { .. } => table.span_of("length_m"),

@@ -1,7 +1,7 @@
 //! How good a pattern is when it is built imperfectly: a seeded Monte Carlo of its worst case.
 //!
 //! ```text
-//! M_j → M_j + σ_M z_j,  pitch → pitch (1 + σ_p z),  δ → δ + σ_δ z,  K → K (1 + σ_K z),  h → h (1 + σ_h z),  m → m + σ_m z
+//! M_j → M_j + σ_M z_j − Poisson(λ),  pitch → pitch (1 + σ_p z),  δ → δ + σ_δ z,  K → K (1 + σ_K z),  h → h (1 + σ_h z),  m → m + σ_m z
 //! share_i = Var(worst | only spread i) / Σ_i Var(worst | only spread i)
 //! ```
 //!
@@ -12,6 +12,10 @@
 //! | δ | midpoint offset | `midpoint_offset_sd_m` |
 //! | K, h | diffusivity, film coefficient | `diffusivity_sd`, `film_sd` |
 //! | m | mismatch of the halves | `mismatch_sd` |
+//! | λ | whole turns that a layer loses on average | `lost_turns_mean` |
+//! | p_j | each layer's own pitch, p (1 + σ z_j): the radii and so the lengths of the layers above follow | `layer_pitch_sd` |
+//! | h_f | film at each heated flange, h_f (1 + σ z) | `flange_film_sd` |
+//! | 2δ | surplus that trimming leaves, evenly within ±t | `trim_residue_m` |
 //! | z | standard normal, one a sample and quantity | |
 //!
 //! The worst case is the guaranteed one where the model has it, else the sampled one over the declared profiles.
@@ -20,6 +24,8 @@
 //! # Source
 //! Shares one spread at a time: Saltelli et al., Global Sensitivity Analysis (2008), section 1.2.
 
+mod built;
+
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -27,7 +33,7 @@ use statrs::statistics::Statistics;
 use thiserror::Error;
 
 use crate::coil::CoilError;
-use crate::effect::{self, Address, DeclaredEffect};
+use crate::effect;
 use crate::pattern::Pattern;
 use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;
@@ -35,9 +41,23 @@ use crate::search::cost::deviates::Deviates;
 use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
 use crate::search::cost::sampled_coils::quantile;
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
+use built::built;
 
 /// Spreads of what is built, as standard deviations; zero: exact.
-#[derive(Debug, Clone, PartialEq)]
+/// What winding and trimming leave, beside the spreads of numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct AsBuilt {
+    /// Whole turns that a layer loses on average, each layer for itself.
+    pub lost_turns_mean: f64,
+    /// Relative, of each layer's own radial pitch. Only lengths follow it; what heat flows through keeps the mean pitch.
+    pub layer_pitch_sd: f64,
+    /// Relative, of the film at each heated flange for itself.
+    pub flange_film_sd: f64,
+    /// The largest asymmetric length that trimming leaves; every one up to it is as likely.
+    pub trim_residue_m: f64,
+}
+
+#[derive(Clone, PartialEq)]
 pub struct ToleranceSpec {
     /// Turns, independent from layer to layer.
     pub turns_per_layer_sd: f64,
@@ -50,10 +70,32 @@ pub struct ToleranceSpec {
     pub film_sd: f64,
     /// Absolute, of `strain_mismatch`.
     pub mismatch_sd: f64,
+    pub as_built: AsBuilt,
     pub samples: usize,
     pub seed: u64,
     /// A coil whose worst case is larger is scrap.
     pub limit_rad_per_s: Option<f64>,
+}
+
+/// Without what winding leaves as before there was any: cells of campaigns are told by it.
+impl std::fmt::Debug for ToleranceSpec {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut shown = f.debug_struct("ToleranceSpec");
+        shown
+            .field("turns_per_layer_sd", &self.turns_per_layer_sd)
+            .field("radial_pitch_sd", &self.radial_pitch_sd)
+            .field("midpoint_offset_sd_m", &self.midpoint_offset_sd_m)
+            .field("diffusivity_sd", &self.diffusivity_sd)
+            .field("film_sd", &self.film_sd)
+            .field("mismatch_sd", &self.mismatch_sd)
+            .field("samples", &self.samples)
+            .field("seed", &self.seed)
+            .field("limit_rad_per_s", &self.limit_rad_per_s);
+        if self.as_built != AsBuilt::default() {
+            shown.field("as_built", &self.as_built);
+        }
+        shown.finish()
+    }
 }
 
 /// What may spread, in the order of the shares.
@@ -65,12 +107,20 @@ pub enum Spread {
     Diffusivity,
     Film,
     Mismatch,
+    LostTurns,
+    LayerPitch,
+    FlangeFilm,
+    TrimResidue,
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum ToleranceError {
     #[error("tolerance.film_percent_sd needs a film: declare the effect surface_film or leave the spread out")]
     NoFilm,
+    #[error(
+        "tolerance.flange_film_percent_sd needs a heated flange: declare the effect axial_gradient or leave the spread out"
+    )]
+    NoFlange,
     #[error("[tolerance] states no spread: give at least one standard deviation above 0")]
     NoSpread,
     #[error("a search for the 95 % quantile needs a [tolerance] table: state there how much what is built spreads")]
@@ -122,13 +172,17 @@ impl Distribution {
 }
 
 impl Spread {
-    pub const ALL: [Spread; 6] = [
+    pub const ALL: [Spread; 10] = [
         Spread::Turns,
         Spread::RadialPitch,
         Spread::MidpointOffset,
         Spread::Diffusivity,
         Spread::Film,
         Spread::Mismatch,
+        Spread::LostTurns,
+        Spread::LayerPitch,
+        Spread::FlangeFilm,
+        Spread::TrimResidue,
     ];
 
     /// The key of its standard deviation in a model file.
@@ -140,12 +194,16 @@ impl Spread {
             Spread::Diffusivity => "diffusivity_percent_sd",
             Spread::Film => "film_percent_sd",
             Spread::Mismatch => "mismatch_sd",
+            Spread::LostTurns => "lost_turns_per_layer_mean",
+            Spread::LayerPitch => "layer_pitch_percent_sd",
+            Spread::FlangeFilm => "flange_film_percent_sd",
+            Spread::TrimResidue => "trim_residue_mm",
         }
     }
 
     /// Whether the temperature field changes with it.
     fn is_thermal(self) -> bool {
-        matches!(self, Spread::RadialPitch | Spread::Diffusivity | Spread::Film)
+        matches!(self, Spread::RadialPitch | Spread::Diffusivity | Spread::Film | Spread::FlangeFilm)
     }
 }
 
@@ -158,6 +216,10 @@ impl ToleranceSpec {
             Spread::Diffusivity => self.diffusivity_sd,
             Spread::Film => self.film_sd,
             Spread::Mismatch => self.mismatch_sd,
+            Spread::LostTurns => self.as_built.lost_turns_mean,
+            Spread::LayerPitch => self.as_built.layer_pitch_sd,
+            Spread::FlangeFilm => self.as_built.flange_film_sd,
+            Spread::TrimResidue => self.as_built.trim_residue_m,
         }
     }
 
@@ -165,9 +227,6 @@ impl ToleranceSpec {
         Spread::ALL.into_iter().filter(|s| self.sd(*s) > 0.0).collect()
     }
 }
-
-/// A factor is not varied below this: a coil with less is no coil.
-const LEAST_FACTOR: f64 = 0.1;
 
 /// The coils of a study, drawn once: every pattern is judged on the same ones.
 pub struct Coils<'a> {
@@ -207,8 +266,12 @@ impl<'a> Coils<'a> {
         if active.contains(&Spread::Film) && !has_film {
             return Err(ToleranceError::NoFilm);
         }
+        if active.contains(&Spread::FlangeFilm) && !model.effects.iter().any(|e| e.is_at(effect::FLANGE_FILM)) {
+            return Err(ToleranceError::NoFlange);
+        }
         let judge = Judge::new(model, profiles)?;
-        let deviates = Deviates::of(spec.seed, model.coil.layers(), coils);
+        let is_further = spec.as_built != AsBuilt::default();
+        let deviates = Deviates::of(spec.seed, model.coil.layers(), coils, is_further);
         Ok(Self { model, spec, active, judge, deviates })
     }
 
@@ -383,54 +446,6 @@ fn solved(model: &CoilModel, profiles: &ProfileSpec, measure: Measure) -> Result
         }
     }
     Ok(Solved::Profiles(SolvedProfiles::new(model, &profiles.profiles())?))
-}
-
-/// The model of one coil as built, with the given spreads only.
-fn built(
-    model: &CoilModel,
-    spec: &ToleranceSpec,
-    spreads: &[Spread],
-    coil: &Deviates,
-) -> Result<CoilModel, SearchError> {
-    let mut model = model.clone();
-    for &spread in spreads {
-        let index = Spread::ALL.iter().position(|s| *s == spread).unwrap_or(0);
-        let change = spec.sd(spread) * coil.others[index];
-        let factor = (1.0 + change).max(LEAST_FACTOR);
-        match spread {
-            Spread::Turns => {
-                let turns = model.coil.turns().iter().zip(&coil.turns);
-                let turns = turns.map(|(m, z)| (m + spec.turns_per_layer_sd * z).max(LEAST_FACTOR * m)).collect();
-                model.coil = model.coil.with_turns(turns)?;
-            }
-            Spread::RadialPitch => {
-                model.coil = model.coil.with_radial_pitch(model.coil.radial_pitch_m() * factor)?;
-            }
-            Spread::MidpointOffset => change_effect(&mut model, effect::OFFSET_OF_MIDDLE, |offset_m| offset_m + change),
-            Spread::Diffusivity => change_effect(&mut model, effect::DIFFUSIVITY_FACTOR, |f| f * factor),
-            Spread::Film => change_effect(&mut model, effect::FILM, |film| film * factor),
-            Spread::Mismatch => change_effect(&mut model, effect::MISMATCH_OF_HALVES, |m| m + change),
-        }
-    }
-    Ok(model)
-}
-
-/// Changes a parameter within its bounds; an effect that is not declared begins where it changes nothing.
-fn change_effect(model: &mut CoilModel, address: Address, change: impl Fn(f64) -> f64) {
-    let Address { spec, parameter: index, neutral } = address;
-    let parameter = &spec.parameters[index];
-    let within = |si: f64| si.clamp(parameter.unit.to_si(parameter.lower), parameter.unit.to_si(parameter.upper));
-    let declared = model.effects.iter_mut().find(|e| e.is_at(address));
-    let mut values = declared.as_ref().map_or(vec![neutral; spec.parameters.len()], |e| e.values().to_vec());
-    values[index] = within(change(values[index]));
-    match declared {
-        Some(effect) => {
-            if let Ok(changed) = effect.with_values(values) {
-                *effect = changed;
-            }
-        }
-        None => model.effects.extend(DeclaredEffect::new(spec, values, vec![0; spec.choices.len()])),
-    }
 }
 
 impl From<CoilError> for ToleranceError {

@@ -5,6 +5,7 @@ use crate::coil::LayerLength;
 use crate::search::anneal::rounds::Rules;
 use crate::search::cost::samples::tests::{model, profiles};
 use crate::search::cost::signs::segments_of_signs;
+use crate::search::cost::tolerance::AsBuilt;
 
 fn request<'a>(
     model: &'a CoilModel,
@@ -43,6 +44,7 @@ fn spread() -> ToleranceSpec {
         diffusivity_sd: 0.1,
         film_sd: 0.2,
         mismatch_sd: 0.0,
+        as_built: AsBuilt::default(),
         samples: 12,
         seed: 5,
         limit_rad_per_s: None,

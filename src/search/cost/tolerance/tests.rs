@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::coil::LayerLength;
+use crate::effect::DeclaredEffect;
 use crate::pattern::classic::Classic;
 use crate::search::cost::samples::tests::{model, profiles};
 
@@ -18,6 +19,7 @@ fn exact() -> ToleranceSpec {
         diffusivity_sd: 0.0,
         film_sd: 0.0,
         mismatch_sd: 0.0,
+        as_built: AsBuilt::default(),
         samples: 200,
         seed: 3,
         limit_rad_per_s: None,
@@ -71,4 +73,95 @@ fn a_film_that_is_not_there_cannot_spread_and_no_spread_is_no_study() {
     let error = study(&model, &profile_spec(), &ToleranceSpec { film_sd: 0.1, ..exact() }, &qua).unwrap_err();
     assert_eq!(error, ToleranceError::NoFilm);
     assert_eq!(study(&model, &profile_spec(), &exact(), &qua).unwrap_err(), ToleranceError::NoSpread);
+}
+
+#[test]
+fn lost_turns_are_whole_and_as_many_on_average_as_stated() {
+    let model = model(8, LayerLength::Actual, &[]);
+    let (mean, coils) = (0.7, 2000);
+    let spec = ToleranceSpec { as_built: AsBuilt { lost_turns_mean: mean, ..AsBuilt::default() }, ..exact() };
+    let drawn = Deviates::of(4, 8, 0..coils, true);
+    let lost: Vec<f64> = drawn
+        .iter()
+        .flat_map(|coil| built(&model, &spec, &[Spread::LostTurns], coil).unwrap().coil.turns().to_vec())
+        .map(|turns| 50.0 - turns)
+        .collect();
+    assert!(lost.iter().all(|turns| turns.fract() == 0.0 && *turns >= 0.0));
+    // Mean and variance of a Poisson variable are the same; four standard errors.
+    let count = lost.len() as f64;
+    assert!((lost.iter().mean() - mean).abs() < 4.0 * (mean / count).sqrt());
+    assert!((lost.iter().variance() - mean).abs() < 4.0 * ((mean + 2.0 * mean * mean) / count).sqrt());
+}
+
+#[test]
+fn a_layer_s_own_pitch_moves_the_radii_of_the_layers_above_as_a_sum_of_what_is_below() {
+    let model = model(24, LayerLength::Actual, &[]);
+    let as_built = AsBuilt { layer_pitch_sd: 0.02, ..AsBuilt::default() };
+    let spec = ToleranceSpec { as_built, ..exact() };
+    let drawn = Deviates::of(4, 24, 0..4000, true);
+    let outermost: Vec<f64> = drawn
+        .iter()
+        .map(|coil| {
+            let coil = built(&model, &spec, &[Spread::LayerPitch], coil).unwrap().coil;
+            assert_eq!(coil.turns(), model.coil.turns());
+            coil.layer_lengths_m()[23] / (50.0 * std::f64::consts::TAU) - coil.layer_radius_m(23)
+        })
+        .collect();
+    // 23 pitches below and half of its own.
+    let expected_m = 0.02 * model.coil.radial_pitch_m() * 23.25_f64.sqrt();
+    assert!((outermost.iter().std_dev() / expected_m - 1.0).abs() < 4.0 / 8000.0_f64.sqrt());
+}
+
+#[test]
+fn what_trimming_leaves_is_even_and_adds_what_surplus_fibre_does() {
+    let model = model(8, LayerLength::Equal, &[]);
+    let as_built = AsBuilt { trim_residue_m: 8.0, ..AsBuilt::default() };
+    let spec = ToleranceSpec { as_built, samples: 2000, ..exact() };
+    let qua = Classic::Qua.pattern(8).unwrap();
+    let found = &study(&model, &profile_spec(), &spec, &[qua]).unwrap()[0];
+    assert_eq!(found.variance_shares, vec![(Spread::TrimResidue, 1.0)]);
+    // Where the residue makes most of the error, that is linear in its size: quantiles lie as those of an even spread.
+    let (p60, p90) = (found.quantile_rad_per_s(0.6), found.quantile_rad_per_s(0.9));
+    let (p75, slope) = (found.quantile_rad_per_s(0.75), (p90 - p60) / 0.3);
+    assert!(slope > 0.0 && (p75 - 0.5 * (p60 + p90)).abs() < 0.05 * (p90 - p60), "{p60} {p75} {p90}");
+    // The largest is that of t/2 of surplus at one end.
+    let most = model.with_effect(DeclaredEffect::new(effect::OFFSET_OF_MIDDLE.spec, vec![4.0], vec![0]).unwrap());
+    let least = model.with_effect(DeclaredEffect::new(effect::OFFSET_OF_MIDDLE.spec, vec![-4.0], vec![0]).unwrap());
+    let of = |model: &CoilModel| {
+        let step = UnitStep::new(model, 0.003).unwrap();
+        step.guaranteed(model, &Classic::Qua.pattern(8).unwrap()).unwrap().rate_rad_per_s
+    };
+    let largest = of(&most).max(of(&least));
+    let drawn = found.worst_rad_per_s[1999];
+    assert!(drawn <= largest * (1.0 + 1e-9) && drawn > 0.995 * largest, "{drawn} {largest}");
+}
+
+#[test]
+fn films_at_two_flanges_that_differ_heat_a_coil_that_equal_ones_heat_evenly() {
+    let flange = |second: usize| {
+        let spec = effect::FLANGE_FILM.spec;
+        let start = DeclaredEffect::at_start(spec);
+        DeclaredEffect::new(spec, start.values().to_vec(), vec![second]).unwrap()
+    };
+    let model = model(8, LayerLength::Actual, &["surface_film"]).with_effect(flange(0)).with_effect(flange(1));
+    let as_built = AsBuilt { flange_film_sd: 0.2, ..AsBuilt::default() };
+    let spec = ToleranceSpec { as_built, samples: 40, ..exact() };
+    let dip = Classic::Dip.pattern(8).unwrap();
+    let found = &study(&model, &profile_spec(), &spec, &[dip.clone()]).unwrap()[0];
+    assert_eq!(found.variance_shares, vec![(Spread::FlangeFilm, 1.0)]);
+    let spread = found.worst_rad_per_s[39] - found.worst_rad_per_s[0];
+    assert!(spread > 1e-5 * found.nominal_rad_per_s, "{spread} {}", found.nominal_rad_per_s);
+    for coil in Deviates::of(spec.seed, 8, 0..40, true) {
+        let films = |model: &CoilModel| -> Vec<f64> {
+            model.effects.iter().filter(|e| e.is_at(effect::FLANGE_FILM)).map(|e| e.values()[0]).collect()
+        };
+        let (as_declared, as_built) =
+            (films(&model), films(&built(&model, &spec, &[Spread::FlangeFilm], &coil).unwrap()));
+        for (i, z) in coil.flanges.into_iter().enumerate() {
+            assert!((as_built[i] / as_declared[i] - (1.0 + 0.2 * z)).abs() < 1e-12);
+        }
+    }
+    let without = super::super::samples::tests::model(8, LayerLength::Equal, &[]);
+    let error = study(&without, &profile_spec(), &spec, &[dip]).unwrap_err();
+    assert_eq!(error, ToleranceError::NoFlange);
 }
