@@ -147,7 +147,7 @@ fn films_at_two_flanges_that_differ_heat_a_coil_that_equal_ones_heat_evenly() {
     let as_built = AsBuilt { flange_film_sd: 0.2, ..AsBuilt::default() };
     let spec = ToleranceSpec { as_built, samples: 40, ..exact() };
     let dip = Classic::Dip.pattern(8).unwrap();
-    let found = &study(&model, &profile_spec(), &spec, &[dip.clone()]).unwrap()[0];
+    let found = &study(&model, &profile_spec(), &spec, std::slice::from_ref(&dip)).unwrap()[0];
     assert_eq!(found.variance_shares, vec![(Spread::FlangeFilm, 1.0)]);
     let spread = found.worst_rad_per_s[39] - found.worst_rad_per_s[0];
     assert!(spread > 1e-5 * found.nominal_rad_per_s, "{spread} {}", found.nominal_rad_per_s);
