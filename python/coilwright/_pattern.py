@@ -154,7 +154,7 @@ class Pattern(Sequence[int]):
             wound.append((self.layers, self.layers))
             layers.append(self.layers)
         return WindingGraph(
-            tuple(WindingStep(*piece, *step) for piece, step in zip(wound, steps)),
+            tuple(WindingStep(layer, segment, *step) for (layer, segment), step in zip(wound, steps)),
             captive_run,
             tuple(zip(layers, layers[1:])),
         )
