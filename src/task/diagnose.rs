@@ -90,7 +90,14 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
     let all: Vec<&Record> = records.iter().chain(&holdout).collect();
     let seed = request.experiment_seed.filter(|_| !diagnosis.effects.is_empty());
     let experiment = match Chamber::of(&all).zip(seed) {
-        Some((chamber, seed)) => design(&diagnose::contest(&asked, &diagnosis)?, &chamber, seed),
+        Some((chamber, seed)) => match diagnose::contest(&asked, &diagnosis) {
+            Ok(contest) => design(&contest, &chamber, seed),
+            // What was found holds without it.
+            Err(error) => {
+                observer.note(&format!("no experiment could be planned: {error}"));
+                None
+            }
+        },
         None => None,
     };
     let holdout_noise = (!holdout.is_empty()).then(|| noise_of(&holdout));

@@ -108,7 +108,8 @@ pub(in crate::diagnose) fn discover<'a>(
     }
     let fitted = found.explanations.iter().map(|e| e.merit).fold(f64::NEG_INFINITY, f64::max);
     let Some(contender) = contender.filter(|set| set.merit > fitted + BEATS) else { return Ok(None) };
-    let anew = anew::anew(question, found, allowed, &contender, best_listed - contender.total())?;
+    // A chamber that cannot be looked through with the set speaks against the set alone.
+    let anew = anew::anew(question, found, allowed, &contender, best_listed - contender.total()).unwrap_or_default();
     Ok(anew.map(|(discovered, chamber)| (discovered, Some(chamber))))
 }
 
