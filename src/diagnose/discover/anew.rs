@@ -10,12 +10,11 @@
 
 use rayon::prelude::*;
 
+use super::grammar::Allowed;
 use super::search::{MOST_TERMS, Set, WITHIN_REACH};
 use super::{BEATS, Discovered, concluded, tools};
 use crate::chamber::{Chamber, ChamberError, Effort, Fit};
 use crate::diagnose::joint::{Explanation, Found, Question, fitted};
-
-use super::grammar::Allowed;
 
 /// The discovery in a chamber that was looked through with a set, and that chamber; None where the set is not better on
 /// average. `behind` says by how much it is worse where it was found.
@@ -58,9 +57,7 @@ fn again(question: &Question, found: &Found, known: &Explanation) -> Option<Expl
     let begin = (known.fit.assumed.clone(), known.fit.free.clone());
     let mut own = fitted(question, &found.windings, known.members.clone(), &begin, &known.fit, Effort::FULL)?;
     if !question.held_out.is_empty() {
-        let one = |&r: &usize| question.chamber.held_out(&own.fit, r).map(|fit| fit.evidence);
-        let scores: Result<Vec<f64>, ChamberError> = question.held_out.iter().map(one).collect();
-        own.held_out = Some(scores.map_or(f64::NEG_INFINITY, |s| s.iter().sum()));
+        own.held_out = Some(question.held_out_evidence(&own.fit));
     }
     Some(own)
 }

@@ -18,7 +18,7 @@ use super::courses::Courses;
 use super::grammar::{Family, Term};
 use crate::chamber::{Column, Effort, Fit, Input, Scored, Scorer};
 use crate::diagnose::joint::{
-    EFFECT, Explanation, Member, Outcome, Proposal, Question, Winding, fitted, proposals, rates, with, without,
+    EFFECT, Explanation, Member, Proposal, Question, Winding, fitted, proposals, rates, with, without,
 };
 use crate::numeric::maximise::golden_section_within;
 
@@ -369,13 +369,7 @@ impl Tools<'_, '_> {
         }
         let mut frozen = set.explanation.fit.clone();
         frozen.assumed.inputs.iter_mut().for_each(|input| input.deviation = 0.0);
-        let scores: Outcome<Vec<f64>> = self
-            .question
-            .held_out
-            .iter()
-            .map(|&r| self.question.chamber.held_out(&frozen, r).map(|fit| fit.evidence))
-            .collect();
-        set.held_out = Some(scores.map_or(f64::NEG_INFINITY, |s| s.iter().sum()));
+        set.held_out = Some(self.question.held_out_evidence(&frozen));
         set
     }
 

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::explanation::{fitted, without};
 use super::odds::{CERTAIN, WINDOW};
 use super::{Explanation, Question, Winding};
-use crate::chamber::{ChamberError, Effort};
+use crate::chamber::Effort;
 
 /// Sets that are judged by held-out records at most.
 const JUDGED: usize = 8;
@@ -55,12 +55,7 @@ pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mu
             *e = again;
         }
         if !question.held_out.is_empty() {
-            let scores: Result<Vec<f64>, ChamberError> = question
-                .held_out
-                .iter()
-                .map(|&r| question.chamber.held_out(&e.fit, r).map(|fit| fit.evidence))
-                .collect();
-            e.held_out = Some(scores.map_or(f64::NEG_INFINITY, |s| s.iter().sum()));
+            e.held_out = Some(question.held_out_evidence(&e.fit));
         }
     });
     order(explanations);

@@ -42,6 +42,15 @@ pub struct Question<'a> {
     pub depth: usize,
 }
 
+impl Question<'_> {
+    /// Log evidence of the held-out records with the coil's numbers as a fit has them; −∞ where one cannot be solved.
+    pub fn held_out_evidence(&self, fit: &Fit) -> f64 {
+        let scores: Outcome<Vec<f64>> =
+            self.held_out.iter().map(|&r| self.chamber.held_out(fit, r).map(|day| day.evidence)).collect();
+        scores.map_or(f64::NEG_INFINITY, |s| s.iter().sum())
+    }
+}
+
 /// What the search found.
 #[derive(Debug, Clone)]
 pub struct Found {
