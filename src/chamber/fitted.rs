@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::fit::Fit;
 use super::known::Reference;
-use super::parameter::{Place, Scale};
+use super::parameter::{Parameter, Place, Scale};
 use super::prior::Quantity;
 
 /// A parameter of an effect that a fit moved.
@@ -106,22 +106,21 @@ impl Fit {
     ///
     /// z: distance from an effect's prior in its deviations; c, e: numbers of the chamber and of effects; n: `rows`.
     pub fn merit(&self, rows: usize) -> f64 {
-        let of_chamber: Vec<usize> = (0..self.parameters.len())
-            .filter(|&i| matches!(self.parameters[i].place, Place::Quantity { .. }))
-            .collect();
+        let effects = self.parameters.iter().zip(&self.coordinates).filter(|(p, _)| !p.is_of_chamber());
+        let cost = |p: &Parameter, x: f64| 0.5 * ((x - p.mean) / p.deviation).powi(2) + 0.5 * (rows as f64).ln();
+        self.merit_of_chamber() - effects.map(|(p, &x)| cost(p, x)).sum::<f64>()
+    }
+
+    /// As [`Fit::merit`], without what parameters of effects cost.
+    pub fn merit_of_chamber(&self) -> f64 {
+        let of_chamber: Vec<usize> =
+            (0..self.parameters.len()).filter(|&i| self.parameters[i].is_of_chamber()).collect();
         let count = of_chamber.len();
         let block = DMatrix::from_fn(count, count, |i, k| self.information[(of_chamber[i], of_chamber[k])]);
         let Some(factor) = block.cholesky() else { return f64::NEG_INFINITY };
         let log_determinant = 2.0 * factor.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
-        let mut merit = self.log_likelihood + 0.5 * count as f64 * std::f64::consts::TAU.ln() - 0.5 * log_determinant;
-        for (i, p) in self.parameters.iter().enumerate() {
-            if of_chamber.contains(&i) {
-                merit += p.log_prior(self.coordinates[i]);
-            } else {
-                merit -= 0.5 * ((self.coordinates[i] - p.mean) / p.deviation).powi(2) + 0.5 * (rows as f64).ln();
-            }
-        }
-        merit
+        let log_prior: f64 = of_chamber.iter().map(|&i| self.parameters[i].log_prior(self.coordinates[i])).sum();
+        self.log_likelihood + log_prior + 0.5 * count as f64 * std::f64::consts::TAU.ln() - 0.5 * log_determinant
     }
 
     /// Whether it was made with [`super::Effort::FULL`]: the same again from there gains less than that effort's tolerance, unless the

@@ -171,6 +171,10 @@ impl Parameter {
         }
     }
 
+    pub(super) fn is_of_chamber(&self) -> bool {
+        matches!(self.place, Place::Quantity { .. })
+    }
+
     /// Whether a record's likelihood depends on it.
     pub(super) fn concerns(&self, record: usize) -> bool {
         !matches!(self.place, Place::Quantity { record: Some(own), .. } if own != record)

@@ -50,12 +50,17 @@ impl<'a> Chamber<'a> {
 
     /// A chamber whose fits do not see the rates.
     fn of_readings(model: &CoilModel, records: &[&'a Record]) -> Result<Self, ChamberError> {
-        let mut chamber = Self::made(model, records, Origin::Measured)?;
+        Ok(Self::made(model, records, Origin::Measured)?.without_rates())
+    }
+
+    /// The same chamber; its fits do not see the rates.
+    pub fn without_rates(&self) -> Self {
+        let mut chamber = self.clone();
         for observed in &mut chamber.observed {
             observed.blind = true;
             observed.series.rows = without_rates(&observed.series);
         }
-        Ok(chamber)
+        chamber
     }
 
     /// The pass over a record with everything kept, and what it was made with.

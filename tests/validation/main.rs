@@ -3,6 +3,7 @@
 mod allan;
 mod compensation;
 mod conductivity;
+mod controls;
 mod diagnosis;
 mod effects;
 mod every_pattern;

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::explanation::{fitted, with};
 use super::odds::{CERTAIN, EFFECT};
+use super::readings::Readings;
 use super::screen::{Proposal, proposals};
 use super::{Explanation, Member, Outcome, Question};
 use crate::chamber::{Effort, Fit};
@@ -50,16 +51,19 @@ pub fn beside(question: &Question, null: &Fit, wandering: &Fit) -> Outcome<Vec<B
         }
     });
     promising.truncate(CONFIRMED);
-    let found = promising.into_par_iter().filter_map(|Proposal { member, values, .. }| {
+    let fits = promising.into_par_iter().filter_map(|Proposal { member, values, .. }| {
         let begin = with(question, &[], &null.fit, member, values)?;
-        let there = fitted(question, &[], vec![member], &begin, &null.fit, Effort::QUICK)?;
-        let candidate = match member {
-            Member::Effect(place) => Some(place),
+        fitted(question, &[], vec![member], &begin, &null.fit, Effort::QUICK)
+    });
+    let mut fits: Vec<Explanation> = fits.collect();
+    Readings::new(question, null.fit.clone()).take_off(question, &mut fits);
+    let found = fits.into_iter().map(|there| {
+        let candidate = match there.members[..] {
+            [Member::Effect(place)] => Some(place),
             _ => None,
         };
         let gain = there.fit.log_likelihood - null.fit.log_likelihood;
-        Some(Beside { candidate, gain, merit: there.merit - null.merit })
+        Beside { candidate, gain, merit: there.total() - null.total() }
     });
-    let found: Vec<Beside> = found.collect();
-    Ok(found.into_iter().filter(|b| b.merit > CERTAIN.log).collect())
+    Ok(found.filter(|b| b.merit > CERTAIN.log).collect())
 }

@@ -40,6 +40,8 @@ pub struct Explanation {
     pub merit: f64,
     /// … of the held-out ones; None where it was not computed or nothing was held out.
     pub held_out: Option<f64>,
+    /// What of both is gained in the readings alone, and says nothing of the coil.
+    pub in_readings: f64,
     pub probability: f64,
 }
 
@@ -64,7 +66,7 @@ impl Explanation {
             })
             .sum();
         let merit = fit.merit(rates(question.chamber, &fit)) + prior;
-        let mut explanation = Self { members, fit, merit, held_out: None, probability: 0.0 };
+        let mut explanation = Self { members, fit, merit, held_out: None, in_readings: 0.0, probability: 0.0 };
         if explanation.is_beyond_physical() {
             // Whatever it is, it is not what it is called.
             explanation.merit += OUTSIDE.log;
@@ -80,7 +82,7 @@ impl Explanation {
     }
 
     pub fn total(&self) -> f64 {
-        self.merit + self.held_out.unwrap_or(0.0)
+        self.merit + self.held_out.unwrap_or(0.0) - self.in_readings
     }
 
     /// Whether something is in it that no known effect explains: a member that says so, an estimate beyond what is physical.

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::explanation::{fitted, without};
 use super::odds::{CERTAIN, WINDOW};
+use super::readings::Readings;
 use super::{Explanation, Question, Winding};
 use crate::chamber::Effort;
 
@@ -58,6 +59,9 @@ pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mu
             e.held_out = Some(question.held_out_evidence(&e.fit));
         }
     });
+    if let Some(declared) = explanations.iter().find(|e| e.members.is_empty()).map(|e| e.fit.clone()) {
+        Readings::new(question, declared).take_off(question, explanations);
+    }
     order(explanations);
     let top = explanations.first().map_or(0.0, Explanation::total);
     let masses: Vec<f64> = explanations.iter().map(|e| (e.total() - top).exp()).collect();

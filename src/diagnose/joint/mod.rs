@@ -1,7 +1,7 @@
 //! The search over sets of explanations in the joint model, and what is left of them by posterior mass.
 //!
 //! ```text
-//! M(set) = ln E(fitted records) + ln E(held-out records | the coil's numbers as fitted) + Σ ln p(member)
+//! M(set) = ln E(fitted rates | readings) + ln E(held-out rates | readings, the coil's numbers as fitted) + Σ ln p(member)
 //! p(set) ∝ e^M;   a set that holds a smaller one as good gives its mass to that one
 //! ```
 //!
@@ -12,6 +12,7 @@ mod beside;
 mod explanation;
 mod judge;
 mod odds;
+mod readings;
 mod screen;
 mod search;
 mod winding;

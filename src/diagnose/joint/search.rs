@@ -261,7 +261,7 @@ pub fn refit_without(question: &Question, from: &Explanation, place: usize) -> O
     members.remove(place);
     let begin = without(question, from, place);
     let fit = question.chamber.fit(&begin.0, &begin.1, &question.fitted, Some(&from.fit), Effort::QUICK).ok()?;
-    Some(Explanation { members, fit, merit: f64::NEG_INFINITY, held_out: None, probability: 0.0 })
+    Some(Explanation { members, fit, merit: f64::NEG_INFINITY, held_out: None, in_readings: 0.0, probability: 0.0 })
 }
 
 /// Leaves out what the rest does not need.

@@ -1,0 +1,33 @@
+//! Reference: records of an independent simulator in which nothing is hidden (`tests/data/records-controls`): what the air did makes
+//! readings likelier with a lag of the sensor (26 in log likelihood), or with another pack, than without; the rates do not ask for it.
+//! Flicker is 0.3 and 0.5 of the white noise. Tolerance: nothing is named, no formula is proposed, and nothing is called unexplained.
+
+use std::path::Path;
+
+use coilwright::diagnose::{Request, Terms, Verdict, diagnose};
+use coilwright::io::read::model_file::read_model;
+use coilwright::io::read::record_file::read_record;
+
+fn assert_adequate(name: &str) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/records-controls").join(name);
+    let file = read_model(&folder.join("coil.toml")).unwrap();
+    let pattern = file.pattern.unwrap().pattern;
+    let record = |part: &str| read_record(&folder.join(part)).unwrap();
+    let (records, holdout) = ([record("calibration.csv")], [record("validation.csv")]);
+    let terms = Terms::default();
+    let request = Request { model: &file.model, pattern: &pattern, records: &records, holdout: &holdout, terms };
+    let found = diagnose(&request, &|_| ()).unwrap();
+    println!("{name}: {:?}", found.posterior.iter().map(|s| (&s.effects, s.probability)).collect::<Vec<_>>());
+    assert_eq!(found.verdict, Verdict::Adequate, "{name}");
+    assert!(found.effects.is_empty() && found.proposals.is_empty(), "{name}");
+}
+
+#[test]
+fn readings_that_a_lag_makes_likelier_name_no_lag() {
+    assert_adequate("flicker-lag");
+}
+
+#[test]
+fn flicker_of_half_the_white_noise_is_adequate() {
+    assert_adequate("flicker-half");
+}
