@@ -13,7 +13,8 @@ pub struct Channel {
     pub values: Vec<f64>,
 }
 
-/// The channel of the table's rate, which a record's rates are without [°/h].
+/// The channel of the table's rate, which a record's rates are without [°/h]: of each row the mean over the same time as the gyro's
+/// rate in it.
 pub const TABLE_RATE: &str = "table_rate_deg_per_h";
 
 const LAYER_CHANNEL: (&str, &str) = ("temperature_layer_", "_c");
@@ -192,12 +193,19 @@ impl Record {
         self.ambient_k.as_deref()
     }
 
-    /// Of each further column the means over the time that a rate is a mean over: what a rate sees of it.
+    /// Of each further column the means over the time that a rate is a mean over: what a rate sees of it. The table's rate is such a
+    /// mean already: the rates are without it, row by row.
     ///
     /// # Shapes
     /// Columns × rows.
     pub fn channel_means(&self, rate_mean_s: f64) -> Vec<Vec<f64>> {
-        let mean = |channel: &Channel| trailing_means(&self.times_s, &channel.values, rate_mean_s);
+        let mean = |channel: &Channel| {
+            if channel.name == TABLE_RATE {
+                channel.values.clone()
+            } else {
+                trailing_means(&self.times_s, &channel.values, rate_mean_s)
+            }
+        };
         self.channels.iter().map(mean).collect()
     }
 
@@ -299,6 +307,18 @@ pub fn gross_errors_of(temperature_k: &[f64], rate_rad_per_s: &[f64]) -> Vec<Gro
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_rate_sees_the_mean_of_a_column_but_of_the_table_what_was_taken_off_it() {
+        let times_s: Vec<f64> = (0..6).map(|i| 10.0 * f64::from(i)).collect();
+        let values = vec![0.0, 0.0, 100.0, 100.0, 0.0, 0.0];
+        let record = Record::new("x", times_s, vec![300.0; 6], vec![0.0; 6]).unwrap();
+        let channel = |name: &str| Channel { name: name.to_owned(), values: values.clone() };
+        let record = record.with_channel(channel("supply_v")).unwrap().with_channel(channel(TABLE_RATE)).unwrap();
+        let means = record.channel_means(10.0);
+        assert_eq!(means[0], [0.0, 0.0, 50.0, 100.0, 50.0, 0.0]);
+        assert_eq!(means[1], values);
+    }
 
     #[test]
     fn gross_errors_of_a_ramp_are_found_and_can_be_left_out() {
