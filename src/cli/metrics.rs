@@ -17,6 +17,7 @@ use crate::metrics::earth::Attitude;
 use crate::task::Observer;
 use crate::task::metrics::{self, DEFAULT_AVERAGE_S, Measured, Settings, measure_stream};
 use crate::task::page::REPORT_FILE;
+use crate::text::number::{known, usual};
 use crate::units::rad_from_deg;
 
 /// Bias, stability, Allan deviation and temperature sensitivity of records
@@ -158,7 +159,7 @@ fn text(body: &MetricsJson) -> String {
     let mut header = vec!["measure", "unit"];
     header.extend(body.records.iter().map(|r| r.file.as_str()));
     let stability = format!("bias stability, means over {} s", body.bias_stability_average_s);
-    let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.6}"));
+    let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), usual);
     type Show = fn(&RecordMetricsJson) -> Option<f64>;
     let measures: [(&str, &str, Show); 13] = [
         ("bias", "°/h", |r| Some(r.bias_deg_per_h)),
@@ -182,17 +183,19 @@ fn text(body: &MetricsJson) -> String {
     });
     let mut text = table(&header, rows);
     if let Some(repeatability) = body.repeatability_deg_per_h {
-        text += &format!("\nrepeatability of the bias over {} records: {repeatability:.6} °/h\n", body.records.len());
+        text +=
+            &format!("\nrepeatability of the bias over {} records: {} °/h\n", body.records.len(), usual(repeatability));
     }
     for record in body.records.iter().filter(|r| !r.noise.is_empty()) {
         text += &format!("\nnoise of {}, intervals that hold together with 95 %\n", record.file);
         let row = |n: &NoiseJson| {
-            vec![
-                n.kind.replace('_', " "),
-                format!("{:.6}", n.value),
-                format!("{:.6} to {:.6}", n.low, n.high),
-                n.unit.clone(),
-            ]
+            let [value, low, high] = known([n.value, n.low, n.high], 0.5 * (n.high - n.low));
+            let (value, within) = match (n.value > 0.0, n.low > 0.0) {
+                (true, true) => (value, format!("{low} to {high}")),
+                (true, false) => (value, format!("0 to {high}")),
+                (false, _) => ("not seen".to_owned(), format!("at most {high}")),
+            };
+            vec![n.kind.replace('_', " "), value, within, n.unit.clone()]
         };
         text += &table(&["kind", "value", "interval", "unit"], record.noise.iter().map(row));
     }
@@ -209,16 +212,17 @@ fn text(body: &MetricsJson) -> String {
     }
     let known = body.records.iter().filter_map(|r| Some((r, r.earth_rate_deg_per_h?, r.bias_without_earth_deg_per_h?)));
     let rows: Vec<Vec<String>> =
-        known.map(|(r, earth, bias)| vec![r.file.clone(), format!("{earth:.6}"), format!("{bias:.6}")]).collect();
+        known.map(|(r, earth, bias)| vec![r.file.clone(), usual(earth), usual(bias)]).collect();
     if !rows.is_empty() {
         text.push('\n');
         text += &table(&["record", "earth's rate °/h", "bias without it °/h"], rows);
     }
     if let Some(found) = &body.positions {
-        let error = found.scale_error_ppm.standard_error.map_or(String::new(), |e| format!(" ± {e:.1}"));
+        let (value, error) = with_error(found.scale_error_ppm.value, found.scale_error_ppm.standard_error);
+        let error = error.map_or(String::new(), |e| format!(" ± {e}"));
         text += &format!(
-            "\nsteps of the offset between attitudes: scale factor off by {:.1}{error} ppm, bias of the gyro itself {:.6} °/h\n",
-            found.scale_error_ppm.value, found.bias_deg_per_h
+            "\nsteps of the offset between attitudes: scale factor off by {value}{error} ppm, bias of the gyro itself {} °/h\n",
+            usual(found.bias_deg_per_h)
         );
     }
     for record in &body.records {
@@ -227,10 +231,22 @@ fn text(body: &MetricsJson) -> String {
     text
 }
 
+/// A value and its standard error, as far as it is known.
+fn with_error(value: f64, error: Option<f64>) -> (String, Option<String>) {
+    match error {
+        Some(error) if error > 0.0 && error.is_finite() => {
+            let [value, error] = known([value, error], error);
+            (value, Some(error))
+        }
+        _ => (usual(value), None),
+    }
+}
+
 fn scale_rows(scale: &ScaleFactorJson) -> Vec<Vec<String>> {
     let row = |name: String, value: Option<f64>, error: Option<f64>, unit: &str| {
-        let shown = |v: Option<f64>| v.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
-        vec![name, shown(value), shown(error), unit.to_owned()]
+        let none = || "-".to_owned();
+        let (value, error) = value.map_or_else(|| (none(), None), |value| with_error(value, error));
+        vec![name, value, error.unwrap_or_else(none), unit.to_owned()]
     };
     let estimate = |name: &str, of: Option<&EstimateJson>, unit: &str| {
         row(name.to_owned(), of.map(|e| e.value), of.and_then(|e| e.standard_error), unit)

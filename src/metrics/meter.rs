@@ -67,7 +67,7 @@ impl Meter {
     fn begin(&mut self) {
         let steps: Vec<f64> = self.first.windows(2).map(|w| w[1].time_s - w[0].time_s).collect();
         let level = self.first.iter().map(|r| r.rate_rad_per_s).sum::<f64>() / self.first.len() as f64;
-        let interval_s = usual(steps);
+        let interval_s = without_rounding(usual(steps.clone()), &steps);
         let mut running =
             Running::new(self.first[0], interval_s, level, self.average_s, self.first.len() < LEAST_LED_ROWS);
         self.first.drain(..).for_each(|row| running.push(row));
@@ -92,6 +92,30 @@ fn usual(mut steps: Vec<f64>) -> f64 {
     steps.sort_by(f64::total_cmp);
     steps[steps.len() / 2]
 }
+
+/// Of stamps that are rounded (seconds since 1970 are, to a quarter of a microsecond) the interval that they were before: the mean of
+/// the steps near the usual one, to the decimals that it is known to. Steps that really differ leave it as it is.
+fn without_rounding(usual_s: f64, steps: &[f64]) -> f64 {
+    let near = || steps.iter().filter(|step| (*step - usual_s).abs() <= ROUNDING * usual_s);
+    let spread = near().fold(Extremes::NONE, |mut extremes, step| {
+        extremes.push(*step);
+        extremes
+    });
+    let count = near().count() as f64;
+    // A tenth of a decimal to spare, so that the mean's own error does not decide it.
+    let decimals = -(10.0 * spread.width() / count).log10().ceil();
+    if !(0.0..=MOST_DECIMALS).contains(&decimals) {
+        return usual_s;
+    }
+    let scale = 10f64.powf(decimals);
+    let rounded = (near().sum::<f64>() / count * scale).round() / scale;
+    if rounded > 0.0 { rounded } else { usual_s }
+}
+
+/// Steps that differ by less, relatively, differ by the rounding of stamps.
+const ROUNDING: f64 = 1e-5;
+/// Powers of ten up to this one are exact.
+const MOST_DECIMALS: f64 = 15.0;
 
 #[derive(Debug)]
 struct Extremes {

@@ -4,6 +4,7 @@
 //! cell, a line of a file that is none of ours — reaches a file or a terminal only through the type of that sink
 //! ([`sink`]), which has no other constructor than its own escape.
 
+pub(crate) mod number;
 pub mod sink;
 
 /// The most characters that a name may have: no drawing number, part or pattern is longer.

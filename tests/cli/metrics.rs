@@ -38,8 +38,8 @@ fn a_record_of_three_rows_gives_what_can_be_worked_out_by_hand() {
     let output = run_in(folder.path(), &["metrics", "record.csv"]);
     let expected = "\
 measure                             unit  record.csv
-bias                                 °/h    3.000000
-bias stability, means over 10 s      °/h    2.645751
+bias                                 °/h           3
+bias stability, means over 10 s      °/h     2.64575
 bias instability (Allan minimum)     °/h           -
 at averaging time                      s           -
 angle random walk                   °/√h           -
@@ -47,10 +47,10 @@ rate random walk                  °/h/√h           -
 flicker                              °/h           -
 quantisation                      arcsec           -
 temperature sensitivity           °/h/°C           -
-peak to peak                         °/h    5.000000
-peak to peak of the means            °/h    5.000000
-drift angle                            °    0.025000
-duration                               s   20.000000
+peak to peak                         °/h           5
+peak to peak of the means            °/h           5
+drift angle                            °       0.025
+duration                               s          20
 
 caution: record.csv: too short or too irregular to tell noises apart: no noise coefficients
 ";
@@ -155,6 +155,34 @@ fn a_mapped_file_with_semicolons_decimal_commas_and_bad_rows_gives_the_plain_fil
     }
     let wrong = run(&["metrics", &path, "--columns", "time=Zeit:fortnights"]);
     assert!(stderr(&wrong).contains("expected a unit of s, ms"), "{}", stderr(&wrong));
+}
+
+#[test]
+fn text_has_the_digits_that_mean_something_and_stamps_of_seconds_since_1970_are_a_second_apart() {
+    let rows = white_record(4000, 1.0, 1.0);
+    let epoch: String = rows
+        .lines()
+        .map(|line| match line.split_once(',') {
+            Some((time, rest)) if time != "time_s" => {
+                format!("{:.2},{rest}\n", 1.7e9 + 0.1 * time.parse::<f64>().unwrap())
+            }
+            _ => line.to_owned() + "\n",
+        })
+        .collect();
+    let (_folder, path) = folder_with("epoch.csv", epoch);
+    let file = path.display().to_string();
+    let found = json(&["metrics", &file]);
+    assert_eq!(found["bias_stability_average_s"], 10.0, "{found}");
+    for noise in found["records"][0]["noise"].as_array().unwrap() {
+        // What may be absent is 0, not a number that no octave shows.
+        let [value, low, high] = ["value", "low", "high"].map(|key| noise[key].as_f64().unwrap());
+        assert!(value == 0.0 || value > 1e-3 * high, "{noise}");
+        assert!(low <= value && value <= high, "{noise}");
+    }
+    let said = run(&["metrics", &file]);
+    let text = stdout(&said);
+    assert!(text.contains("not seen") && text.contains("at most"), "{text}");
+    assert!(!text.contains("0.000000") && !text.contains("9.9999"), "{text}");
 }
 
 /// A gyro on a table at latitude 30°, its axis upright: counts, with an error of 500 ppm that grows by 10 ppm a kelvin.
