@@ -199,32 +199,62 @@ pub struct Filter {
 /// The covariance recursion.
 struct Covariance<'a> {
     dynamics: &'a Dynamics,
+    /// Fᵀ and hᵀ.
+    back: DMatrix<f64>,
+    seen: DMatrix<f64>,
     noise_variance: f64,
     p: DMatrix<f64>,
-    /// Of each row of the chain with the states.
-    cross: Vec<DMatrix<f64>>,
+    /// Of each row of the chain with the states, one behind the other; none while only the states are followed.
+    cross: Vec<f64>,
+    former: Vec<f64>,
 }
 
-impl Covariance<'_> {
+impl<'a> Covariance<'a> {
+    fn new(dynamics: &'a Dynamics, noise_k: f64) -> Self {
+        let n = dynamics.states();
+        Self {
+            dynamics,
+            back: dynamics.transition.transpose(),
+            seen: dynamics.reading.transpose(),
+            noise_variance: noise_k * noise_k,
+            p: DMatrix::identity(n, n) * 1e-6,
+            cross: Vec::new(),
+            former: Vec::new(),
+        }
+    }
+
+    /// From now on with a chain of so many rows, of which nothing is known yet.
+    fn with_chain(&mut self, rows: usize) {
+        self.cross = vec![0.0; rows * self.dynamics.states()];
+        self.former = self.cross.clone();
+    }
+
     /// One row further, the slope shaken with this variance somewhere within it.
     fn step(&mut self, slope_variance: f64) -> Gains {
         let Dynamics { transition, rate, reading, shock, noise, .. } = self.dynamics;
         let n = transition.nrows();
         let shaken = shock * slope_variance + noise;
-        for j in (1..self.cross.len()).rev() {
-            self.cross[j] = &self.cross[j - 1] * transition.transpose();
+        if !self.cross.is_empty() {
+            std::mem::swap(&mut self.cross, &mut self.former);
+            for (row, before) in self.cross.chunks_exact_mut(n).skip(1).zip(self.former.chunks_exact(n)) {
+                for (entry, forwards) in row.iter_mut().zip(self.back.column_iter()) {
+                    *entry = before.iter().zip(forwards.iter()).map(|(c, f)| c * f).sum();
+                }
+            }
+            let newest = rate * &self.p * &self.back + shaken.view((n, 0), (1, n));
+            self.cross[..n].copy_from_slice(newest.as_slice());
         }
-        self.cross[0] = rate * &self.p * transition.transpose() + shaken.view((n, 0), (1, n));
-        self.p = transition * &self.p * transition.transpose() + shaken.view((0, 0), (n, n));
-        let seen = &self.p * reading.transpose();
+        self.p = transition * &self.p * &self.back + shaken.view((0, 0), (n, n));
+        let seen = &self.p * &self.seen;
         let variance = (reading * &seen)[(0, 0)] + self.noise_variance;
         let gain = &seen / variance;
         self.p -= &gain * gain.transpose() * variance;
         self.p = 0.5 * (&self.p + self.p.transpose());
         let mut all = gain.as_slice().to_vec();
-        for cross in &mut self.cross {
-            let entry = (&*cross * reading.transpose())[(0, 0)] / variance;
-            *cross -= gain.transpose() * (entry * variance);
+        for cross in self.cross.chunks_exact_mut(n) {
+            let shown: f64 = cross.iter().zip(self.seen.iter()).map(|(c, h)| c * h).sum();
+            let entry = shown / variance;
+            cross.iter_mut().zip(gain.iter()).for_each(|(c, k)| *c -= k * (entry * variance));
             all.push(entry);
         }
         Gains { gain: all, variance }
@@ -246,17 +276,23 @@ fn schedule(dynamics: &Dynamics, tuning: &Tuning) -> Vec<Gains> {
     const MOST_ROUNDS: usize = 20_000;
     const STILL: f64 = 1e-12;
     let n = dynamics.states();
-    let mut covariance = Covariance {
-        dynamics,
-        noise_variance: tuning.noise_k * tuning.noise_k,
-        p: DMatrix::identity(n, n) * 1e-6,
-        cross: vec![DMatrix::zeros(1, n); tuning.delay_rows + 1],
-    };
+    let mut covariance = Covariance::new(dynamics, tuning.noise_k);
     let mut long_ago = covariance.step(tuning.slope_variance);
-    let mut settled = 0;
+    // The chain follows the states and settles as many rows later as it is long.
     for _ in 0..MOST_ROUNDS {
         let next = covariance.step(tuning.slope_variance);
-        settled = if difference(&next, &long_ago, n) <= STILL { settled + 1 } else { 0 };
+        let is_still = difference(&next, &long_ago, n) <= STILL;
+        long_ago = next;
+        if is_still {
+            break;
+        }
+    }
+    covariance.with_chain(tuning.delay_rows + 1);
+    let mut settled = 0;
+    for _ in 0..2 * (tuning.delay_rows + 2) {
+        let next = covariance.step(tuning.slope_variance);
+        let is_first = next.gain.len() != long_ago.gain.len();
+        settled = if !is_first && difference(&next, &long_ago, n) <= STILL { settled + 1 } else { 0 };
         long_ago = next;
         if settled > tuning.delay_rows + 1 {
             break;
