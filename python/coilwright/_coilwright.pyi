@@ -260,7 +260,7 @@ class StreamHandle:
 def compensator(
     model: ModelHandle,
     method: str,
-    fit: RecordArgument | None = None,
+    fit: list[RecordArgument] = ...,
     pattern: PatternArgument | None = None,
     linear: bool = False,
     delay_s: float | None = None,
@@ -269,7 +269,10 @@ def compensate_file(
     handle: CompensatorHandle, path: str, output: str | None = None
 ) -> tuple[Answered, bytes | None]: ...
 def compensate_all(
-    model: ModelHandle, fit: RecordArgument, record: RecordArgument, pattern: PatternArgument | None = None
+    model: ModelHandle,
+    fit: list[RecordArgument],
+    record: RecordArgument | None = None,
+    pattern: PatternArgument | None = None,
 ) -> tuple[Answered, list[tuple[str, Array]]]: ...
 
 def campaign(

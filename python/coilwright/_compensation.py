@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,7 +16,7 @@ from ._errors import RequestError
 from ._functions import ModelLike, PathLike, _log, model_of, result_of
 from ._measured_results import CompensateResult
 from ._model import PatternLike, pattern_argument
-from ._record import Record, RecordLike, record_argument
+from ._record import Record, RecordLike, record_argument, record_arguments
 
 Array = npt.NDArray[np.float64]
 
@@ -86,7 +86,7 @@ class Compensator:
 
     Args:
         model: a :class:`Model` or a model file.
-        fit: the record that film, noise, delay and offset (or the lines, or the regression) are fitted to.
+        fit: the record that film, noise, delay and offset (or the lines, or the regression) are fitted to, or several of one gyro.
         method: "physical" (the model's own physics), "piecewise", "regression" or "learned"; all but the first need ``fit``.
         pattern: without it, the model's own.
         linear: one difference equation of fixed gains.
@@ -100,14 +100,14 @@ class Compensator:
         self,
         model: ModelLike,
         *,
-        fit: RecordLike | None = None,
+        fit: RecordLike | Sequence[RecordLike] | None = None,
         method: str = "physical",
         pattern: PatternLike | None = None,
         linear: bool = False,
         delay_s: float | None = None,
     ) -> None:
         asked = model_of(model)
-        taken = None if fit is None else record_argument(fit)
+        taken = record_arguments(fit)
         stated = None if pattern is None else pattern_argument(pattern)
         self._handle, self.notes = _coilwright.compensator(asked._handle, method, taken, stated, linear, delay_s)
         self._made_of = (asked, fit, method, pattern, linear, delay_s)
@@ -170,7 +170,7 @@ class Compensator:
 
 def _restored(
     model: ModelLike,
-    fit: RecordLike | None,
+    fit: RecordLike | Sequence[RecordLike] | None,
     method: str,
     pattern: PatternLike | None,
     linear: bool,
@@ -221,9 +221,9 @@ def _of_lines(lines: bytes) -> tuple[Array | None, Array, dict[int, list[str]]]:
 
 def compensate(
     model: ModelLike,
-    record: RecordLike,
+    record: RecordLike | None = None,
     *,
-    fit: RecordLike | None = None,
+    fit: RecordLike | Sequence[RecordLike] | None = None,
     method: str = "physical",
     pattern: PatternLike | None = None,
     linear: bool = False,
@@ -235,7 +235,8 @@ def compensate(
 
     A record file goes through line by line, as through the command: ``csv`` holds what it prints. A :class:`Record` or a table
     comes back as an array. With ``all_methods`` every method is fitted to ``fit`` and tried on the record: ``curves`` holds what
-    each leaves, ``methods`` how well each does.
+    each leaves, ``methods`` how well each does. With several records to fit to, ``leave_one_out`` says what each method leaves of each
+    of them, fitted to the others; ``record`` is then not needed.
 
     Args:
         model, fit, method, pattern, linear, delay_s: as of :class:`Compensator`.
@@ -246,10 +247,12 @@ def compensate(
             raise RequestError("all_methods: needs a record to fit to: give fit")
         stated = None if pattern is None else pattern_argument(pattern)
         answered, curves = _coilwright.compensate_all(
-            model_of(model)._handle, record_argument(fit), record_argument(record), stated
+            model_of(model)._handle, record_arguments(fit), None if record is None else record_argument(record), stated
         )
         result = _filled(result_of(CompensateResult, answered), None, None, {}, None)
         object.__setattr__(result, "curves", dict(curves))
         return result
+    if record is None:
+        raise RequestError("record: needed unless all_methods is set and several records are given to fit to")
     made = Compensator(model, fit=fit, method=method, pattern=pattern, linear=linear, delay_s=delay_s)
     return made(record, output=output)

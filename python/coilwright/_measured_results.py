@@ -160,7 +160,9 @@ class CompensateResult(Result):
         rate_compensated_deg_per_h: of each row, NaN where nothing is known yet; None where the lines were written to a file.
         flags: by row (counted from 0), what happened to it.
         csv: the lines that the command prints, where a file was compensated without an output.
-        curves: by method what is left, where all were asked for.
+        curves: by method what is left, where all were asked for; without a record of the fitted ones, each left out in turn, one
+            behind the other.
+        leave_one_out: what each method leaves of each of several fitted records, fitted to the others; missing otherwise.
     """
 
     __slots__ = ("time_s", "rate_compensated_deg_per_h", "flags", "csv", "curves")
@@ -172,6 +174,7 @@ class CompensateResult(Result):
     flags: dict[int, list[str]]
     csv: bytes | None
     curves: dict[str, Array]
+    leave_one_out: Result
 
     def _state(self) -> dict[str, Any]:
         return {**super()._state(), **{name: getattr(self, name) for name in CompensateResult.__slots__}}

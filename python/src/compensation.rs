@@ -13,7 +13,6 @@ use coilwright::io::read::table_file::Source;
 use coilwright::io::write::compensation_file::{StreamError, compensate_lines};
 use coilwright::record::LEAST_INTERVAL_S;
 use coilwright::task::compensate::{Answer, LONGEST_S, Request, all_methods, compensate_record, run, write_exported};
-use coilwright::task::measurement::Measurement;
 use coilwright::task::{self, TaskError};
 use coilwright::units::{deg_per_h_from_rad_per_s, kelvin_from_celsius, rad_per_s_from_deg_per_h};
 use numpy::PyArray1;
@@ -24,7 +23,7 @@ use crate::error::{raise, wrong};
 use crate::model::{ModelHandle, option};
 use crate::pattern::PatternArgument;
 use crate::reads::Reads;
-use crate::record::{RecordArgument, RecordHandle};
+use crate::record::{RecordArgument, RecordHandle, measurements};
 use crate::tasks::{Answered, document, one_pattern};
 use crate::worker::work;
 
@@ -56,12 +55,12 @@ fn method_of(py: Python, stated: &str) -> PyResult<Method> {
 }
 
 #[pyfunction]
-#[pyo3(signature = (model, method, fit=None, pattern=None, linear=false, delay_s=None))]
+#[pyo3(signature = (model, method, fit=Vec::new(), pattern=None, linear=false, delay_s=None))]
 pub fn compensator(
     py: Python,
     model: &ModelHandle,
     method: &str,
-    fit: Option<RecordArgument>,
+    fit: Vec<RecordArgument>,
     pattern: Option<PatternArgument>,
     linear: bool,
     delay_s: Option<f64>,
@@ -69,12 +68,11 @@ pub fn compensator(
     let file = Arc::clone(&model.file);
     let stated = pattern.as_ref();
     let (method, pattern) = (method_of(py, method)?, one_pattern(py, stated, &file)?);
-    let fit: Option<Measurement> = fit.map(|fit| fit.measurement(py, &file.record)).transpose()?;
+    let fit = measurements(py, &fit, &file.record)?;
     let reads = Arc::new(Reads::of(&file).patterns(stated).records(&fit));
     let format = file.record.clone();
     let worked = work(py, None, move |watcher| {
-        let request =
-            Request { pattern: pattern.as_ref(), method, fit: fit.as_ref(), linear, delay_s, ..Request::new(&file) };
+        let request = Request { pattern: pattern.as_ref(), method, fit: &fit, linear, delay_s, ..Request::new(&file) };
         Ok(run(&request, &watcher)?)
     })?;
     let answer = Arc::new(worked.answer);
@@ -121,6 +119,7 @@ impl CompensatorHandle {
     #[pyo3(signature = (interval_s=None))]
     fn difference_equation(&self, py: Python, interval_s: Option<f64>) -> PyResult<(String, String)> {
         check_interval(py, interval_s)?;
+        self.answer.check_whole().map_err(|e| raise(py, TaskError::from(e)))?;
         let Some(equation) = self.answer.difference_equation(interval_s) else {
             return Err(wrong(
                 py,
@@ -280,22 +279,24 @@ pub fn compensate_file(
 
 type Curve<'py> = (&'static str, Bound<'py, PyArray1<f64>>);
 
-/// Every method, fitted to one record and tried on another; besides the document what each leaves [°/h].
+/// Every method, fitted to records and tried on another and on each of them, left out in turn; besides the document what each leaves
+/// [°/h].
 #[pyfunction]
-#[pyo3(signature = (model, fit, record, pattern=None))]
+#[pyo3(signature = (model, fit, record=None, pattern=None))]
 pub fn compensate_all<'py>(
     py: Python<'py>,
     model: &ModelHandle,
-    fit: RecordArgument,
-    record: RecordArgument,
+    fit: Vec<RecordArgument>,
+    record: Option<RecordArgument>,
     pattern: Option<PatternArgument>,
 ) -> PyResult<(Answered, Vec<Curve<'py>>)> {
     let file = Arc::clone(&model.file);
     let pattern = one_pattern(py, pattern.as_ref(), &file)?;
-    let (fit, record) = (fit.measurement(py, &file.record)?, record.measurement(py, &file.record)?);
+    let fit = measurements(py, &fit, &file.record)?;
+    let record = record.map(|record| record.measurement(py, &file.record)).transpose()?;
     let worked = work(py, None, move |watcher| {
-        let request = Request { pattern: pattern.as_ref(), fit: Some(&fit), ..task::compensate::Request::new(&file) };
-        let found = all_methods(&request, &record, &watcher)?;
+        let request = Request { pattern: pattern.as_ref(), fit: &fit, ..task::compensate::Request::new(&file) };
+        let found = all_methods(&request, record.as_ref(), &watcher)?;
         let shown = |rates: Vec<f64>| rates.into_iter().map(deg_per_h_from_rad_per_s).collect::<Vec<f64>>();
         let curves: Vec<_> = found.curves.into_iter().map(|(name, rates)| (name, shown(rates))).collect();
         Ok((document(found.document)?, curves))

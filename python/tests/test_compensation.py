@@ -105,3 +105,19 @@ def test_many_rows_go_through_and_each_depends_on_those_before_it_only(day_1: cw
     half = compensator(cw.Record(**{name: values[: rows // 2] for name, values in columns.items()})).rate_compensated_deg_per_h
     assert whole is not None and half is not None and whole.size == rows
     assert np.array_equal(whole[: rows // 2 - 100], half[:-100], equal_nan=True)
+
+
+def test_each_of_several_records_is_left_out_in_turn(day_1: cw.Record) -> None:
+    day_2 = cw.Record.read("examples/chamber-day-2.csv")
+    found = cw.compensate(COIL, fit=[day_1, day_2], all_methods=True)
+    methods = {method.method: method for method in found.leave_one_out.methods}
+    assert list(methods) == ["physical", "piecewise", "regression", "learned"]
+    # Leaving one of two out is fitting to the other.
+    alone = cw.compensate(COIL, day_2, fit=day_1, all_methods=True)
+    for method in alone.methods:
+        assert methods[method.method].records[1].rms_deg_per_h == method.rms_deg_per_h
+    assert found.curves["regression"].size == len(day_1) + len(day_2)
+    with pytest.raises(cw.RequestError, match="record"):
+        cw.compensate(COIL, fit=[day_1, day_2])
+    both = cw.Compensator(COIL, fit=[day_1, day_2], method="regression")
+    assert both(day_2).rate_compensated_deg_per_h is not None

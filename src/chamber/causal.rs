@@ -45,6 +45,25 @@ impl Surroundings {
         other
     }
 
+    /// What several records of one gyro say together: the film by the relative error that each has of it, of all else the middle
+    /// of logarithms.
+    ///
+    /// None of no record.
+    pub(crate) fn together(seen: &[(Self, f64)]) -> Option<Self> {
+        let (first, _) = seen.first()?;
+        if seen.len() == 1 {
+            return Some(first.clone());
+        }
+        let weight = |error: f64| error.max(LEAST_FILM_ERROR).powi(-2);
+        let weights: f64 = seen.iter().map(|(_, error)| weight(*error)).sum();
+        let film: f64 = seen.iter().map(|(s, error)| weight(*error) / weights * s.film_w_per_m2_k.ln()).sum();
+        let middle = |place: usize| {
+            let logarithms = seen.iter().map(|(s, _)| s.numbers.0[place].ln());
+            (logarithms.sum::<f64>() / seen.len() as f64).exp()
+        };
+        Some(Self { film_w_per_m2_k: film.exp(), numbers: Numbers(std::array::from_fn(middle)) })
+    }
+
     /// Standard deviation of one reading besides the sensor's resolution \[K\].
     pub fn reading_noise_k(&self) -> f64 {
         self.numbers.get(Quantity::ReadingNoise)
@@ -56,7 +75,16 @@ impl Surroundings {
     }
 }
 
+/// No film is known better than this, relative to itself: the air of a chamber moves another way every day.
+const LEAST_FILM_ERROR: f64 = 0.01;
+
 impl Chamber<'_> {
+    /// How well a fitted record knows the film, relative to it.
+    pub(crate) fn film_error(fit: &Fit) -> f64 {
+        let film = fit.value(Place::Quantity { quantity: Quantity::Film, record: None });
+        film.map_or(1.0, |(value, error)| error / value)
+    }
+
     /// The surroundings of a fitted record.
     pub fn surroundings(&self, fit: &Fit, record: usize) -> Surroundings {
         let mut numbers = self.numbers_for(fit, record);

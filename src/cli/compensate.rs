@@ -17,30 +17,33 @@ use crate::io::read::model_file::read_model;
 use crate::io::read::record_columns::RecordFormat;
 use crate::io::read::table_file::Source;
 use crate::io::write::compensation_file::{CompensateJson, MeasuresJson, StreamSummary, compensate_lines_from_turn_on};
+use crate::io::write::leave_one_out::LeaveOneOutJson;
 use crate::record::LEAST_INTERVAL_S;
 use crate::report::compensation::compensation_chart;
 use crate::task::compensate::{
     Answer, LONGEST_S, Request, all_methods as try_all, run as compensator_for, write_exported,
 };
 use crate::task::measurement::Measurement;
+use crate::text::number::usual;
 
 /// Temperature and rate in, compensated rate out, as a file or as a stream
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  coilwright compensate coil.toml day-2.csv --fit day-1.csv > compensated.csv\n  logger | coilwright compensate coil.toml - --fit day-1.csv\n  coilwright compensate coil.toml day-2.csv --fit day-1.csv --all-methods\n  coilwright compensate coil.toml --fit day-1.csv --export embedded/compensation\n\nEvery line comes out, in order, with rate_compensated_deg_per_h and flags behind it: malformed, clock_back, gap,\ntemperature_held, channel_held, rate_held, rate_rejected, turn_on."
+    after_help = "Examples:\n  coilwright compensate coil.toml day-2.csv --fit day-1.csv > compensated.csv\n  logger | coilwright compensate coil.toml - --fit day-1.csv\n  coilwright compensate coil.toml day-2.csv --fit day-1.csv --all-methods\n  coilwright compensate coil.toml --fit day-1.csv --fit day-2.csv --all-methods -o left-out.svg\n  coilwright compensate coil.toml --fit day-1.csv --export embedded/compensation\n\nEvery line comes out, in order, with rate_compensated_deg_per_h and flags behind it: malformed, clock_back, gap,\ntemperature_held, channel_held, rate_held, rate_rejected, turn_on."
 )]
 pub struct Arguments {
     /// The model file
     model: PathBuf,
     /// A record (CSV), or - for standard input
     record: Option<PathBuf>,
-    /// The record to fit film, noise, delay and offset (or the lines, or the regression) to
+    /// The record to fit film, noise, delay and offset (or the lines, or the regression) to; again for each further one of the same gyro
     #[arg(long, value_name = "RECORD")]
-    fit: Option<PathBuf>,
+    fit: Vec<PathBuf>,
     /// How to compensate
     #[arg(long, value_enum, default_value_t = Way::Physical)]
     method: Way,
-    /// Fits every method and shows how well each does on the record
+    /// Fits every method and shows how well each does on the record; with several --fit, also on each of those, fitted to the
+    /// others
     #[arg(long, requires = "fit")]
     all_methods: bool,
     /// A winding's name or a pattern file; without it, the model's own
@@ -101,11 +104,11 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     }
     let format = arguments.reading.format(Some(&file))?;
     let pattern = pattern_asked(&file, arguments.pattern.as_deref())?;
-    let fit = arguments.fit.as_ref().map(|path| Measurement::read(path, &format)).transpose()?;
+    let fit = arguments.fit.iter().map(|path| Measurement::read(path, &format)).collect::<Result<Vec<_>, _>>()?;
     let request = Request {
         pattern: pattern.as_ref(),
         method: arguments.method.into(),
-        fit: fit.as_ref(),
+        fit: &fit,
         linear: arguments.linear,
         delay_s: arguments.delay,
         ..Request::new(&file)
@@ -217,19 +220,17 @@ fn export(answer: &Answer, interval_s: Option<f64>, prefix: &Path, screen: &Scre
 }
 
 /// Every measure, a column a method.
-fn before_and_after(body: &CompensateJson) -> String {
-    let measured: Vec<(&str, &MeasuresJson)> = body
-        .before
-        .iter()
-        .map(|m| ("before", m))
-        .chain(body.methods.iter().filter_map(|m| Some((m.method, m.measures.as_ref()?))))
-        .collect();
-    let Some((_, first)) = measured.first() else { return String::new() };
+fn before_and_after<'m>(
+    before: &'m MeasuresJson,
+    methods: impl Iterator<Item = (&'static str, Option<&'m MeasuresJson>)>,
+) -> String {
+    let measured: Vec<(&str, &MeasuresJson)> =
+        [("before", before)].into_iter().chain(methods.filter_map(|(name, m)| Some((name, m?)))).collect();
     let mut header = vec!["measure", "unit"];
     header.extend(measured.iter().map(|(name, _)| *name));
-    let rows = first.all().into_iter().enumerate().map(|(i, (name, unit, _))| {
+    let rows = before.all().into_iter().enumerate().map(|(i, (name, unit, _))| {
         let mut row = vec![name.to_owned(), unit.to_owned()];
-        row.extend(measured.iter().map(|(_, m)| m.all()[i].2.map_or_else(|| "-".to_owned(), |v| format!("{v:.6}"))));
+        row.extend(measured.iter().map(|(_, m)| m.all()[i].2.map_or_else(|| "-".to_owned(), usual)));
         row
     });
     table(&header, rows)
@@ -241,27 +242,56 @@ fn all_methods(
     format: &RecordFormat,
     screen: &Screen,
 ) -> Result<Ending, CliError> {
-    let (Some(_), Some(path)) = (request.fit, &arguments.record) else { return Err(CliError::NoHoldout) };
-    let holdout = Measurement::read(path, format)?;
-    let found = try_all(request, &holdout, &Watching::quiet(screen))?;
+    let holdout = arguments.record.as_ref().map(|path| Measurement::read(path, format)).transpose()?;
+    let found = try_all(request, holdout.as_ref(), &Watching::quiet(screen))?;
     if let Some(path) = &arguments.output {
-        write_atomically(path, compensation_chart(found.record.times_s(), &found.curves).svg().as_bytes())?;
+        write_atomically(path, compensation_chart(&found.times_s, &found.curves).svg().as_bytes())?;
         screen.note(&format!("wrote {}", path.display()));
     }
     let body = found.document;
     screen.answer(body, |body| {
-        let rows = body.methods.iter().map(|m| {
-            vec![
-                m.method.to_owned(),
-                shown(m.rms_deg_per_h),
-                m.delay_rows.map_or_else(|| "-".to_owned(), |d| d.to_string()),
-                m.reason.clone().unwrap_or_default(),
-            ]
-        });
-        let noise = shown(body.noise_floor_deg_per_h);
-        table(&["method", "rms °/h", "delay rows", ""], rows)
-            + &format!("noise floor of the record: {noise} °/h\n\n")
-            + &before_and_after(body)
+        let parts =
+            [body.before.as_ref().map(|before| on_holdout(body, before)), body.leave_one_out.as_ref().map(left_out)];
+        parts.into_iter().flatten().collect::<Vec<_>>().join("\n")
     })?;
     Ok(Ending::Done)
+}
+
+/// On the record that was not fitted.
+fn on_holdout(body: &CompensateJson, before: &MeasuresJson) -> String {
+    let rows = body.methods.iter().map(|m| {
+        vec![
+            m.method.to_owned(),
+            shown(m.rms_deg_per_h),
+            m.delay_rows.map_or_else(|| "-".to_owned(), |d| d.to_string()),
+            m.reason.clone().unwrap_or_default(),
+        ]
+    });
+    let noise = shown(body.noise_floor_deg_per_h);
+    table(&["method", "rms °/h", "delay rows", ""], rows)
+        + &format!("noise floor of the record: {noise} °/h\n\n")
+        + &before_and_after(before, body.methods.iter().map(|m| (m.method, m.measures.as_ref())))
+}
+
+/// On each fitted record, by what was fitted to the others.
+fn left_out(found: &LeaveOneOutJson) -> String {
+    let rows = found.methods.iter().map(|m| {
+        vec![
+            m.method.to_owned(),
+            shown(m.fitted_rms_deg_per_h),
+            shown(m.left_out_rms_deg_per_h),
+            m.reason.clone().unwrap_or_default(),
+        ]
+    });
+    let mut text = format!("{} records, each compensated by what was fitted to the others\n", found.records.len());
+    text += &table(&["method", "rms °/h where fitted", "rms °/h left out", ""], rows);
+    text += &format!("with nothing but the others' mean rate taken off: {:.5} °/h\n", found.by_offset_rms_deg_per_h);
+    for (place, record) in found.records.iter().enumerate() {
+        text += &format!("\n{} left out\n", record.file);
+        let of_record = found.methods.iter().map(|m| (m.method, m.records[place].measures.as_ref()));
+        text += &before_and_after(&record.before, of_record);
+        let failed = found.methods.iter().filter_map(|m| Some((m.method, m.records[place].reason.as_ref()?)));
+        text.extend(failed.map(|(method, reason)| format!("{method}: {reason}\n")));
+    }
+    text
 }

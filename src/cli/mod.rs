@@ -155,8 +155,6 @@ pub enum CliError {
         "error: a model with a bias over temperature or further columns has no physical compensator that can be exported (the other methods have), and the interval must be known: give --interval or --fit"
     )]
     NoExport,
-    #[error("error: --all-methods needs a record to try them on")]
-    NoHoldout,
     #[error("error: {0}")]
     Thesis(#[from] ThesisError),
     #[error("error: {path} exists already: choose another name or remove it first")]

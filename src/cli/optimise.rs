@@ -78,7 +78,8 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     diagnosis: Option<PathBuf>,
     /// Temperatures of the layers that were computed elsewhere (CSV: time_s, layer_1_c, …, or time_s, layer, temperature_c), used
-    /// instead of the profiles; may be repeated, each file is a case
+    /// instead of the profiles; may be repeated, each file is a case. Such a search proves nothing, leaves no checkpoint to resume from
+    /// and writes pattern, schedule and summary.json without a page
     #[arg(long, value_name = "FILE", conflicts_with_all = ["resume", "fresh", "compare_with", "cutting_planes", "diagnosis", "prove", "trim_turns", "split_layer"])]
     pub(super) field: Vec<PathBuf>,
     /// Tries for so long to prove that the best pattern is the best of its class

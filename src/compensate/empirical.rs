@@ -103,9 +103,12 @@ struct Cumulated {
 }
 
 impl Cumulated {
-    fn new(record: &Record) -> Self {
-        let mut rows: Vec<(f64, f64)> =
-            record.temperature_k().iter().copied().zip(record.rate_rad_per_s().iter().copied()).collect();
+    fn new(records: &[&Record]) -> Self {
+        let rows_of = |record: &&Record| {
+            let rates = record.rate_rad_per_s().iter().copied();
+            record.temperature_k().iter().copied().zip(rates).collect::<Vec<(f64, f64)>>()
+        };
+        let mut rows: Vec<(f64, f64)> = records.iter().flat_map(rows_of).collect();
         rows.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut sums = vec![Sums::default()];
         let mut all = Sums::default();
@@ -211,14 +214,15 @@ impl Cumulated {
 }
 
 impl PiecewiseBias {
+    /// To all rows of some records together.
+    ///
     /// # Errors
-    /// A record too short for one line.
-    pub fn fit(record: &Record) -> Result<Self, CompensateError> {
-        let cumulated = Cumulated::new(record);
+    /// Records too short for one line.
+    pub fn fit(records: &[&Record]) -> Result<Self, CompensateError> {
+        let cumulated = Cumulated::new(records);
         let rows = cumulated.rows();
-        let whole = cumulated
-            .left(0, rows)
-            .ok_or(CompensateError::TooFew { needed: LEAST_ROWS as usize, found: record.rows() })?;
+        let whole =
+            cumulated.left(0, rows).ok_or(CompensateError::TooFew { needed: LEAST_ROWS as usize, found: rows })?;
         let borders = cumulated.borders();
         let tails: Vec<Option<f64>> = borders.iter().map(|&i| cumulated.left(i, rows)).collect();
         let mut best = (whole, Vec::new());
@@ -275,27 +279,37 @@ pub struct Regression {
 const WINDOWS: [usize; 7] = [1, 2, 3, 5, 8, 12, 20];
 
 impl Regression {
+    /// To all rows of some records together. Windows are as many rows of the one whose rows are furthest apart; those of the others
+    /// are as long.
+    ///
     /// # Errors
-    /// A record too short.
-    pub fn fit(record: &Record) -> Result<Self, CompensateError> {
-        let interval_s = record.interval_s();
+    /// A record too short, or none.
+    pub fn fit(records: &[&Record]) -> Result<Self, CompensateError> {
+        let interval_s = records.iter().map(|record| record.interval_s()).fold(0.0, f64::max);
+        let has_inner = records.iter().all(|record| record.inner_k().is_some());
         let mut best: Option<(f64, Self)> = None;
         for half in WINDOWS {
-            if record.rows() <= 2 * half + LEAST_ROWS as usize {
-                continue;
-            }
-            let has_inner = record.inner_k().is_some();
-            let mut window = Window::new(half);
-            let mut rows = Vec::new();
-            for row in 0..record.rows() {
-                window.push(Some(record.temperature_k()[row]), record.inner_k().map(|k| k[row]));
-                if row >= half {
-                    rows.push(window.regressors(half, interval_s));
+            let window_s = half as f64 * interval_s;
+            let (mut rows, mut rates) = (Vec::new(), Vec::new());
+            let mut is_long_enough = true;
+            for record in records {
+                let half = (window_s / record.interval_s()).round().max(1.0) as usize;
+                is_long_enough &= record.rows() > 2 * half + LEAST_ROWS as usize;
+                let mut window = Window::new(half);
+                for row in 0..record.rows() {
+                    window.push(Some(record.temperature_k()[row]), record.inner_k().map(|k| k[row]));
+                    if row >= half {
+                        rows.push(window.regressors(half, record.interval_s()));
+                        rates.push(record.rate_rad_per_s()[row - half]);
+                    }
                 }
+            }
+            if !is_long_enough || rows.is_empty() {
+                continue;
             }
             let columns = if has_inner { 4 } else { 3 };
             let matrix = DMatrix::from_fn(rows.len(), columns, |i, j| rows[i][j]);
-            let target = DVector::from_column_slice(&record.rate_rad_per_s()[..rows.len()]);
+            let target = DVector::from_column_slice(&rates);
             let scales: Vec<f64> = matrix.column_iter().map(|c| c.norm().max(f64::MIN_POSITIVE)).collect();
             let scaled = DMatrix::from_fn(rows.len(), columns, |i, j| matrix[(i, j)] / scales[j]);
             let Ok(found) = scaled.clone().svd(true, true).solve(&target, 1e-12) else { continue };
@@ -305,11 +319,11 @@ impl Regression {
                 for (place, value) in coefficients.iter_mut().zip(found.iter().zip(&scales)) {
                     *place = value.0 / value.1;
                 }
-                best = Some((left, Self { coefficients, has_inner, window_s: half as f64 * interval_s }));
+                best = Some((left, Self { coefficients, has_inner, window_s }));
             }
         }
-        best.map(|(_, found)| found)
-            .ok_or(CompensateError::TooFew { needed: 2 + LEAST_ROWS as usize + 1, found: record.rows() })
+        let found = records.iter().map(|record| record.rows()).min().unwrap_or(0);
+        best.map(|(_, best)| best).ok_or(CompensateError::TooFew { needed: 2 + LEAST_ROWS as usize + 1, found })
     }
 
     pub(super) fn bias_rad_per_s(&self, regressors: &[f64; 4]) -> f64 {

@@ -9,8 +9,8 @@
 //! | x_i | lagged temperatures, powers, slopes, warming up, all of the past only | [`crate::metrics::thermal`] |
 //! | s_i, λ | the column's root mean square; the strength that predicts blocks left out best | `Learned::fit` |
 //!
-//! Each eighth of the record is predicted from the others for every λ; the least error of these is what the compensator is worth
-//! on such a day, beside what it leaves of the record that it was fitted to: where the two differ, it only fits.
+//! Each eighth of the record (of several records each whole one) is predicted from the others for every λ; the least error of these is
+//! what the compensator is worth on such a day, beside what it leaves of what it was fitted to: where the two differ, it only fits.
 //!
 //! # Source
 //! Hoerl and Kennard, Technometrics 12 (1970) 55; cross-validation by blocks: Roberts et al., Ecography 40 (2017) 913.
@@ -23,14 +23,14 @@ use super::CompensateError;
 use crate::metrics::thermal::{COLUMNS, ThermalColumns};
 use crate::record::{Record, Row};
 
-/// The record is left out by so many blocks in turn.
+/// One record is left out by so many blocks in turn.
 const BLOCKS: usize = 8;
 /// λ of the mean square of a column, tried in turn: a decade apart.
 const STRENGTHS: [f64; 9] = [1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2];
 /// A block needs more rows than there are columns.
 const LEAST_ROWS: usize = BLOCKS * 2 * (COLUMNS + 1);
 /// In-sample and cross-validated errors further apart than this factor: it only fits.
-const ONLY_FITS: f64 = 1.5;
+pub(crate) const ONLY_FITS: f64 = 1.5;
 /// Steps this many times the usual one begin anew.
 pub const LONGEST_GAP: f64 = 1000.0;
 
@@ -39,9 +39,9 @@ pub const LONGEST_GAP: f64 = 1000.0;
 pub struct Learned {
     /// β_0, then one a column.
     pub coefficients: Vec<f64>,
-    /// Of the record that it was fitted to; the shortest lag follows it.
+    /// Of the record that it was fitted to, of several the longest; the shortest lag follows it.
     pub interval_s: f64,
-    /// Root mean square of what it leaves of that record, and of the blocks that it was not shown.
+    /// Root mean square of what it leaves of what it was fitted to, and of the blocks (or whole records) that it was not shown.
     pub left_rad_per_s: f64,
     pub cross_validated_rad_per_s: f64,
 }
@@ -92,21 +92,27 @@ impl Sums {
 }
 
 impl Learned {
+    /// To some records together.
+    ///
     /// # Errors
-    /// A record too short to leave parts of it out.
-    pub fn fit(record: &Record) -> Result<Self, CompensateError> {
-        let rows = record.rows();
+    /// Records too short to leave parts of them out.
+    pub fn fit(records: &[&Record]) -> Result<Self, CompensateError> {
+        let rows = records.iter().map(|record| record.rows()).sum();
         if rows < LEAST_ROWS {
             return Err(CompensateError::TooFew { needed: LEAST_ROWS, found: rows });
         }
-        let interval_s = record.interval_s();
+        let interval_s = records.iter().map(|record| record.interval_s()).fold(0.0, f64::max);
         // About the mean, so that β_0 does not need its digits.
-        let level = record.rate_rad_per_s().iter().sum::<f64>() / rows as f64;
-        let mut blocks = vec![Sums::new(); BLOCKS];
-        let mut follower = Follower::default();
-        for (i, row) in record.each_row().enumerate() {
-            let x = follower.columns(row.time_s, row.temperature_k, interval_s);
-            blocks[i * BLOCKS / rows].add(&x, row.rate_rad_per_s - level);
+        let level = records.iter().flat_map(|record| record.rate_rad_per_s()).sum::<f64>() / rows as f64;
+        let is_one = records.len() == 1;
+        let mut blocks = vec![Sums::new(); if is_one { BLOCKS } else { records.len() }];
+        for (place, record) in records.iter().enumerate() {
+            let mut follower = Follower::default();
+            for (i, row) in record.each_row().enumerate() {
+                let x = follower.columns(row.time_s, row.temperature_k, interval_s);
+                let block = if is_one { i * BLOCKS / rows } else { place };
+                blocks[block].add(&x, row.rate_rad_per_s - level);
+            }
         }
         let all = blocks.iter().fold(Sums::new(), |sum, block| sum.with(block, 1.0));
         let judged = |strength: f64| -> Option<f64> {
@@ -197,7 +203,7 @@ mod tests {
 
     #[test]
     fn a_learned_day_compensates_another_one_and_says_what_it_is_worth() {
-        let learned = Learned::fit(&day(0.0)).unwrap();
+        let learned = Learned::fit(&[&day(0.0)]).unwrap();
         println!("left {:e}, cross-validated {:e}", learned.left_rad_per_s, learned.cross_validated_rad_per_s);
         let other = day(0.0);
         let mut follower = Follower::default();
@@ -218,6 +224,6 @@ mod tests {
     #[test]
     fn a_record_too_short_to_leave_parts_out_is_refused() {
         let short = Record::new("x", vec![0.0, 1.0, 2.0], vec![300.0; 3], vec![0.0; 3]).unwrap();
-        assert!(matches!(Learned::fit(&short), Err(CompensateError::TooFew { .. })));
+        assert!(matches!(Learned::fit(&[&short]), Err(CompensateError::TooFew { .. })));
     }
 }

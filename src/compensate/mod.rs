@@ -14,6 +14,8 @@ pub mod learned;
 pub mod physical;
 pub mod stream;
 
+use std::sync::OnceLock;
+
 use thiserror::Error;
 
 use crate::chamber::{self, Assumption, Chamber, ChamberError, MOST_ROWS_FITTED, Surroundings};
@@ -74,6 +76,12 @@ pub enum CompensateError {
     TooFew { needed: usize, found: usize },
     #[error("{method} needs a record to be fitted to: give one with --fit", method = .method.key())]
     NeedsRecord { method: Method },
+    #[error(
+        "an export gives the rate error of a gyro at rest and holds no scale factor: {} would be lost; export a model without {}, and divide the compensated rate by 1 + ε(T)",
+        .effects.join(", "),
+        if .effects.len() == 1 { "it" } else { "them" }
+    )]
+    ScaleFactorLost { effects: Vec<String> },
     #[error(transparent)]
     Predict(#[from] PredictError),
     #[error(transparent)]
@@ -91,8 +99,28 @@ pub enum CompensateError {
 /// Fewer rows than this hold no ramp.
 const LEAST_ROWS: usize = 16;
 
+/// A record to fit to, and what it says of its surroundings once that is asked: each is asked once, however many fits it is part of.
+#[derive(Debug)]
+pub(crate) struct Day<'r> {
+    pub record: &'r Record,
+    seen: OnceLock<Result<Seen, CompensateError>>,
+}
+
+/// Surroundings, and the relative error of the film.
+type Seen = (Surroundings, f64);
+
+impl<'r> Day<'r> {
+    pub(crate) fn new(record: &'r Record) -> Self {
+        Self { record, seen: OnceLock::new() }
+    }
+
+    fn seen(&self, model: &CoilModel, pattern: &Pattern) -> Result<Seen, CompensateError> {
+        self.seen.get_or_init(|| surroundings(model, pattern, self.record)).clone()
+    }
+}
+
 /// What readings and rates of a record say of chamber, film and sensor; of a long one, those of the stretch that moves most.
-fn surroundings(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<Surroundings, CompensateError> {
+fn surroundings(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<Seen, CompensateError> {
     if record.rows() < LEAST_ROWS {
         return Err(CompensateError::TooFew { needed: LEAST_ROWS, found: record.rows() });
     }
@@ -100,7 +128,7 @@ fn surroundings(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result
     let busiest = Chamber::of_any(model, &[record])?.busiest(0, MOST_ROWS_FITTED);
     let stretch = record.stretch(busiest)?;
     let (chamber, fit) = Chamber::of_any(model, &[&stretch])?.settled(&assumed, &[0])?;
-    Ok(chamber.surroundings(&fit, 0))
+    Ok((chamber.surroundings(&fit, 0), Chamber::film_error(&fit)))
 }
 
 fn listed(effects: &[String]) -> String {
@@ -111,34 +139,56 @@ fn listed(effects: &[String]) -> String {
     }
 }
 
+/// The model's own physics within what the records show of their surroundings.
+fn physical_in(
+    model: &CoilModel,
+    pattern: &Pattern,
+    days: &[&Day],
+    records: &[&Record],
+) -> Result<Physical, CompensateError> {
+    let declared = Physical::new(model, pattern)?;
+    let needed = || declared.channel_names().chain(declared.formula_columns());
+    let has = |record: &Record, name: &str| record.channels().iter().any(|c| c.name == name);
+    if let Some(name) = records.iter().find_map(|record| needed().find(|name| !has(record, name))) {
+        return Err(CompensateError::MissingChannel { name: name.to_owned() });
+    }
+    let seen = days.iter().map(|day| day.seen(model, pattern)).collect::<Result<Vec<_>, _>>()?;
+    let method = Method::Physical;
+    let surroundings = Surroundings::together(&seen).ok_or(CompensateError::NeedsRecord { method })?;
+    let range_k = records
+        .iter()
+        .flat_map(|record| record.temperature_k())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(*t), high.max(*t)));
+    let mut physical = Physical::within(model, pattern, surroundings, Some(range_k))?;
+    physical.tune(records);
+    Ok(physical)
+}
+
 impl Compensator {
     /// Fitted to a record; the physical one's physics stays as declared: film, noise, delay and offset are fitted.
     ///
     /// # Errors
     /// A model that is not linear, a record that is too short or whose temperature says nothing.
     pub fn fit(method: Method, model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<Self, CompensateError> {
+        Self::fit_to(method, model, pattern, &[&Day::new(record)])
+    }
+
+    /// Fitted to several records of one gyro.
+    ///
+    /// # Errors
+    /// As [`Compensator::fit`], for any of them; no record.
+    pub(crate) fn fit_to(
+        method: Method,
+        model: &CoilModel,
+        pattern: &Pattern,
+        days: &[&Day],
+    ) -> Result<Self, CompensateError> {
+        let records: Vec<&Record> = days.iter().map(|day| day.record).collect();
         Ok(match method {
-            Method::Physical => {
-                let mut physical = Physical::new(model, pattern)?;
-                if let Some(name) = physical
-                    .channel_names()
-                    .chain(physical.formula_columns())
-                    .find(|n| record.channels().iter().all(|c| c.name != *n))
-                {
-                    return Err(CompensateError::MissingChannel { name: name.to_owned() });
-                }
-                let surroundings = surroundings(model, pattern, record)?;
-                let range_k = record
-                    .temperature_k()
-                    .iter()
-                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(*t), high.max(*t)));
-                physical = Physical::within(model, pattern, surroundings, Some(range_k))?;
-                physical.tune(record);
-                Compensator::Physical(Box::new(physical))
-            }
-            Method::Piecewise => Compensator::Piecewise(PiecewiseBias::fit(record)?),
-            Method::Regression => Compensator::Regression(Regression::fit(record)?),
-            Method::Learned => Compensator::Learned(Learned::fit(record)?),
+            Method::Physical => Compensator::Physical(Box::new(physical_in(model, pattern, days, &records)?)),
+            Method::Piecewise => Compensator::Piecewise(PiecewiseBias::fit(&records)?),
+            Method::Regression => Compensator::Regression(Regression::fit(&records)?),
+            Method::Learned => Compensator::Learned(Learned::fit(&records)?),
         })
     }
 

@@ -25,6 +25,8 @@
 
 mod beside;
 
+use rayon::prelude::*;
+
 use super::CompensateError;
 use super::filter::{Dynamics, Filter, Tuning};
 use super::formulas::{Formulas, seen};
@@ -79,6 +81,16 @@ pub struct Physical {
     pub hypotheses: usize,
     pub delay_s: f64,
     pub offset_rad_per_s: f64,
+}
+
+/// A stretch of a record, ready for trials.
+struct Part {
+    record: Record,
+    dynamics: Dynamics,
+    /// What formulas add to each row.
+    beside: Vec<f64>,
+    /// In rows of the record, those that are tried.
+    lags: Vec<usize>,
 }
 
 /// A conductivity that was taken at one temperature.
@@ -161,20 +173,28 @@ impl Physical {
         Ok(found)
     }
 
-    /// Chooses delay and offset so that a record's rate is compensated best, and how much more the air's slope wanders to a
-    /// filter that does not know beforehand when it breaks.
-    pub fn tune(&mut self, record: &Record) {
-        let interval_s = record.interval_s();
-        let Ok(dynamics) = self.dynamics(interval_s) else { return };
-        let part = record.stretch(0..record.rows().min(MOST_ROWS_TUNED));
-        let record = part.as_ref().unwrap_or(record);
-        let beside = self.formulas_over(record);
+    /// Chooses delay and offset so that the records' rates are compensated best, each about its own mean, and how much more the
+    /// air's slope wanders to a filter that does not know beforehand when it breaks. The offset is the mean of all.
+    pub fn tune(&mut self, records: &[&Record]) {
+        let most = MOST_ROWS_TUNED / records.len().max(1);
+        let interval_s = records.iter().map(|record| record.interval_s()).fold(0.0, f64::max);
+        let part = |record: &&Record| {
+            let record = record.stretch(0..record.rows().min(most)).unwrap_or_else(|_| (*record).clone());
+            let own_s = record.interval_s();
+            let dynamics = self.dynamics(own_s).ok()?;
+            let lags = (0..=TRIAL_DELAY_ROWS).map(|lag| (lag as f64 * interval_s / own_s).round() as usize);
+            let lags = lags.map(|lag| lag.min(MOST_DELAY_ROWS)).collect();
+            Some(Part { beside: self.formulas_over(&record), record, dynamics, lags })
+        };
+        let parts: Option<Vec<Part>> = records.iter().map(part).collect();
+        let Some(parts) = parts.filter(|parts| !parts.is_empty()) else { return };
         let least = |squares: &[f64]| squares.iter().copied().fold(f64::INFINITY, f64::min);
         let trials: Vec<(Surroundings, Vec<f64>, Vec<f64>)> = WANDER_HALF_DECADES
+            .into_par_iter()
             .map(|halves| {
                 let mut trial = self.clone();
                 trial.surroundings = self.surroundings.wandering(10f64.powf(-0.5 * f64::from(halves)));
-                let (squares, means) = trial.misfit(&dynamics, record, &beside);
+                let (squares, means) = trial.misfit(&parts);
                 (trial.surroundings, squares, means)
             })
             .collect();
@@ -194,10 +214,27 @@ impl Physical {
         &self.surroundings
     }
 
-    /// Variance and mean of the compensated rate at each lag.
-    fn misfit(&self, dynamics: &Dynamics, record: &Record, beside: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    /// Variance about each record's own mean, and the mean, of the compensated rate at each lag.
+    fn misfit(&self, parts: &[Part]) -> (Vec<f64>, Vec<f64>) {
+        let by_part: Vec<Vec<(f64, f64, f64)>> = parts.iter().map(|part| self.sums(part)).collect();
+        (0..=TRIAL_DELAY_ROWS)
+            .map(|lag| {
+                let (mut rows, mut sums, mut squares) = (0.0, 0.0, 0.0);
+                for (n, sum, square) in by_part.iter().map(|part| part[lag]) {
+                    rows += n;
+                    sums += sum;
+                    squares += square - sum * sum / n;
+                }
+                (squares / rows, sums / rows)
+            })
+            .unzip()
+    }
+
+    /// Rows, sum and sum of squares of the compensated rate at each lag.
+    fn sums(&self, part: &Part) -> Vec<(f64, f64, f64)> {
+        let Part { record, dynamics, beside, lags } = part;
         let interval_s = record.interval_s();
-        let mut filter = Filter::new(dynamics, &self.tuning(interval_s, TRIAL_DELAY_ROWS));
+        let mut filter = Filter::new(dynamics, &self.tuning(interval_s, lags[TRIAL_DELAY_ROWS]));
         let mut sums = vec![(0.0, 0.0, 0.0); TRIAL_DELAY_ROWS + 1];
         let rates = record.rate_rad_per_s();
         let error = |row: usize, air: f64| {
@@ -215,7 +252,7 @@ impl Physical {
             filter.step(Some(self.of_the_air_k(time_s, temperature_k)));
             rows_of_step.push(Some(row));
             last_s = time_s;
-            for (lag, sum) in sums.iter_mut().enumerate() {
+            for (&lag, sum) in lags.iter().zip(&mut sums) {
                 let Some(step) = rows_of_step.len().checked_sub(lag + 1) else { continue };
                 if let Some(then) = rows_of_step[step] {
                     let left = rates[then] - beside[then] - error(then, filter.rate_error_rad_per_s(lag));
@@ -223,7 +260,7 @@ impl Physical {
                 }
             }
         }
-        sums.iter().map(|(n, sum, square)| ((square - sum * sum / n) / n, sum / n)).unzip()
+        sums
     }
 
     fn causal(&self, interval_s: f64) -> Result<Causal, ThermalError> {

@@ -195,7 +195,7 @@ fn kalman_estimate(raw: &[(f64, f64)], lines: &PiecewiseBias) -> (f64, f64) {
 pub fn reproduce() -> Result<Reproduction, ThesisError> {
     let raw_rows = raw(SEED, 0.0);
     let record = filtered(&raw_rows)?;
-    let lines = PiecewiseBias::fit(&record)?;
+    let lines = PiecewiseBias::fit(&[&record])?;
     let after = compensated(&record, &lines)?;
     let interval_s = record.interval_s();
     let (measured, left) = (Metrics::of(&record, interval_s)?, Metrics::of(&after, interval_s)?);

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::compensate::learned::Learned;
 use crate::compensate::stream::{Compensated, Flag, Stream};
-use crate::compensate::{CompensateError, Compensator, Method};
+use crate::compensate::{CompensateError, Compensator, Day, Method};
 use crate::effect::{Acts, DeclaredEffect};
 use crate::io::files::{WriteError, folder_of};
 use crate::io::folder::Replacement;
@@ -19,6 +19,7 @@ use crate::predict::noise_floor_rad_per_s;
 use crate::record::Record;
 use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s, percent_from_fraction};
 
+use super::leave_one_out::{Trial, leave_one_out};
 use super::measurement::{GrossErrors, Measurement};
 use super::metrics::DEFAULT_AVERAGE_S;
 use super::{Observer, TaskError, pattern_or_own};
@@ -30,8 +31,8 @@ pub struct Request<'a> {
     /// None for the model's own.
     pub pattern: Option<&'a NamedPattern>,
     pub method: Method,
-    /// What film, noise, delay and offset (or the lines, or the regression) are fitted to.
-    pub fit: Option<&'a Measurement>,
+    /// What film, noise, delay and offset (or the lines, or the regression) are fitted to: records of one gyro.
+    pub fit: &'a [Measurement],
     /// One difference equation of fixed gains, without hypotheses about breaks of the air's slope.
     pub linear: bool,
     /// Looks so far ahead; none for as far as the fitted record says is worth it.
@@ -41,7 +42,7 @@ pub struct Request<'a> {
 impl<'a> Request<'a> {
     /// The model's own physics and pattern, as declared.
     pub fn new(model: &'a ModelFile) -> Self {
-        Self { model, pattern: None, method: Method::Physical, fit: None, linear: false, delay_s: None }
+        Self { model, pattern: None, method: Method::Physical, fit: &[], linear: false, delay_s: None }
     }
 }
 
@@ -49,9 +50,11 @@ impl<'a> Request<'a> {
 #[derive(Debug)]
 pub struct Answer {
     pub compensator: Compensator,
-    /// The fitted record, without its gross errors.
-    pub fitted: Option<Record>,
+    /// The fitted records, without their gross errors.
+    pub fitted: Vec<Record>,
     model: String,
+    /// The model's effects on the scale factor, which no compensator holds.
+    on_scale_factor: Vec<String>,
 }
 
 /// Makes the compensator.
@@ -67,38 +70,39 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
     if !turning.is_empty() {
         observer.note(&format!("what depends on a table's rate is not compensated: {}", turning.join(", ")));
     }
-    let mut compensator = match (&fitted, &request.model.learned) {
-        (Some(record), _) => Compensator::fit(request.method, model, &named.pattern, record)?,
-        (None, Some(learned)) if request.method == Method::Physical => {
+    let days: Vec<Day> = fitted.iter().map(Day::new).collect();
+    let mut compensator = match &request.model.learned {
+        _ if !days.is_empty() => {
+            Compensator::fit_to(request.method, model, &named.pattern, &days.iter().collect::<Vec<_>>())?
+        }
+        Some(learned) if request.method == Method::Physical => {
             observer.note("film, chamber and offset are those that the model file states as [boundary]");
             Compensator::in_known_surroundings(model, &named.pattern, learned)?
         }
-        (None, _) => Compensator::declared(request.method, model, &named.pattern)?,
+        _ => Compensator::declared(request.method, model, &named.pattern)?,
     };
     if let Compensator::Physical(physical) = &mut compensator {
         if request.linear {
             physical.hypotheses = 1;
-            if let Some(record) = &fitted {
-                physical.tune(record);
-            }
+            physical.tune(&fitted.iter().collect::<Vec<_>>());
         }
         if let Some(delay_s) = request.delay_s.filter(|d| *d >= 0.0) {
             physical.delay_s = delay_s;
         }
         if let Some(linearised) = physical.linearised() {
             observer.note(&format!(
-                "the conductivity is taken at {:.1} °C; over the fitted record it differs by up to {:.1} %",
+                "the conductivity is taken at {:.1} °C; over what was fitted it differs by up to {:.1} %",
                 celsius_from_kelvin(linearised.at_k),
                 percent_from_fraction(linearised.conductivity_error)
             ));
         }
     }
-    Ok(Answer { compensator, fitted, model: model.name.clone() })
+    Ok(Answer { compensator, fitted, model: model.name.clone(), on_scale_factor: turning })
 }
 
-fn fitted(request: &Request, observer: &dyn Observer) -> Result<Option<Record>, TaskError> {
-    let noticed = request.fit.map(|m| m.noticed(GrossErrors::Drop, Some(request.model), observer)).transpose()?;
-    Ok(noticed.map(|noticed| noticed.record))
+pub(super) fn fitted(request: &Request, observer: &dyn Observer) -> Result<Vec<Record>, TaskError> {
+    let sound = |m: &Measurement| Ok(m.noticed(GrossErrors::Drop, Some(request.model), observer)?.record);
+    request.fit.iter().map(sound).collect()
 }
 
 impl Answer {
@@ -111,23 +115,31 @@ impl Answer {
             noise_floor_deg_per_h: None,
             before: None,
             methods: Vec::new(),
+            leave_one_out: None,
             lines: BiasLineJson::all(&self.compensator),
         }
+    }
+
+    /// As asked for, or that of the fitted records where they agree.
+    fn interval_s(&self, asked_s: Option<f64>) -> Option<f64> {
+        let first_s = self.fitted.first().map(Record::interval_s);
+        let agreed_s = first_s.filter(|s| self.fitted.iter().all(|r| (r.interval_s() / s - 1.0).abs() < SAME_INTERVAL));
+        asked_s.or(agreed_s).filter(|i| *i > 0.0 && i.is_finite())
     }
 
     /// The compensator for an embedded target, as JSON and as a C header, for this interval or that of the fitted record; none where
     /// no such program holds it or the interval is not known.
     ///
     /// # Errors
-    /// None that a compensator causes.
+    /// A model whose scale factor would be lost.
     pub fn exported(&self, interval_s: Option<f64>) -> Result<Option<[String; 2]>, TaskError> {
+        self.check_whole()?;
         let pretty = |text: String| text + "\n";
         if let Some(equation) = self.difference_equation(interval_s) {
             let header = equation.c_header();
             return Ok(Some([pretty(serde_json::to_string_pretty(&Document::new(equation))?), header]));
         }
-        let interval_s = interval_s.or(self.fitted.as_ref().map(Record::interval_s));
-        let interval_s = interval_s.filter(|i| *i > 0.0 && i.is_finite());
+        let interval_s = self.interval_s(interval_s);
         let Some(empirical) = interval_s.and_then(|s| EmpiricalExport::new(&self.model, &self.compensator, s)) else {
             return Ok(None);
         };
@@ -135,16 +147,29 @@ impl Answer {
         Ok(Some([pretty(serde_json::to_string_pretty(&Document::new(empirical))?), header]))
     }
 
+    /// Whether the compensator is the whole of what the model says of a rate.
+    ///
+    /// # Errors
+    /// A physical one whose model has a scale factor's error too.
+    pub fn check_whole(&self) -> Result<(), CompensateError> {
+        let is_physical = self.compensator.method() == Method::Physical;
+        if is_physical && !self.on_scale_factor.is_empty() {
+            return Err(CompensateError::ScaleFactorLost { effects: self.on_scale_factor.clone() });
+        }
+        Ok(())
+    }
+
     /// The compensator as a difference equation, for this interval or that of the fitted record; none where no such equation
     /// holds it or the interval is not known.
     pub fn difference_equation(&self, interval_s: Option<f64>) -> Option<DifferenceEquation> {
-        let interval_s = interval_s.or(self.fitted.as_ref().map(Record::interval_s));
-        let interval_s = interval_s.filter(|i| *i > 0.0 && i.is_finite())?;
+        let interval_s = self.interval_s(interval_s)?;
         let Compensator::Physical(physical) = &self.compensator else { return None };
         DifferenceEquation::new(&self.model, physical, interval_s, self.compensator.delay_rows(interval_s))
     }
 }
 
+/// Intervals of records that differ by less, relatively, are one.
+const SAME_INTERVAL: f64 = 0.01;
 /// No coil remembers longer: an interval or a delay beyond is none.
 pub const LONGEST_S: f64 = 1e5;
 
@@ -215,67 +240,89 @@ pub fn compensate_record(compensator: &Compensator, record: &Record) -> Result<C
 /// A rate before compensation, and what each method leaves of it, row by row.
 pub type Curves = Vec<(&'static str, Vec<f64>)>;
 
-/// Every method, fitted to one record and tried on another.
+/// Every method, fitted to some records and tried on others.
 #[derive(Debug)]
 pub struct AllMethods {
     pub document: CompensateJson,
     /// In rad/s.
     pub curves: Curves,
-    /// What they were tried on.
-    pub record: Record,
+    /// Of the curves' rows: those of the record that was not fitted, or of the fitted ones, each left out in turn, one behind the other.
+    pub times_s: Vec<f64>,
 }
 
-/// Fits every method to the request's record and tries it on another.
+/// Fits every method to the request's records and tries it on another record where one is given; and, where there are several to fit
+/// to, to all but each of them in turn, and tries it on that one.
 ///
 /// # Errors
-/// No pattern or no record to fit to; records that cannot be measured.
-pub fn all_methods(request: &Request, holdout: &Measurement, observer: &dyn Observer) -> Result<AllMethods, TaskError> {
+/// No pattern, no record to fit to or none to try on; records that cannot be measured.
+pub fn all_methods(
+    request: &Request,
+    holdout: Option<&Measurement>,
+    observer: &dyn Observer,
+) -> Result<AllMethods, TaskError> {
     let file = request.model;
     let named = pattern_or_own(file, request.pattern)?;
-    let Some(fitted) = fitted(request, observer)? else {
-        let method = Method::Piecewise;
-        return Err(CompensateError::NeedsRecord { method }.into());
-    };
-    let record = holdout.noticed(GrossErrors::Keep, Some(file), observer)?.record;
-    let rate = |values: &[f64]| deg_per_h_from_rad_per_s(rms(values));
-    let measures = |rates: Vec<f64>| -> Result<MeasuresJson, TaskError> {
-        let left = Record::new("left", record.times_s().to_vec(), record.temperature_k().to_vec(), rates)?;
-        Ok(MeasuresJson::new(&Metrics::of(&left, DEFAULT_AVERAGE_S)?))
-    };
-    let mut curves = vec![("before", record.rate_rad_per_s().to_vec())];
-    let mut methods = Vec::new();
-    for method in Method::ALL {
-        methods.push(match Compensator::fit(method, &file.model, &named.pattern, &fitted) {
-            Ok(compensator) => {
-                let left = compensator.batch(&record);
-                curves.push((method.key(), left.clone()));
-                MethodJson {
-                    method: method.key(),
-                    rms_deg_per_h: Some(rate(&left)),
-                    delay_rows: Some(compensator.delay_rows(record.interval_s())),
-                    reason: worth(&compensator),
-                    measures: Some(measures(left)?),
-                }
-            }
-            Err(error) => MethodJson {
-                method: method.key(),
-                rms_deg_per_h: None,
-                delay_rows: None,
-                reason: Some(error.to_string()),
-                measures: None,
-            },
-        });
+    let fitted = fitted(request, observer)?;
+    if fitted.is_empty() {
+        return Err(CompensateError::NeedsRecord { method: Method::Piecewise }.into());
     }
-    let document = CompensateJson {
+    let files: Vec<&str> = request.fit.iter().map(|m| m.file.as_str()).collect();
+    let trial =
+        Trial { model: &file.model, pattern: &named.pattern, days: fitted.iter().map(Day::new).collect(), files };
+    let left_out = (fitted.len() > 1).then(|| leave_one_out(&trial, observer)).transpose()?;
+    let mut document = CompensateJson {
         model: file.model.name.clone(),
         method: "all",
         summary: None,
-        noise_floor_deg_per_h: Some(deg_per_h_from_rad_per_s(noise_floor_rad_per_s(&record))),
-        before: Some(measures(record.rate_rad_per_s().to_vec())?),
-        methods,
+        noise_floor_deg_per_h: None,
+        before: None,
+        methods: Vec::new(),
+        leave_one_out: None,
         lines: Vec::new(),
     };
-    Ok(AllMethods { document, curves, record })
+    let (mut curves, mut times_s) = left_out.map_or_else(Default::default, |found| {
+        document.leave_one_out = Some(found.document);
+        (found.curves, found.times_s)
+    });
+    if let Some(holdout) = holdout {
+        let record = holdout.noticed(GrossErrors::Keep, Some(file), observer)?.record;
+        document.noise_floor_deg_per_h = Some(deg_per_h_from_rad_per_s(noise_floor_rad_per_s(&record)));
+        document.before = Some(measures(&record, record.rate_rad_per_s().to_vec())?);
+        curves = vec![("before", record.rate_rad_per_s().to_vec())];
+        for method in Method::ALL {
+            let tried =
+                trial.fit(method, None).and_then(|compensator| Ok((trial.tried(&compensator, &record)?, compensator)));
+            document.methods.push(match tried {
+                Ok((left, compensator)) => {
+                    curves.push((method.key(), left.clone()));
+                    MethodJson {
+                        method: method.key(),
+                        rms_deg_per_h: Some(deg_per_h_from_rad_per_s(rms(&left))),
+                        delay_rows: Some(compensator.delay_rows(record.interval_s())),
+                        reason: worth(&compensator),
+                        measures: Some(measures(&record, left)?),
+                    }
+                }
+                Err(error) => MethodJson {
+                    method: method.key(),
+                    rms_deg_per_h: None,
+                    delay_rows: None,
+                    reason: Some(error.to_string()),
+                    measures: None,
+                },
+            });
+        }
+        times_s = record.times_s().to_vec();
+    } else if document.leave_one_out.is_none() {
+        return Err(TaskError::NoHoldout);
+    }
+    Ok(AllMethods { document, curves, times_s })
+}
+
+/// What is left of a record, measured.
+pub(super) fn measures(record: &Record, rates: Vec<f64>) -> Result<MeasuresJson, TaskError> {
+    let left = Record::new("left", record.times_s().to_vec(), record.temperature_k().to_vec(), rates)?;
+    Ok(MeasuresJson::new(&Metrics::of(&left, DEFAULT_AVERAGE_S)?))
 }
 
 /// What a learned compensator leaves of days that it was not shown, where that is not what it leaves of its own.

@@ -10,6 +10,7 @@ pub mod evaluate;
 pub mod exact;
 pub mod explore;
 pub mod field;
+mod leave_one_out;
 pub mod measurement;
 pub mod metrics;
 pub mod optimise;
@@ -148,6 +149,10 @@ pub enum TaskError {
     Option { option: &'static str, message: String },
     #[error("the temperature field does not fit: {message}")]
     Field { message: String },
+    #[error(
+        "methods are tried on a record that they were not fitted to: give one, or several to fit to, of which each is left out in turn"
+    )]
+    NoHoldout,
     #[error("the answer cannot be written down: {0}")]
     Unprintable(String),
 }

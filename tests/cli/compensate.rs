@@ -89,3 +89,91 @@ fn the_offset_of_another_start_up_stays_without_turn_on_and_goes_with_it() {
     let refused = run(&[&common[..], &["--turn-on", "0"]].concat());
     assert!(code(&refused) == 2 && stderr(&refused).contains("above zero"), "{}", stderr(&refused));
 }
+
+/// A short day: the temperature goes through a cycle of its own, and the rate follows its value.
+fn day_that_follows(start_c: f64, bias_deg_per_h: f64, slope: f64, seed: u32) -> String {
+    let rows = (0..1500_u32).map(|i| {
+        let temperature_c = start_c + 8.0 * (f64::from(i) / 150.0).sin();
+        let noise = 0.02 * (f64::from((i * 7919 + seed * 104_729) % 101) - 50.0) / 29.2;
+        format!("{},{temperature_c},{}\n", 10 * i, slope * temperature_c + bias_deg_per_h + noise)
+    });
+    "time_s,temperature_c,rate_deg_per_h\n".to_owned() + &rows.collect::<String>()
+}
+
+#[test]
+fn each_of_several_records_is_left_out_in_turn_and_what_only_fits_is_said() {
+    let (folder, _) = folder_with("1.csv", day_that_follows(20.0, 0.3, 0.5, 1));
+    let place = |name: &str| folder.path().join(name).display().to_string();
+    for (name, start_c, seed) in [("2.csv", 30.0, 2), ("3.csv", 25.0, 3)] {
+        std::fs::write(place(name), day_that_follows(start_c, 0.3, 0.5, seed)).unwrap();
+    }
+    let (first, second, third) = (place("1.csv"), place("2.csv"), place("3.csv"));
+    let picture = place("left.svg");
+    let fits = ["--fit", &first, "--fit", &second, "--fit", &third, "--all-methods"];
+    let found = json(&[&["compensate", COIL][..], &fits, &["-o", &picture]].concat());
+    assert_eq!(
+        (found["method"].as_str(), found["methods"].as_array().map(Vec::len)),
+        (Some("all"), Some(0)),
+        "{found}"
+    );
+    let left_out = &found["leave_one_out"];
+    let number = |value: &serde_json::Value| value.as_f64().unwrap();
+    let method = |name: &str| left_out["methods"].as_array().unwrap().iter().find(|m| m["method"] == name).unwrap();
+    // A line is a line on every day: what is left is the noise, 0.02 °/h.
+    let regression = method("regression");
+    assert!(number(&regression["left_out_rms_deg_per_h"]) < 0.022, "{regression}");
+    assert_eq!((regression["only_fits"].as_bool(), regression["reason"].is_null()), (Some(false), true));
+    for (place, file) in [&first, &second, &third].into_iter().enumerate() {
+        assert_eq!(regression["records"][place]["file"], **file);
+        assert!(number(&regression["records"][place]["measures"]["peak_to_peak_deg_per_h"]) < 0.1, "{regression}");
+    }
+    // The mean of the others knows nothing of a slope: days at 20, 30 and 25 °C with a cycle of ±8 °C.
+    assert!(number(&left_out["by_offset_rms_deg_per_h"]) > 3.0, "{left_out}");
+    assert!(std::fs::read_to_string(&picture).unwrap().contains("regression"));
+    // The one record that was left out is what a fit to the two others leaves of it.
+    let two = ["compensate", COIL, &third, "--fit", &first, "--fit", &second, "--all-methods"];
+    let by_others = json(&two);
+    let of_third = by_others["methods"].as_array().unwrap().iter().find(|m| m["method"] == "regression").unwrap();
+    assert_eq!(of_third["rms_deg_per_h"], regression["records"][2]["rms_deg_per_h"]);
+    assert_eq!(by_others["leave_one_out"]["records"].as_array().map(Vec::len), Some(2));
+    let words = run(&[&["compensate", COIL][..], &fits].concat());
+    let said = stdout(&words);
+    assert!(said.contains("3 records, each compensated by what was fitted to the others"), "{said}");
+    assert!(said.contains(&format!("{second} left out")) && said.contains("peak to peak"), "{said}");
+    // Where the line is another one every day, a method that follows it is worth nothing on a day it was not shown.
+    std::fs::write(place("2.csv"), day_that_follows(30.0, 0.3, -0.5, 2)).unwrap();
+    let found = json(&["compensate", COIL, "--fit", &first, "--fit", &second, "--all-methods"]);
+    let learned =
+        found["leave_one_out"]["methods"].as_array().unwrap().iter().find(|m| m["method"] == "learned").unwrap();
+    assert_eq!(learned["only_fits"], true, "{learned}");
+    assert!(learned["reason"].as_str().unwrap().contains("it only fits"), "{learned}");
+}
+
+#[test]
+fn a_physical_compensator_is_fitted_to_several_records_at_once() {
+    let validation = "tests/data/records/a-control/validation.csv";
+    let rms = |fits: &[&str]| {
+        let answer = json(&[&["compensate", COIL, validation][..], fits].concat());
+        answer["summary"]["compensated_deviation_deg_per_h"].as_f64().unwrap()
+    };
+    let one = rms(&["--fit", RECORD]);
+    let both = rms(&["--fit", RECORD, "--fit", validation]);
+    // Two days of one chamber say the same: knowing both is no worse on either.
+    assert!(both < 1.02 * one, "{both} {one}");
+}
+
+#[test]
+fn a_model_with_a_scale_factors_error_is_not_exported_as_a_physical_compensator() {
+    let text = std::fs::read_to_string(root().join(COIL)).unwrap();
+    let text = text + "\n[[effect]]\nkind = \"scale_factor_error\"\nerror_ppm = 300.0\n";
+    let (folder, coil) = folder_with("coil.toml", text);
+    let (coil, prefix) = (coil.display().to_string(), folder.path().join("embedded").display().to_string());
+    let refused = run(&["compensate", &coil, "--export", &prefix, "--interval", "10"]);
+    assert_eq!(code(&refused), 2, "{}", stderr(&refused));
+    assert!(stderr(&refused).contains("scale_factor_error would be lost"), "{}", stderr(&refused));
+    assert!(!folder.path().join("embedded.h").exists());
+    // The others know nothing of the model.
+    let lines = run(&["compensate", &coil, "--fit", RECORD, "--method", "piecewise", "--export", &prefix]);
+    assert_eq!(code(&lines), 0, "{}", stderr(&lines));
+    assert!(folder.path().join("embedded.h").exists());
+}

@@ -350,10 +350,10 @@ fn the_headers_of_the_methods_that_know_no_coil_give_the_programs_own_output() {
         of.clone().with_inner_k(inner).unwrap()
     };
     let cases = [
-        Compensator::Piecewise(PiecewiseBias::fit(&calibration).unwrap()),
-        Compensator::Regression(Regression::fit(&calibration).unwrap()),
-        Compensator::Regression(Regression::fit(&inner(&calibration)).unwrap()),
-        Compensator::Learned(Learned::fit(&calibration).unwrap()),
+        Compensator::Piecewise(PiecewiseBias::fit(&[&calibration]).unwrap()),
+        Compensator::Regression(Regression::fit(&[&calibration]).unwrap()),
+        Compensator::Regression(Regression::fit(&[&inner(&calibration)]).unwrap()),
+        Compensator::Learned(Learned::fit(&[&calibration]).unwrap()),
     ];
     for compensator in cases {
         let interval_s = holdout.interval_s();
@@ -435,7 +435,7 @@ fn chapter_record(noise_band_units: f64, seed: u64) -> Record {
 }
 
 fn fit(record: &Record) -> PiecewiseBias {
-    PiecewiseBias::fit(record).unwrap()
+    PiecewiseBias::fit(&[record]).unwrap()
 }
 
 fn holds_the_true_breaks(piecewise: &PiecewiseBias) -> bool {

@@ -15,6 +15,7 @@ use crate::io::read::record_columns::{COMPENSATED, Column, FLAGS, Quantity, Reco
 use crate::io::read::record_head::Head;
 use crate::io::read::record_rows::{NO_HEADER, header_columns};
 use crate::io::table::PassedRow;
+use crate::io::write::leave_one_out::LeaveOneOutJson;
 use crate::metrics::Metrics;
 use crate::numeric::statistics::RunningDeviation;
 use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s};
@@ -422,6 +423,9 @@ pub struct CompensateJson {
     pub before: Option<MeasuresJson>,
     /// All methods on the hold-out, where that was asked for.
     pub methods: Vec<MethodJson>,
+    /// All methods on each fitted record, left out in turn, where there are several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub leave_one_out: Option<LeaveOneOutJson>,
     pub lines: Vec<BiasLineJson>,
 }
 

@@ -12,6 +12,7 @@ pub mod difference_equation;
 pub mod empirical_export;
 pub mod field_table;
 mod formulas_in_c;
+pub(crate) mod leave_one_out;
 pub mod machine_program;
 pub mod measurement_folder;
 pub mod model_edit;
