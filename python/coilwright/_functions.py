@@ -130,7 +130,7 @@ def optimise(
     Args:
         seed: of everything random; without it, the model's own.
         windability: "standard", "captive:K" or "any"; without it, the model's own.
-        objective: "worst-rate", "worst-phase", "rms", "guaranteed-rate" or "p95"; without it, the model's own.
+        objective: "worst-rate", "worst-phase", "rms", "guaranteed-rate", "p95" or "pointing"; without it, the model's own.
         budget_s: ends after this time.
         rounds, moves, patience, target_deg_per_h: further rules; the first that fires ends the search.
         restarts, moves_per_restart: effort of a round.
@@ -193,7 +193,7 @@ def exact(
 
     Args:
         windability: "standard", "captive:K" or "any"; without it, the model's own.
-        objective: "worst-rate", "rms" or "guaranteed-rate"; without it, "worst-rate".
+        objective: "worst-rate", "rms", "guaranteed-rate" or "pointing"; without it, "worst-rate".
         budget_s: gives up after this time, with the bound reached until then.
         patterns: patterns to begin with, besides the classics and what a short search finds.
     """

@@ -34,7 +34,7 @@ pub struct Arguments {
     /// What can be wound: standard, captive:K or any; without it, the model's own
     #[arg(long, value_name = "CLASS", value_parser = offered::classes(), hide_possible_values = true)]
     windability: Option<WindabilityClass>,
-    /// What is proved to be small: worst-rate, rms or guaranteed-rate; without it, the model's own
+    /// What is proved to be small: worst-rate, rms, guaranteed-rate or pointing; without it, the model's own
     #[arg(long, value_name = "WHAT", value_parser = offered::objectives(), hide_possible_values = true)]
     objective: Option<Objective>,
     /// Gives up after this time, e.g. 30s or 5m, with the lower bound reached until then
@@ -48,7 +48,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Writes the samples that the proof ran on as a table, for other solvers: constant and one coefficient a layer in
-    /// °/h, so that the rate error is constant + Σ a_j (2 P(j) − 1 − N). Needs equal lengths and halves that respond alike
+    /// °/h (for pointing in °), so that the rate error is constant + Σ a_j (2 P(j) − 1 − N). Needs equal lengths and halves that respond alike
     #[arg(long, value_name = "FILE")]
     samples: Option<PathBuf>,
     /// Writes the best winding as a pattern file
@@ -101,6 +101,8 @@ pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
 
 fn text(body: &ExactJson) -> String {
     let best = &body.best;
+    let objective = Objective::from_key(&body.objective).unwrap_or(Objective::WorstRate);
+    let unit = objective.unit();
     let segments: Vec<String> = best.segments.iter().map(ToString::to_string).collect();
     let proof = match (body.proof.status.as_str(), body.proof.lower_bound_deg_per_h) {
         ("optimal", _) => format!(
@@ -109,19 +111,19 @@ fn text(body: &ExactJson) -> String {
             body.proof
                 .grid_margin_deg_per_h
                 .filter(|m| *m > 0.0)
-                .map_or_else(|| "rounding".to_owned(), |m| format!("the {m:.1e} °/h that the grid may be off"))
+                .map_or_else(|| "rounding".to_owned(), |m| format!("the {m:.1e} {unit} that the grid may be off"))
         ),
         (_, Some(bound)) => format!(
-            "gap: no winding of the class {} is below {bound:.6} °/h, {:.1} % under the best known",
+            "gap: no winding of the class {} is below {bound:.6} {unit}, {:.1} % under the best known",
             body.windability,
             100.0 * (1.0 - bound / body.best_objective_deg_per_h)
         ),
         _ => "none: nothing is proved; give a longer --budget".to_owned(),
     };
-    let what = if body.objective == Objective::WorstRate.key() {
+    let what = if objective == Objective::WorstRate {
         String::new()
     } else {
-        format!("proof is of the {}\n", body.objective)
+        format!("proof is of the {}, {:.6} {unit}\n", objective.title(), body.best_objective_deg_per_h)
     };
     format!(
         "{what}best     {}: {}\nworst    {:.6} °/h{}, under {} at {:.2} s\nproof    {proof}\n\

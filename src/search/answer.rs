@@ -2,6 +2,7 @@
 
 use super::anneal::rounds::{State, Stop};
 use super::aside::GridCheck;
+use super::cost::objective::Objective;
 use super::cutting::Cuts;
 use super::end_turns::WithEnds;
 use super::evaluator::Judged;
@@ -84,12 +85,13 @@ impl Proof {
         Self { lower_bound_rad_per_s, grid_margin_rad_per_s, ..self }
     }
 
-    /// To be said after how good the best pattern is; `what` is the objective in words.
-    pub fn words(&self, what: &str) -> String {
+    /// To be said after how good the best pattern is under the objective.
+    pub fn words(&self, objective: Objective) -> String {
+        let (what, unit) = (objective.title(), objective.unit());
         match self.status {
             Status::Optimal => format!(" Proved: no pattern of the class has a smaller {what} at any time."),
             Status::Gap => format!(
-                " Proved: no pattern of the class has a {what} below {:.4} °/h.",
+                " Proved: no pattern of the class has a {what} below {:.4} {unit}.",
                 deg_per_h_from_rad_per_s(self.lower_bound_rad_per_s)
             ),
             Status::None => String::new(),

@@ -11,7 +11,7 @@ use crate::search::anneal::rounds::Found;
 use crate::search::aside::{Aside, GridCheck, GridChecked, PointingError};
 use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
 use crate::search::cost::objective::{Objective, POINTING_S};
-use crate::search::cost::pointing::worst_pointing;
+use crate::search::cost::pointing::pointing_as_rate;
 use crate::search::cost::tolerance::{Coils, ToleranceError, ToleranceSpec};
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles, WorstCase};
 use crate::search::proof::permutation_tree::MOST_LAYERS;
@@ -131,7 +131,7 @@ impl Evaluator<'_> {
             Objective::RootMeanSquare => crate::search::cost::objective::rms_rad_per_s(&rate_model, self.solved),
             Objective::GuaranteedRate => or_none(guaranteed_rad_per_s),
             Objective::P95 => or_none(p95),
-            Objective::Pointing => worst_pointing(self.model, self.solved, pattern)?.rate_rad_per_s.abs() / POINTING_S,
+            Objective::Pointing => pointing_as_rate(self.model, self.solved, pattern)?.rate_rad_per_s.abs(),
         };
         Ok(Judged {
             name: name.to_owned(),
@@ -227,6 +227,17 @@ impl Evaluator<'_> {
         of_profiles.fold(self.profiles.max_rate_k_per_s, f64::max)
     }
 
+    /// By how much the grid may put the objective of any pattern off the continuum's.
+    ///
+    /// # Errors
+    /// None that a model which could be solved would cause.
+    pub fn margin_of_any(&self, aside: &Aside) -> Result<f64, SearchError> {
+        let of_rate = aside.margin.of_any(self.steepest_k_per_s())?;
+        let longest_s = self.solved.profiles().iter().map(|p| p.profile.duration_s()).fold(0.0, f64::max);
+        // A rate that is off by no more at any time adds up to no more.
+        Ok(if self.objective == Objective::Pointing { of_rate * longest_s / POINTING_S } else { of_rate })
+    }
+
     /// What a proof for the objective is about; `None` for a quantile over built coils, and for a guaranteed worst case
     /// that the model has not.
     pub fn goal(&self) -> Option<Goal<'_>> {
@@ -234,7 +245,8 @@ impl Evaluator<'_> {
             Objective::WorstRate | Objective::WorstPhase => Some(Goal::WorstRate),
             Objective::RootMeanSquare => Some(Goal::RootMeanSquare),
             Objective::GuaranteedRate => self.unit_step.map(Goal::Guaranteed),
-            Objective::P95 | Objective::Pointing => None,
+            Objective::Pointing => Some(Goal::Pointing),
+            Objective::P95 => None,
         }
     }
 
@@ -248,7 +260,7 @@ impl Evaluator<'_> {
         let layers = self.model.coil.layers();
         let lengths_m = self.model.coil.layer_lengths_m();
         let has_equal_layers = lengths_m.iter().all(|l| *l == lengths_m[0]);
-        let is_of_worst = matches!(self.objective, Objective::WorstRate | Objective::WorstPhase);
+        let is_of_worst = matches!(self.objective, Objective::WorstRate | Objective::WorstPhase | Objective::Pointing);
         is_of_worst && self.can_improve(class) && has_equal_layers && layers <= PROVABLE_LAYERS
     }
 

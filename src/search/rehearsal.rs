@@ -23,7 +23,6 @@ use super::cost::samples::SampleMatrix;
 use super::cost::worst_case::SolvedProfiles;
 use super::evaluator::{Evaluator, JudgeError};
 use super::proof::support::Support;
-use super::proof::{Goal, Task};
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::rate::LayerWeights;
@@ -94,7 +93,7 @@ impl Evaluator<'_> {
         let factors: Vec<f64> = sets.iter().map(|set| 1.0 / set.map_or(over_listed, |k| least[k])).collect();
         let mut matrix = matrix.scaled(&factors);
         let coefficients = |matrix: &SampleMatrix, pattern: &Pattern| Ok(matrix.coefficients(&weights(pattern)?));
-        let bound = self.bound_over_classics(class, matrix.layout, classics, &weights)?;
+        let bound = self.bound_over_classics(matrix.layout, classics, &weights)?;
         if let Some(bound) = &bound {
             let of: Result<Vec<Vec<f64>>, SearchError> =
                 classics.iter().chain(starts).map(|p| coefficients(&matrix, p)).collect();
@@ -144,16 +143,15 @@ impl Evaluator<'_> {
 
     fn bound_over_classics(
         &self,
-        class: WindabilityClass,
         layout: super::cost::samples::Layout,
         classics: &[Pattern],
         weights: &dyn Fn(&Pattern) -> Result<LayerWeights, SearchError>,
     ) -> Result<Option<Bound>, JudgeError> {
         let Some(step) = self.unit_step else { return Ok(None) };
-        let task = Task { model: self.model, solved: self.solved, class, goal: Goal::Guaranteed(step) };
-        let Some(support) = Support::new(&task)?.filter(|support| support.matrix().layout == layout) else {
+        let support = Support::of_guaranteed(self.model, step)?;
+        if support.matrix().layout != layout {
             return Ok(None);
-        };
+        }
         let mut over = f64::INFINITY;
         for classic in classics {
             over = over.min(support.value(&support.matrix().coefficients(&weights(classic)?)));

@@ -166,17 +166,13 @@ pub fn run(request: &Request, observer: &mut dyn Observer) -> Result<Option<Answ
     let on_unseen = validation.as_ref().map(|v| evaluator.words_on_unseen(v, &best, &baselines));
     let statement = evaluator.statement(&best, &baselines, class)
         + &on_unseen.unwrap_or_default()
-        + &proof.words(request.objective.title())
+        + &proof.words(request.objective)
         + &caution.unwrap_or_default();
     let aside = Aside::new(request.model, &solved)?;
     let best = evaluator.completed(&aside, best)?;
     let baselines =
         baselines.into_iter().map(|b| evaluator.completed(&aside, b)).collect::<Result<Vec<Judged>, _>>()?;
-    let proof = if proof.status == Status::None {
-        proof
-    } else {
-        proof.beside_grid(aside.margin.of_any(evaluator.steepest_k_per_s())?)
-    };
+    let proof = if proof.status == Status::None { proof } else { proof.beside_grid(evaluator.margin_of_any(&aside)?) };
     let first = search.state().first_with_best().map_or(0, |record| record.evaluations);
     let mut answer = Answer {
         improvement_over_qua: improvement_over_qua(&best, &baselines),

@@ -15,7 +15,7 @@ use crate::search::aside::Aside;
 use crate::search::cost::guaranteed::UnitStep;
 use crate::search::cost::objective::Objective;
 use crate::search::cost::worst_case::SolvedProfiles;
-use crate::search::evaluator::JudgeError;
+use crate::search::evaluator::{Evaluator, JudgeError};
 use crate::search::proof::{Certificate, Goal, Progress, Status, Task, prove, starting_patterns};
 use crate::units::deg_per_h_from_rad_per_s;
 
@@ -105,9 +105,10 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
         Objective::WorstRate | Objective::WorstPhase => Goal::WorstRate,
         Objective::RootMeanSquare => Goal::RootMeanSquare,
         Objective::GuaranteedRate => Goal::Guaranteed(step.as_ref().map_err(|error| JudgeError::from(error.clone()))?),
-        Objective::P95 | Objective::Pointing => {
+        Objective::Pointing => Goal::Pointing,
+        Objective::P95 => {
             let message = format!(
-                "there is no proof of \"{}\": state worst-rate, rms or guaranteed-rate, or use optimise",
+                "there is no proof of \"{}\": state worst-rate, rms, guaranteed-rate or pointing, or use optimise",
                 request.objective.key()
             );
             return Err(TaskError::Option { option: "--objective", message });
@@ -124,25 +125,31 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
         // Pieces of work report far more often than anything changes.
         let seen = ((at.pass * PROGRESS_STEPS as f64) as u64) << 32 | step;
         if shown.swap(seen, Ordering::Relaxed) != seen {
-            observer.at(at.share_done, &words(&at));
+            observer.at(at.share_done, &words(&at, request.objective.unit()));
         }
         if observer.goes_on() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     };
     let certificate = prove(&task, &starts, &watcher)?;
 
     let pattern = &certificate.pattern;
+    let evaluator = Evaluator {
+        model,
+        solved: &solved,
+        objective: request.objective,
+        unit_step: step.as_ref().ok(),
+        profiles: &file.profiles,
+        tolerance: None,
+    };
     let worst = solved.worst_case(model, pattern)?;
     let phase_rad = RateModel::new(model, pattern, &[])?.phase_rad(worst.rate_rad_per_s);
-    let bound = step.and_then(|s| s.guaranteed(model, pattern)).ok();
+    let bound = evaluator.unit_step.and_then(|step| step.guaranteed(model, pattern).ok());
     let name = name_of(pattern);
-    let steepest = solved.profiles().iter().map(|p| p.profile.max_rate_k_per_s());
-    let steepest = steepest.fold(file.profiles.max_rate_k_per_s, f64::max);
     let aside = Aside::new(model, &solved)?;
     let best = PatternJson::new(&name, pattern, &worst, phase_rad, bound.map(|b| b.rate_rad_per_s))
-        .with_margin(aside.margin.of(&solved, pattern, steepest)?)
+        .with_margin(aside.margin.of(&solved, pattern, evaluator.steepest_k_per_s())?)
         .with_pointing(&aside.pointing(model, &solved, pattern, file.profiles.max_rate_k_per_s)?);
     Ok(Answer {
-        proof: Proof::of(&certificate).beside_grid(aside.margin.of_any(steepest)?),
+        proof: Proof::of(&certificate).beside_grid(evaluator.margin_of_any(&aside)?),
         best,
         name,
         profiles: solved.profiles().len(),
@@ -153,10 +160,10 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
     })
 }
 
-fn words(at: &Progress) -> String {
+fn words(at: &Progress, unit: &str) -> String {
     let shown = deg_per_h_from_rad_per_s;
     format!(
-        "best {:.5} °/h, none below {:.5}, now up to {:.0} %",
+        "best {:.5} {unit}, none below {:.5}, now up to {:.0} %",
         shown(at.best_rad_per_s),
         shown(at.lower_bound_rad_per_s),
         100.0 * at.pass

@@ -12,7 +12,7 @@
 //! | G | rate error after a unit step of the drive's rate | rad/s per K/s | as in [`super::guaranteed`] |
 //!
 //! Only differences of temperature count, not the way to them. What of a model is not linear in the rates is integrated
-//! between the profile's instants and added (where a search samples it, by the trapezium rule).
+//! between the profile's instants by Gauss's rule and added.
 //!
 //! # Source
 //! Pointing error thermal sensitivity: Opt. Express 21 (2013) 2521 (by its abstract).
@@ -20,6 +20,7 @@
 use rayon::prelude::*;
 
 use super::guaranteed::is_linear;
+use super::objective::POINTING_S;
 use super::samples::{SampleMatrix, any_rate_model};
 use super::worst_case::{PEAK_SHARE, SearchError, SolvedProfile, SolvedProfiles, WorstCase};
 use crate::numeric::lobatto::gauss;
@@ -68,25 +69,81 @@ fn integrated(history: &ThermalHistory) -> ThermalHistory {
     }
 }
 
-/// Adds ∫ (all − linear) dt over the rows to each of them, by Gauss's rule between each two of them.
-fn add_rest(profile: &SolvedProfile, whole: &RateModel, linear: &RateModel, to: &mut [f64]) {
-    let times_s = &profile.history.times_s;
+/// Instants of Gauss's rule between each two rows of a profile, in order, and what each counts in an integral [s].
+fn between_rows(profile: &SolvedProfile) -> (ThermalHistory, Vec<f64>) {
     let rule = gauss(POINTS);
-    let inside = times_s.windows(2).flat_map(|pair| {
+    let (mut instants, mut counts_s) = (Vec::new(), Vec::new());
+    for pair in profile.history.times_s.windows(2) {
         let (middle_s, half_s) = (0.5 * (pair[0] + pair[1]), 0.5 * (pair[1] - pair[0]));
-        rule.iter().map(move |(x, _)| Instant::after(middle_s + half_s * x)).collect::<Vec<_>>()
-    });
-    let between = profile.field.at(&inside.collect::<Vec<_>>());
-    let rest = |row: usize| {
-        whole.rate_error_rad_per_s(&whole.state(&between, row, &[]))
-            - linear.rate_error_rad_per_s(&linear.state(&between, row, &[]))
-    };
-    let mut sum = 0.0;
-    for (row, pair) in times_s.windows(2).enumerate() {
-        let half_s = 0.5 * (pair[1] - pair[0]);
-        sum += rule.iter().enumerate().map(|(p, (_, w))| half_s * w * rest(row * POINTS + p)).sum::<f64>();
-        to[row + 1] += sum;
+        instants.extend(rule.iter().map(|(x, _)| Instant::after(middle_s + half_s * x)));
+        counts_s.extend(rule.iter().map(|(_, w)| half_s * w));
     }
+    (profile.field.at(&instants), counts_s)
+}
+
+/// The pointing error of a pattern; its two parts are added where the model is not linear.
+#[derive(Debug)]
+pub(in crate::search) struct Pointing {
+    linear: RateModel,
+    /// None where all is linear.
+    whole: Option<RateModel>,
+}
+
+impl Pointing {
+    /// # Errors
+    /// A pattern of another layer count.
+    pub(in crate::search) fn new(model: &CoilModel, pattern: &Pattern) -> Result<Self, SearchError> {
+        let linear = RateModel::new(&linear_part(model)?, pattern, &[])?;
+        let whole = if is_linear(model)? { None } else { Some(RateModel::new(model, pattern, &[])?) };
+        Ok(Self { linear, whole })
+    }
+
+    /// ψ \[rad\] at every instant of a profile.
+    fn series_rad(&self, profile: &SolvedProfile) -> Vec<f64> {
+        let mut series = self.linear.series_rad_per_s(&integrated(&profile.history));
+        if let Some(whole) = &self.whole {
+            let (between, counts_s) = between_rows(profile);
+            let all = whole.series_after(&between, &mut profile.past(whole));
+            let linear = self.linear.series_rad_per_s(&between);
+            let rest: Vec<f64> = all.iter().zip(linear).zip(counts_s).map(|((a, l), s)| (a - l) * s).collect();
+            let mut sum = 0.0;
+            for (psi, rest) in series[1..].iter_mut().zip(rest.chunks(POINTS)) {
+                sum += rest.iter().sum::<f64>();
+                *psi += sum;
+            }
+        }
+        series
+    }
+
+    /// The largest of them by size and its time, between the instants too where the model is linear.
+    fn worst_of_series(&self, profile: &SolvedProfile, series: &[f64]) -> (f64, f64) {
+        let history = &profile.history;
+        let size = |row: usize| series[row].abs();
+        let worst = (1..series.len()).fold(0, |best, row| if size(row) > size(best) { row } else { best });
+        let found = (series[worst], history.times_s[worst]);
+        if self.whole.is_some() || worst == 0 || worst + 1 == series.len() {
+            return found;
+        }
+        let error_at = |time_s: f64| {
+            let changes = changes_until(profile, time_s);
+            self.linear.rate_error_rad_per_s(&self.linear.state(&changes, 1, &[]))
+        };
+        let (from_s, to_s) = (history.times_s[worst - 1], history.times_s[worst + 1]);
+        let peak = golden_section(|t| error_at(t).abs(), from_s, to_s);
+        if peak.value > found.0.abs() { (error_at(peak.at), peak.at) } else { found }
+    }
+
+    /// The rate that makes in one hour what ψ is where its size is largest over a profile, and the time of it.
+    pub(in crate::search) fn worst(&self, profile: &SolvedProfile) -> (f64, f64) {
+        let (error_rad, time_s) = self.worst_of_series(profile, &self.series_rad(profile));
+        (error_rad / POINTING_S, time_s)
+    }
+}
+
+/// Changes since a profile's start: none in the first row, those until a time in the second.
+fn changes_until(profile: &SolvedProfile, time_s: f64) -> ThermalHistory {
+    let start = Instant::after(profile.history.times_s[0]);
+    integrated(&profile.field.at(&[start, Instant::after(time_s)]))
 }
 
 /// The largest |ψ| of a pattern over all profiles and times, with its sign, as a [`WorstCase`] in rad.
@@ -94,11 +151,8 @@ fn add_rest(profile: &SolvedProfile, whole: &RateModel, linear: &RateModel, to: 
 /// # Errors
 /// A pattern of another layer count.
 pub fn worst_pointing(model: &CoilModel, solved: &SolvedProfiles, pattern: &Pattern) -> Result<WorstCase, SearchError> {
-    let part = linear_part(model)?;
-    let linear = RateModel::new(&part, pattern, &[])?;
-    let whole = if is_linear(model)? { None } else { Some(RateModel::new(model, pattern, &[])?) };
-    let sampled: Vec<Vec<f64>> =
-        solved.profiles().par_iter().map(|profile| samples_of(profile, &linear, whole.as_ref())).collect();
+    let pointing = Pointing::new(model, pattern)?;
+    let sampled: Vec<Vec<f64>> = solved.profiles().par_iter().map(|profile| pointing.series_rad(profile)).collect();
     let tops: Vec<f64> =
         sampled.iter().map(|series| series.iter().fold(0.0, |most: f64, e| most.max(e.abs()))).collect();
     let least = PEAK_SHARE * tops.iter().copied().fold(0.0, f64::max);
@@ -107,7 +161,7 @@ pub fn worst_pointing(model: &CoilModel, solved: &SolvedProfiles, pattern: &Patt
         .into_par_iter()
         .map(|index| {
             let profile = &solved.profiles()[index];
-            let (error_rad, time_s) = worst_of(profile, &sampled[index], &linear, whole.is_none());
+            let (error_rad, time_s) = pointing.worst_of_series(profile, &sampled[index]);
             WorstCase {
                 rate_rad_per_s: error_rad,
                 profile: profile.profile.name().to_owned(),
@@ -126,32 +180,70 @@ pub fn worst_pointing(model: &CoilModel, solved: &SolvedProfiles, pattern: &Patt
     Ok(worst)
 }
 
-/// ψ at every instant of a profile.
-fn samples_of(profile: &SolvedProfile, linear: &RateModel, whole: Option<&RateModel>) -> Vec<f64> {
-    let mut series = linear.series_rad_per_s(&integrated(&profile.history));
-    if let Some(whole) = whole {
-        add_rest(profile, whole, linear, &mut series);
-    }
-    series
+/// The same as the rate that makes it in one hour.
+///
+/// # Errors
+/// As [`worst_pointing`].
+pub(in crate::search) fn pointing_as_rate(
+    model: &CoilModel,
+    solved: &SolvedProfiles,
+    pattern: &Pattern,
+) -> Result<WorstCase, SearchError> {
+    let worst = worst_pointing(model, solved, pattern)?;
+    Ok(WorstCase { rate_rad_per_s: worst.rate_rad_per_s / POINTING_S, ..worst })
 }
 
-/// The largest of them, between the instants too where the model is linear.
-fn worst_of(profile: &SolvedProfile, series: &[f64], linear: &RateModel, is_linear: bool) -> (f64, f64) {
-    let history = &profile.history;
-    let size = |row: usize| series[row].abs();
-    let worst = (1..series.len()).fold(0, |best, row| if size(row) > size(best) { row } else { best });
-    let found = (series[worst], history.times_s[worst]);
-    if !is_linear || worst == 0 || worst + 1 == series.len() {
-        return found;
+/// ψ of any pattern as what its weights are multiplied by.
+#[derive(Debug)]
+pub(in crate::search) struct PointingResponses {
+    linear: RateModel,
+    /// None where all is linear.
+    whole: Option<RateModel>,
+}
+
+impl PointingResponses {
+    /// # Errors
+    /// Effects that leave a layer no turns.
+    pub(in crate::search) fn new(model: &CoilModel) -> Result<Self, SearchError> {
+        let linear = any_rate_model(&linear_part(model)?)?;
+        let whole = if is_linear(model)? { None } else { Some(any_rate_model(model)?) };
+        Ok(Self { linear, whole })
     }
-    let start = Instant::after(history.times_s[0]);
-    let error_at = |time_s: f64| {
-        let between = integrated(&profile.field.at(&[start, Instant::after(time_s)]));
-        linear.rate_error_rad_per_s(&linear.state(&between, 1, &[]))
-    };
-    let (from_s, to_s) = (history.times_s[worst - 1], history.times_s[worst + 1]);
-    let peak = golden_section(|t| error_at(t).abs(), from_s, to_s);
-    if peak.value > found.0.abs() { (error_at(peak.at), peak.at) } else { found }
+
+    /// At every instant of a profile.
+    fn of_profile(&self, profile: &SolvedProfile) -> Vec<WeightResponse> {
+        let changes = integrated(&profile.history);
+        let of_linear =
+            |history: &ThermalHistory, row: usize| self.linear.weight_response(&self.linear.state(history, row, &[]));
+        let mut of_rows: Vec<WeightResponse> = (0..changes.len()).map(|row| of_linear(&changes, row)).collect();
+        if let Some(whole) = &self.whole {
+            let (between, counts_s) = between_rows(profile);
+            let mut past = profile.past(whole);
+            let mut sum = combined(&of_rows[0], 0.0, &of_rows[0], 0.0);
+            for (row, &count_s) in counts_s.iter().enumerate() {
+                let all = whole.weight_response_after(&whole.state(&between, row, &[]), &mut past);
+                let rest = combined(&all, count_s, &of_linear(&between, row), -count_s);
+                sum = combined(&sum, 1.0, &rest, 1.0);
+                if (row + 1).is_multiple_of(POINTS) {
+                    let of_row = &mut of_rows[(row + 1) / POINTS];
+                    *of_row = combined(of_row, 1.0, &sum, 1.0);
+                }
+            }
+        }
+        of_rows
+    }
+
+    /// At a time that [`Pointing::worst`] answered: where the model is not linear, that of one of the instants.
+    pub(in crate::search) fn at(&self, profile: &SolvedProfile, time_s: f64) -> WeightResponse {
+        let response = if self.whole.is_none() {
+            self.linear.weight_response(&self.linear.state(&changes_until(profile, time_s), 1, &[]))
+        } else {
+            let row = profile.history.times_s.partition_point(|t| *t < time_s);
+            let mut of_rows = self.of_profile(profile);
+            of_rows.swap_remove(row.min(of_rows.len() - 1))
+        };
+        combined(&response, 1.0 / POINTING_S, &response, 0.0)
+    }
 }
 
 /// ψ at every instant of the solved profiles as samples: what a search over the pointing error runs on.
@@ -159,35 +251,10 @@ fn worst_of(profile: &SolvedProfile, series: &[f64], linear: &RateModel, is_line
 /// # Errors
 /// Effects that leave a layer no turns.
 pub fn pointing_samples(model: &CoilModel, solved: &SolvedProfiles) -> Result<SampleMatrix, SearchError> {
-    let (part, whole) = (linear_part(model)?, any_rate_model(model)?);
-    let linear = any_rate_model(&part)?;
-    let is_linear = is_linear(model)?;
-    let responses: Vec<WeightResponse> = solved
-        .profiles()
-        .par_iter()
-        .flat_map_iter(|profile| {
-            let (history, changes) = (&profile.history, integrated(&profile.history));
-            let mut of_rows: Vec<WeightResponse> =
-                (0..changes.len()).map(|row| linear.weight_response(&linear.state(&changes, row, &[]))).collect();
-            if !is_linear {
-                let rest = |row: usize| {
-                    let all = whole.weight_response(&whole.state(history, row, &[]));
-                    combined(&all, 1.0, &linear.weight_response(&linear.state(history, row, &[])), -1.0)
-                };
-                let mut before = rest(0);
-                let mut sum = combined(&before, 0.0, &before, 0.0);
-                for (row, of_row) in of_rows.iter_mut().enumerate().skip(1) {
-                    let here = rest(row);
-                    let half_s = 0.5 * (history.times_s[row] - history.times_s[row - 1]);
-                    sum = combined(&sum, 1.0, &combined(&before, half_s, &here, half_s), 1.0);
-                    *of_row = combined(of_row, 1.0, &sum, 1.0);
-                    before = here;
-                }
-            }
-            of_rows
-        })
-        .collect();
-    Ok(SampleMatrix::new(model, &responses)?)
+    let responses = PointingResponses::new(model)?;
+    let of_all: Vec<WeightResponse> =
+        solved.profiles().par_iter().flat_map_iter(|profile| responses.of_profile(profile)).collect();
+    Ok(SampleMatrix::new(model, &of_all)?)
 }
 
 /// a A + b B.

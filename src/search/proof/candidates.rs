@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
+use super::course::Course;
 use super::support::Support;
 use super::{Goal, Outcome, Task, Watch};
 use crate::coil::Coil;
@@ -12,9 +13,9 @@ use crate::rate::{LayerWeights, RateError, RateModel};
 use crate::search::cost::columns::{BLOCK, Norm};
 use crate::search::cost::guaranteed::GuaranteedError;
 use crate::search::cost::objective::rms_rad_per_s;
-use crate::search::cost::samples::{SampleMatrix, any_rate_model};
-use crate::search::cost::worst_case::SearchError;
-use crate::thermal::Instant;
+use crate::search::cost::pointing::pointing_as_rate;
+use crate::search::cost::samples::SampleMatrix;
+use crate::search::cost::worst_case::{SearchError, WorstCase};
 
 /// A pattern and its cost by the reference, refined in time where it is a worst rate.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,13 +60,32 @@ const SAME_INSTANT: f64 = 1e-7;
 /// samples exceeds them by a few per cent only, as the reference takes it too.
 const PEAK_OVER_SAMPLES: f64 = 0.9;
 
+/// What the goal is the largest of.
+#[derive(Debug)]
+enum Largest {
+    /// What every time of the profiles shows.
+    Course(Course),
+    /// The samples that a norm can be asked for.
+    Norm(Support),
+}
+
+impl Largest {
+    fn new(task: &Task) -> Result<Self, SearchError> {
+        Ok(match task.goal {
+            Goal::WorstRate => Self::Course(Course::of_rate(task)?),
+            Goal::Pointing => Self::Course(Course::of_pointing(task)?),
+            Goal::RootMeanSquare => Self::Norm(Support::of_rms(task.model, task.solved)?),
+            Goal::Guaranteed(step) => Self::Norm(Support::of_guaranteed(task.model, step)?),
+        })
+    }
+}
+
 /// Every sample of the solved profiles, or the samples that a norm has been asked for, and the reference behind them.
 #[derive(Debug)]
 pub struct Judge<'a> {
     task: Task<'a>,
     coil: Coil,
-    /// None where the goal is a largest value of samples already.
-    support: Option<Support>,
+    of: Largest,
     /// What became samples besides those that were there at first, in their order.
     witnesses: Vec<Witness>,
     matrix: SampleMatrix,
@@ -80,18 +100,15 @@ impl<'a> Judge<'a> {
     /// # Errors
     /// Effects that leave a layer no turns; rates that are not finite.
     pub fn new(task: &Task<'a>) -> Result<Self, SearchError> {
-        let support = Support::new(task)?;
-        let (matrix, profile_of) = match &support {
-            Some(support) => (support.first_samples(), Vec::new()),
-            None => {
-                let (matrix, origins) = SampleMatrix::of_profiles(task.model, task.solved)?;
-                (matrix, origins.iter().map(|origin| origin.profile).collect())
-            }
+        let of = Largest::new(task)?;
+        let (matrix, profile_of) = match &of {
+            Largest::Course(course) => course.samples(task)?,
+            Largest::Norm(support) => (support.first_samples(), Vec::new()),
         };
         Ok(Self {
             task: *task,
             coil: task.model.wound_coil()?,
-            support,
+            of,
             witnesses: Vec::new(),
             profile_of,
             order: (0..matrix.samples()).collect(),
@@ -122,12 +139,13 @@ impl<'a> Judge<'a> {
     pub fn candidate_and_witness(&self, pattern: &Pattern) -> Result<(Candidate, Witness), SearchError> {
         let Task { model, solved, goal, .. } = self.task;
         let segments = pattern.segments().to_vec();
+        let of_time = |worst: WorstCase| {
+            let witness = Witness::Instant { profile: worst.profile_index, time_s: worst.time_s };
+            (worst.rate_rad_per_s.abs(), witness)
+        };
         let (rate_rad_per_s, witness) = match goal {
-            Goal::WorstRate => {
-                let worst = solved.worst_case(model, pattern)?;
-                let witness = Witness::Instant { profile: worst.profile_index, time_s: worst.time_s };
-                (worst.rate_rad_per_s.abs(), witness)
-            }
+            Goal::WorstRate => of_time(solved.worst_case(model, pattern)?),
+            Goal::Pointing => of_time(pointing_as_rate(model, solved, pattern)?),
             Goal::RootMeanSquare => {
                 let rate_model = RateModel::new(model, pattern, &[])?;
                 (rms_rad_per_s(&rate_model, solved), Witness::Pattern(segments.clone()))
@@ -148,34 +166,36 @@ impl<'a> Judge<'a> {
     /// The largest size over the samples, or the norm of all of them.
     pub fn sampled_worst_rad_per_s(&self, segments: &[usize]) -> f64 {
         let coefficients = self.coefficients_of(segments);
-        match &self.support {
-            Some(support) => support.value(&coefficients),
-            None => Norm::Largest.of(&self.matrix.columns.values(&coefficients)),
+        match &self.of {
+            Largest::Norm(support) => support.value(&coefficients),
+            Largest::Course(_) => Norm::Largest.of(&self.matrix.columns.values(&coefficients)),
         }
     }
 
     /// Makes samples of what refuted patterns; false if none of them is new.
     pub fn add_witnesses(&mut self, witnesses: &[Witness]) -> bool {
-        let any = any_rate_model(self.task.model).expect("the model was compiled before");
         let (mut responses, mut attaining) = (Vec::new(), Vec::new());
         for witness in witnesses {
             if self.witnesses.iter().any(|known| self.is_same(known, witness)) {
                 continue;
             }
             self.witnesses.push(witness.clone());
-            match witness {
-                Witness::Instant { profile, time_s } => {
-                    let solved = &self.task.solved.profiles()[*profile];
-                    responses.push(solved.response_at(&any, Instant::after(*time_s)));
+            match (witness, &self.of) {
+                (Witness::Instant { profile, time_s }, Largest::Course(course)) => {
+                    responses.push(course.response_at(&self.task.solved.profiles()[*profile], *time_s));
                 }
-                Witness::Pattern(segments) => attaining.push(self.coefficients_of(segments)),
+                (Witness::Pattern(segments), Largest::Norm(_)) => attaining.push(self.coefficients_of(segments)),
+                // A goal has witnesses of its own kind only.
+                (Witness::Instant { .. }, Largest::Norm(_)) | (Witness::Pattern(_), Largest::Course(_)) => {}
             }
         }
         let from = self.matrix.samples();
         if !responses.is_empty() {
             self.matrix = self.matrix.extended(&responses);
         }
-        if let Some(support) = self.support.as_ref().filter(|_| !attaining.is_empty()) {
+        if let Largest::Norm(support) = &self.of
+            && !attaining.is_empty()
+        {
             self.matrix = self.matrix.joined(&support.attaining(&attaining));
         }
         let added: Vec<usize> = (from..self.matrix.samples()).collect();
@@ -221,23 +241,22 @@ impl<'a> Judge<'a> {
                 return Finding::Refuted { sample: self.order[from + at] };
             }
         }
-        match &self.support {
-            Some(support) if support.value(&coefficients) >= limit_rad_per_s => {
+        match &self.of {
+            Largest::Norm(support) if support.value(&coefficients) >= limit_rad_per_s => {
                 Finding::RefutedBetween(Witness::Pattern(segments.to_vec()))
             }
-            Some(_) => match self.candidate_and_witness(&pattern) {
+            Largest::Norm(_) => match self.candidate_and_witness(&pattern) {
                 Ok((candidate, _)) if candidate.rate_rad_per_s < limit_rad_per_s => Finding::Better(candidate),
                 _ => Finding::RefutedBetween(Witness::Pattern(segments.to_vec())),
             },
-            None => self.refined(&pattern, limit_rad_per_s),
+            Largest::Course(course) => self.refined(course, &pattern, limit_rad_per_s),
         }
     }
 
-    /// The worst rate refined in time, over the profiles in the order of their worst samples, until one is not below the
+    /// What is worst refined in time, over the profiles in the order of their worst samples, until one is not below the
     /// limit or none that is left can be worse.
-    fn refined(&self, pattern: &Pattern, limit_rad_per_s: f64) -> Finding {
-        let rate_model =
-            RateModel::new(self.task.model, pattern, &[]).expect("a search makes patterns of the coil's layers");
+    fn refined(&self, course: &Course, pattern: &Pattern, limit_rad_per_s: f64) -> Finding {
+        let of_pattern = course.of(&self.task, pattern).expect("a search makes patterns of the coil's layers");
         let values = self.matrix.columns.values(&self.coefficients(pattern));
         let mut largest = vec![0.0_f64; self.task.solved.profiles().len()];
         for (&profile, v) in self.profile_of.iter().zip(&values) {
@@ -250,7 +269,7 @@ impl<'a> Judge<'a> {
             if largest[profile] < PEAK_OVER_SAMPLES * worst_rad_per_s {
                 break;
             }
-            let (rate_rad_per_s, time_s) = self.task.solved.profiles()[profile].worst(&rate_model);
+            let (rate_rad_per_s, time_s) = of_pattern.worst(&self.task.solved.profiles()[profile]);
             worst_rad_per_s = worst_rad_per_s.max(rate_rad_per_s.abs());
             if worst_rad_per_s >= limit_rad_per_s {
                 return Finding::RefutedBetween(Witness::Instant { profile, time_s });
@@ -270,7 +289,7 @@ impl<'a> Judge<'a> {
 
     /// The samples at which given patterns are worst, the most frequent first, no two next to each other.
     pub fn binding_samples(&mut self, patterns: &[Vec<usize>], most: usize) -> Vec<usize> {
-        if self.support.is_some() {
+        if matches!(self.of, Largest::Norm(_)) {
             // Each pattern's own sample: of the first and then of every so many-th.
             let stride = patterns.len().div_ceil(most).max(1);
             let from = self.matrix.samples();

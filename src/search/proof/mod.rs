@@ -22,12 +22,14 @@
 //! Where nothing tells the halves of the fibre apart and nothing is added outside the coil, a pattern and its mirror
 //! image s → N+1−s have opposite errors and one of the two is searched.
 //!
-//! Holds for the worst rate (and so the worst phase, a fixed multiple of it), the rms rate and the guaranteed worst
-//! rate, which are largest values of samples too ([`support`]). Leaves out the quantile over built coils.
+//! Holds for the worst rate (and so the worst phase, a fixed multiple of it), the pointing error, whose samples are those of
+//! its own, and the rms rate and the guaranteed worst rate, which are largest values of samples too ([`support`]). Leaves
+//! out the quantile over built coils.
 
 pub mod beam;
 pub mod box_join;
 pub mod candidates;
+mod course;
 pub mod descent;
 pub mod matrix_game;
 pub mod permutation_tree;
@@ -65,6 +67,8 @@ pub enum Goal<'a> {
     RootMeanSquare,
     /// The largest |Ω| over all profiles within the largest rate.
     Guaranteed(&'a UnitStep),
+    /// The largest |∫ Ω dt| over all profiles and times, as the rate that makes it in one hour.
+    Pointing,
 }
 
 /// What is to be proved.

@@ -34,6 +34,7 @@ pub fn starting_patterns(task: &Task, seed: u64) -> Result<Vec<Pattern>, SearchE
     }
     let (matrix, norm) = match task.goal {
         Goal::WorstRate => (Objective::WorstRate.of_profiles(task.model, task.solved)?, Norm::Largest),
+        Goal::Pointing => (Objective::Pointing.of_profiles(task.model, task.solved)?, Norm::Largest),
         Goal::RootMeanSquare => (Objective::RootMeanSquare.of_profiles(task.model, task.solved)?, Norm::RootMeanSquare),
         Goal::Guaranteed(step) => (SampleMatrix::new(task.model, &step.parts(task.model, 1)?.changes)?, Norm::Sum),
     };

@@ -18,12 +18,12 @@
 //! # Source
 //! Kelley, J. SIAM 8, 703 (1960), cutting planes; Rockafellar, Convex Analysis (1970), section 13, support functions.
 
-use super::{Goal, Task};
-use crate::rate::WeightResponse;
+use crate::rate::{CoilModel, WeightResponse};
 use crate::search::cost::columns::Norm;
+use crate::search::cost::guaranteed::UnitStep;
 use crate::search::cost::objective::Objective;
 use crate::search::cost::samples::SampleMatrix;
-use crate::search::cost::worst_case::SearchError;
+use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
 
 /// The samples of a norm, and how they make it.
 #[derive(Debug)]
@@ -49,25 +49,25 @@ type Weights = Vec<(usize, f64)>;
 const STRIDE: usize = 4;
 
 impl Support {
-    /// `None` where the goal is a largest value already.
+    /// Of the rms rate.
     ///
     /// # Errors
     /// Effects that leave a layer no turns; rates that are not finite.
-    pub fn new(task: &Task) -> Result<Option<Self>, SearchError> {
-        Ok(match task.goal {
-            Goal::WorstRate => None,
-            Goal::RootMeanSquare => {
-                let matrix = Objective::RootMeanSquare.of_profiles(task.model, task.solved)?;
-                Some(Self { matrix, kind: Kind::RootMeanSquare })
-            }
-            Goal::Guaranteed(step) => {
-                let parts = step.parts(task.model, 1)?;
-                let (changes, heated) = (parts.changes.len(), !parts.heat.is_empty());
-                let responses: Vec<WeightResponse> = parts.changes.into_iter().chain(parts.heat).collect();
-                let matrix = SampleMatrix::new(task.model, &responses)?;
-                Some(Self { matrix, kind: Kind::Guaranteed { changes, heated } })
-            }
-        })
+    pub fn of_rms(model: &CoilModel, solved: &SolvedProfiles) -> Result<Self, SearchError> {
+        let matrix = Objective::RootMeanSquare.of_profiles(model, solved)?;
+        Ok(Self { matrix, kind: Kind::RootMeanSquare })
+    }
+
+    /// Of the guaranteed worst rate.
+    ///
+    /// # Errors
+    /// Effects that leave a layer no turns.
+    pub fn of_guaranteed(model: &CoilModel, step: &UnitStep) -> Result<Self, SearchError> {
+        let parts = step.parts(model, 1)?;
+        let (changes, heated) = (parts.changes.len(), !parts.heat.is_empty());
+        let responses: Vec<WeightResponse> = parts.changes.into_iter().chain(parts.heat).collect();
+        let matrix = SampleMatrix::new(model, &responses)?;
+        Ok(Self { matrix, kind: Kind::Guaranteed { changes, heated } })
     }
 
     pub fn matrix(&self) -> &SampleMatrix {

@@ -5,6 +5,8 @@ use std::ops::ControlFlow;
 use super::*;
 use crate::coil::LayerLength;
 use crate::search::cost::columns::Norm;
+use crate::search::cost::objective::POINTING_S;
+use crate::search::cost::pointing::worst_pointing;
 use crate::search::cost::samples::SampleMatrix;
 use crate::search::cost::samples::tests::{model, profiles};
 use crate::search::cost::signs::segments_of_signs;
@@ -165,6 +167,28 @@ fn a_start_of_another_class_is_refused_in_words() {
         error.to_string(),
         "a proof must begin with a pattern of the class standard, found none: give one of that class"
     );
+}
+
+#[test]
+fn the_pointing_error_is_proved_as_enumeration_finds_it_also_where_it_is_not_linear_in_the_rates() {
+    let sets = [&["surface_film"][..], &["surface_film", "self_heating"], &["thermo_optic_temperature"]];
+    for effects in sets.into_iter().chain([&["strain_mismatch", "heating_cooling_asymmetry"][..]]) {
+        for (class, layers) in
+            [(WindabilityClass::Standard, 8), (WindabilityClass::Captive(1), 6), (WindabilityClass::Any, 6)]
+        {
+            let model = model(layers, LayerLength::Actual, effects);
+            let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
+            let task = Task { model: &model, solved: &solved, class, goal: Goal::Pointing };
+            let cost = |p: &Pattern| worst_pointing(&model, &solved, p).unwrap().rate_rad_per_s.abs() / POINTING_S;
+            let smallest = patterns_of(class, layers).iter().map(cost).fold(f64::INFINITY, f64::min);
+            let found = prove(&task, &[Pattern::new((1..=layers).collect()).unwrap()], &go_on).unwrap();
+            let context = format!("{class} {layers} {effects:?}");
+            assert_eq!(found.status, Status::Optimal, "{context}");
+            let best = found.best_rad_per_s;
+            assert!((best / smallest - 1.0).abs() < 1e-8, "{context}: {best} {smallest}");
+            assert!(found.lower_bound_rad_per_s <= smallest, "{context}");
+        }
+    }
 }
 
 #[test]
