@@ -72,7 +72,7 @@ impl<'a> Evaluator<'a> {
         let plan = Plan {
             seed: plan.seed,
             restarts_per_round: plan.restarts_per_round,
-            moves_per_restart: plan.moves_per_restart.min(self.objective.default_moves_per_restart(layers)),
+            moves_per_restart: plan.moves_per_restart.min(self.short_moves_per_restart(layers)),
             rules: Rules { rounds: ROUNDS, patience: ROUNDS, moves: None, target: None },
             starts: Vec::new(),
         };

@@ -1,7 +1,7 @@
 //! From an objective to a search: the cost that it compiles to, and the rounds that make it small.
 
 use super::anneal::limits::draw;
-use super::anneal::quantile::QuantileCost;
+use super::anneal::quantile::{self, QuantileCost};
 use super::anneal::restart::generator;
 use super::anneal::rounds::{Optimisation, Plan, Rounds, Rules, State};
 use super::anneal::sample_cost::SampleCost;
@@ -58,6 +58,16 @@ impl Evaluator<'_> {
             return Ok(begun(self.sample_cost(matrix, class, self.objective.norm())?, plan, saved));
         };
         Ok(begun(QuantileCost::new(coils, class), plan, saved))
+    }
+
+    /// Moves of a restart of a short search: where a move is judged on whole coils, as many as one over built coils has.
+    pub(super) fn short_moves_per_restart(&self, layers: usize) -> u64 {
+        let is_heated = self.objective == Objective::GuaranteedRate && self.unit_step.is_some_and(UnitStep::is_heated);
+        if is_heated {
+            quantile::default_moves_per_restart(layers)
+        } else {
+            self.objective.default_moves_per_restart(layers)
+        }
     }
 
     /// A norm of samples as the annealer runs on it.
