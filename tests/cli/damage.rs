@@ -62,8 +62,9 @@ const SIGNS: &[&str] = &[
 const VALUES: &[&str] =
     &["true", "\"x\"", "\"\"", "[]", "{}", "[1, 2, 3]", "[[1]]", "\"any\"", "\"pack\"", "\"../x\"", "1979-05-27"];
 
-/// The file's text, damaged in one to three places.
-pub fn damaged(file: &str, text: &str, random: &mut impl Rng) -> Vec<u8> {
+/// The file, damaged in one to three places.
+pub fn damaged(file: &str, whole: &[u8], random: &mut impl Rng) -> Vec<u8> {
+    let Ok(text) = std::str::from_utf8(whole) else { return octets(whole, random) };
     let mut text = text.to_owned();
     for _ in 0..random.random_range(1..4) {
         text = match (file.rsplit('.').next().unwrap_or_default(), random.random_range(0..10)) {
@@ -78,6 +79,32 @@ pub fn damaged(file: &str, text: &str, random: &mut impl Rng) -> Vec<u8> {
     if !bytes.is_empty() && random.random_range(0..40) == 0 {
         let at = random.random_range(0..bytes.len());
         bytes[at] = random.random_range(128..=255);
+    }
+    bytes
+}
+
+/// A file that is no text: bits, sizes and offsets, most of them near its head, parts lost, put in or moved.
+fn octets(whole: &[u8], random: &mut impl Rng) -> Vec<u8> {
+    const HEAD: usize = 700;
+    let mut bytes = whole.to_vec();
+    for _ in 0..random.random_range(1..6) {
+        let most = if random.random_range(0..2) == 0 { bytes.len() } else { bytes.len().min(HEAD) };
+        let at = random.random_range(0..most);
+        let length = random.random_range(1..64).min(bytes.len() - at);
+        match random.random_range(0..7) {
+            0 => bytes[at] ^= 1 << random.random_range(0..8),
+            1 => bytes[at] = [0, 127, 128, 255][random.random_range(0..4)],
+            2 | 3 => {
+                let size = [0_u32, 1, 0x7fff_ffff, 0x8000_0000, u32::MAX][random.random_range(0..5)].to_le_bytes();
+                bytes[at..].iter_mut().zip(size).for_each(|(byte, of)| *byte = of);
+            }
+            4 => bytes.truncate(at.max(1)),
+            5 => drop(bytes.splice(at..at, (0..length).map(|_| random.random_range(0..=255)).collect::<Vec<u8>>())),
+            _ => {
+                let from = random.random_range(0..=bytes.len() - length);
+                bytes.copy_within(from..from + length, at);
+            }
+        }
     }
     bytes
 }

@@ -75,6 +75,10 @@ const WAYS: &[(&str, &[&str])] = &[
         "mapped.csv",
         &["metrics", "mapped.csv", "--columns", "time=Zeit:min,temperature=T1:c,rate=Omega:counts,scale=12.5"],
     ),
+    ("packed.mat", &["metrics", "packed.mat", "--format", "json", "-o", "out"]),
+    ("seven-three.mat", &["metrics", "seven-three.mat"]),
+    ("structure.mat", &["compare", "model.toml", "structure.mat", "--format", "json"]),
+    ("compound.h5", &["metrics", "compound.h5", "--format", "json"]),
     ("table.csv", &["metrics", "table.csv", "--format", "json", "--latitude", "48", "--elevation", "90"]),
     ("field.csv", &["evaluate", "model.toml", "--field", "field.csv", "--format", "json"]),
     ("long.csv", &["evaluate", "model.toml", "--field", "long.csv", "--field", "field.csv"]),
@@ -232,6 +236,10 @@ pub(super) fn bench(folder: &Path) {
         format!("{i},{},{},{table}\n", 20 + i / 60, 3600.0 * table * 1.001 + (i % 5) as f64)
     };
     let turned: String = (0..240).map(turned).collect();
+    for logged in ["packed.mat", "seven-three.mat", "structure.mat", "compound.h5"] {
+        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/record-files").join(logged);
+        std::fs::copy(shipped, folder.join(logged)).unwrap();
+    }
     write("table.csv", &format!("time_s,temperature_c,rate_deg_per_h,table_rate_deg_per_s\n{turned}"));
     for arguments in [
         &["schedule", "model.toml", "-o", "shop"][..],
@@ -359,7 +367,7 @@ fn no_damaged_file_makes_a_command_panic_hang_or_answer_with_what_is_no_number()
         let place = folder.path().join("tried");
         let _ = std::fs::remove_dir_all(&place);
         copied(&whole, &place);
-        let bytes = damaged(file, &std::fs::read_to_string(whole.join(file)).unwrap(), &mut random);
+        let bytes = damaged(file, &std::fs::read(whole.join(file)).unwrap(), &mut random);
         std::fs::write(place.join(file), &bytes).unwrap();
         std::fs::create_dir(place.join("out")).unwrap();
         let ran = bounded(&place, arguments);
@@ -414,7 +422,7 @@ fn goes_on_elsewhere(ran: &Ran, whole: &Path, place: &Path) -> Option<String> {
 
 /// The lines that the damaged file has and the whole one has not.
 fn changes(whole: &Path, damaged: &str) -> String {
-    let whole = std::fs::read_to_string(whole).unwrap();
+    let whole = String::from_utf8_lossy(&std::fs::read(whole).unwrap()).into_owned();
     let known: std::collections::HashSet<&str> = whole.lines().collect();
     let new = damaged.lines().enumerate().filter(|(_, line)| !known.contains(line));
     let shown: Vec<String> = new.take(6).map(|(i, line)| format!("  line {}: {line:.200?}", i + 1)).collect();
