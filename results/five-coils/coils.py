@@ -1,0 +1,42 @@
+BASE = '''name = "{name}"
+[fibre]
+refractive_index = 1.456
+thermo_optic_per_k = 1.0e-5
+wavelength_nm = 1550.0
+outer_diameter_um = {d}
+[winding]
+layers = {n}
+turns_per_layer = {m}
+inner_diameter_mm = {di}
+radial_pitch_um = {p}
+axial_pitch_um = {ax}
+layer_length = "{ll}"
+pattern = "qua"
+[thermal]
+model = "pack"
+conductivity_w_per_m_k = {k}
+volumetric_heat_capacity_j_per_m3_k = {c}
+[sensor]
+location = "{loc}"
+{effects}
+[profiles]
+max_rate_c_per_h = 60.0
+count = 64
+segments = {seg}
+duration_s = {dur}
+seed = SEED
+[search]
+windability = "standard"
+seed = 1
+'''
+film = lambda h: f'[[effect]]\nkind = "surface_film"\nfilm_w_per_m2_k = {h}\n'
+C = {
+ 'c12': dict(name='c12', d=250, n=12, m=40, di=75, p=250, ax=260, ll='actual', k=0.4, c=1.8e6, loc='outer_layer', effects='', seg=4, dur=4000),
+ 'c16': dict(name='c16', d=165, n=16, m=60, di=60, p=170, ax=170, ll='actual', k=0.3, c=1.7e6, loc='ambient', effects=film(15)+'[[effect]]\nkind = "spool_mass"\nheat_capacity_j_per_m2_k = 3000.0\ncontact_w_per_m2_k = 100.0\n', seg=6, dur=6000),
+ 'c24': dict(name='c24', d=165, n=24, m=60, di=80, p=170, ax=172, ll='actual', k=0.35, c=1.7e6, loc='ambient', effects=film(80), seg=3, dur=3000),
+ 'c32': dict(name='c32', d=165, n=32, m=80, di=100, p=170, ax=172, ll='actual', k=0.30, c=1.8e6, loc='ambient', effects=film(25)+'[[effect]]\nkind = "strain_mismatch"\nmismatch = 0.002\n', seg=4, dur=5000),
+ 'c48': dict(name='c48', d=135, n=48, m=70, di=110, p=137, ax=140, ll='actual', k=0.35, c=1.7e6, loc='ambient', effects=film(300), seg=5, dur=4000),
+}
+def model(name, seed, out, **kw):
+    t = BASE.format(**{**C[name], **kw}).replace('SEED', str(seed))
+    open(out, 'w').write(t)
