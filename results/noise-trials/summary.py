@@ -33,6 +33,7 @@ def table(key, title):
 
 table(lambda row: row["kind"], "kind")
 table(lambda row: row["rows"] + " rows", "length")
+table(lambda row: row["kind"] + ", " + row["rows"] + " rows", "kind and length")
 table(lambda row: "with cycles" if row["cycles"] == "1" else "without", "thermal cycles")
 table(lambda row: "all", "all")
 
@@ -42,7 +43,7 @@ for row in rows:
     if row["white_whittle"]:
         groups[row["kind"], row["rows"]].append(row)
 for (kind, length), group in groups.items():
-    for name in NAMES[:3]:
+    for name in NAMES[:4]:
         true = float(group[0][f"{name}_true"])
         if true == 0.0:
             continue

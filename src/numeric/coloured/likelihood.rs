@@ -44,7 +44,7 @@ pub(super) struct Point {
     pub minus_two_log_likelihood: f64,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Octave {
     n: f64,
     weight: f64,
@@ -54,7 +54,7 @@ struct Octave {
     units: [f64; COMPONENTS],
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Likelihood {
     octaves: Vec<Octave>,
     /// Which group each column is in; None for the ramp.
@@ -62,6 +62,15 @@ pub(super) struct Likelihood {
     group_count: usize,
     y_scale: f64,
     ramp_scale: Option<f64>,
+}
+
+/// A ramp in its own units: its slope, the standard error at given variances, and by how much what octaves say in common makes
+/// the likelihood claim more than it knows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ramp {
+    pub slope: f64,
+    pub error: f64,
+    pub inflation: f64,
 }
 
 /// What is left of y at given variances.
@@ -133,6 +142,11 @@ impl Likelihood {
             least + FAINT * usual
         });
         Point { variances, group_variances: vec![1.0; self.group_count], minus_two_log_likelihood: f64::INFINITY }
+    }
+
+    /// The same, with what columns explain as elsewhere.
+    pub(super) fn start_in(&self, point: &Point) -> Point {
+        Point { group_variances: point.group_variances.clone(), ..self.start() }
     }
 
     /// A variance so small that no octave shows it. Octaves in which nothing varies but rounding would show any.
@@ -299,12 +313,9 @@ impl Likelihood {
         self.octaves.iter_mut().zip(weights).for_each(|(o, w)| o.weight = w);
     }
 
-    /// The ramp's slope, its standard error and the degrees of freedom of that, in units of y a second.
-    pub(super) fn slope(&self, point: &Point) -> (f64, f64, f64) {
-        let (Some(ramp_scale), Some(rest)) = (self.ramp_scale, self.rest(&point.variances, &point.group_variances))
-        else {
-            return (0.0, 0.0, 1.0);
-        };
+    /// The ramp as the point has it, in its own units, and one of those in units of y a second.
+    pub(super) fn ramp(&self, point: &Point) -> Option<(Ramp, f64)> {
+        let rest = self.ramp_scale.and(self.rest(&point.variances, &point.group_variances))?;
         let model = self.model(&point.variances);
         // What each octave says of the slope, and how much of that its random walk says in common with others.
         let told: Vec<(f64, f64, f64)> = self
@@ -329,9 +340,25 @@ impl Likelihood {
             }
         }
         let inflation = if alone > 0.0 { (common / alone).max(1.0) } else { 1.0 };
-        let freedom = alone * alone / told.iter().map(|t| t.0 * t.0 / t.2.max(1.0)).sum::<f64>().max(f64::MIN_POSITIVE);
-        let by = self.y_scale / ramp_scale;
-        (by * rest.beta[0], by * (rest.covariance[(0, 0)] * inflation).sqrt(), freedom)
+        let error = rest.covariance[(0, 0)].max(0.0).sqrt();
+        Some((Ramp { slope: rest.beta[0], error, inflation }, self.y_scale / self.ramp_scale?))
+    }
+
+    /// The same octaves without a ramp of this slope, in the ramp's own units, and without any other.
+    pub(super) fn without_ramp(&self, slope: f64) -> Self {
+        let octaves = self.octaves.iter().map(|o| Octave {
+            yy: (o.yy - 2.0 * slope * o.xy[0] + slope * slope * o.xx[(0, 0)]).max(0.0),
+            xy: (&o.xy - o.xx.column(0) * slope).remove_row(0),
+            xx: o.xx.clone().remove_row(0).remove_column(0),
+            ..*o
+        });
+        Self {
+            octaves: octaves.collect(),
+            groups: self.groups[1..].to_vec(),
+            group_count: self.group_count,
+            y_scale: self.y_scale,
+            ramp_scale: None,
+        }
     }
 
     /// Root mean square of what the further columns explain, in units of y.

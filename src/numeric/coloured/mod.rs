@@ -17,10 +17,12 @@
 //!
 //! β is integrated out (restricted likelihood), so that a record that follows its temperature loses exactly the octaves that the
 //! temperature explains, and one that doesn't loses nothing: τ_g is estimated with the rest. An interval is where the likelihood,
-//! maximised over everything else, stays within the χ² quantile of 98.98 %: all five intervals hold together with 95 %.
-//! A value is the best fit with those noises that the intervals show not to be zero.
+//! maximised over everything else, stays within the χ² quantile of 98.98 %: all five intervals hold together with 95 %. That of
+//! the ramp is maximised over a walk's strength too, so that a slow walk is not taken for a ramp.
+//! A value is the best fit with those noises that the intervals show not to be zero; one that may be absent is 0.
 //!
-//! That w_j makes it conservative: Σ_jk a_j a_k w_j w_k C_jk ≤ Σ_j a_j² w_j for every direction a (Gershgorin), so the variance
+//! Upper ends are sought with the w_j of the best fit and with those of the end itself, where the noise in question is strongest; the
+//! higher one counts. That w_j makes it conservative: Σ_jk a_j a_k w_j w_k C_jk ≤ Σ_j a_j² w_j for every direction a (Gershgorin), so the variance
 //! of the score is never more than the curvature says.
 //!
 //! # Source
@@ -30,8 +32,6 @@
 //! (1981) 165; coefficients: IEEE Std 952.
 
 mod likelihood;
-
-use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 use crate::numeric::pyramid::Level;
 use likelihood::{Likelihood, Point};
@@ -58,16 +58,18 @@ pub struct NoiseStrengths {
 
 /// χ² with one degree of freedom at 0.95^(1/5).
 const LIKELIHOOD_RATIO: f64 = 6.602;
-/// P(|β| within) of the ramp, alike.
-const EACH: f64 = 0.989_794;
 /// Relative, of an octave's variance.
 const STRAY: f64 = 0.03;
 /// Fewer octaves tell no noise from another.
 const LEAST_LEVELS: usize = 3;
 /// Rounds in which weights follow the fit.
 const WEIGHTINGS: usize = 2;
+/// Rounds in which the weights at an upper end follow it.
+const DOUBTS: usize = 4;
 /// An end of an interval is found to this part of itself.
 const FINE: f64 = 2e-3;
+/// … and the ramp's to this part of its distance.
+const RAMP_FINE: f64 = 1e-2;
 const MOST_DOUBLINGS: usize = 80;
 
 /// Which of the likelihood's components make up each kind: quantisation, white, flicker, random walk.
@@ -92,6 +94,8 @@ pub fn noise_strengths(levels: &[(usize, Level)], interval_s: f64, groups: &[usi
     let strength = |kind: usize| {
         let variance: f64 = KINDS[kind].iter().map(|part| best.variances[*part]).sum();
         let Interval { low, high, .. } = found[kind];
+        // What no octave shows is none.
+        let variance = if variance < likelihood.least_visible(KINDS[kind]) { 0.0 } else { variance };
         Interval { value: scale * variance.clamp(low, high).sqrt(), low: scale * low.sqrt(), high: scale * high.sqrt() }
     };
     Some(NoiseStrengths {
@@ -99,7 +103,7 @@ pub fn noise_strengths(levels: &[(usize, Level)], interval_s: f64, groups: &[usi
         white: strength(1),
         flicker: strength(2),
         random_walk: strength(3),
-        ramp: ramp(&likelihood, &best),
+        ramp: ramp(&likelihood, &point, &best),
         explained: likelihood.explained(&best),
     })
 }
@@ -128,7 +132,28 @@ fn interval(likelihood: &Likelihood, best: &Point, parts: &[usize]) -> Interval 
         }
         outside
     };
-    let (mut inside, mut from) = (value.max(least), best.clone());
+    let (mut high, mut there) = upper_end(likelihood, best, parts, value.max(least));
+    // With so much of this noise the octaves say more in common than with the best fit's: they count less.
+    let mut doubtful = likelihood.clone();
+    for _ in 0..DOUBTS {
+        doubtful.weigh(&there);
+        let best = doubtful.maximised(best, None);
+        let (end, at) = upper_end(&doubtful, &best, parts, value.max(least));
+        if end <= high * (1.0 + FINE) {
+            break;
+        }
+        (high, there) = (end, at);
+    }
+    Interval { value, low, high }
+}
+
+/// The largest variance within the quantile, sought from one that is, and the fit nearest to it.
+fn upper_end(likelihood: &Likelihood, best: &Point, parts: &[usize], within: f64) -> (f64, Point) {
+    let above = |from: &Point, variance: f64| {
+        let at = likelihood.maximised(from, Some((parts, variance)));
+        (at.minus_two_log_likelihood - best.minus_two_log_likelihood, at)
+    };
+    let (mut inside, mut from) = (within, best.clone());
     let mut outside = 2.0 * inside;
     for _ in 0..MOST_DOUBLINGS {
         let (height, at) = above(&from, outside);
@@ -147,7 +172,7 @@ fn interval(likelihood: &Likelihood, best: &Point, parts: &[usize]) -> Interval 
             (inside, from) = (middle, at);
         }
     }
-    Interval { value, low, high: outside }
+    (outside, from)
 }
 
 /// The geometric mean: also of variances whose product is no number, or none but zero.
@@ -171,14 +196,51 @@ fn parsimonious(likelihood: &Likelihood, point: &Point, found: &[Interval]) -> P
     if is_as_good { fewer } else { point.clone() }
 }
 
-/// The size of the ramp, and an interval as wide as noise that is the same in neighbouring octaves asks for.
-fn ramp(likelihood: &Likelihood, best: &Point) -> Interval {
-    let (slope, error, freedom) = likelihood.slope(best);
-    let tail = 0.5 + 0.5 * EACH;
-    let normal = Normal::new(0.0, 1.0).map_or(3.0, |n| n.inverse_cdf(tail));
-    let quantile = StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(normal, |t| t.inverse_cdf(tail));
-    let (low, high) = ((slope.abs() - quantile * error).max(0.0), slope.abs() + quantile * error);
-    Interval { value: if low > 0.0 { slope.abs() } else { 0.0 }, low, high }
+/// The size of the ramp, and where its likelihood, maximised over all else, stays within the quantile: a ramp is told from a slow
+/// walk only as far as that can be.
+fn ramp(likelihood: &Likelihood, point: &Point, best: &Point) -> Interval {
+    let none = Interval { value: 0.0, low: 0.0, high: 0.0 };
+    let (Some((ramp, unit)), Some((by_best, _))) = (likelihood.ramp(point), likelihood.ramp(best)) else { return none };
+    let above = |slope: f64, from: Option<&Point>| {
+        let rest = likelihood.without_ramp(slope);
+        let fresh = rest.maximised(&rest.start_in(point), None);
+        let near = from.map(|from| rest.maximised(from, None));
+        let is_lower = |near: &Point| near.minus_two_log_likelihood < fresh.minus_two_log_likelihood;
+        near.filter(is_lower).unwrap_or(fresh)
+    };
+    let middle = above(ramp.slope, Some(point));
+    let other = above(by_best.slope, Some(best));
+    let least = middle.minus_two_log_likelihood.min(other.minus_two_log_likelihood);
+    let limit = least + LIKELIHOOD_RATIO * ramp.inflation.max(by_best.inflation);
+    let end = |direction: f64| {
+        let (mut inside, mut from) = (0.0, middle.clone());
+        let mut outside = 2.0 * ramp.error.max(by_best.error).max(f64::MIN_POSITIVE);
+        let step = |off: f64, from: &mut Point| {
+            let at = above(ramp.slope + direction * off, Some(from));
+            let is_inside = at.minus_two_log_likelihood <= limit;
+            if is_inside {
+                *from = at;
+            }
+            is_inside
+        };
+        for _ in 0..MOST_DOUBLINGS {
+            if !step(outside, &mut from) {
+                break;
+            }
+            inside = outside;
+            outside *= 2.0;
+        }
+        while outside - inside > RAMP_FINE * outside {
+            let middle = 0.5 * (inside + outside);
+            if step(middle, &mut from) { inside = middle } else { outside = middle }
+        }
+        ramp.slope + direction * outside
+    };
+    let (first, last) = (end(-1.0), end(1.0));
+    let high = first.abs().max(last.abs());
+    let low = if first * last > 0.0 { first.abs().min(last.abs()) } else { 0.0 };
+    let value = if low > 0.0 { by_best.slope.abs().clamp(low, high) } else { 0.0 };
+    Interval { value: unit * value, low: unit * low, high: unit * high }
 }
 
 #[cfg(test)]
@@ -187,6 +249,7 @@ mod tests {
     use crate::numeric::pyramid::Pyramid;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
+    use statrs::distribution::{ContinuousCDF, Normal};
 
     fn gaussians(seed: u64, n: usize) -> Vec<f64> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
