@@ -20,7 +20,7 @@ pub struct Fibre {
 
 impl Fibre {
     /// n_g: how long light takes, and so by how much the two beams meet a change at different times.
-    pub fn transit_index(&self) -> f64 {
+    pub(crate) fn transit_index(&self) -> f64 {
         self.group_index.unwrap_or(self.refractive_index)
     }
 
@@ -41,7 +41,7 @@ pub enum LayerLength {
 
 /// Which diameter stands in the Sagnac scale factor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum SagnacDiameter {
+pub(crate) enum SagnacDiameter {
     /// The mean of the innermost and the outermost layer's (the paper).
     #[default]
     Mean,
@@ -112,7 +112,7 @@ impl Coil {
     ///
     /// # Errors
     /// As [`Coil::new`]; crossovers that take all of a stated length.
-    pub fn with_crossovers(spec: CoilSpec, crossover_turns: f64) -> Result<Self, CoilError> {
+    pub(crate) fn with_crossovers(spec: CoilSpec, crossover_turns: f64) -> Result<Self, CoilError> {
         if spec.layers < 2 || !spec.layers.is_multiple_of(2) {
             return Err(CoilError::Layers { found: spec.layers });
         }
@@ -205,14 +205,14 @@ impl Coil {
     }
 
     /// The same coil with layers of other lengths, each by its factor, and as many turns.
-    pub fn with_lengths_scaled(&self, factors: &[f64]) -> Self {
+    pub(crate) fn with_lengths_scaled(&self, factors: &[f64]) -> Self {
         let mut coil = self.clone();
         coil.layer_lengths_m.iter_mut().zip(factors).for_each(|(length_m, factor)| *length_m *= factor);
         coil
     }
 
     /// The same coil with another diameter in its Sagnac scale factor.
-    pub fn with_sagnac(&self, sagnac: SagnacDiameter) -> Self {
+    pub(crate) fn with_sagnac(&self, sagnac: SagnacDiameter) -> Self {
         Self { sagnac, ..self.clone() }
     }
 
@@ -232,7 +232,7 @@ impl Coil {
     }
 
     /// The same coil of fibre with another expansion, which adds to κ.
-    pub fn with_thermal_expansion(&self, per_k: f64) -> Self {
+    pub(crate) fn with_thermal_expansion(&self, per_k: f64) -> Self {
         let mut coil = self.clone();
         coil.fibre.thermal_expansion_per_k = per_k;
         coil
@@ -262,11 +262,11 @@ impl Coil {
     }
 
     /// Fibre that each layer takes to change sides \[turns\].
-    pub fn crossover_turns(&self) -> f64 {
+    pub(crate) fn crossover_turns(&self) -> f64 {
         self.crossover_turns
     }
 
-    pub fn sagnac(&self) -> SagnacDiameter {
+    pub(crate) fn sagnac(&self) -> SagnacDiameter {
         self.sagnac
     }
 
@@ -294,7 +294,7 @@ impl Coil {
     }
 
     /// Between the flanges.
-    pub fn height_m(&self) -> f64 {
+    pub(crate) fn height_m(&self) -> f64 {
         self.axial_pitch_m * self.turns.iter().copied().fold(0.0, f64::max)
     }
 
@@ -313,7 +313,7 @@ impl Coil {
     }
 
     /// D, the diameter in the Sagnac scale factor.
-    pub fn sagnac_diameter_m(&self) -> f64 {
+    pub(crate) fn sagnac_diameter_m(&self) -> f64 {
         match self.sagnac {
             SagnacDiameter::Mean => self.mean_diameter_m(),
             SagnacDiameter::ByLength => {

@@ -26,6 +26,13 @@
 //! `cli` (the command line) and `report` (pages and pictures) are on by default. Without them the library also builds for
 //! `wasm32-unknown-unknown`.
 
+// What is not meant for others is `pub(crate)`, and what nobody uses goes. The build with all default features is the one that
+// tells: without them, what only the command line, pages or tables use counts as unused or out of reach.
+#![cfg_attr(all(feature = "cli", feature = "mat"), warn(unreachable_pub))]
+#![cfg_attr(not(all(feature = "cli", feature = "mat")), allow(dead_code, unused_imports))]
+// The heads of modules speak to those who read the source.
+#![allow(rustdoc::private_intra_doc_links)]
+
 // Floor 0: units, mathematics and text without domain words.
 pub mod numeric;
 pub mod text;
@@ -42,12 +49,11 @@ pub mod thermal;
 // Floor 3: the readable reference of the rate error.
 pub mod rate;
 // Floor 4: what is done with it.
-pub mod chamber;
+pub(crate) mod chamber;
 pub mod compare;
 pub mod compensate;
 pub mod diagnose;
-pub mod fit;
-pub mod metrics;
+pub(crate) mod metrics;
 pub mod predict;
 pub mod reproduce;
 pub mod schedule;

@@ -38,30 +38,30 @@ pub struct Prediction {
     /// The record's white noise.
     pub noise_rad_per_s: f64,
     /// The pack over each averaging interval.
-    pub pack: Vec<PackRow>,
+    pub(crate) pack: Vec<PackRow>,
 }
 
 /// The pack over one averaging interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PackRow {
+pub(crate) struct PackRow {
     /// Of the outermost layer.
-    pub outer_k: f64,
-    pub outer_rate_k_per_s: f64,
+    pub(crate) outer_k: f64,
+    pub(crate) outer_rate_k_per_s: f64,
     /// Over the fibre's length.
-    pub mean_k: f64,
-    pub mean_rate_k_per_s: f64,
+    pub(crate) mean_k: f64,
+    pub(crate) mean_rate_k_per_s: f64,
     /// Outermost less innermost layer.
-    pub gradient_k: f64,
-    pub gradient_rate_k_per_s: f64,
+    pub(crate) gradient_k: f64,
+    pub(crate) gradient_rate_k_per_s: f64,
 }
 
 /// What drove a record, as its readings tell.
 #[derive(Debug, Clone)]
 pub struct Boundary {
     /// Film between air and pack with its standard error [W/(m²K)]; None where the model's own counts.
-    pub film_w_per_m2_k: Option<(f64, f64)>,
+    pub(crate) film_w_per_m2_k: Option<(f64, f64)>,
     /// Where the air's slope changed.
-    pub bends: Vec<Bend>,
+    pub(crate) bends: Vec<Bend>,
     course: Course,
     /// One entry a row of the chamber.
     rate_variance_rad2_per_s2: Vec<f64>,
@@ -109,11 +109,11 @@ const ROWS_AT_A_TIME: usize = 4096;
 
 /// A record, taken in.
 #[derive(Debug)]
-pub struct Read<'a> {
-    pub chamber: Chamber<'a>,
+pub(crate) struct Read<'a> {
+    pub(crate) chamber: Chamber<'a>,
     /// Film, chamber and noise, by readings and rates together.
-    pub fit: Fit,
-    pub boundary: Boundary,
+    pub(crate) fit: Fit,
+    pub(crate) boundary: Boundary,
 }
 
 /// Takes a record in: film and chamber are what readings and rates show together, whatever else the rate may do beside
@@ -121,7 +121,7 @@ pub struct Read<'a> {
 ///
 /// # Errors
 /// A pattern of another layer count, a heat path that cannot be solved, a record whose temperature says nothing.
-pub fn read<'a>(model: &CoilModel, pattern: &Pattern, record: &'a Record) -> Result<Read<'a>, PredictError> {
+pub(crate) fn read<'a>(model: &CoilModel, pattern: &Pattern, record: &'a Record) -> Result<Read<'a>, PredictError> {
     if record.rows() < LEAST_READINGS {
         return Err(PredictError::TooFew { needed: LEAST_READINGS, found: record.rows() });
     }
@@ -173,7 +173,7 @@ impl Read<'_> {
     ///
     /// # Errors
     /// Rates without noise, a model that cannot be solved.
-    pub fn declared<T>(
+    pub(crate) fn declared<T>(
         &self,
         then: impl FnOnce(&Chamber, &Fit, &Fit) -> Result<T, PredictError>,
     ) -> Result<T, PredictError> {
@@ -286,7 +286,7 @@ impl Boundary {
     ///
     /// # Errors
     /// A field of other layers than the coil's, or that does not span the record's averaging intervals.
-    pub fn given(model: &CoilModel, field: &GivenField, record: &Record) -> Result<Self, PredictError> {
+    pub(crate) fn given(model: &CoilModel, field: &GivenField, record: &Record) -> Result<Self, PredictError> {
         let fault = |message: String| Err(PredictError::Field { message });
         let (history, layers) = (&field.history, model.coil.layers());
         if history.layers != layers {
@@ -329,7 +329,7 @@ impl Boundary {
     }
 
     /// The pack over the averaging intervals of some of a record's rows.
-    pub fn history(&self, record: &Record, rows: Range<usize>, rate_mean_s: f64) -> ThermalHistory {
+    pub(crate) fn history(&self, record: &Record, rows: Range<usize>, rate_mean_s: f64) -> ThermalHistory {
         let course = &self.course;
         let count = rows.len();
         let mut history = ThermalHistory::with_capacity(course.layers, count);

@@ -38,7 +38,7 @@ use crate::thermal::{Extent, HeatPath, Location, Material, PackShape, ThermalHis
 use crate::units::{LIGHT_SPEED_M_PER_S, REFERENCE_TEMPERATURE_K};
 
 pub use builder::CoilModelBuilder;
-pub use laid::{Laid, LaidPiece};
+pub(crate) use laid::Laid;
 pub use past::Past;
 
 /// A coil, how it is heated, and which physics is taken into account; everything but the pattern.
@@ -105,7 +105,7 @@ impl CoilModel {
 
     /// Whether the outermost layer follows the drive at once, with no film of air between them: the first instant of a
     /// ramp then heats that layer alone, and windings that put the same pieces of fibre there tie.
-    pub fn prescribes_outermost_layer(&self) -> bool {
+    pub(crate) fn prescribes_outermost_layer(&self) -> bool {
         self.heat_path().is_ok_and(|path| path.location == Location::OuterLayer && path.film_w_per_m2_k.is_none())
     }
 
@@ -122,7 +122,7 @@ impl CoilModel {
     }
 
     /// Columns that the effects read and that are not among `channels`.
-    pub fn missing_channels(&self, channels: &[String]) -> Vec<String> {
+    pub(crate) fn missing_channels(&self, channels: &[String]) -> Vec<String> {
         let mut missing: Vec<String> = self.effects.iter().flat_map(|e| e.channels()).collect();
         missing.retain(|name| !channels.contains(name));
         missing.dedup();
@@ -145,7 +145,7 @@ pub struct LayerWeights {
     /// The part with z > L/2 \[m²\].
     pub half_b_m2: Vec<f64>,
     /// 2 d_j l_j² of whole layers, the weight of the axial moment \[m²\].
-    pub axial_m2: Vec<f64>,
+    pub(crate) axial_m2: Vec<f64>,
 }
 
 /// ∫(2z − L)dz over a piece of fibre, kept apart for the two halves of the fibre.
@@ -161,7 +161,7 @@ impl LayerWeights {
         Ok(Self::of(&Laid::new(coil, pattern)?))
     }
 
-    pub fn of(laid: &Laid) -> Self {
+    pub(crate) fn of(laid: &Laid) -> Self {
         let layers = laid.coil.layers();
         let length_m = laid.coil.length_m();
         let mut weights =
@@ -196,9 +196,9 @@ impl LayerWeights {
 pub struct WeightResponse {
     pub half_a_rad_per_s_m2: Vec<f64>,
     pub half_b_rad_per_s_m2: Vec<f64>,
-    pub axial_rad_per_s_m2: Vec<f64>,
+    pub(crate) axial_rad_per_s_m2: Vec<f64>,
     /// Lead and everything outside the coil.
-    pub constant_rad_per_s: f64,
+    pub(crate) constant_rad_per_s: f64,
 }
 
 /// A coil model with a pattern: from the pack's state to the rate error.
@@ -256,7 +256,7 @@ impl RateModel {
         self.steady.get(layer).copied().unwrap_or_else(|| self.layer_at(layer, temperature_k))
     }
 
-    pub fn coil(&self) -> &Coil {
+    pub(crate) fn coil(&self) -> &Coil {
         &self.coil
     }
 
@@ -265,7 +265,7 @@ impl RateModel {
     }
 
     /// n_g/(L D) [1/m²].
-    pub fn scale_per_m2(&self) -> f64 {
+    pub(crate) fn scale_per_m2(&self) -> f64 {
         self.coil.fibre().transit_index() / (self.coil.length_m() * self.coil.sagnac_diameter_m())
     }
 
@@ -321,7 +321,7 @@ impl RateModel {
 
     /// The same after the states that the past holds; what is not linear in the coil's own rate is refused by
     /// [`RateModel::check_searchable`].
-    pub fn weight_response_after(&self, state: &PackState, past: &mut Past) -> WeightResponse {
+    pub(crate) fn weight_response_after(&self, state: &PackState, past: &mut Past) -> WeightResponse {
         let gain: f64 = self.effects.iter().map(|e| e.coil_gain(state)).product();
         let rates_k_per_s = self.followed_rates(state);
         let lead: f64 = self.surplus.iter().map(|s| self.surplus_rad_per_s(s, state, &rates_k_per_s)).sum();
@@ -404,7 +404,7 @@ impl RateModel {
     }
 
     /// The same after what the past holds.
-    pub fn series_after(&self, history: &ThermalHistory, past: &mut Past) -> Vec<f64> {
+    pub(crate) fn series_after(&self, history: &ThermalHistory, past: &mut Past) -> Vec<f64> {
         (0..history.len()).map(|row| self.rate_error_after(&self.state(history, row, &[]), past)).collect()
     }
 

@@ -20,18 +20,18 @@ pub const TABLE_RATE: &str = "table_rate_deg_per_h";
 const LAYER_CHANNEL: (&str, &str) = ("temperature_layer_", "_c");
 
 /// The channel of a thermometer at a layer [°C], counted from 1 innermost.
-pub fn layer_channel(layer: usize) -> String {
+pub(crate) fn layer_channel(layer: usize) -> String {
     format!("{}{layer}{}", LAYER_CHANNEL.0, LAYER_CHANNEL.1)
 }
 
 /// One row of what every record has.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
-    pub time_s: f64,
-    pub temperature_k: f64,
+    pub(crate) time_s: f64,
+    pub(crate) temperature_k: f64,
     /// Beside the table's, where the gyro stood on one.
-    pub rate_rad_per_s: f64,
-    pub table_rad_per_s: Option<f64>,
+    pub(crate) rate_rad_per_s: f64,
+    pub(crate) table_rad_per_s: Option<f64>,
 }
 
 /// A value that stands alone.
@@ -81,7 +81,7 @@ pub enum RecordError {
 }
 
 /// Fewer rows than this describe no record.
-pub const MIN_ROWS: usize = 3;
+pub(crate) const MIN_ROWS: usize = 3;
 /// Rows that are usually closer are no record: no gyro gives a million rates a second.
 pub const LEAST_INTERVAL_S: f64 = 1e-6;
 
@@ -198,7 +198,7 @@ impl Record {
     ///
     /// # Shapes
     /// Columns × rows.
-    pub fn channel_means(&self, rate_mean_s: f64) -> Vec<Vec<f64>> {
+    pub(crate) fn channel_means(&self, rate_mean_s: f64) -> Vec<Vec<f64>> {
         let mean = |channel: &Channel| {
             if channel.name == TABLE_RATE {
                 channel.values.clone()
@@ -214,7 +214,7 @@ impl Record {
     }
 
     /// Thermometers at layers, counted from 1 innermost, with what they showed [°C].
-    pub fn layer_sensors(&self) -> impl Iterator<Item = (usize, &Channel)> {
+    pub(crate) fn layer_sensors(&self) -> impl Iterator<Item = (usize, &Channel)> {
         let of = |channel: &Channel| {
             channel.name.strip_prefix(LAYER_CHANNEL.0)?.strip_suffix(LAYER_CHANNEL.1)?.parse::<usize>().ok()
         };
@@ -227,7 +227,7 @@ impl Record {
     }
 
     /// Row by row what every record has.
-    pub fn each_row(&self) -> impl Iterator<Item = Row> {
+    pub(crate) fn each_row(&self) -> impl Iterator<Item = Row> {
         let table = self.channels.iter().find(|c| c.name == TABLE_RATE).map(|c| c.values.as_slice());
         (0..self.rows()).map(move |i| Row {
             time_s: self.times_s[i],
@@ -255,7 +255,7 @@ impl Record {
     ///
     /// # Errors
     /// Too few rows left.
-    pub fn stretch(&self, rows: std::ops::Range<usize>) -> Result<Self, RecordError> {
+    pub(crate) fn stretch(&self, rows: std::ops::Range<usize>) -> Result<Self, RecordError> {
         self.each_column(|values| values[rows.clone()].to_vec())
     }
 
@@ -284,14 +284,14 @@ impl Record {
 }
 
 /// The median of the intervals between at least two times.
-pub fn usual_interval_s(times_s: &[f64]) -> f64 {
+pub(crate) fn usual_interval_s(times_s: &[f64]) -> f64 {
     let mut steps: Vec<f64> = times_s.windows(2).map(|w| w[1] - w[0]).collect();
     steps.sort_by(f64::total_cmp);
     steps[steps.len() / 2]
 }
 
 /// As [`Record::gross_errors`], of a stretch of rows.
-pub fn gross_errors_of(temperature_k: &[f64], rate_rad_per_s: &[f64]) -> Vec<GrossError> {
+pub(crate) fn gross_errors_of(temperature_k: &[f64], rate_rad_per_s: &[f64]) -> Vec<GrossError> {
     let find = |values: &[f64], column: &'static str| -> Vec<GrossError> {
         let changes: Vec<f64> = values.windows(2).map(|w| w[1] - w[0]).collect();
         let floor = FLOOR_FACTOR * robust_deviation(&changes);

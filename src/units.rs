@@ -6,7 +6,7 @@
 /// Speed of light in vacuum [m/s], exact by definition of the metre.
 pub const LIGHT_SPEED_M_PER_S: f64 = 299_792_458.0;
 
-pub const SECONDS_PER_HOUR: f64 = 3600.0;
+pub(crate) const SECONDS_PER_HOUR: f64 = 3600.0;
 const HOURS_PER_DAY: f64 = 24.0;
 const SECONDS_PER_MINUTE: f64 = 60.0;
 const DEGREES_PER_RADIAN: f64 = 180.0 / std::f64::consts::PI;
@@ -55,25 +55,25 @@ pub fn deg_per_s_from_rad_per_s(rate_rad_per_s: f64) -> f64 {
 }
 
 /// Angle random walk: rad/√s to °/√h.
-pub fn deg_per_sqrt_h_from_rad_per_sqrt_s(walk_rad_per_sqrt_s: f64) -> f64 {
+pub(crate) fn deg_per_sqrt_h_from_rad_per_sqrt_s(walk_rad_per_sqrt_s: f64) -> f64 {
     walk_rad_per_sqrt_s * DEGREES_PER_RADIAN * SECONDS_PER_HOUR.sqrt()
 }
 
 /// Rate random walk: rad/s/√s to °/h/√h.
-pub fn deg_per_h_per_sqrt_h_from_rad_per_s_per_sqrt_s(walk_rad_per_s_per_sqrt_s: f64) -> f64 {
+pub(crate) fn deg_per_h_per_sqrt_h_from_rad_per_s_per_sqrt_s(walk_rad_per_s_per_sqrt_s: f64) -> f64 {
     deg_per_h_from_rad_per_s(walk_rad_per_s_per_sqrt_s) * SECONDS_PER_HOUR.sqrt()
 }
 
 /// Ramp of the rate: rad/s² to °/h/h.
-pub fn deg_per_h_per_h_from_rad_per_s2(ramp_rad_per_s2: f64) -> f64 {
+pub(crate) fn deg_per_h_per_h_from_rad_per_s2(ramp_rad_per_s2: f64) -> f64 {
     deg_per_h_from_rad_per_s(ramp_rad_per_s2) * SECONDS_PER_HOUR
 }
 
-pub fn deg_from_rad(angle_rad: f64) -> f64 {
+pub(crate) fn deg_from_rad(angle_rad: f64) -> f64 {
     angle_rad * DEGREES_PER_RADIAN
 }
 
-pub fn arcsec_from_rad(angle_rad: f64) -> f64 {
+pub(crate) fn arcsec_from_rad(angle_rad: f64) -> f64 {
     angle_rad * DEGREES_PER_RADIAN * SECONDS_PER_HOUR
 }
 
@@ -89,7 +89,7 @@ pub fn k_per_s_from_c_per_h(ramp_c_per_h: f64) -> f64 {
     ramp_c_per_h / SECONDS_PER_HOUR
 }
 
-pub fn c_per_h_from_k_per_s(ramp_k_per_s: f64) -> f64 {
+pub(crate) fn c_per_h_from_k_per_s(ramp_k_per_s: f64) -> f64 {
     ramp_k_per_s * SECONDS_PER_HOUR
 }
 
@@ -97,11 +97,11 @@ pub fn k_per_s_from_c_per_min(ramp_c_per_min: f64) -> f64 {
     ramp_c_per_min / SECONDS_PER_MINUTE
 }
 
-pub fn c_per_min_from_k_per_s(ramp_k_per_s: f64) -> f64 {
+pub(crate) fn c_per_min_from_k_per_s(ramp_k_per_s: f64) -> f64 {
     ramp_k_per_s * SECONDS_PER_MINUTE
 }
 
-pub fn h_from_s(duration_s: f64) -> f64 {
+pub(crate) fn h_from_s(duration_s: f64) -> f64 {
     duration_s / SECONDS_PER_HOUR
 }
 
@@ -113,65 +113,65 @@ pub fn s_from_min(duration_min: f64) -> f64 {
     duration_min * SECONDS_PER_MINUTE
 }
 
-pub fn s_from_days(duration_d: f64) -> f64 {
+pub(crate) fn s_from_days(duration_d: f64) -> f64 {
     s_from_h(duration_d * HOURS_PER_DAY)
 }
 
-pub fn s_from_ms(duration_ms: f64) -> f64 {
+pub(crate) fn s_from_ms(duration_ms: f64) -> f64 {
     duration_ms / 1e3
 }
 
-pub fn s_from_us(duration_us: f64) -> f64 {
+pub(crate) fn s_from_us(duration_us: f64) -> f64 {
     duration_us / 1e6
 }
 
-pub fn s_from_ns(duration_ns: f64) -> f64 {
+pub(crate) fn s_from_ns(duration_ns: f64) -> f64 {
     duration_ns / 1e9
 }
 
-pub fn rad_per_s_from_arcsec_per_s(rate_arcsec_per_s: f64) -> f64 {
+pub(crate) fn rad_per_s_from_arcsec_per_s(rate_arcsec_per_s: f64) -> f64 {
     rate_arcsec_per_s / DEGREES_PER_RADIAN / SECONDS_PER_HOUR
 }
 
-pub fn celsius_from_fahrenheit(temperature_f: f64) -> f64 {
+pub(crate) fn celsius_from_fahrenheit(temperature_f: f64) -> f64 {
     (temperature_f - 32.0) / 1.8
 }
 
-pub fn s_from_h(duration_h: f64) -> f64 {
+pub(crate) fn s_from_h(duration_h: f64) -> f64 {
     duration_h * SECONDS_PER_HOUR
 }
 
-pub fn m_from_mm(length_mm: f64) -> f64 {
+pub(crate) fn m_from_mm(length_mm: f64) -> f64 {
     length_mm * MILLI
 }
 
-pub fn mm_from_m(length_m: f64) -> f64 {
+pub(crate) fn mm_from_m(length_m: f64) -> f64 {
     length_m / MILLI
 }
 
-pub fn m_from_um(length_um: f64) -> f64 {
+pub(crate) fn m_from_um(length_um: f64) -> f64 {
     length_um * MICRO
 }
 
-pub fn um_from_m(length_m: f64) -> f64 {
+pub(crate) fn um_from_m(length_m: f64) -> f64 {
     length_m / MICRO
 }
 
-pub fn m_from_nm(length_nm: f64) -> f64 {
+pub(crate) fn m_from_nm(length_nm: f64) -> f64 {
     length_nm * NANO
 }
 
-pub fn nm_from_m(length_m: f64) -> f64 {
+pub(crate) fn nm_from_m(length_m: f64) -> f64 {
     length_m / NANO
 }
 
 /// \[Pa\].
-pub fn pa_from_mpa(stress_mpa: f64) -> f64 {
+pub(crate) fn pa_from_mpa(stress_mpa: f64) -> f64 {
     stress_mpa / MICRO
 }
 
 /// \[MPa\].
-pub fn mpa_from_pa(stress_pa: f64) -> f64 {
+pub(crate) fn mpa_from_pa(stress_pa: f64) -> f64 {
     stress_pa * MICRO
 }
 
@@ -179,19 +179,19 @@ pub fn percent_from_fraction(fraction: f64) -> f64 {
     fraction * 100.0
 }
 
-pub fn ppm_from_fraction(fraction: f64) -> f64 {
+pub(crate) fn ppm_from_fraction(fraction: f64) -> f64 {
     fraction * 1e6
 }
 
-pub fn fraction_from_ppm(ppm: f64) -> f64 {
+pub(crate) fn fraction_from_ppm(ppm: f64) -> f64 {
     ppm / 1e6
 }
 
-pub fn rad_from_deg(angle_deg: f64) -> f64 {
+pub(crate) fn rad_from_deg(angle_deg: f64) -> f64 {
     angle_deg / DEGREES_PER_RADIAN
 }
 
-pub fn fraction_from_percent(percent: f64) -> f64 {
+pub(crate) fn fraction_from_percent(percent: f64) -> f64 {
     percent / 100.0
 }
 
@@ -224,7 +224,7 @@ pub enum Unit {
 
 impl Unit {
     /// As shown behind a number.
-    pub fn symbol(self) -> &'static str {
+    pub(crate) fn symbol(self) -> &'static str {
         match self {
             Unit::One | Unit::Layer => "1",
             Unit::PerKelvin => "1/K",
@@ -265,7 +265,7 @@ impl Unit {
     }
 
     /// A difference or a standard error in SI, as stated to the user (no zero point).
-    pub fn difference_from_si(self, si: f64) -> f64 {
+    pub(crate) fn difference_from_si(self, si: f64) -> f64 {
         si / self.scale()
     }
 

@@ -68,8 +68,8 @@ pub fn field_of(
     si: bool,
 ) -> FieldHandle {
     let same = |v: f64| v;
-    let (kelvin, per_s): (fn(f64) -> f64, fn(f64) -> f64) =
-        if si { (same, same) } else { (kelvin_from_celsius, k_per_s_from_c_per_h) };
+    let kelvin: fn(f64) -> f64 = if si { same } else { kelvin_from_celsius };
+    let per_s: fn(f64) -> f64 = if si { same } else { k_per_s_from_c_per_h };
     let plain = |rows: Option<Rows>, to_si: fn(f64) -> f64| -> Vec<f64> {
         rows.map_or_else(Vec::new, |rows| rows.as_array().iter().copied().map(to_si).collect())
     };

@@ -12,14 +12,14 @@ use crate::thermal::{Extent, HeatPath, Location, ThermalError};
 
 /// Chamber, sensor and film in numbers.
 #[derive(Debug, Clone)]
-pub struct Surroundings {
-    pub film_w_per_m2_k: f64,
+pub(crate) struct Surroundings {
+    pub(crate) film_w_per_m2_k: f64,
     numbers: Numbers,
 }
 
 impl Surroundings {
     /// What is likely of any chamber.
-    pub fn usual() -> Self {
+    pub(crate) fn usual() -> Self {
         let mut numbers = Numbers([f64::NAN; PRIORS.len()]);
         for prior in &PRIORS {
             // The gyro's own numbers are relative to a noise that is not there.
@@ -29,7 +29,7 @@ impl Surroundings {
     }
 
     /// What a model file states of them.
-    pub fn learned(learned: &Learned) -> Self {
+    pub(crate) fn learned(learned: &Learned) -> Self {
         let mut usual = Self::usual();
         if let Some(film) = learned.film_w_per_m2_k {
             usual.film_w_per_m2_k = film.value;
@@ -39,7 +39,7 @@ impl Surroundings {
     }
 
     /// With this density of the noise of the air's slope between its breaks.
-    pub fn wandering(&self, rest_noise_k2_per_s3: f64) -> Self {
+    pub(crate) fn wandering(&self, rest_noise_k2_per_s3: f64) -> Self {
         let mut other = self.clone();
         other.numbers.set(Quantity::RestNoise, rest_noise_k2_per_s3);
         other
@@ -65,12 +65,12 @@ impl Surroundings {
     }
 
     /// Standard deviation of one reading besides the sensor's resolution \[K\].
-    pub fn reading_noise_k(&self) -> f64 {
+    pub(crate) fn reading_noise_k(&self) -> f64 {
         self.numbers.get(Quantity::ReadingNoise)
     }
 
     /// Density of the noise of the air's slope between its breaks \[K²/s³\].
-    pub fn rest_noise_k2_per_s3(&self) -> f64 {
+    pub(crate) fn rest_noise_k2_per_s3(&self) -> f64 {
         self.numbers.get(Quantity::RestNoise)
     }
 }
@@ -86,7 +86,7 @@ impl Chamber<'_> {
     }
 
     /// The surroundings of a fitted record.
-    pub fn surroundings(&self, fit: &Fit, record: usize) -> Surroundings {
+    pub(crate) fn surroundings(&self, fit: &Fit, record: usize) -> Surroundings {
         let mut numbers = self.numbers_for(fit, record);
         // Resolution is noise to a filter.
         let noise = numbers.get(Quantity::ReadingNoise).hypot(self.resolution_k(record) / 12f64.sqrt());
@@ -101,19 +101,19 @@ impl Chamber<'_> {
 /// # Shapes
 /// `dynamics` row-major states × states; `noise`, `functional` and `reading` one entry a state.
 #[derive(Debug, Clone)]
-pub struct Causal {
-    pub states: usize,
-    pub dynamics: Vec<f64>,
+pub(crate) struct Causal {
+    pub(crate) states: usize,
+    pub(crate) dynamics: Vec<f64>,
     /// Densities of the white noises that drive the states, but for the slope's.
-    pub noise: Vec<f64>,
+    pub(crate) noise: Vec<f64>,
     /// The integral of the rate error \[rad/K\].
-    pub functional: Vec<f64>,
-    pub reading: Vec<f64>,
+    pub(crate) functional: Vec<f64>,
+    pub(crate) reading: Vec<f64>,
     /// Row-major layers × states: each layer's temperature.
-    pub layers: Vec<f64>,
+    pub(crate) layers: Vec<f64>,
     /// The states that are a temperature: in equilibrium all show the air's.
-    pub level_states: Vec<usize>,
-    pub slope: usize,
+    pub(crate) level_states: Vec<usize>,
+    pub(crate) slope: usize,
 }
 
 /// The longest time that a half space's response is fitted to \[s\].
@@ -124,7 +124,7 @@ impl Causal {
     ///
     /// # Errors
     /// A heat path that cannot be solved.
-    pub fn new(
+    pub(crate) fn new(
         path: &HeatPath,
         layer_gains: &[f64],
         air_gain: f64,

@@ -14,14 +14,14 @@ use super::{Chamber, ChamberError};
 /// # Shapes
 /// One entry a row of the chamber; NaN where a row has no rate.
 #[derive(Debug, Clone)]
-pub struct Prediction {
-    pub rate_rad_per_s: Vec<f64>,
+pub(crate) struct Prediction {
+    pub(crate) rate_rad_per_s: Vec<f64>,
     /// Variance that the model expects of measured less predicted, white noise and wander included.
-    pub variance_rad2_per_s2: Vec<f64>,
+    pub(crate) variance_rad2_per_s2: Vec<f64>,
     /// Measured less predicted.
-    pub residual_rad_per_s: Vec<f64>,
+    pub(crate) residual_rad_per_s: Vec<f64>,
     /// The layers and the air that the readings imply.
-    pub course: Reference,
+    pub(crate) course: Reference,
 }
 
 impl Chamber<'_> {
@@ -30,7 +30,7 @@ impl Chamber<'_> {
     ///
     /// # Errors
     /// A model that cannot be solved for this record.
-    pub fn held_out(&self, fit: &Fit, record: usize) -> Result<Fit, ChamberError> {
+    pub(crate) fn held_out(&self, fit: &Fit, record: usize) -> Result<Fit, ChamberError> {
         self.fit(&fit.assumed, &[], &[record], Some(fit), Effort::FULL)
     }
 
@@ -39,7 +39,7 @@ impl Chamber<'_> {
     ///
     /// # Errors
     /// As [`Chamber::held_out`].
-    pub fn prediction(&self, fit: &Fit, record: usize) -> Result<Prediction, ChamberError> {
+    pub(crate) fn prediction(&self, fit: &Fit, record: usize) -> Result<Prediction, ChamberError> {
         let observed = &self.observed[record];
         let numbers = self.numbers_for(fit, record);
         let (assumed, film) = (&fit.assumed, numbers.get(Quantity::Film));

@@ -19,7 +19,7 @@ pub(super) mod tests {
     use crate::record::Record;
     use crate::thermal::{Extent, Location, Material};
 
-    pub fn model(effects: Vec<DeclaredEffect>) -> CoilModel {
+    pub(crate) fn model(effects: Vec<DeclaredEffect>) -> CoilModel {
         let fibre = Fibre {
             refractive_index: 1.45,
             thermo_optic_per_k: 1.0e-5,

@@ -11,12 +11,12 @@ use super::filter::Innovation;
 /// dv and dS of one coordinate.
 #[derive(Debug, Clone)]
 pub(super) struct DerivativeColumn {
-    pub value: Vec<f64>,
-    pub variance: Vec<f64>,
+    pub(crate) value: Vec<f64>,
+    pub(crate) variance: Vec<f64>,
 }
 
 impl DerivativeColumn {
-    pub fn new(base: &[Innovation], there: &[Innovation], step: f64) -> Self {
+    pub(crate) fn new(base: &[Innovation], there: &[Innovation], step: f64) -> Self {
         let over = |f: fn(&Innovation) -> f64| base.iter().zip(there).map(|(b, t)| (f(t) - f(b)) / step).collect();
         Self { value: over(|i| i.value), variance: over(|i| i.variance) }
     }
@@ -25,13 +25,13 @@ impl DerivativeColumn {
 /// The derivatives of one record's innovations.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Derivatives {
-    pub parameters: Vec<usize>,
-    pub columns: Vec<DerivativeColumn>,
+    pub(crate) parameters: Vec<usize>,
+    pub(crate) columns: Vec<DerivativeColumn>,
 }
 
 impl Derivatives {
     /// As [`Self::add_to`] for values without noise, whose variances say nothing.
-    pub fn add_values_to(&self, base: &[Innovation], score: &mut DVector<f64>, information: &mut DMatrix<f64>) {
+    pub(crate) fn add_values_to(&self, base: &[Innovation], score: &mut DVector<f64>, information: &mut DMatrix<f64>) {
         let sum = |a: &[f64], b: &mut dyn Iterator<Item = f64>| -> f64 {
             a.iter().zip(b).zip(base).map(|((a, b), i)| a * b / i.variance).sum()
         };
@@ -43,7 +43,7 @@ impl Derivatives {
         }
     }
 
-    pub fn add_to(&self, base: &[Innovation], score: &mut DVector<f64>, information: &mut DMatrix<f64>) {
+    pub(crate) fn add_to(&self, base: &[Innovation], score: &mut DVector<f64>, information: &mut DMatrix<f64>) {
         let weighted: Vec<(Vec<f64>, Vec<f64>)> = self
             .columns
             .iter()
@@ -74,7 +74,7 @@ impl Derivatives {
 
 impl Derivatives {
     /// Score of the last column, and its information with all.
-    pub fn last_row(&self, base: &[Innovation], size: usize) -> (f64, DVector<f64>) {
+    pub(crate) fn last_row(&self, base: &[Innovation], size: usize) -> (f64, DVector<f64>) {
         let mut row = DVector::zeros(size);
         let mut score = 0.0;
         if let Some(last) = self.columns.last() {

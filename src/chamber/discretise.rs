@@ -19,8 +19,8 @@ const LARGEST_NORM: f64 = 0.5;
 /// Φ and, for each of the noises, Q; all row-major n × n.
 #[derive(Debug, Clone)]
 pub(super) struct Discrete {
-    pub transition: Vec<f64>,
-    pub noises: Vec<Vec<f64>>,
+    pub(crate) transition: Vec<f64>,
+    pub(crate) noises: Vec<Vec<f64>>,
 }
 
 /// # Shapes

@@ -41,30 +41,30 @@ const SETTLED_ROWS: usize = 4;
 /// One step of time.
 #[derive(Debug, Clone)]
 pub(super) struct Step {
-    pub phi: Sparse,
-    pub phi_turned: Sparse,
+    pub(crate) phi: Sparse,
+    pub(crate) phi_turned: Sparse,
     /// Row-major n × n: everything but the trend's noise, and the trend's per unit of its density.
-    pub noise: Vec<f64>,
-    pub trend_noise: Vec<f64>,
+    pub(crate) noise: Vec<f64>,
+    pub(crate) trend_noise: Vec<f64>,
 }
 
 /// A linear Gaussian system with numbers in it.
 #[derive(Debug, Clone)]
 pub(super) struct System {
-    pub size: usize,
-    pub steps: Vec<Step>,
+    pub(crate) size: usize,
+    pub(crate) steps: Vec<Step>,
     /// Slope noise of the air's trend at rest and where readings bend [K²/s³].
-    pub trend: (f64, f64),
+    pub(crate) trend: (f64, f64),
     /// The state that is the trend's slope.
-    pub slope: usize,
+    pub(crate) slope: usize,
     /// Rows of the thermometers and of the rate, each for the shares of a window: see [`Row::window`].
-    pub rows: Sparse,
-    pub variances: [f64; MEASURED],
+    pub(crate) rows: Sparse,
+    pub(crate) variances: [f64; MEASURED],
     /// What is kept where a window begins, by the window's slot: states and the rows (of `kept`) that they take.
-    pub keeps: Vec<Vec<(usize, usize)>>,
-    pub kept: Sparse,
-    pub mean: Vec<f64>,
-    pub covariance: Vec<f64>,
+    pub(crate) keeps: Vec<Vec<(usize, usize)>>,
+    pub(crate) kept: Sparse,
+    pub(crate) mean: Vec<f64>,
+    pub(crate) covariance: Vec<f64>,
 }
 
 /// The values of a record's rows, known inputs already taken off.
@@ -73,38 +73,38 @@ pub(super) struct System {
 /// One entry a row.
 #[derive(Debug, Clone)]
 pub(super) struct Values {
-    pub of: [Vec<f64>; MEASURED],
+    pub(crate) of: [Vec<f64>; MEASURED],
 }
 
 /// An innovation with its variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Innovation {
-    pub value: f64,
-    pub variance: f64,
+pub(crate) struct Innovation {
+    pub(crate) value: f64,
+    pub(crate) variance: f64,
 }
 
 /// Gains and covariance of a row; rows with frozen gains share one.
 #[derive(Debug, Clone)]
 pub(super) struct Gains {
     /// Row-major, states: P before the measurements.
-    pub covariance: Vec<f64>,
+    pub(crate) covariance: Vec<f64>,
     /// A gain a measurement, one after another, and 1/S.
-    pub gain: Vec<f64>,
+    pub(crate) gain: Vec<f64>,
 }
 
 /// What a forward pass leaves.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Trace {
     /// In the order of rows, of each its measurements.
-    pub innovations: Vec<Innovation>,
-    pub gains: Vec<Gains>,
+    pub(crate) innovations: Vec<Innovation>,
+    pub(crate) gains: Vec<Gains>,
     /// Of each row its gains; only where they were to be kept.
-    pub gains_of: Vec<u32>,
+    pub(crate) gains_of: Vec<u32>,
     /// Row-major rows × states: before the measurements.
-    pub means: Vec<f64>,
-    pub log_likelihood: f64,
+    pub(crate) means: Vec<f64>,
+    pub(crate) log_likelihood: f64,
     /// Rows for which the covariance was computed.
-    pub thawed: usize,
+    pub(crate) thawed: usize,
 }
 
 /// Calls a function with the least number of states that has room.
@@ -152,9 +152,9 @@ pub(super) fn doubts(system: &System, rows: &[Row], trace: &Trace) -> Doubts {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Doubts {
     /// In the order of the innovations.
-    pub values: Vec<f64>,
+    pub(crate) values: Vec<f64>,
     /// One entry a row: standardised, and the change of slope that it stands for [K/s].
-    pub kinks: Vec<(f64, f64)>,
+    pub(crate) kinks: Vec<(f64, f64)>,
 }
 
 struct Doubt<'a> {

@@ -14,21 +14,21 @@ use super::{Assumption, Chamber, ChamberError};
 
 /// How much work a fit may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Effort {
-    pub iterations: usize,
+pub(crate) struct Effort {
+    pub(crate) iterations: usize,
     /// A step that gains less ends the fit.
-    pub tolerance: f64,
+    pub(crate) tolerance: f64,
     /// Times that the course is smoothed again where the model is not linear.
-    pub rounds: usize,
+    pub(crate) rounds: usize,
 }
 
 impl Effort {
     /// To a tenth of a unit of log likelihood.
-    pub const FULL: Self = Self { iterations: 25, tolerance: 0.1, rounds: 2 };
+    pub(crate) const FULL: Self = Self { iterations: 25, tolerance: 0.1, rounds: 2 };
     /// To half a unit: enough to rank sets.
-    pub const QUICK: Self = Self { iterations: 10, tolerance: 0.7, rounds: 1 };
+    pub(crate) const QUICK: Self = Self { iterations: 10, tolerance: 0.7, rounds: 1 };
     /// Enough to rank starts.
-    pub const SHORT: Self = Self { iterations: 3, tolerance: 3.0, rounds: 1 };
+    pub(crate) const SHORT: Self = Self { iterations: 3, tolerance: 3.0, rounds: 1 };
     /// Whether what is fitted so far is only compared.
     fn is_for_ranking(self) -> bool {
         self.tolerance > Self::QUICK.tolerance
@@ -45,20 +45,20 @@ pub(super) enum Wanted {
 
 /// A model fitted to records.
 #[derive(Debug, Clone)]
-pub struct Fit {
-    pub assumed: Assumption,
-    pub free: Vec<Free>,
+pub(crate) struct Fit {
+    pub(crate) assumed: Assumption,
+    pub(crate) free: Vec<Free>,
     /// Places of the fitted records in the chamber.
-    pub records: Vec<usize>,
+    pub(crate) records: Vec<usize>,
     pub parameters: Vec<Parameter>,
     /// In the order of the parameters.
-    pub coordinates: Vec<f64>,
+    pub(crate) coordinates: Vec<f64>,
     /// Of the coordinates, from the information at the maximum.
     pub standard_errors: Vec<f64>,
-    pub log_likelihood: f64,
-    pub log_prior: f64,
+    pub(crate) log_likelihood: f64,
+    pub(crate) log_prior: f64,
     /// Natural logarithm of the evidence.
-    pub evidence: f64,
+    pub(crate) evidence: f64,
     /// Information of data and prior.
     pub(super) information: DMatrix<f64>,
     /// Whether its ascent was that of [`Effort::FULL`], from whatever start.
@@ -71,11 +71,11 @@ pub struct Fit {
 
 /// All that a likelihood is computed from.
 pub(super) struct Place0<'a> {
-    pub assumed: Assumption,
-    pub numbers: Vec<Numbers>,
-    pub sides: Vec<Option<CoilSide>>,
-    pub values: Vec<Option<Values>>,
-    pub courses: &'a [Option<Reference>],
+    pub(crate) assumed: Assumption,
+    pub(crate) numbers: Vec<Numbers>,
+    pub(crate) sides: Vec<Option<CoilSide>>,
+    pub(crate) values: Vec<Option<Values>>,
+    pub(crate) courses: &'a [Option<Reference>],
 }
 
 impl Chamber<'_> {
@@ -84,7 +84,7 @@ impl Chamber<'_> {
     ///
     /// # Errors
     /// A model that cannot be solved where the fit begins.
-    pub fn fit(
+    pub(crate) fn fit(
         &self,
         assumed: &Assumption,
         free: &[Free],

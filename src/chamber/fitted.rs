@@ -9,14 +9,14 @@ use super::prior::Quantity;
 
 /// A parameter of an effect that a fit moved.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EffectEstimate {
+pub(crate) struct EffectEstimate {
     /// Place among the fitted model's effects, and among that effect's parameters.
-    pub effect: usize,
-    pub parameter: usize,
+    pub(crate) effect: usize,
+    pub(crate) parameter: usize,
     /// Whether the logarithm of the value is what is normal.
-    pub is_logarithmic: bool,
+    pub(crate) is_logarithmic: bool,
     /// The value, or its logarithm; SI.
-    pub coordinate: f64,
+    pub(crate) coordinate: f64,
 }
 
 /// The parameters of effects that a fit moved, and the joint covariance of their coordinates, whatever the chamber was.
@@ -24,14 +24,14 @@ pub struct EffectEstimate {
 /// # Shapes
 /// `covariance` is row-major, one row an estimate.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct EffectEstimates {
-    pub of: Vec<EffectEstimate>,
-    pub covariance: Vec<f64>,
+pub(crate) struct EffectEstimates {
+    pub(crate) of: Vec<EffectEstimate>,
+    pub(crate) covariance: Vec<f64>,
 }
 
 impl Fit {
     /// What the records say of the effects' parameters together; empty where they determine nothing.
-    pub fn effect_estimates(&self) -> EffectEstimates {
+    pub(crate) fn effect_estimates(&self) -> EffectEstimates {
         let places: Vec<(usize, EffectEstimate)> = self
             .parameters
             .iter()
@@ -56,7 +56,7 @@ impl Fit {
     }
 
     /// The parameter's value and its standard error, both in SI; that of a logarithm is relative.
-    pub fn value(&self, place: Place) -> Option<(f64, f64)> {
+    pub(crate) fn value(&self, place: Place) -> Option<(f64, f64)> {
         let at = self.parameters.iter().position(|p| p.place == place)?;
         let value = self.parameters[at].value(self.coordinates[at]);
         let error = match self.parameters[at].scale {
@@ -67,17 +67,17 @@ impl Fit {
     }
 
     /// A number of the chamber, of one of its records.
-    pub fn number(&self, quantity: Quantity, record: usize) -> f64 {
+    pub(crate) fn number(&self, quantity: Quantity, record: usize) -> f64 {
         self.numbers[record].get(quantity)
     }
 
     /// The smoothed course of a fitted record.
-    pub fn course(&self, record: usize) -> Option<&Reference> {
+    pub(crate) fn course(&self, record: usize) -> Option<&Reference> {
         self.courses.get(record)?.as_ref()
     }
 
     /// Begins again with a gyro whose wander is the prior's and whose white noise makes up for it.
-    pub fn calm(&mut self, records: &[usize]) {
+    pub(crate) fn calm(&mut self, records: &[usize]) {
         self.is_full = false;
         for &r in records {
             let numbers = &mut self.numbers[r];
@@ -90,7 +90,7 @@ impl Fit {
     }
 
     /// Another value of a number of the chamber, for a fit to begin with.
-    pub fn set_number(&mut self, quantity: Quantity, value: f64) {
+    pub(crate) fn set_number(&mut self, quantity: Quantity, value: f64) {
         self.is_full = false;
         self.numbers.iter_mut().for_each(|n| n.set(quantity, value));
     }
@@ -105,14 +105,14 @@ impl Fit {
     /// ```
     ///
     /// z: distance from an effect's prior in its deviations; c, e: numbers of the chamber and of effects; n: `rows`.
-    pub fn merit(&self, rows: usize) -> f64 {
+    pub(crate) fn merit(&self, rows: usize) -> f64 {
         let effects = self.parameters.iter().zip(&self.coordinates).filter(|(p, _)| !p.is_of_chamber());
         let cost = |p: &Parameter, x: f64| 0.5 * ((x - p.mean) / p.deviation).powi(2) + 0.5 * (rows as f64).ln();
         self.merit_of_chamber() - effects.map(|(p, &x)| cost(p, x)).sum::<f64>()
     }
 
     /// As [`Fit::merit`], without what parameters of effects cost.
-    pub fn merit_of_chamber(&self) -> f64 {
+    pub(crate) fn merit_of_chamber(&self) -> f64 {
         let of_chamber: Vec<usize> =
             (0..self.parameters.len()).filter(|&i| self.parameters[i].is_of_chamber()).collect();
         let count = of_chamber.len();
@@ -125,12 +125,12 @@ impl Fit {
 
     /// Whether it was made with [`super::Effort::FULL`]: the same again from there gains less than that effort's tolerance, unless the
     /// ascent ended at its last iteration.
-    pub fn is_full(&self) -> bool {
+    pub(crate) fn is_full(&self) -> bool {
         self.is_full
     }
 
     /// Logarithm of likelihood times prior.
-    pub fn posterior(&self) -> f64 {
+    pub(crate) fn posterior(&self) -> f64 {
         self.log_likelihood + self.log_prior
     }
 }

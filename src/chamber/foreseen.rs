@@ -5,9 +5,9 @@ use nalgebra::{DMatrix, DVector};
 use super::filter::Innovation;
 use super::fit::Fit;
 use super::kinks::Bend;
-use super::parameter::{Free, Parameter, Place, write};
+use super::parameter::{Parameter, Place, write};
 use super::point::{CoilSide, Rates, smoothed};
-use super::prior::{PRIORS, Quantity};
+use super::prior::Quantity;
 use super::series::Origin;
 use super::system::Numbers;
 use super::{Assumption, Chamber, ChamberError};
@@ -16,8 +16,8 @@ use crate::record::Record;
 
 /// How firmly records at hand hold the coil's numbers: −2 ln L rises by δᵀ H δ.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Hold {
-    pub information: DMatrix<f64>,
+pub(crate) struct Hold {
+    pub(crate) information: DMatrix<f64>,
 }
 
 /// Steps of a fit to what is foreseen: it begins where the records left it.
@@ -28,7 +28,7 @@ const HALVINGS: usize = 4;
 
 impl Fit {
     /// The coil's free numbers and the film, in the order of [`Chamber::foresee`].
-    pub fn hold(&self) -> Option<Hold> {
+    pub(crate) fn hold(&self) -> Option<Hold> {
         let places: Vec<usize> = (0..self.parameters.len()).filter(|&i| is_coil(&self.parameters[i])).collect();
         let covariance = self.information.clone().cholesky()?.inverse();
         let block = DMatrix::from_fn(places.len(), places.len(), |i, k| covariance[(places[i], places[k])]);
@@ -38,9 +38,10 @@ impl Fit {
 
 impl Fit {
     /// A fit to nothing: what is assumed, in a chamber as likely as any, with this white noise of a rate.
-    pub fn to_nothing(assumed: Assumption, free: Vec<Free>, noise_rad_per_s: f64) -> Self {
-        let mut numbers = Numbers([f64::NAN; PRIORS.len()]);
-        for prior in &PRIORS {
+    #[cfg(test)]
+    pub(crate) fn to_nothing(assumed: Assumption, free: Vec<super::parameter::Free>, noise_rad_per_s: f64) -> Self {
+        let mut numbers = Numbers([f64::NAN; super::prior::PRIORS.len()]);
+        for prior in &super::prior::PRIORS {
             numbers.set(prior.quantity, prior.median * if prior.relative { noise_rad_per_s } else { 1.0 });
         }
         Self {
@@ -61,7 +62,7 @@ impl Fit {
     }
 
     /// The chamber's numbers of one of its records, as those of the only record.
-    pub fn of_record(&self, record: usize) -> Self {
+    pub(crate) fn of_record(&self, record: usize) -> Self {
         Self { records: vec![0], numbers: vec![self.numbers[record]], courses: vec![None], ..self.clone() }
     }
 }
@@ -72,7 +73,7 @@ impl<'a> Chamber<'a> {
     ///
     /// # Errors
     /// As [`Chamber::new`].
-    pub fn planned(
+    pub(crate) fn planned(
         model: &CoilModel,
         record: &'a Record,
         bends: &[Bend],
@@ -103,7 +104,7 @@ impl Chamber<'_> {
     ///
     /// # Errors
     /// A model that cannot be solved.
-    pub fn foresee(
+    pub(crate) fn foresee(
         &self,
         from: &Fit,
         air: &Fit,

@@ -16,9 +16,9 @@ use super::{Assumption, Chamber, ChamberError};
 
 /// A change of the air's slope that stands out.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bend {
-    pub time_s: f64,
-    pub slope_change_k_per_s: f64,
+pub(crate) struct Bend {
+    pub(crate) time_s: f64,
+    pub(crate) slope_change_k_per_s: f64,
 }
 
 /// Rows to each side of where readings have a kink in which it may be: a lagging sensor shows it late.
@@ -33,7 +33,7 @@ impl Chamber<'_> {
     ///
     /// # Errors
     /// As [`Chamber::fit`].
-    pub fn settled_in_time(mut self, assumed: &Assumption) -> Result<(Self, Fit), ChamberError> {
+    pub(crate) fn settled_in_time(mut self, assumed: &Assumption) -> Result<(Self, Fit), ChamberError> {
         let fit = self.best_start(assumed, &[], &[0])?;
         let fit = self.looked_through(fit, &[0])?;
         self.time_kinks(&fit, 0)?;
@@ -45,7 +45,7 @@ impl Chamber<'_> {
     ///
     /// # Errors
     /// A model that cannot be solved.
-    pub fn time_kinks(&mut self, fit: &Fit, record: usize) -> Result<(), ChamberError> {
+    pub(crate) fn time_kinks(&mut self, fit: &Fit, record: usize) -> Result<(), ChamberError> {
         let windows = self.observed[record].series.widen_kinks();
         if windows.is_empty() {
             return Ok(());

@@ -27,16 +27,16 @@ use crate::units::REFERENCE_TEMPERATURE_K;
 /// # Shapes
 /// `outputs_k` row-major rows × outputs: the layers' means, innermost first, then their axial moments.
 #[derive(Debug, Clone)]
-pub struct Reference {
-    pub layers: usize,
-    pub outputs: usize,
+pub(crate) struct Reference {
+    pub(crate) layers: usize,
+    pub(crate) outputs: usize,
     /// Above the record's `reference_k`.
-    pub air_k: Vec<f64>,
-    pub outputs_k: Vec<f64>,
+    pub(crate) air_k: Vec<f64>,
+    pub(crate) outputs_k: Vec<f64>,
 }
 
 impl Reference {
-    pub fn row(&self, row: usize) -> &[f64] {
+    pub(crate) fn row(&self, row: usize) -> &[f64] {
         &self.outputs_k[row * self.outputs..(row + 1) * self.outputs]
     }
 
@@ -75,21 +75,21 @@ impl Reference {
 /// What a model needs to have worked out.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Asked<'a> {
-    pub path: &'a HeatPath,
-    pub film_w_per_m2_k: f64,
-    pub modes: usize,
-    pub reduced: &'a Reduced,
-    pub gains: &'a Gains,
-    pub rate: &'a RateModel,
+    pub(crate) path: &'a HeatPath,
+    pub(crate) film_w_per_m2_k: f64,
+    pub(crate) modes: usize,
+    pub(crate) reduced: &'a Reduced,
+    pub(crate) gains: &'a Gains,
+    pub(crate) rate: &'a RateModel,
     /// Whether the rate is more than the gains say.
-    pub beyond_linear: bool,
-    pub shows_air: bool,
-    pub lag_s: f64,
+    pub(crate) beyond_linear: bool,
+    pub(crate) shows_air: bool,
+    pub(crate) lag_s: f64,
 }
 
 impl Asked<'_> {
     /// Whether there is anything to work out.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         !self.beyond_linear && !self.path.has_own_course() && self.path.conductivity_slope_per_k == 0.0
     }
 }

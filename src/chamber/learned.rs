@@ -9,22 +9,22 @@ use super::{Chamber, ChamberError};
 
 /// A number with its standard error, both in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate {
-    pub value: f64,
-    pub standard_error: f64,
+pub(crate) struct Estimate {
+    pub(crate) value: f64,
+    pub(crate) standard_error: f64,
 }
 
 /// What records say of what surrounds the coil, sensor and gyro included.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Learned {
     /// Film between air and pack \[W/(m²K)\]; None where the model states it or the records don't determine it.
-    pub film_w_per_m2_k: Option<Estimate>,
+    pub(crate) film_w_per_m2_k: Option<Estimate>,
     /// Mean offset of the rates \[rad/s\]; its error counts how records differ.
-    pub offset_rad_per_s: Option<Estimate>,
+    pub(crate) offset_rad_per_s: Option<Estimate>,
     /// Of the chamber, sensor and gyro: geometric mean over the records and its error.
-    pub numbers: Vec<(Quantity, Estimate)>,
+    pub(crate) numbers: Vec<(Quantity, Estimate)>,
     /// How many records it was learned from.
-    pub records: usize,
+    pub(crate) records: usize,
 }
 
 /// Records determine a number whose error is at most this share of what was known of it before.
@@ -35,7 +35,7 @@ impl Chamber<'_> {
     ///
     /// # Errors
     /// A model that cannot be solved.
-    pub fn learned(&self, fit: &Fit) -> Result<Learned, ChamberError> {
+    pub(crate) fn learned(&self, fit: &Fit) -> Result<Learned, ChamberError> {
         let determined = |quantity: Quantity, relative: f64| relative < DETERMINED * quantity.prior().deviation;
         let film = fit.value(Place::Quantity { quantity: Quantity::Film, record: None });
         let film_w_per_m2_k = film
@@ -67,7 +67,7 @@ impl Chamber<'_> {
     ///
     /// # Errors
     /// A model that cannot be solved.
-    pub fn offset(&self, fit: &Fit, record: usize) -> Result<Estimate, ChamberError> {
+    pub(crate) fn offset(&self, fit: &Fit, record: usize) -> Result<Estimate, ChamberError> {
         let (side, system, trace) = self.traced(fit, record)?;
         let series = &self.observed[record].series;
         let place = Layout::new(&side.parts(&fit.assumed), series).offset();

@@ -7,7 +7,7 @@ use super::settle::GROSS_ROUNDS;
 use super::{Chamber, ChamberError};
 
 /// Numbers of a chamber are fitted to at most so many of its rows: a day of half-minute rows, more than they need.
-pub const MOST_ROWS_FITTED: usize = 4000;
+pub(crate) const MOST_ROWS_FITTED: usize = 4000;
 /// A change of temperature is told from noise over so many rows.
 const APART: usize = 50;
 /// Stretches that are compared overlap by all but this share of their length.
@@ -16,7 +16,7 @@ const STRIDE: usize = 8;
 impl Chamber<'_> {
     /// The record's rows in that stretch of `most` rows of the chamber in which the readings move most; the whole record where
     /// it is no longer.
-    pub fn busiest(&self, record: usize, most: usize) -> Range<usize> {
+    pub(crate) fn busiest(&self, record: usize, most: usize) -> Range<usize> {
         let series = &self.observed[record].series;
         let rows = series.rows.len();
         let whole = |from: usize, to: usize| series.spans[from].0..series.spans[to - 1].1 + 1;
@@ -43,7 +43,7 @@ impl Chamber<'_> {
     ///
     /// # Errors
     /// A model that cannot be solved.
-    pub fn adopt(&mut self, stretch: &Chamber, found: &Fit) -> Result<Fit, ChamberError> {
+    pub(crate) fn adopt(&mut self, stretch: &Chamber, found: &Fit) -> Result<Fit, ChamberError> {
         let mut fit = found.of_record(found.records[0]);
         let settle = |chamber: &Self, fit: &mut Fit| {
             let (assumed, numbers) = (fit.assumed.clone(), fit.numbers.clone());

@@ -45,7 +45,7 @@ mod long;
 mod noise;
 mod parameter;
 mod point;
-pub mod prior;
+pub(crate) mod prior;
 mod readings;
 mod row;
 mod score;
@@ -67,38 +67,37 @@ use point::Observed;
 use series::{Origin, Series};
 use system::driven_by_air;
 
-pub use causal::{Causal, Surroundings};
-pub use course::Prediction;
-pub use filter::Innovation;
-pub use fit::{Effort, Fit};
-pub use fitted::{EffectEstimate, EffectEstimates};
-pub use foreseen::Hold;
-pub use kinks::Bend;
-pub use known::Reference;
-pub use learned::{Estimate, Learned};
-pub use long::MOST_ROWS_FITTED;
-pub use noise::{Noise, Remedy};
-pub use parameter::{Free, Parameter, Place, Scale};
-pub use prior::{BREAK_K2_PER_S2, BREAKS_PER_S, PRIORS, Prior, Quantity};
-pub use readings::Told;
-pub use score::{Column, Direction, Scores};
-pub use scorer::{Scored, Scorer};
-pub use states::RowStates;
+pub(crate) use causal::{Causal, Surroundings};
+pub(crate) use filter::Innovation;
+pub(crate) use fit::{Effort, Fit};
+pub(crate) use fitted::{EffectEstimate, EffectEstimates};
+pub(crate) use foreseen::Hold;
+pub(crate) use kinks::Bend;
+pub(crate) use known::Reference;
+pub(crate) use learned::{Estimate, Learned};
+pub(crate) use long::MOST_ROWS_FITTED;
+pub(crate) use noise::{Noise, Remedy};
+pub(crate) use parameter::{Free, Place, Scale};
+pub(crate) use prior::{BREAK_K2_PER_S2, BREAKS_PER_S, PRIORS, Quantity};
+pub(crate) use readings::Told;
+pub(crate) use score::Column;
+pub(crate) use scorer::{Scored, Scorer};
+pub(crate) use states::RowStates;
 
 /// What is assumed of coil, sensor and gyro; the numbers of chamber and noise are fitted with it.
 #[derive(Debug, Clone)]
-pub struct Assumption {
-    pub model: CoilModel,
-    pub pattern: Pattern,
+pub(crate) struct Assumption {
+    pub(crate) model: CoilModel,
+    pub(crate) pattern: Pattern,
     /// Wander beyond what a gyro of this noise should have.
-    pub drift: bool,
+    pub(crate) drift: bool,
     /// A cycle that nothing in the model makes.
-    pub cycle: bool,
-    pub inputs: Vec<Input>,
+    pub(crate) cycle: bool,
+    pub(crate) inputs: Vec<Input>,
 }
 
 impl Assumption {
-    pub fn new(model: CoilModel, pattern: Pattern) -> Self {
+    pub(crate) fn new(model: CoilModel, pattern: Pattern) -> Self {
         Self { model, pattern, drift: false, cycle: false, inputs: Vec::new() }
     }
 }
@@ -108,17 +107,17 @@ impl Assumption {
 /// # Shapes
 /// One course a record of the chamber, with one entry a row of the chamber.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Input {
-    pub name: String,
-    pub rate_rad_per_s: Vec<Vec<f64>>,
-    pub amplitude: f64,
+pub(crate) struct Input {
+    pub(crate) name: String,
+    pub(crate) rate_rad_per_s: Vec<Vec<f64>>,
+    pub(crate) amplitude: f64,
     /// Prior standard deviation of the amplitude about zero; 0: the amplitude is known, and no fit moves it.
-    pub deviation: f64,
+    pub(crate) deviation: f64,
 }
 
 /// Records, ready to be explained.
 #[derive(Debug, Clone)]
-pub struct Chamber<'a> {
+pub(crate) struct Chamber<'a> {
     observed: Vec<Observed<'a>>,
     modes: usize,
 }
@@ -158,7 +157,7 @@ impl<'a> Chamber<'a> {
     ///
     /// # Errors
     /// A model that cannot be solved; records whose temperature does not change or whose rate has no noise.
-    pub fn new(model: &CoilModel, records: &[&'a Record]) -> Result<Self, ChamberError> {
+    pub(crate) fn new(model: &CoilModel, records: &[&'a Record]) -> Result<Self, ChamberError> {
         let chamber = Self::made(model, records, Origin::Measured)?;
         chamber.checked()?;
         Ok(chamber)
@@ -205,46 +204,46 @@ impl<'a> Chamber<'a> {
         Ok(Self { observed, modes })
     }
 
-    pub fn records(&self) -> usize {
+    pub(crate) fn records(&self) -> usize {
         self.observed.len()
     }
 
-    pub fn record(&self, place: usize) -> &'a Record {
+    pub(crate) fn record(&self, place: usize) -> &'a Record {
         self.observed[place].record
     }
 
     /// Ends of the chamber's rows of one record.
-    pub fn times_s(&self, place: usize) -> &[f64] {
+    pub(crate) fn times_s(&self, place: usize) -> &[f64] {
         &self.observed[place].series.times_s
     }
 
     /// The first and last of a record's rows that are in one of the chamber's.
-    pub fn span(&self, place: usize, row: usize) -> (usize, usize) {
+    pub(crate) fn span(&self, place: usize, row: usize) -> (usize, usize) {
         self.observed[place].series.spans[row]
     }
 
     /// What courses count their temperatures from.
-    pub fn reference_k(&self, place: usize) -> f64 {
+    pub(crate) fn reference_k(&self, place: usize) -> f64 {
         self.observed[place].series.reference_k
     }
 
     /// Readings and rates left out as gross errors.
-    pub fn spikes(&self, place: usize) -> usize {
+    pub(crate) fn spikes(&self, place: usize) -> usize {
         self.observed[place].series.spikes
     }
 
     /// Rows of a record in one row of the chamber.
-    pub fn averaged(&self, place: usize) -> usize {
+    pub(crate) fn averaged(&self, place: usize) -> usize {
         self.observed[place].series.averaged
     }
 
     /// The sensor's resolution; 0 where readings lie on no grid.
-    pub fn resolution_k(&self, place: usize) -> f64 {
+    pub(crate) fn resolution_k(&self, place: usize) -> f64 {
         self.observed[place].series.resolution_k
     }
 
     /// The record's noise by windows too short for anything else.
-    pub fn noise_floor_rad_per_s(&self, place: usize) -> f64 {
+    pub(crate) fn noise_floor_rad_per_s(&self, place: usize) -> f64 {
         self.observed[place].series.noise_floor_rad_per_s
     }
 }

@@ -13,25 +13,25 @@ use super::{Chamber, ChamberError, Place};
 
 /// What the rate of a record consists of beside the coil [rad/s].
 #[derive(Debug, Clone, PartialEq)]
-pub struct Noise {
+pub(crate) struct Noise {
     /// Of one value as logged.
-    pub white_rad_per_s: f64,
-    pub white_standard_error_rad_per_s: f64,
+    pub(crate) white_rad_per_s: f64,
+    pub(crate) white_standard_error_rad_per_s: f64,
     /// Slow wander of the gyro, drift and cycle included.
-    pub wander_rad_per_s: f64,
+    pub(crate) wander_rad_per_s: f64,
     /// What the air does that the sensor cannot see, on a row of the chamber.
-    pub unresolved_air_rad_per_s: f64,
+    pub(crate) unresolved_air_rad_per_s: f64,
     /// What is beyond all that; 0 where the rate differs from the prediction by no more than is expected.
-    pub model_error_rad_per_s: f64,
+    pub(crate) model_error_rad_per_s: f64,
     /// Root mean square of the innovations of the rate in units of their expected deviation: 1 for a right model.
-    pub whiteness: f64,
+    pub(crate) whiteness: f64,
     /// What each change of the measurement would leave of the unresolved air, most helpful first.
-    pub remedies: Vec<(Remedy, f64)>,
+    pub(crate) remedies: Vec<(Remedy, f64)>,
 }
 
 /// A change of the measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Remedy {
+pub(crate) enum Remedy {
     /// A sensor of a tenth of the noise.
     QuieterSensor,
     /// Readings that are not rounded.
@@ -43,7 +43,7 @@ pub enum Remedy {
 }
 
 impl Remedy {
-    pub const ALL: [Remedy; 4] =
+    pub(crate) const ALL: [Remedy; 4] =
         [Remedy::QuieterSensor, Remedy::FinerResolution, Remedy::SensorInAir, Remedy::CalmerAir];
 
     pub(super) fn apply(self, parts: &mut Parts, numbers: &mut Numbers) {
@@ -71,7 +71,7 @@ impl Chamber<'_> {
     ///
     /// # Errors
     /// As [`Chamber::held_out`].
-    pub fn noise(&self, fit: &Fit, record: usize) -> Result<Noise, ChamberError> {
+    pub(crate) fn noise(&self, fit: &Fit, record: usize) -> Result<Noise, ChamberError> {
         let numbers = self.numbers_for(fit, record);
         let white = numbers.get(Quantity::RateNoise);
         let place = Place::Quantity { quantity: Quantity::RateNoise, record: Some(record) };

@@ -8,7 +8,7 @@ use crate::units::Unit;
 
 /// Which number a parameter is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Place {
+pub(crate) enum Place {
     /// Of one record, or (None) of all.
     Quantity {
         quantity: Quantity,
@@ -26,32 +26,32 @@ pub enum Place {
 
 /// Which effect's parameters a fit moves, and how firmly what the model states holds them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Free {
-    pub effect: usize,
-    pub parameter: usize,
+pub(crate) struct Free {
+    pub(crate) effect: usize,
+    pub(crate) parameter: usize,
     /// Some: the model states the value, which is wrong by this share at the most (one standard deviation); None: the
     /// prior is that of the effect's description.
-    pub stated_within: Option<f64>,
+    pub(crate) stated_within: Option<f64>,
 }
 
 /// How a number becomes the coordinate in which its prior is normal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scale {
+pub(crate) enum Scale {
     Logarithm,
     Linear,
 }
 
 /// One coordinate of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Parameter {
-    pub place: Place,
-    pub scale: Scale,
+pub(crate) struct Parameter {
+    pub(crate) place: Place,
+    pub(crate) scale: Scale,
     /// Of the prior, in the coordinate.
-    pub mean: f64,
-    pub deviation: f64,
+    pub(crate) mean: f64,
+    pub(crate) deviation: f64,
     /// Bounds, in the coordinate.
-    pub lower: f64,
-    pub upper: f64,
+    pub(crate) lower: f64,
+    pub(crate) upper: f64,
 }
 
 /// Prior of an effect's parameter by its description.
@@ -70,7 +70,7 @@ const STARTS: f64 = 4.0;
 const SHARE_OF_BOUND: f64 = 0.01;
 
 /// Whether a parameter's description is that of a factor on a declared number.
-pub fn is_factor(spec: &ParameterSpec) -> bool {
+pub(crate) fn is_factor(spec: &ParameterSpec) -> bool {
     spec.unit == Unit::One && spec.lower > 0.0 && (spec.lower * spec.upper - 1.0).abs() < 1e-9
 }
 
@@ -135,14 +135,14 @@ impl Parameter {
         }
     }
 
-    pub fn value(&self, coordinate: f64) -> f64 {
+    pub(crate) fn value(&self, coordinate: f64) -> f64 {
         match self.scale {
             Scale::Logarithm => coordinate.exp(),
             Scale::Linear => coordinate,
         }
     }
 
-    pub fn coordinate(&self, value: f64) -> f64 {
+    pub(crate) fn coordinate(&self, value: f64) -> f64 {
         match self.scale {
             Scale::Logarithm => value.ln(),
             Scale::Linear => value,

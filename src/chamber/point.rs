@@ -18,8 +18,8 @@ pub(super) struct CoilSide {
     path: HeatPath,
     film_w_per_m2_k: f64,
     modes: usize,
-    pub reduced: Reduced,
-    pub gains: Gains,
+    pub(crate) reduced: Reduced,
+    pub(crate) gains: Gains,
     rate: RateModel,
     skin_s: Option<f64>,
     shows_air: bool,
@@ -30,20 +30,25 @@ pub(super) struct CoilSide {
 /// A record as the chamber knows it.
 #[derive(Debug, Clone)]
 pub(super) struct Observed<'a> {
-    pub record: &'a Record,
-    pub series: Series,
-    pub channels: Vec<String>,
-    pub mean_k: f64,
+    pub(crate) record: &'a Record,
+    pub(crate) series: Series,
+    pub(crate) channels: Vec<String>,
+    pub(crate) mean_k: f64,
     /// Its rates are not measurements.
-    pub blind: bool,
+    pub(crate) blind: bool,
     /// What its own air was found to be, by itself.
-    pub day: Option<Numbers>,
+    pub(crate) day: Option<Numbers>,
 }
 
 impl CoilSide {
     /// # Errors
     /// A model that cannot be solved.
-    pub fn new(assumed: &Assumption, film: f64, modes: usize, observed: &Observed) -> Result<Self, ChamberError> {
+    pub(crate) fn new(
+        assumed: &Assumption,
+        film: f64,
+        modes: usize,
+        observed: &Observed,
+    ) -> Result<Self, ChamberError> {
         let model = &assumed.model;
         let path = model.heat_path()?;
         let shows_air = path.location != Location::OuterLayer;
@@ -61,7 +66,7 @@ impl CoilSide {
         Ok(Self { path, film_w_per_m2_k, modes, reduced, gains, rate, skin_s, shows_air, lag_s, beyond_linear })
     }
 
-    pub fn parts<'a>(&'a self, assumed: &Assumption) -> Parts<'a> {
+    pub(crate) fn parts<'a>(&'a self, assumed: &Assumption) -> Parts<'a> {
         Parts {
             reduced: &self.reduced,
             gains: &self.gains,
@@ -88,7 +93,7 @@ impl CoilSide {
     }
 
     /// Whether a reference is needed.
-    pub fn needs_reference(&self) -> bool {
+    pub(crate) fn needs_reference(&self) -> bool {
         !self.asked().is_empty()
     }
 
@@ -96,7 +101,7 @@ impl CoilSide {
     ///
     /// # Errors
     /// A conductivity that is not positive.
-    pub fn values(
+    pub(crate) fn values(
         &self,
         assumed: &Assumption,
         observed: &Observed,
@@ -118,7 +123,7 @@ impl CoilSide {
     ///
     /// # Errors
     /// A conductivity that is not positive.
-    pub fn rates(
+    pub(crate) fn rates(
         &self,
         assumed: &Assumption,
         observed: &Observed,
@@ -145,7 +150,7 @@ impl CoilSide {
     }
 
     /// Whether a course is one of this side's outputs.
-    pub fn fits(&self, course: &Reference) -> bool {
+    pub(crate) fn fits(&self, course: &Reference) -> bool {
         course.outputs == self.reduced.outputs
     }
 
@@ -153,7 +158,7 @@ impl CoilSide {
     ///
     /// # Errors
     /// A conductivity that is not positive.
-    pub fn reference(
+    pub(crate) fn reference(
         &self,
         assumed: &Assumption,
         observed: &Observed,

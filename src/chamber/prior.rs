@@ -4,7 +4,7 @@
 
 /// A number that describes the chamber, the sensor or the gyro, not the coil.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Quantity {
+pub(crate) enum Quantity {
     /// Film between air and pack \[W/(m²K)\].
     Film,
     /// White noise of one reading of the sensor, besides its resolution \[K\].
@@ -39,20 +39,20 @@ pub enum Quantity {
 
 /// One line of the table.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Prior {
-    pub quantity: Quantity,
+pub(crate) struct Prior {
+    pub(crate) quantity: Quantity,
     /// In SI; relative to the record's own noise floor where `relative`.
-    pub median: f64,
+    pub(crate) median: f64,
     /// Of the natural logarithm.
-    pub deviation: f64,
-    pub relative: bool,
+    pub(crate) deviation: f64,
+    pub(crate) relative: bool,
     /// What is larger is not this any more.
-    pub most: f64,
-    pub reason: &'static str,
+    pub(crate) most: f64,
+    pub(crate) reason: &'static str,
 }
 
 /// Every prior of the chamber.
-pub const PRIORS: [Prior; 19] = [
+pub(crate) const PRIORS: [Prior; 19] = [
     line(Quantity::Film, 25.0, 0.8, "free to moderately forced convection in a chamber: 8 … 80 W/(m²K)"),
     line(Quantity::ReadingNoise, 0.005, 1.0, "platinum sensors and their bridges read to a few millikelvin"),
     line(Quantity::InnerNoise, 0.005, 1.0, "as the sensor"),
@@ -97,7 +97,7 @@ const fn relative(quantity: Quantity, median: f64, deviation: f64, reason: &'sta
 
 impl Quantity {
     /// Its key in files, unit and all.
-    pub fn key(self) -> &'static str {
+    pub(crate) fn key(self) -> &'static str {
         match self {
             Self::Film => "surface_film_w_per_m2_k",
             Self::ReadingNoise => "reading_noise_k",
@@ -134,25 +134,25 @@ impl Quantity {
     ];
 
     /// Whether it is an angular rate, in SI rad/s.
-    pub fn is_rate(self) -> bool {
+    pub(crate) fn is_rate(self) -> bool {
         matches!(self, Self::RateNoise | Self::DriftSize | Self::CycleSize)
     }
 
-    pub fn prior(self) -> &'static Prior {
+    pub(crate) fn prior(self) -> &'static Prior {
         let found = PRIORS.iter().find(|p| p.quantity == self);
         found.unwrap_or(&PRIORS[0])
     }
 
     /// Whether it is one number for all records.
-    pub fn is_shared(self) -> bool {
+    pub(crate) fn is_shared(self) -> bool {
         self == Quantity::Film
     }
 }
 
 /// How often a chamber's air breaks from one ramp into another, and the mean square of the change of its slope
 /// \[(K/s)²\]: every fifty minutes by 2 K/min, so much wider than one record shows that the next one breaks within it.
-pub const BREAKS_PER_S: f64 = 1.0 / 3000.0;
-pub const BREAK_K2_PER_S2: f64 = 1e-3;
+pub(crate) const BREAKS_PER_S: f64 = 1.0 / 3000.0;
+pub(crate) const BREAK_K2_PER_S2: f64 = 1e-3;
 
 /// Standard deviation of the pack's first temperature about the first reading \[K\].
 pub(super) const START_K: f64 = 1.0;

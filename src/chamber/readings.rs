@@ -25,14 +25,14 @@ use crate::record::Record;
 /// # Shapes
 /// One entry a row of the chamber.
 #[derive(Debug, Clone)]
-pub struct Told {
+pub(crate) struct Told {
     /// Layers and air.
-    pub course: Reference,
+    pub(crate) course: Reference,
     /// Slopes of the layers, their axial moments and the air, row-major \[K/s\].
-    pub slopes_k_per_s: Vec<f64>,
+    pub(crate) slopes_k_per_s: Vec<f64>,
     /// Variance that what the readings leave open gives each row's rate \[(rad/s)²\].
-    pub rate_variance_rad2_per_s2: Vec<f64>,
-    pub bends: Vec<Bend>,
+    pub(crate) rate_variance_rad2_per_s2: Vec<f64>,
+    pub(crate) bends: Vec<Bend>,
 }
 
 impl<'a> Chamber<'a> {
@@ -41,7 +41,7 @@ impl<'a> Chamber<'a> {
     ///
     /// # Errors
     /// A model that cannot be solved; records whose temperature does not change.
-    pub fn of_any(model: &CoilModel, records: &[&'a Record]) -> Result<Self, ChamberError> {
+    pub(crate) fn of_any(model: &CoilModel, records: &[&'a Record]) -> Result<Self, ChamberError> {
         match Self::new(model, records) {
             Err(ChamberError::NoNoise { .. }) => Self::of_readings(model, records),
             chamber => chamber,
@@ -54,7 +54,7 @@ impl<'a> Chamber<'a> {
     }
 
     /// The same chamber; its fits do not see the rates.
-    pub fn without_rates(&self) -> Self {
+    pub(crate) fn without_rates(&self) -> Self {
         let mut chamber = self.clone();
         for observed in &mut chamber.observed {
             observed.blind = true;
@@ -88,7 +88,7 @@ impl<'a> Chamber<'a> {
     ///
     /// # Errors
     /// A model that cannot be solved.
-    pub fn told(&self, fit: &Fit, record: usize) -> Result<Told, ChamberError> {
+    pub(crate) fn told(&self, fit: &Fit, record: usize) -> Result<Told, ChamberError> {
         let observed = &self.observed[record];
         let numbers = self.numbers_for(fit, record);
         let (side, values) = self.side_and_values(fit, record, &numbers)?;
@@ -169,7 +169,7 @@ impl Chamber<'_> {
     ///
     /// # Errors
     /// A model that cannot be solved.
-    pub fn chi_square_beyond_readings(
+    pub(crate) fn chi_square_beyond_readings(
         &self,
         fit: &Fit,
         record: usize,

@@ -17,20 +17,20 @@ pub(super) enum Move {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Row {
     /// From the row before to this one.
-    pub moves: Vec<Move>,
+    pub(crate) moves: Vec<Move>,
     /// Of how much the readings bend here: 0 at rest to 1.
-    pub bend: f64,
+    pub(crate) bend: f64,
     /// Variance of a kink of the air's slope where this row's steps begin, or at [`Move::Kink`] [K²/s²].
-    pub kink: f64,
+    pub(crate) kink: f64,
     /// Rows of [`super::filter::System::rows`] to measure with; None where there is no value.
-    pub measured: [Option<u16>; MEASURED],
+    pub(crate) measured: [Option<u16>; MEASURED],
     /// Values that were averaged into this one: variances are divided by it.
-    pub averaged: f64,
+    pub(crate) averaged: f64,
 }
 
 impl Row {
     /// Whether its kink is between its steps, not where they begin.
-    pub fn is_kinked_within(&self) -> bool {
+    pub(crate) fn is_kinked_within(&self) -> bool {
         self.kink > 0.0 && self.moves.contains(&Move::Kink)
     }
 }

@@ -27,13 +27,13 @@ use super::{Assumption, Chamber, ChamberError};
 /// # Shapes
 /// One course a record of the chamber, one entry a row of the chamber; those of records that were not fitted may be empty.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Column {
-    pub rate_rad_per_s: Vec<Vec<f64>>,
+pub(crate) struct Column {
+    pub(crate) rate_rad_per_s: Vec<Vec<f64>>,
 }
 
 impl Column {
     /// One from a row of a record on.
-    pub fn step(chamber: &Chamber, record: usize, row: usize) -> Self {
+    pub(crate) fn step(chamber: &Chamber, record: usize, row: usize) -> Self {
         let course = |r: usize| {
             let rows = chamber.times_s(r).len();
             (0..rows).map(|k| f64::from(r == record && k >= row)).collect()
@@ -44,14 +44,14 @@ impl Column {
 
 /// A change of the model as a direction from a fit, cleared of what was fitted; the whole change is one unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Direction {
-    pub score: f64,
-    pub information: f64,
+pub(crate) struct Direction {
+    pub(crate) score: f64,
+    pub(crate) information: f64,
 }
 
 impl Direction {
     /// By how much the log likelihood would rise at most between these multiples of the change, and at which.
-    pub fn gain(&self, least: f64, most: f64) -> (f64, f64) {
+    pub(crate) fn gain(&self, least: f64, most: f64) -> (f64, f64) {
         let amplitude = (self.score / self.information).clamp(least, most);
         (amplitude * self.score - 0.5 * amplitude * amplitude * self.information, amplitude)
     }
@@ -59,16 +59,16 @@ impl Direction {
 
 /// Score and information of columns, cleared of what was fitted.
 #[derive(Debug, Clone)]
-pub struct Scores {
+pub(crate) struct Scores {
     /// g̃ of each column.
-    pub score: DVector<f64>,
+    pub(crate) score: DVector<f64>,
     /// J̃ between columns.
-    pub information: DMatrix<f64>,
+    pub(crate) information: DMatrix<f64>,
 }
 
 impl Scores {
     /// By how much the log likelihood would rise with a column at its best amplitude, and that amplitude.
-    pub fn gain(&self, column: usize) -> (f64, f64) {
+    pub(crate) fn gain(&self, column: usize) -> (f64, f64) {
         let information = self.information[(column, column)];
         if !(information > 0.0) {
             return (0.0, 0.0);
@@ -78,7 +78,7 @@ impl Scores {
     }
 
     /// By how much it would rise with given amplitudes of all columns.
-    pub fn gain_of(&self, amplitudes: &DVector<f64>) -> f64 {
+    pub(crate) fn gain_of(&self, amplitudes: &DVector<f64>) -> f64 {
         amplitudes.dot(&self.score) - 0.5 * amplitudes.dot(&(&self.information * amplitudes))
     }
 }
@@ -88,7 +88,7 @@ impl Chamber<'_> {
     ///
     /// # Errors
     /// A model that cannot be solved.
-    pub fn score(&self, fit: &Fit, columns: &[Column]) -> Result<Scores, ChamberError> {
+    pub(crate) fn score(&self, fit: &Fit, columns: &[Column]) -> Result<Scores, ChamberError> {
         let place = self.place(fit.assumed.clone(), fit.numbers.clone(), &fit.records, &fit.courses)?;
         let (count, fitted) = (columns.len(), fit.parameters.len());
         let mut score = DVector::zeros(count);
@@ -141,7 +141,11 @@ impl Chamber<'_> {
     ///
     /// # Errors
     /// A fit whose own model cannot be solved.
-    pub fn score_models(&self, fit: &Fit, changed: &[Assumption]) -> Result<Vec<Option<Direction>>, ChamberError> {
+    pub(crate) fn score_models(
+        &self,
+        fit: &Fit,
+        changed: &[Assumption],
+    ) -> Result<Vec<Option<Direction>>, ChamberError> {
         let place = self.place(fit.assumed.clone(), fit.numbers.clone(), &fit.records, &fit.courses)?;
         let base: Result<Vec<_>, _> = fit.records.iter().map(|&r| self.innovations(&place, r)).collect();
         let base = base?;
@@ -186,7 +190,7 @@ impl Chamber<'_> {
     ///
     /// # Shapes
     /// One column an output: the layers, innermost first, then axial moments.
-    pub fn layer_columns(&self, fit: &Fit) -> Vec<Column> {
+    pub(crate) fn layer_columns(&self, fit: &Fit) -> Vec<Column> {
         let outputs = fit.courses.iter().flatten().map(|c| c.outputs).next().unwrap_or(0);
         (0..outputs)
             .map(|j| Column {

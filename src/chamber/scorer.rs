@@ -13,7 +13,6 @@
 //! As [`super::score`].
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
-use rayon::prelude::*;
 
 use super::derivative::Derivatives;
 use super::filter::{RATE, System, Trace, Values, respond};
@@ -24,7 +23,7 @@ use super::prior::Quantity;
 use super::{Chamber, ChamberError, Column};
 
 /// A fit with its filter's gains and derivatives, of each record that it was fitted to.
-pub struct Scorer<'c, 'a> {
+pub(crate) struct Scorer<'c, 'a> {
     chamber: &'c Chamber<'a>,
     records: Vec<Prepared>,
     factor: Cholesky<f64, Dyn>,
@@ -44,14 +43,14 @@ struct Prepared {
 
 /// A column as the filter sees it, cleared of what was fitted.
 #[derive(Debug, Clone)]
-pub struct Scored {
+pub(crate) struct Scored {
     /// In units of the innovations' deviations, record after record.
     response: Vec<f64>,
     cross: DVector<f64>,
     weights: DVector<f64>,
     /// g̃ and J̃.
-    pub score: f64,
-    pub information: f64,
+    pub(crate) score: f64,
+    pub(crate) information: f64,
 }
 
 /// A column that what was fitted explains to this share says nothing of its own.
@@ -59,7 +58,7 @@ const OWN_SHARE: f64 = 1e-6;
 
 impl Scored {
     /// By how much the log likelihood would rise at the best amplitude, and that amplitude.
-    pub fn gain(&self) -> (f64, f64) {
+    pub(crate) fn gain(&self) -> (f64, f64) {
         let all: f64 = self.response.iter().map(|r| r * r).sum();
         if !(self.information > OWN_SHARE * all) || !self.score.is_finite() {
             return (0.0, 0.0);
@@ -69,20 +68,15 @@ impl Scored {
     }
 
     /// J̃ between two columns.
-    pub fn information_with(&self, other: &Self) -> f64 {
+    pub(crate) fn information_with(&self, other: &Self) -> f64 {
         self.response.iter().zip(&other.response).map(|(a, b)| a * b).sum::<f64>() - self.cross.dot(&other.weights)
-    }
-
-    /// Cosine of the angle between two columns, as far as the records tell them apart.
-    pub fn likeness(&self, other: &Self) -> f64 {
-        self.information_with(other) / (self.information * other.information).sqrt()
     }
 }
 
 impl<'a> Chamber<'a> {
     /// # Errors
     /// A fit whose model cannot be solved, or whose information is not positive.
-    pub fn scorer(&self, fit: &Fit) -> Result<Scorer<'_, 'a>, ChamberError> {
+    pub(crate) fn scorer(&self, fit: &Fit) -> Result<Scorer<'_, 'a>, ChamberError> {
         self.scorer_of(fit, |_| true)
     }
 
@@ -90,7 +84,7 @@ impl<'a> Chamber<'a> {
     ///
     /// # Errors
     /// As [`Chamber::scorer`].
-    pub fn regression(&self, fit: &Fit) -> Result<Scorer<'_, 'a>, ChamberError> {
+    pub(crate) fn regression(&self, fit: &Fit) -> Result<Scorer<'_, 'a>, ChamberError> {
         let mut quiet = fit.clone();
         self.quieten(&mut quiet);
         let of_noise =
@@ -99,7 +93,7 @@ impl<'a> Chamber<'a> {
     }
 
     /// A gyro of the record's own white noise, with the wander that is usual beside it.
-    pub fn quieten(&self, fit: &mut Fit) {
+    pub(crate) fn quieten(&self, fit: &mut Fit) {
         fit.calm(&fit.records.clone());
         for &r in &fit.records {
             let floor = self.noise_floor_rad_per_s(r);
@@ -163,7 +157,7 @@ fn scaled(own: &Derivatives, deviations: &[f64], fitted: usize) -> DMatrix<f64> 
 
 impl Scorer<'_, '_> {
     /// One column; the amplitude's unit is that of the column.
-    pub fn score(&self, column: &Column) -> Scored {
+    pub(crate) fn score(&self, column: &Column) -> Scored {
         let mut response = Vec::new();
         let mut cross = DVector::zeros(self.slope.len());
         let mut score = 0.0;
@@ -183,10 +177,5 @@ impl Scorer<'_, '_> {
         let score = score + weights.dot(&self.slope);
         let information = response.iter().map(|r| r * r).sum::<f64>() - cross.dot(&weights);
         Scored { response, cross, weights, score, information }
-    }
-
-    /// Many columns, in their order.
-    pub fn score_all(&self, columns: &[Column]) -> Vec<Scored> {
-        columns.par_iter().map(|column| self.score(column)).collect()
     }
 }

@@ -14,32 +14,32 @@ use crate::record::Record;
 #[derive(Debug, Clone)]
 pub(super) struct Series {
     /// Ends of the windows [s].
-    pub times_s: Vec<f64>,
+    pub(crate) times_s: Vec<f64>,
     /// Readings in K above `reference_k` (sensor, bore, air), and the rate in rad/s; NaN where there is none.
-    pub values: [Vec<f64>; MEASURED],
-    pub reference_k: f64,
+    pub(crate) values: [Vec<f64>; MEASURED],
+    pub(crate) reference_k: f64,
     /// The record's further columns as a row's rate sees them.
-    pub columns: Vec<Vec<f64>>,
+    pub(crate) columns: Vec<Vec<f64>>,
     /// One entry a row; `Row::measured` holds places of [`Self::shapes`] times measured.
-    pub rows: Vec<Row>,
+    pub(crate) rows: Vec<Row>,
     /// Distinct lengths of steps [s].
-    pub steps_s: Vec<f64>,
+    pub(crate) steps_s: Vec<f64>,
     /// Distinct ways in which a row is measured.
-    pub shapes: Vec<Shape>,
+    pub(crate) shapes: Vec<Shape>,
     /// Of each row, the first and last of the record's rows in it.
-    pub spans: Vec<(usize, usize)>,
+    pub(crate) spans: Vec<(usize, usize)>,
     /// Rows of the record whose reading or rate was left out as a gross error.
-    pub spikes: usize,
+    pub(crate) spikes: usize,
     /// Values in one row.
-    pub averaged: usize,
+    pub(crate) averaged: usize,
     /// Resolution of the sensor [K]; 0 where readings are not on a grid.
-    pub resolution_k: f64,
-    pub noise_floor_rad_per_s: f64,
-    pub duration_s: f64,
+    pub(crate) resolution_k: f64,
+    pub(crate) noise_floor_rad_per_s: f64,
+    pub(crate) duration_s: f64,
     /// The record's first instant [s].
-    pub start_s: f64,
+    pub(crate) start_s: f64,
     /// Whether a rate's window may begin before the row before it.
-    pub overlaps: bool,
+    pub(crate) overlaps: bool,
     shape_of: Vec<u16>,
 }
 
@@ -55,11 +55,11 @@ pub(super) enum Origin {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Shape {
     /// Length of the rate's window [s]; 0: the rate at an instant.
-    pub window_s: f64,
+    pub(crate) window_s: f64,
     /// Share of the window's end in the readings, the rest being its beginning's.
-    pub end_share: f64,
+    pub(crate) end_share: f64,
     /// Of the two slots that remember a window's beginning.
-    pub slot: u8,
+    pub(crate) slot: u8,
 }
 
 /// Rows are averaged while they are shorter than this share of the pack's own time …
@@ -85,7 +85,7 @@ const LEVELS: f64 = 8.0;
 
 impl Series {
     /// `pack_s`: the shortest time in which the pack evens out that a row should resolve.
-    pub fn new(record: &Record, rate_mean_s: f64, pack_s: f64, origin: Origin) -> Self {
+    pub(crate) fn new(record: &Record, rate_mean_s: f64, pack_s: f64, origin: Origin) -> Self {
         let mut columns: [Vec<f64>; MEASURED] = [
             record.temperature_k().to_vec(),
             record.inner_k().map(<[f64]>::to_vec).unwrap_or_default(),
@@ -144,18 +144,18 @@ impl Series {
     }
 
     /// Takes a gross error out.
-    pub fn leave_out(&mut self, row: usize, measurement: usize) {
+    pub(crate) fn leave_out(&mut self, row: usize, measurement: usize) {
         self.values[measurement][row] = f64::NAN;
         self.rows[row].measured[measurement] = None;
         self.spikes += 1;
     }
 
-    pub fn shape_of(&self, row: usize) -> usize {
+    pub(crate) fn shape_of(&self, row: usize) -> usize {
         self.shape_of[row] as usize
     }
 
     /// The usual time between rows [s].
-    pub fn shortest_s(&self) -> f64 {
+    pub(crate) fn shortest_s(&self) -> f64 {
         let steps: Vec<f64> = self.times_s.windows(2).map(|w| w[1] - w[0]).collect();
         median(&steps)
     }

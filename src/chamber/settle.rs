@@ -30,7 +30,7 @@ impl<'a> Chamber<'a> {
     ///
     /// # Errors
     /// As [`Chamber::fit`].
-    pub fn settled(self, assumed: &Assumption, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
+    pub(crate) fn settled(self, assumed: &Assumption, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
         let fit = self.best_start(assumed, &[], records)?;
         self.settled_from(fit, records)
     }
@@ -40,7 +40,7 @@ impl<'a> Chamber<'a> {
     ///
     /// # Errors
     /// As [`Chamber::fit`].
-    pub fn settled_from(mut self, fit: Fit, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
+    pub(crate) fn settled_from(mut self, fit: Fit, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
         let fit = self.looked_through(fit, records)?;
         for other in (0..self.records()).filter(|r| !records.contains(r)) {
             let day = self.fit(&fit.assumed, &[], &[other], Some(&fit), Effort::SHORT)?;
@@ -77,7 +77,7 @@ impl<'a> Chamber<'a> {
     ///
     /// # Errors
     /// As [`Chamber::fit`].
-    pub fn without_gross_errors(&mut self, mut fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
+    pub(crate) fn without_gross_errors(&mut self, mut fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
         for _ in 0..GROSS_ROUNDS {
             let mut found = 0;
             for &r in records {
@@ -233,7 +233,12 @@ impl<'a> Chamber<'a> {
     ///
     /// # Errors
     /// As [`Chamber::fit`].
-    pub fn fit_anew(&self, assumed: &Assumption, free: &[super::Free], records: &[usize]) -> Result<Fit, ChamberError> {
+    pub(crate) fn fit_anew(
+        &self,
+        assumed: &Assumption,
+        free: &[super::Free],
+        records: &[usize],
+    ) -> Result<Fit, ChamberError> {
         let best = self.best_start(assumed, free, records)?;
         self.fit(&best.assumed.clone(), free, records, Some(&best), Effort::FULL)
     }

@@ -17,7 +17,7 @@ pub(super) struct Sparse {
 impl Sparse {
     /// # Shapes
     /// `matrix` row-major with `columns` columns.
-    pub fn new(matrix: &[f64], columns: usize) -> Self {
+    pub(crate) fn new(matrix: &[f64], columns: usize) -> Self {
         let mut sparse = Self { starts: vec![0], entries: Vec::new() };
         for row in matrix.chunks_exact(columns) {
             sparse.entries.extend(row.iter().copied().enumerate().filter(|(_, v)| *v != 0.0));
@@ -26,13 +26,13 @@ impl Sparse {
         sparse
     }
 
-    pub fn transposed(matrix: &[f64], n: usize) -> Self {
+    pub(crate) fn transposed(matrix: &[f64], n: usize) -> Self {
         let turned: Vec<f64> = (0..n * n).map(|i| matrix[i % n * n + i / n]).collect();
         Self::new(&turned, n)
     }
 
     #[inline(always)]
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.starts.len() - 1
     }
 
@@ -43,7 +43,7 @@ impl Sparse {
 
     /// One row times a vector.
     #[inline(always)]
-    pub fn dot(&self, row: usize, vector: &[f64]) -> f64 {
+    pub(crate) fn dot(&self, row: usize, vector: &[f64]) -> f64 {
         let mut sum = 0.0;
         for &(k, v) in self.row(row) {
             sum += v * vector[k];
@@ -53,7 +53,7 @@ impl Sparse {
 
     /// Adds a multiple of one row to a vector.
     #[inline(always)]
-    pub fn add_to(&self, row: usize, factor: f64, vector: &mut [f64]) {
+    pub(crate) fn add_to(&self, row: usize, factor: f64, vector: &mut [f64]) {
         for &(k, v) in self.row(row) {
             vector[k] += factor * v;
         }
@@ -61,7 +61,7 @@ impl Sparse {
 
     /// M x.
     #[inline(always)]
-    pub fn times<const N: usize>(&self, vector: &[f64; N]) -> [f64; N] {
+    pub(crate) fn times<const N: usize>(&self, vector: &[f64; N]) -> [f64; N] {
         let mut out = [0.0; N];
         for row in 0..self.rows() {
             out[row] = self.dot(row, vector);
@@ -71,7 +71,7 @@ impl Sparse {
 
     /// Σ_k m_k X_k over one row of M: that row times X.
     #[inline(always)]
-    pub fn combine<const N: usize>(&self, row: usize, x: &Square<N>) -> [f64; N] {
+    pub(crate) fn combine<const N: usize>(&self, row: usize, x: &Square<N>) -> [f64; N] {
         let mut sum = [0.0; N];
         for &(k, v) in self.row(row) {
             let line = &x[k];
@@ -84,7 +84,7 @@ impl Sparse {
 
     /// M S Mᵀ for a symmetric S.
     #[inline(always)]
-    pub fn surround<const N: usize>(&self, square: &Square<N>) -> Square<N> {
+    pub(crate) fn surround<const N: usize>(&self, square: &Square<N>) -> Square<N> {
         let mut product = [[0.0; N]; N];
         for row in 0..self.rows() {
             product[row] = self.combine(row, square);
@@ -102,7 +102,7 @@ impl Sparse {
     }
 
     /// M X for a row-major X of `columns` columns, without a width known to the compiler.
-    pub fn times_matrix(&self, x: &[f64], columns: usize) -> Vec<f64> {
+    pub(crate) fn times_matrix(&self, x: &[f64], columns: usize) -> Vec<f64> {
         let mut out = vec![0.0; self.rows() * columns];
         for (row, line) in out.chunks_exact_mut(columns).enumerate() {
             for &(k, v) in self.row(row) {

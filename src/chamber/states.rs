@@ -9,17 +9,17 @@ use super::{Chamber, ChamberError};
 /// # Shapes
 /// One entry a row of the chamber; rates are zero at the first row.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RowStates {
-    pub times_s: Vec<f64>,
+pub(crate) struct RowStates {
+    pub(crate) times_s: Vec<f64>,
     /// Layers × rows, innermost layer first.
-    pub temperatures_k: Vec<Vec<f64>>,
-    pub rates_k_per_s: Vec<Vec<f64>>,
-    pub ambient_k: Vec<f64>,
-    pub ambient_rate_k_per_s: Vec<f64>,
+    pub(crate) temperatures_k: Vec<Vec<f64>>,
+    pub(crate) rates_k_per_s: Vec<Vec<f64>>,
+    pub(crate) ambient_k: Vec<f64>,
+    pub(crate) ambient_rate_k_per_s: Vec<f64>,
     /// What of them the layer gains of the fit's own model make.
-    pub thermal_rate_rad_per_s: Vec<f64>,
+    pub(crate) thermal_rate_rad_per_s: Vec<f64>,
     /// Further columns of the record by name, on average over each row.
-    pub channels: Vec<(String, Vec<f64>)>,
+    pub(crate) channels: Vec<(String, Vec<f64>)>,
 }
 
 impl Chamber<'_> {
@@ -27,7 +27,7 @@ impl Chamber<'_> {
     ///
     /// # Errors
     /// A pattern of another layer count.
-    pub fn states(&self, fit: &Fit, record: usize, course: &Reference) -> Result<RowStates, ChamberError> {
+    pub(crate) fn states(&self, fit: &Fit, record: usize, course: &Reference) -> Result<RowStates, ChamberError> {
         let series = &self.observed[record].series;
         let rows = series.times_s.len();
         let mut temperatures_k = vec![vec![0.0; rows]; course.layers];

@@ -32,19 +32,19 @@ use crate::thermal::{Extent, HeatPath, Location, Material};
 
 /// Values of the chamber's quantities, by [`Quantity`]; NaN where a model has none.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Numbers(pub [f64; PRIORS.len()]);
+pub(super) struct Numbers(pub(crate) [f64; PRIORS.len()]);
 
 impl Numbers {
-    pub fn get(&self, quantity: Quantity) -> f64 {
+    pub(crate) fn get(&self, quantity: Quantity) -> f64 {
         self.0[quantity as usize]
     }
 
-    pub fn set(&mut self, quantity: Quantity, value: f64) {
+    pub(crate) fn set(&mut self, quantity: Quantity, value: f64) {
         self.0[quantity as usize] = value;
     }
 
     /// The medians of the priors, for one record.
-    pub fn medians(series: &Series) -> Self {
+    pub(crate) fn medians(series: &Series) -> Self {
         let mut numbers = Self([f64::NAN; PRIORS.len()]);
         for prior in &PRIORS {
             let unit = if prior.relative { series.noise_floor_rad_per_s } else { 1.0 };
@@ -57,22 +57,22 @@ impl Numbers {
 /// What the coil makes of the outputs' rates, and of the air's [rad/s per K/s].
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Gains {
-    pub outputs: Vec<f64>,
-    pub air: f64,
+    pub(crate) outputs: Vec<f64>,
+    pub(crate) air: f64,
 }
 
 /// What of a model's structure the system depends on.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Parts<'a> {
-    pub reduced: &'a Reduced,
-    pub gains: &'a Gains,
+    pub(crate) reduced: &'a Reduced,
+    pub(crate) gains: &'a Gains,
     /// The drive follows the air with this time [s]; None: the film is in the modes.
-    pub skin_s: Option<f64>,
+    pub(crate) skin_s: Option<f64>,
     /// The sensor shows the air, not the outermost layer.
-    pub shows_air: bool,
-    pub lag_s: f64,
-    pub drift: bool,
-    pub cycle: bool,
+    pub(crate) shows_air: bool,
+    pub(crate) lag_s: f64,
+    pub(crate) drift: bool,
+    pub(crate) cycle: bool,
 }
 
 /// Heat capacity that a pack is taken to have where only its diffusivity is known [J/(m³K)].
@@ -106,12 +106,12 @@ pub(super) fn driven_by_air(path: &HeatPath, film_w_per_m2_k: f64) -> (HeatPath,
 /// Where each state stands.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Layout {
-    pub modes: usize,
+    pub(crate) modes: usize,
     skin: Option<usize>,
     /// Level of the air's trend; its slope is the next.
-    pub trend: usize,
-    pub turbulence: usize,
-    pub ripple: usize,
+    pub(crate) trend: usize,
+    pub(crate) turbulence: usize,
+    pub(crate) ripple: usize,
     /// What drives the ripple.
     driver: usize,
     lag: Option<usize>,
@@ -123,16 +123,16 @@ pub(super) struct Layout {
     windows: [usize; 2],
     /// What readings were where a window begins; only where readings are averaged.
     reading: Option<usize>,
-    pub size: usize,
+    pub(crate) size: usize,
 }
 
 impl Layout {
-    pub fn new(parts: &Parts, series: &Series) -> Self {
+    pub(crate) fn new(parts: &Parts, series: &Series) -> Self {
         Self::with(parts, series.overlaps, series.averaged > 1)
     }
 
     /// `overlaps`: rates' windows do; `averaged`: readings are means.
-    pub fn with(parts: &Parts, overlaps: bool, averaged: bool) -> Self {
+    pub(crate) fn with(parts: &Parts, overlaps: bool, averaged: bool) -> Self {
         let mut size = 0;
         let mut take = |count: usize| {
             size += count;
@@ -169,32 +169,32 @@ impl Layout {
     }
 
     /// How many states come before the gyro's own.
-    pub fn own(&self) -> usize {
+    pub(crate) fn own(&self) -> usize {
         self.wander
     }
 
     /// The states that show the air's temperature in equilibrium.
-    pub fn levels(&self) -> impl Iterator<Item = usize> {
+    pub(crate) fn levels(&self) -> impl Iterator<Item = usize> {
         (0..self.modes).chain(self.skin).chain([self.trend]).chain(self.lag)
     }
 
-    pub fn offset(&self) -> usize {
+    pub(crate) fn offset(&self) -> usize {
         self.offset
     }
 
     /// The states that are the gyro's own.
-    pub fn gyro(&self) -> impl Iterator<Item = usize> {
+    pub(crate) fn gyro(&self) -> impl Iterator<Item = usize> {
         let cycle = self.cycle.into_iter().flat_map(|c| [c, c + 1]);
         [self.wander, self.offset].into_iter().chain(self.drift).chain(cycle)
     }
 
     /// The states whose sum is the air.
-    pub fn air(&self) -> [usize; 3] {
+    pub(crate) fn air(&self) -> [usize; 3] {
         [self.trend, self.turbulence, self.ripple]
     }
 
     /// What the modes follow.
-    pub fn drive(&self, states: &[f64]) -> f64 {
+    pub(crate) fn drive(&self, states: &[f64]) -> f64 {
         match self.skin {
             Some(skin) => states[skin],
             None => self.air().into_iter().map(|i| states[i]).sum(),
@@ -202,7 +202,7 @@ impl Layout {
     }
 
     /// An output's row over the states.
-    pub fn output(&self, reduced: &Reduced, output: usize) -> Vec<f64> {
+    pub(crate) fn output(&self, reduced: &Reduced, output: usize) -> Vec<f64> {
         let mut row = vec![0.0; self.size];
         row[..self.modes].copy_from_slice(reduced.row(output));
         match self.skin {
@@ -212,7 +212,7 @@ impl Layout {
         row
     }
 
-    pub fn air_row(&self) -> Vec<f64> {
+    pub(crate) fn air_row(&self) -> Vec<f64> {
         let mut row = vec![0.0; self.size];
         self.air().into_iter().for_each(|i| row[i] = 1.0);
         row
@@ -445,7 +445,7 @@ fn start(parts: &Parts, layout: &Layout, numbers: &Numbers, series: &Series) -> 
 
 impl System {
     /// Takes the offset as known and the gyro as steady: what is left of a rate's variance is air and white noise.
-    pub fn forget_offset(&mut self, parts: &Parts, series: &Series) {
+    pub(crate) fn forget_offset(&mut self, parts: &Parts, series: &Series) {
         let layout = Layout::new(parts, series);
         for i in 0..self.size {
             self.covariance[i * self.size + layout.offset] = 0.0;

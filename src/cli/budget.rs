@@ -11,7 +11,7 @@ const LONGEST_S: f64 = 3.2e7;
 ///
 /// # Errors
 /// In words, what was expected.
-pub fn parse_duration(text: &str) -> Result<Duration, String> {
+pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
     let number_end = text.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(text.len());
     let (number, unit) = text.split_at(number_end);
     let expected = || format!("expected a duration such as 30s, 2m, 1h or 500ms, found \"{text}\"");

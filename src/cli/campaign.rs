@@ -39,7 +39,7 @@ use crate::task::campaign::carrying_out::{Face, compute, merge, missing_words};
     coilwright campaign grid.toml -o results/grid --merge\n  \
     coilwright campaign grid.toml --emit slurm -o results/grid-on-slurm"
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The campaign file
     campaign: PathBuf,
     /// The folder of the cells' results and the table
@@ -93,7 +93,7 @@ fn parse_shard(text: &str) -> Result<Shard, String> {
     }
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     if let Some(threads) = arguments.threads {
         // Fails only where a pool exists already, which then serves as well: results don't depend on it.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();

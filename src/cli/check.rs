@@ -12,12 +12,12 @@ use crate::text::sink::Line;
 /// All faults of a model file at once
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  coilwright check examples/paper-200m.toml")]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The model file
     model: PathBuf,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = arguments.model.display().to_string();
     match read_model(&arguments.model) {
         Ok(found) => {

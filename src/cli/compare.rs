@@ -20,7 +20,7 @@ use crate::text::sink::Line;
 #[command(
     after_help = "Examples:\n  coilwright compare coil.toml calibration.csv validation.csv\n  coilwright compare coil.toml day-1.csv --strict --format json\n  coilwright compare coil.toml day-1.csv -o results/day-1\n  coilwright compare coil.toml day-1.csv --field layers.csv"
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The model file
     model: PathBuf,
     /// Records (CSV)
@@ -46,7 +46,7 @@ pub struct Arguments {
     reading: RecordArguments,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
     if let Some(folder) = &arguments.output {
         check_kept(folder, COMPARISON_FILE, screen.named().chain(file.files()))?;

@@ -31,7 +31,7 @@ use crate::text::number::usual;
 #[command(
     after_help = "Examples:\n  coilwright compensate coil.toml day-2.csv --fit day-1.csv > compensated.csv\n  logger | coilwright compensate coil.toml - --fit day-1.csv\n  coilwright compensate coil.toml day-2.csv --fit day-1.csv --all-methods\n  coilwright compensate coil.toml --fit day-1.csv --fit day-2.csv --all-methods -o left-out.svg\n  coilwright compensate coil.toml --fit day-1.csv --export embedded/compensation\n\nEvery line comes out, in order, with rate_compensated_deg_per_h and flags behind it: malformed, clock_back, gap,\ntemperature_held, channel_held, rate_held, rate_rejected, turn_on."
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The model file
     model: PathBuf,
     /// A record (CSV), or - for standard input
@@ -95,7 +95,7 @@ impl From<Way> for Method {
     }
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
     let exported = arguments.export.iter().flat_map(|prefix| export_paths(prefix));
     for written in arguments.output.iter().cloned().chain(exported) {

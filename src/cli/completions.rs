@@ -12,12 +12,12 @@ use crate::io::json::CompletionsJson;
 #[command(
     after_help = "Example:\n  coilwright completions bash > ~/.local/share/bash-completion/completions/coilwright"
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     #[arg(value_enum)]
     shell: Shell,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut Cli::command(), "coilwright", &mut script);
     let script = String::from_utf8_lossy(&script).into_owned();

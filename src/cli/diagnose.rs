@@ -26,7 +26,7 @@ use crate::task::page::REPORT_FILE;
 #[command(
     after_help = "Examples:\n  coilwright diagnose coil.toml calibration.csv --holdout validation.csv\n  coilwright diagnose coil.toml monday.csv tuesday.csv --format json --strict\n  coilwright diagnose coil.toml calibration.csv --holdout validation.csv -o results/coil --experiment next.toml\n\nExit code 1 with --strict if the model is not adequate."
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The model file
     model: PathBuf,
     /// Records to fit (CSV)
@@ -57,7 +57,7 @@ pub struct Arguments {
     reading: RecordArguments,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
     if let Some(folder) = &arguments.output {
         check_kept(folder, DIAGNOSIS_FILE, screen.named().chain(file.files()))?;

@@ -9,13 +9,13 @@ use crate::task::extend::unknown_effect;
 /// The effects that a model file can declare, with equations, parameters and sources
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  coilwright effects\n  coilwright effects spool_mass surface_film --format json")]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// Only these, by the name used in files; all of them without it
     #[arg(value_name = "KIND", value_parser = offered::effects(), hide_possible_values = true)]
     kinds: Vec<String>,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let known = || CATALOGUE.iter().copied().chain([CHANNEL, CUSTOM, THERMAL_STRESS]);
     for stated in &arguments.kinds {
         if !known().any(|spec| spec.kind == stated) {

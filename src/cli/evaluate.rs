@@ -21,7 +21,7 @@ use crate::task::under_fields::{self, FieldFile};
     after_help = "Examples:\n  coilwright evaluate examples/paper-200m.toml --pattern qua --pattern patterns/qua-12.toml\n  \
     coilwright evaluate my-coil.toml --field warm-up.csv --field sun-side.csv     temperatures from a finite-element program"
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The model file
     model: PathBuf,
     /// A winding's name (zyl, sym, sym-text, dip, qua, oct, hex) or a pattern file; may be repeated. Without it: the
@@ -40,7 +40,7 @@ pub struct Arguments {
     bang_bang: Option<PathBuf>,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let mut file = read_design(&arguments.model)?;
     if let Some(written) = &arguments.bang_bang {
         let further = arguments.profiles.iter().map(PathBuf::as_path);

@@ -28,7 +28,7 @@ use crate::text::sink::TomlComment;
     Examples:\n  coilwright exact examples/paper-200m.toml\n  \
     coilwright exact examples/paper-200m.toml --windability any --budget 5m -o best.toml"
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The model file
     model: PathBuf,
     /// What can be wound: standard, captive:K or any; without it, the model's own
@@ -56,7 +56,7 @@ pub struct Arguments {
     output: Option<PathBuf>,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let started = Instant::now();
     let file = read_design(&arguments.model)?;
     for written in arguments.output.iter().chain(&arguments.samples) {

@@ -15,7 +15,7 @@ use crate::text::sink::Line;
 #[command(
     after_help = "Examples:\n  coilwright explore examples/paper-200m.toml\n  coilwright explore my-coil.toml results/my-coil/best.toml qua -o my-coil.html\n\nThe page opens in a browser without network; it can be sent to others, who need nothing else."
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The model file
     model: PathBuf,
     /// Windings to begin with, the first of them shown: names such as qua, or pattern files; the model's own comes after them
@@ -26,7 +26,7 @@ pub struct Arguments {
     output: PathBuf,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
     check_file(&arguments.output, file.files().chain(arguments.patterns.iter().map(Path::new)))?;
     for advice in &file.advice {

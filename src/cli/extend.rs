@@ -22,7 +22,7 @@ use crate::text::sink::Line;
 #[command(
     after_help = "Examples:\n  coilwright extend coil.toml --effect spool_mass --fit calibration.csv -o coil-2.toml\n  coilwright extend coil.toml --effect custom --formula \"a * dT_dt^2\" --parameter a=0.1 --fit calibration.csv -o coil-2.toml\n  coilwright extend coil.toml --proposal results/coil/diagnosis.json -o coil-2.toml"
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The model file
     model: PathBuf,
     /// The effect's name in files, such as strain_mismatch or channel:supply_v; `custom` takes --formula
@@ -60,7 +60,7 @@ fn named_value(stated: &str) -> Result<(String, f64), String> {
     if value.is_finite() { Ok((name.trim().to_owned(), value)) } else { Err(format!("{value} is not finite")) }
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
     let further = arguments.fit.iter().chain(&arguments.holdout).chain(&arguments.proposal).map(PathBuf::as_path);
     check_file(&arguments.output, file.files().chain(further).chain(arguments.pattern.iter().map(Path::new)))?;

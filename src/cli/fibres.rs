@@ -7,9 +7,9 @@ use crate::io::json::fibres::FibresJson;
 /// Fibres that fibre.library of a model file can name, with optics, layers and source
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  coilwright fibres")]
-pub struct Arguments {}
+pub(crate) struct Arguments {}
 
-pub fn run(_arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(_arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     screen.answer(FibresJson::all(), text)?;
     Ok(Ending::Done)
 }

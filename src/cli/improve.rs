@@ -26,7 +26,7 @@ use crate::task::measurement::Measurement;
     taken again only where something that it is made of has changed.\n\n\
     Example:\n  coilwright improve coil.toml monday.csv tuesday.csv --holdout friday.csv -o results/next-coil"
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The model file
     model: PathBuf,
     /// Records of the coil as it is (CSV)
@@ -48,7 +48,7 @@ pub struct Arguments {
     terms: TermArguments,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let stop = StopFlag::listen();
     let file = read_model(&arguments.model)?;
     let pattern = pattern_asked(&file, arguments.pattern.as_deref())?;

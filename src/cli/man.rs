@@ -13,13 +13,13 @@ use crate::io::json::WrittenJson;
 /// Write the manual pages into a folder
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  coilwright man -o ~/.local/share/man/man1")]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The folder
     #[arg(long, short, value_name = "DIR", default_value = "man")]
     output: PathBuf,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let mut root = Cli::command();
     root.build();
     let mut files = Vec::new();

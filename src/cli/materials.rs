@@ -11,7 +11,7 @@ use crate::units::kelvin_from_celsius;
 #[command(
     after_help = "Examples:\n  coilwright materials\n  coilwright materials --use adhesive --at -40 --at 20 --at 70"
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// Only those for this use
     #[arg(long = "use", value_name = "USE", value_parser = ["glass", "coating", "adhesive", "spool"])]
     used_as: Option<String>,
@@ -21,12 +21,12 @@ pub struct Arguments {
 }
 
 /// A temperature that a coil may have.
-pub fn celsius(stated: &str) -> Result<f64, String> {
+pub(crate) fn celsius(stated: &str) -> Result<f64, String> {
     let value: f64 = stated.parse().map_err(|_| format!("expected a temperature in °C, found \"{stated}\""))?;
     if (-200.0..=200.0).contains(&value) { Ok(value) } else { Err("expected -200 to 200 °C".to_owned()) }
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let temperatures_k: Vec<f64> = arguments.at_c.iter().map(|c| kelvin_from_celsius(*c)).collect();
     let wanted = MATERIALS.iter().filter(|m| arguments.used_as.as_deref().is_none_or(|word| word == m.used_as.word()));
     let body = MaterialsJson { materials: wanted.map(|entry| MaterialJson::of(entry, &temperatures_k)).collect() };

@@ -25,7 +25,7 @@ use crate::units::rad_from_deg;
 #[command(
     after_help = "Examples:\n  coilwright metrics day-1.csv day-2.csv --average 100\n  coilwright metrics rest.csv -o results/rest\n  coilwright metrics table.csv --columns time=t,temperature=T,rate=F:counts,scale=12.5,table=Table:deg_per_s\n  coilwright metrics up.csv down.csv --latitude 48.1 --elevation 90,-90\n  coilwright compensate coil.toml day-2.csv --fit day-1.csv | coilwright metrics -"
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// Records (CSV), or - for standard input; what compensate writes is measured by its compensated rate
     #[arg(required = true)]
     records: Vec<PathBuf>,
@@ -51,7 +51,7 @@ pub struct Arguments {
     reading: RecordArguments,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     if let Some(folder) = &arguments.output {
         check_kept(folder, METRICS_FILE, screen.named())?;
     }

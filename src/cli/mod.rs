@@ -26,13 +26,13 @@ mod pareto;
 mod pattern_asked;
 mod patterns;
 mod potting;
-pub mod progress;
+pub(crate) mod progress;
 mod records;
 mod report;
 mod reproduce;
 mod schedule;
 mod schema;
-pub mod screen;
+pub(crate) mod screen;
 mod stress;
 mod temperatures;
 mod terms;
@@ -58,7 +58,7 @@ use screen::Screen;
 /// Designs winding patterns of fibre-optic-gyroscope coils.
 #[derive(Debug, Parser)]
 #[command(name = "coilwright", version, max_term_width = 110, after_help = EXAMPLES)]
-pub struct Cli {
+pub(crate) struct Cli {
     #[command(subcommand)]
     command: Command,
     #[command(flatten)]
@@ -76,23 +76,23 @@ Exit codes: 0 done; 1 the answer is no; 2 the request was wrong; 130 interrupted
 Nothing is coloured but what a terminal shows; NO_COLOR switches colours off.";
 
 #[derive(Debug, Clone, clap::Args)]
-pub struct OutputOptions {
+pub(crate) struct OutputOptions {
     /// How the answer is written to stdout
     #[arg(long, global = true, value_enum, default_value_t = Format::Text)]
-    pub format: Format,
+    pub(crate) format: Format,
     /// Nothing on stderr but errors
     #[arg(long, short, global = true)]
-    pub quiet: bool,
+    pub(crate) quiet: bool,
     /// Says on stderr which version ran, with how many threads, and how long it took
     #[arg(long, short, global = true, conflicts_with = "quiet")]
-    pub verbose: bool,
+    pub(crate) verbose: bool,
     /// How progress is shown on stderr
     #[arg(long, global = true, value_enum, default_value_t = ProgressMode::Auto)]
-    pub progress: ProgressMode,
+    pub(crate) progress: ProgressMode,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Format {
+pub(crate) enum Format {
     /// Words and tables
     Text,
     /// One JSON document
@@ -135,7 +135,7 @@ enum Command {
 
 /// How a command ended; errors aside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ending {
+pub(crate) enum Ending {
     Done,
     /// The answer is no: violations found, model not adequate under `--strict`.
     No,
@@ -144,7 +144,7 @@ pub enum Ending {
 
 /// Why a request cannot be carried out; all of them end with exit code 2.
 #[derive(Debug, Error)]
-pub enum CliError {
+pub(crate) enum CliError {
     #[error("error: --columns: {message}")]
     Columns { message: String },
     #[error("{lead}{0}", lead = if .0.is_drawn() { "" } else { "error: " })]

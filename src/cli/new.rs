@@ -11,12 +11,12 @@ use crate::io::write::model_template::template;
 /// Write a commented model file to start from
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  coilwright new my-coil        writes my-coil.toml")]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The coil's name, or the file's (with .toml)
     name: String,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let mut path = PathBuf::from(&arguments.name);
     if path.extension().is_none_or(|e| e != "toml") {
         path = PathBuf::from(format!("{}.toml", arguments.name));

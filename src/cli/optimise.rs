@@ -44,7 +44,7 @@ use crate::task::optimise::{self, DRAWN_MODELS, Wishes};
     coilwright optimise extended.toml --compare-with results/paper-200m\n  \
     coilwright optimise my-coil.toml --field warm-up.csv   temperatures from a finite-element program"
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The model file
     pub(super) model: PathBuf,
     #[command(flatten)]
@@ -95,41 +95,41 @@ pub struct Arguments {
 
 /// What is searched for and how long; shared with commands that run searches.
 #[derive(Debug, Clone, clap::Args)]
-pub struct SearchOptions {
+pub(crate) struct SearchOptions {
     /// Seed of everything random; without it, the model's own
     #[arg(long, value_name = "N")]
-    pub seed: Option<u64>,
+    pub(crate) seed: Option<u64>,
     /// What can be wound: standard, captive:K or any; without it, the model's own
     #[arg(long, value_name = "CLASS", value_parser = offered::classes(), hide_possible_values = true)]
-    pub windability: Option<WindabilityClass>,
+    pub(crate) windability: Option<WindabilityClass>,
     /// What is made small: worst-rate, worst-phase, rms, guaranteed-rate or p95 (the 95 % quantile of the worst rate over
     /// coils built with the model's [tolerance]); without it, the model's own
     #[arg(long, value_name = "WHAT", value_parser = offered::objectives(), hide_possible_values = true)]
-    pub objective: Option<Objective>,
+    pub(crate) objective: Option<Objective>,
     /// Ends after this time, e.g. 30s or 5m (the result then depends on the machine)
     #[arg(long, value_name = "TIME")]
-    pub budget: Option<String>,
+    pub(crate) budget: Option<String>,
     /// Ends after so many rounds
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
-    pub rounds: Option<u64>,
+    pub(crate) rounds: Option<u64>,
     /// Ends after the round in which so many moves have been judged
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
-    pub moves: Option<u64>,
+    pub(crate) moves: Option<u64>,
     /// Ends after so many rounds without a better pattern
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
-    pub patience: Option<u64>,
+    pub(crate) patience: Option<u64>,
     /// Ends when the objective is this small; a proof is not begun or not finished then
     #[arg(long, value_name = "DEG_PER_H")]
-    pub target: Option<f64>,
+    pub(crate) target: Option<f64>,
     /// Restarts in a round
     #[arg(long, value_name = "N", default_value_t = DEFAULT_RESTARTS_PER_ROUND as u16, value_parser = clap::value_parser!(u16).range(1..=4096))]
-    pub restarts: u16,
+    pub(crate) restarts: u16,
     /// Moves of one restart; without it, 128 N² for N layers, at most a million (p95: 16 N², each over many coils)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
-    pub moves_per_restart: Option<u64>,
+    pub(crate) moves_per_restart: Option<u64>,
     /// The pattern to begin with: a winding's name or a pattern file
     #[arg(long, value_name = "PATTERN", value_parser = offered::patterns(), hide_possible_values = true)]
-    pub init: Option<String>,
+    pub(crate) init: Option<String>,
 }
 
 pub(super) fn parse_class(text: &str) -> Result<WindabilityClass, String> {
@@ -171,7 +171,7 @@ impl SearchOptions {
     }
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     if let Some(threads) = arguments.threads {
         // Fails only where a pool exists already, which then serves as well: results don't depend on it.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();

@@ -20,7 +20,7 @@ use crate::task::pareto::{DEFAULT_MOST_CAPTIVE, DEFAULT_ROUNDS, Request, run as 
     takes. With -o what is done is kept in parts/, so the same command goes on after an interruption.\n\n\
     Example:\n  coilwright pareto examples/paper-200m.toml -o results/paper-200m-front"
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The model file
     model: PathBuf,
     /// Writes pareto.csv, pareto.svg (with tolerances also pareto-p95.svg) and one pattern file a point into this folder
@@ -37,7 +37,7 @@ pub struct Arguments {
     rounds: u64,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let stop = StopFlag::listen();
     let file = read_design(&arguments.model)?;
     let folder = arguments.output.as_deref();

@@ -9,13 +9,13 @@ use crate::pattern::windability::WindingGraph;
 /// The classic windings for a layer count, and what each asks of the winding shop
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  coilwright patterns --layers 24")]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// Number of layers
     #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u16).range(2..=400))]
     layers: u16,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let layers = usize::from(arguments.layers);
     let mut patterns = Vec::new();
     for classic in Classic::ALL {

@@ -15,7 +15,7 @@ use crate::task::stress::{PottingRequest, potting};
 #[command(
     after_help = "Examples:\n  coilwright potting potted.toml\n  coilwright potting potted.toml --spools --pattern qua"
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The model file, with [materials]
     model: PathBuf,
     /// A winding's name or a pattern file; may be repeated. Without it: the model's own and all classics that fit
@@ -26,7 +26,7 @@ pub struct Arguments {
     spools: bool,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
     let patterns = patterns_asked(&file, &arguments.pattern)?;
     let request = PottingRequest { model: &file, patterns: &patterns, with_spools: arguments.spools };

@@ -16,7 +16,7 @@ use crate::units::{h_from_s, min_from_s};
 
 /// How progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ProgressMode {
+pub(crate) enum ProgressMode {
     /// A bar if stderr is a terminal, else nothing
     Auto,
     /// One JSON object a line on stderr
@@ -40,7 +40,7 @@ struct ProgressLine<'a> {
 
 /// Shows how far a task is. Safe to call from several threads.
 #[derive(Debug)]
-pub struct Progress {
+pub(crate) struct Progress {
     task: String,
     total: Option<u64>,
     shown: Shown,
@@ -58,7 +58,7 @@ enum Shown {
 
 impl Progress {
     /// `total` counts whatever `at` will count; none where the end is not known.
-    pub fn new(mode: ProgressMode, quiet: bool, task: &str, total: Option<u64>) -> Self {
+    pub(crate) fn new(mode: ProgressMode, quiet: bool, task: &str, total: Option<u64>) -> Self {
         let shown = match mode {
             ProgressMode::Json => Shown::Json,
             ProgressMode::Auto if !quiet && std::io::stderr().is_terminal() => Shown::Bar(bar(task, total)),
@@ -68,12 +68,12 @@ impl Progress {
     }
 
     /// So much is done; `message` says what has been found so far.
-    pub fn at(&self, done: u64, message: &str) {
+    pub(crate) fn at(&self, done: u64, message: &str) {
         self.at_until(done, self.total, None, message);
     }
 
     /// The same for work that is expected to end when so much is done, and in any case after so long.
-    pub fn at_until(&self, done: u64, end: Option<u64>, latest: Option<Duration>, message: &str) {
+    pub(crate) fn at_until(&self, done: u64, end: Option<u64>, latest: Option<Duration>, message: &str) {
         if matches!(self.shown, Shown::Nothing) {
             return;
         }
@@ -108,7 +108,7 @@ impl Progress {
     }
 
     /// Takes the bar off the terminal.
-    pub fn finish(&self) {
+    pub(crate) fn finish(&self) {
         if let Shown::Bar(bar) = &self.shown {
             bar.finish_and_clear();
         }
@@ -178,12 +178,12 @@ fn bar(task: &str, total: Option<u64>) -> ProgressBar {
 /// Set by Ctrl-C or a termination signal; long work looks at it and ends in good order. A second signal ends the
 /// program at once.
 #[derive(Debug, Clone)]
-pub struct StopFlag(Arc<AtomicBool>);
+pub(crate) struct StopFlag(Arc<AtomicBool>);
 
 impl StopFlag {
     /// Begins to listen for signals. Without signals (an embedding that has taken them) the flag is simply never set.
     /// One flag a process: a command that carries out others ends with any of them.
-    pub fn listen() -> Self {
+    pub(crate) fn listen() -> Self {
         static FLAG: OnceLock<Arc<AtomicBool>> = OnceLock::new();
         let flag = FLAG.get_or_init(|| {
             let flag = Arc::new(AtomicBool::new(false));
@@ -198,12 +198,8 @@ impl StopFlag {
         Self(Arc::clone(flag))
     }
 
-    pub fn is_set(&self) -> bool {
+    pub(crate) fn is_set(&self) -> bool {
         self.0.load(Ordering::Relaxed)
-    }
-
-    pub fn as_atomic(&self) -> &AtomicBool {
-        &self.0
     }
 }
 

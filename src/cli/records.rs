@@ -11,7 +11,7 @@ use crate::task::measurement::{self, Measurement};
 
 /// What to do with values that stand alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum GrossErrors {
+pub(crate) enum GrossErrors {
     /// Report them and use them
     Keep,
     /// Report them and leave their rows out
@@ -29,7 +29,7 @@ impl From<GrossErrors> for measurement::GrossErrors {
 
 /// What to do with rows that are none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum BadRows {
+pub(crate) enum BadRows {
     /// A missing cell, or a stamp that repeats or jumps back, is an error
     Refuse,
     /// Such rows are skipped and counted
@@ -39,7 +39,7 @@ pub enum BadRows {
 /// How a record file is to be read.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Record files")]
-pub struct RecordArguments {
+pub(crate) struct RecordArguments {
     /// Which column is which, and its unit: time=Zeit:min,temperature=T1,rate=Omega:deg_per_s; roles are time, temperature,
     /// rate, inner, ambient, table, date (beside a time of day), layer_1, layer_2 and so on, flange, spool, electronics, source;
     /// scale=N raw units a degree an hour
@@ -55,7 +55,7 @@ pub struct RecordArguments {
 
 impl RecordArguments {
     /// As the model's [record] says, and over it as the command line says.
-    pub fn format(&self, model: Option<&ModelFile>) -> Result<RecordFormat, CliError> {
+    pub(crate) fn format(&self, model: Option<&ModelFile>) -> Result<RecordFormat, CliError> {
         let mut format = model.map_or_else(RecordFormat::default, |m| m.record.clone());
         if let Some(columns) = &self.columns {
             format.map_all(columns).map_err(|message| CliError::Columns { message })?;
@@ -70,7 +70,7 @@ impl RecordArguments {
     }
 
     /// Reads records.
-    pub fn read(&self, paths: &[PathBuf], model: Option<&ModelFile>) -> Result<Vec<Measurement>, CliError> {
+    pub(crate) fn read(&self, paths: &[PathBuf], model: Option<&ModelFile>) -> Result<Vec<Measurement>, CliError> {
         let format = self.format(model)?;
         Ok(paths.iter().map(|path| Measurement::read(path, &format)).collect::<Result<_, _>>()?)
     }

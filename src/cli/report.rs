@@ -11,7 +11,7 @@ use crate::text::sink::Line;
 /// One self-contained page about a search, a comparison, a diagnosis or measures, written to report.html in their folder
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  coilwright report results/paper-200m\n  coilwright report results/day-1")]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The folder that `optimise -o`, `compare -o`, `diagnose -o` or `metrics -o` wrote
     folder: PathBuf,
     /// Where the page goes; without it, report.html in the folder
@@ -19,7 +19,7 @@ pub struct Arguments {
     output: Option<PathBuf>,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let path = arguments.output.clone().unwrap_or_else(|| arguments.folder.join(REPORT_FILE));
     // Read and written as a whole: no other run may change what the page is about.
     let _held = is_in(&arguments.folder, &path).then(|| held(&arguments.folder, "report")).transpose()?;

@@ -17,7 +17,7 @@ use crate::text::sink::Line;
 #[command(
     after_help = "Examples:\n  coilwright reproduce yan1998        writes results/yan1998/\n  coilwright reproduce thesis2021     writes results/thesis2021/"
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// Which publication
     publication: Publication,
     /// Folder for tables and pictures [default: results/PUBLICATION]
@@ -33,7 +33,7 @@ enum Publication {
     Thesis2021,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let folder = |name: &str| arguments.output.clone().unwrap_or_else(|| Path::new("results").join(name));
     match arguments.publication {
         Publication::Yan1998 => of_paper(&folder("yan1998"), screen),

@@ -16,7 +16,7 @@ use crate::task::schedule::{FILES, Request, run as plan};
 #[command(
     after_help = "Examples:\n  coilwright schedule examples/paper-200m.toml --pattern qua\n  coilwright schedule examples/paper-200m.toml --pattern patterns/qua-12.toml -o results/paper-200m"
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The model file
     model: PathBuf,
     /// A winding's name or a pattern file; without it, the model's own
@@ -28,7 +28,7 @@ pub struct Arguments {
     output: Option<PathBuf>,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_design(&arguments.model)?;
     let pattern = pattern_asked(&file, arguments.pattern.as_deref())?;
     let answer = plan(&Request { model: &file, pattern: pattern.as_ref() })?;

@@ -13,7 +13,7 @@ use crate::io::json::schema::{model_schema, pattern_schema, record_schema, sched
 #[command(
     after_help = "Examples:\n  coilwright schema model > coilwright-model.schema.json\n  coilwright schema campaign"
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// Which files it is about
     #[arg(value_enum)]
     kind: Kind,
@@ -31,7 +31,7 @@ enum Kind {
     Compensation,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let schema = match arguments.kind {
         Kind::Model => model_schema(),
         Kind::Pattern => pattern_schema(),

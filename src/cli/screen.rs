@@ -15,19 +15,19 @@ use crate::text::sink::{Block, JsonText, Line};
 
 /// The program's two outlets, with the options that the user gave.
 #[derive(Debug, Clone)]
-pub struct Screen {
+pub(crate) struct Screen {
     format: Format,
     quiet: bool,
     progress: ProgressMode,
     /// The program's name or place, as it was called.
-    pub program: PathBuf,
+    pub(crate) program: PathBuf,
     /// Files that the command line names.
     named: Vec<PathBuf>,
 }
 
 impl Screen {
     /// `words` are those of the command line, the program's name first.
-    pub fn new(options: &OutputOptions, words: &[OsString]) -> Self {
+    pub(crate) fn new(options: &OutputOptions, words: &[OsString]) -> Self {
         let program = words.first().map_or_else(PathBuf::new, PathBuf::from);
         // An option may hold its value behind a sign of equality.
         let value = |word: &OsString| word.to_str().and_then(|word| Some(PathBuf::from(word.split_once('=')?.1)));
@@ -37,23 +37,19 @@ impl Screen {
     }
 
     /// Files that the command line names: what a command reads must not be among what it writes over.
-    pub fn named(&self) -> impl Iterator<Item = &Path> {
+    pub(crate) fn named(&self) -> impl Iterator<Item = &Path> {
         self.named.iter().map(PathBuf::as_path)
     }
 
-    pub fn is_json(&self) -> bool {
+    pub(crate) fn is_json(&self) -> bool {
         self.format == Format::Json
-    }
-
-    pub fn is_quiet(&self) -> bool {
-        self.quiet
     }
 
     /// The answer as one JSON document, or as the text that `text` makes.
     ///
     /// # Errors
     /// A stdout that cannot be written.
-    pub fn answer<T: Serialize>(&self, body: T, text: impl FnOnce(&T) -> String) -> Result<(), CliError> {
+    pub(crate) fn answer<T: Serialize>(&self, body: T, text: impl FnOnce(&T) -> String) -> Result<(), CliError> {
         if self.is_json() {
             let document = Document::new(body);
             self.json(&document)
@@ -66,7 +62,7 @@ impl Screen {
     ///
     /// # Errors
     /// A stdout that cannot be written.
-    pub fn document<T: Serialize>(&self, document: &T, text: impl FnOnce(&T) -> String) -> Result<(), CliError> {
+    pub(crate) fn document<T: Serialize>(&self, document: &T, text: impl FnOnce(&T) -> String) -> Result<(), CliError> {
         if self.is_json() { self.json(document) } else { self.write(&text(document)) }
     }
 
@@ -79,7 +75,7 @@ impl Screen {
     ///
     /// # Errors
     /// A stdout that cannot be written.
-    pub fn write(&self, text: &str) -> Result<(), CliError> {
+    pub(crate) fn write(&self, text: &str) -> Result<(), CliError> {
         let has_colours = may_colour(&std::io::stdout());
         let block = Block::of(text);
         let lines = block.as_str().split_inclusive('\n').map(|line| match line.strip_prefix(HEAD) {
@@ -94,18 +90,18 @@ impl Screen {
     ///
     /// # Errors
     /// A stdout that cannot be written.
-    pub fn own(&self, text: &str) -> Result<(), CliError> {
+    pub(crate) fn own(&self, text: &str) -> Result<(), CliError> {
         let mut stdout = std::io::stdout().lock();
         stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()).map_err(CliError::Stdout)
     }
 
     /// Shows the progress of a task; see [`Progress::new`].
-    pub fn progress(&self, task: &str, total: Option<u64>) -> Progress {
+    pub(crate) fn progress(&self, task: &str, total: Option<u64>) -> Progress {
         Progress::new(self.progress, self.quiet, task, total)
     }
 
     /// A note to the person at the terminal: one line, which a terminal gets broken between words.
-    pub fn note(&self, text: &str) {
+    pub(crate) fn note(&self, text: &str) {
         if !self.quiet {
             eprintln!("{}", fitted(Line::of(text).as_str()));
         }
@@ -116,12 +112,12 @@ impl Screen {
 ///
 /// # Errors
 /// A folder that cannot be written, or that another run holds.
-pub fn held(folder: &Path, command: &str) -> Result<HeldFolder, CliError> {
+pub(crate) fn held(folder: &Path, command: &str) -> Result<HeldFolder, CliError> {
     Ok(HeldFolder::take(folder, &run_of(command))?)
 }
 
 /// What another run is told of this one.
-pub fn run_of(command: &str) -> String {
+pub(crate) fn run_of(command: &str) -> String {
     format!("coilwright {command} (process {})", std::process::id())
 }
 
@@ -140,7 +136,7 @@ fn may_colour(outlet: &impl IsTerminal) -> bool {
 }
 
 /// Writes an error to stderr; on a terminal its first word is coloured, and what is one line is broken between words.
-pub fn complain(words: &Block) {
+pub(crate) fn complain(words: &Block) {
     let words = words.as_str().trim_end();
     let shown = if words.contains('\n') { words.to_owned() } else { fitted(words) };
     if may_colour(&std::io::stderr()) {
@@ -180,7 +176,7 @@ fn broken(words: &str, width: usize) -> String {
 }
 
 /// A plain table: first column to the left, the others to the right. In a window that is narrower, each row is a list.
-pub fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+pub(crate) fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     // A cell's own line break would look like a row of its own.
     let shown = |cell: &dyn std::fmt::Display| Line::of(cell).into_string();
     let header: Vec<String> = header.iter().map(|cell| shown(cell)).collect();

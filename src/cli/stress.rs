@@ -17,7 +17,7 @@ use crate::units::kelvin_from_celsius;
 #[command(
     after_help = "Examples:\n  coilwright stress potted.toml\n  coilwright stress potted.toml --at -40 --at 20 --at 70 --pattern qua"
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The model file, with [materials]
     model: PathBuf,
     /// A winding's name or a pattern file; may be repeated. Without it: the model's own and all classics that fit
@@ -28,7 +28,7 @@ pub struct Arguments {
     at_c: Vec<f64>,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
     let patterns = patterns_asked(&file, &arguments.pattern)?;
     let temperatures_k: Vec<f64> = arguments.at_c.iter().map(|c| kelvin_from_celsius(*c)).collect();

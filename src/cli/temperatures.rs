@@ -20,7 +20,7 @@ use crate::task::temperatures::{Driver, Request, run as solve};
     coilwright temperatures my-coil.toml record.csv -o results/layers\n  \
     coilwright temperatures my-coil.toml --as-judged > field.csv\n  \
     coilwright evaluate my-coil.toml --field field.csv     the same worst case")]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The model file
     model: PathBuf,
     /// A record whose temperature drives the pack; without it, a profile of the model
@@ -47,7 +47,7 @@ pub struct Arguments {
 
 const FILES: [&str; 3] = ["temperatures.csv", "temperatures.svg", "rates.svg"];
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let mut file = read_model(&arguments.model)?;
     if let Some(folder) = &arguments.output {
         check_read(folder, &FILES, screen.named().chain(file.files()))?;

@@ -3,7 +3,7 @@
 use crate::diagnose::Terms;
 
 #[derive(Debug, clap::Args)]
-pub struct TermArguments {
+pub(crate) struct TermArguments {
     /// Seeks no formula for what the listed effects leave
     #[arg(long, conflicts_with = "terms")]
     no_discovery: bool,
@@ -14,7 +14,7 @@ pub struct TermArguments {
 }
 
 impl TermArguments {
-    pub fn asked(&self) -> Terms<'_> {
+    pub(crate) fn asked(&self) -> Terms<'_> {
         let is_unsaid = self.terms.is_empty() && !self.no_discovery;
         Terms::asked((!is_unsaid).then_some(self.terms.as_slice()))
     }

@@ -17,7 +17,7 @@ use crate::units::rad_per_s_from_deg_per_h;
     after_help = "QUA is always among the patterns where it fits: a pattern that wins only on paper loses here.\n\n\
     Example:\n  coilwright tolerance my-coil.toml --pattern results/my-coil/best.toml"
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The model file, with a [tolerance] table
     model: PathBuf,
     /// A winding's name (zyl, sym, sym-text, dip, qua, oct, hex) or a pattern file; may be repeated. Without it: the
@@ -35,7 +35,7 @@ pub struct Arguments {
     limit: Option<f64>,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_design(&arguments.model)?;
     let patterns = patterns_asked(&file, &arguments.pattern)?;
     let request = Request {

@@ -14,7 +14,7 @@ use crate::task::trim::{Request, run as trim};
 /// Effective asymmetric length of a wound coil from measured ramps: what to cut, at which end, and what is then left
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  coilwright trim coil.toml ramp.csv")]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The model file
     model: PathBuf,
     /// Records (CSV) with at least one ramp
@@ -27,7 +27,7 @@ pub struct Arguments {
     reading: RecordArguments,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_model(&arguments.model)?;
     let pattern = pattern_asked(&file, arguments.pattern.as_deref())?;
     let records = arguments.reading.read(&arguments.records, Some(&file))?;

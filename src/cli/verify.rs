@@ -14,14 +14,14 @@ use crate::text::sink::Line;
 #[command(
     after_help = "Example:\n  coilwright verify examples/paper-200m.toml results/paper-200m/schedule.csv\n\nThe answer ends with what was worked out again and what was taken as given. Exit code 1 if anything is violated."
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// The model file
     model: PathBuf,
     /// A schedule, traveller or machine program, as JSON, CSV, HTML or G-code
     schedule: PathBuf,
 }
 
-pub fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
+pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let file = read_design(&arguments.model)?;
     let claim = read_claim(&arguments.schedule)?;
     let claim_name = arguments.schedule.display().to_string();

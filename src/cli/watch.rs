@@ -46,13 +46,13 @@ pub(super) struct Watch<'a> {
     proof_progress: OnceLock<(Progress, Instant)>,
     best_cost: f64,
     /// Seconds until the best pattern was found.
-    pub found_s: f64,
+    pub(crate) found_s: f64,
     /// A file that could not be written; the search ends with it.
-    pub fault: Option<CliError>,
+    pub(crate) fault: Option<CliError>,
 }
 
 impl<'a> Watch<'a> {
-    pub fn new(
+    pub(crate) fn new(
         arguments: &'a Arguments,
         request: &'a Request,
         budget: Option<Duration>,

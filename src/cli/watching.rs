@@ -22,28 +22,28 @@ pub(super) struct Watching<'a> {
 
 impl<'a> Watching<'a> {
     /// Shows progress under a task's name.
-    pub fn new(screen: &'a Screen, task: &'static str) -> Self {
+    pub(crate) fn new(screen: &'a Screen, task: &'static str) -> Self {
         Self { task: Some(task), ..Self::quiet(screen) }
     }
 
     /// Shows notes only.
-    pub fn quiet(screen: &'a Screen) -> Self {
+    pub(crate) fn quiet(screen: &'a Screen) -> Self {
         Self { screen, task: None, progress: OnceLock::new(), stop: None, until: None }
     }
 
-    pub fn stopped_by(mut self, stop: &'a StopFlag) -> Self {
+    pub(crate) fn stopped_by(mut self, stop: &'a StopFlag) -> Self {
         self.stop = Some(stop);
         self
     }
 
     /// Ends the work so long after its start.
-    pub fn within(mut self, started: Instant, budget: Duration) -> Self {
+    pub(crate) fn within(mut self, started: Instant, budget: Duration) -> Self {
         self.until = started.checked_add(budget);
         self
     }
 
     /// Takes the progress off the terminal.
-    pub fn finish(&self) {
+    pub(crate) fn finish(&self) {
         if let Some(progress) = self.progress.get() {
             progress.finish();
         }

@@ -25,8 +25,8 @@
 //! in [`crate::predict`].
 
 pub mod regimes;
-pub mod sensors;
-pub mod suspicion;
+pub(crate) mod sensors;
+pub(crate) mod suspicion;
 pub mod verdict;
 
 use crate::diagnose::{Standing, standing};
@@ -45,46 +45,46 @@ use verdict::{Finding, Verdict};
 #[derive(Debug, Clone)]
 pub struct Comparison {
     pub rows: usize,
-    pub offset_rad_per_s: f64,
-    pub noise_rad_per_s: f64,
-    pub noise_standard_error_rad_per_s: f64,
+    pub(crate) offset_rad_per_s: f64,
+    pub(crate) noise_rad_per_s: f64,
+    pub(crate) noise_standard_error_rad_per_s: f64,
     pub rmse_rad_per_s: f64,
-    pub nrmse_fit_percent: f64,
+    pub(crate) nrmse_fit_percent: f64,
     /// None where the record does not vary.
-    pub r_squared: Option<f64>,
+    pub(crate) r_squared: Option<f64>,
     pub reduced_chi_square: f64,
     pub boundary_chi_square: f64,
     pub whitened_chi_square: f64,
-    pub largest: LargestError,
+    pub(crate) largest: LargestError,
     /// At lags 0, 1, …, of the residual in units of its expected deviation.
-    pub autocorrelation: Vec<f64>,
-    pub autocorrelation_band: f64,
-    pub ljung_box: LjungBox,
-    pub correlations: Vec<Correlation>,
+    pub(crate) autocorrelation: Vec<f64>,
+    pub(crate) autocorrelation_band: f64,
+    pub(crate) ljung_box: LjungBox,
+    pub(crate) correlations: Vec<Correlation>,
     pub regimes: Vec<Part>,
     /// One entry a row.
-    pub regime_of_row: Vec<Regime>,
-    pub temperature_bands: Vec<Part>,
-    pub rate_bands: Vec<Part>,
+    pub(crate) regime_of_row: Vec<Regime>,
+    pub(crate) temperature_bands: Vec<Part>,
+    pub(crate) rate_bands: Vec<Part>,
     pub findings: Vec<Finding>,
     pub verdict: Verdict,
     /// One entry a row.
     pub prediction: Prediction,
-    pub residual_rad_per_s: Vec<f64>,
+    pub(crate) residual_rad_per_s: Vec<f64>,
     /// With its standard error; None where the model's own film counts.
-    pub film_w_per_m2_k: Option<(f64, f64)>,
+    pub(crate) film_w_per_m2_k: Option<(f64, f64)>,
     /// Where the air's slope changed.
-    pub bends_s: Vec<f64>,
+    pub(crate) bends_s: Vec<f64>,
     /// What readings and rates together say of model and noise; None where the rates have none.
-    pub standing: Option<Standing>,
+    pub(crate) standing: Option<Standing>,
     /// Thermometers at layers.
-    pub sensors: Vec<SensorMisfit>,
+    pub(crate) sensors: Vec<SensorMisfit>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LargestError {
-    pub time_s: f64,
-    pub residual_rad_per_s: f64,
+pub(crate) struct LargestError {
+    pub(crate) time_s: f64,
+    pub(crate) residual_rad_per_s: f64,
 }
 
 /// What the residual may go along with.
@@ -117,10 +117,10 @@ impl std::fmt::Display for Quantity {
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub struct Correlation {
-    pub with: Quantity,
+pub(crate) struct Correlation {
+    pub(crate) with: Quantity,
     /// None where the quantity does not vary.
-    pub value: Option<f64>,
+    pub(crate) value: Option<f64>,
 }
 
 /// Lags of the autocorrelation: at most this many, and a quarter of the rows.
@@ -148,7 +148,7 @@ pub fn compare(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<
 ///
 /// # Errors
 /// A pattern of another layer count, a field that does not fit coil or record.
-pub fn compare_under(
+pub(crate) fn compare_under(
     model: &CoilModel,
     pattern: &Pattern,
     record: &Record,

@@ -32,11 +32,11 @@ pub enum Regime {
 }
 
 impl Regime {
-    pub const ALL: [Regime; 5] =
+    pub(crate) const ALL: [Regime; 5] =
         [Regime::WarmUp, Regime::Transient, Regime::HeatingRamp, Regime::CoolingRamp, Regime::Soak];
 
     /// As in JSON documents.
-    pub fn key(self) -> &'static str {
+    pub(crate) fn key(self) -> &'static str {
         match self {
             Regime::WarmUp => "warm_up",
             Regime::Transient => "transient",
@@ -50,11 +50,11 @@ impl Regime {
 /// One part of a record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
-    pub name: String,
-    pub rows: usize,
-    pub share_of_rows: f64,
+    pub(crate) name: String,
+    pub(crate) rows: usize,
+    pub(crate) share_of_rows: f64,
     pub share_of_squared_error: f64,
-    pub rmse_rad_per_s: f64,
+    pub(crate) rmse_rad_per_s: f64,
     /// Σ r²/(σ² + var) over the part, divided by its rows: 1 where the model is complete.
     pub chi_square_per_row: f64,
 }

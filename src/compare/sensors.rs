@@ -7,17 +7,17 @@ use crate::units::kelvin_from_celsius;
 
 /// Reading less model of one thermometer.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SensorMisfit {
-    pub column: String,
+pub(crate) struct SensorMisfit {
+    pub(crate) column: String,
     /// Counted from 1 innermost.
-    pub layer: usize,
+    pub(crate) layer: usize,
     /// With a reading.
-    pub rows: usize,
-    pub mean_k: f64,
-    pub rms_k: f64,
+    pub(crate) rows: usize,
+    pub(crate) mean_k: f64,
+    pub(crate) rms_k: f64,
     /// With its sign.
-    pub largest_k: f64,
-    pub largest_time_s: f64,
+    pub(crate) largest_k: f64,
+    pub(crate) largest_time_s: f64,
 }
 
 /// Rows that are worked out at a time.

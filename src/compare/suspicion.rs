@@ -25,7 +25,7 @@ const SLOPE_ERRORS: f64 = 5.0;
 const FACTOR_TOLERANCE: f64 = 0.03;
 
 #[derive(Debug, Clone, PartialEq)]
-pub enum Suspicion {
+pub(crate) enum Suspicion {
     Step { record: String, step_s: f64, rate_mean_s: f64 },
     Ramp { record: String, slope_k_per_s: f64 },
     Fahrenheit { factor: f64 },
@@ -56,7 +56,7 @@ impl std::fmt::Display for Suspicion {
 }
 
 /// What a record's own rows say against what is stated of it.
-pub fn of_record(record: &Record, rate_mean_s: f64) -> Vec<Suspicion> {
+pub(crate) fn of_record(record: &Record, rate_mean_s: f64) -> Vec<Suspicion> {
     let mut found = Vec::new();
     let step_s = record.interval_s();
     if rate_mean_s > 0.0 && ((step_s / rate_mean_s).ln()).abs() > STEP_TOLERANCE.ln_1p() {
@@ -69,7 +69,7 @@ pub fn of_record(record: &Record, rate_mean_s: f64) -> Vec<Suspicion> {
 }
 
 /// Whether a fitted factor on dn/dT looks like a temperature scale.
-pub fn of_factor(factor: f64) -> Option<Suspicion> {
+pub(crate) fn of_factor(factor: f64) -> Option<Suspicion> {
     let near = |scale: f64| (factor / scale - 1.0).abs() < FACTOR_TOLERANCE;
     (near(5.0 / 9.0) || near(9.0 / 5.0)).then_some(Suspicion::Fahrenheit { factor })
 }

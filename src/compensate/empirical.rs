@@ -32,8 +32,8 @@ pub struct BiasLine {
     /// Where the end may lie, with 95 % confidence; None for the last.
     pub until_within_k: Option<(f64, f64)>,
     /// At 20 °C.
-    pub at_reference_rad_per_s: f64,
-    pub slope_rad_per_s_k: f64,
+    pub(crate) at_reference_rad_per_s: f64,
+    pub(crate) slope_rad_per_s_k: f64,
 }
 
 /// Bias over temperature, in up to three straight lines.
@@ -259,7 +259,7 @@ impl PiecewiseBias {
         Ok(Self { lines })
     }
 
-    pub fn bias_rad_per_s(&self, temperature_k: f64) -> f64 {
+    pub(crate) fn bias_rad_per_s(&self, temperature_k: f64) -> f64 {
         let line = self.lines.iter().find(|l| temperature_k < l.until_k).or(self.lines.last());
         line.map_or(0.0, |l| l.at_reference_rad_per_s + l.slope_rad_per_s_k * (temperature_k - REFERENCE_TEMPERATURE_K))
     }
@@ -269,10 +269,10 @@ impl PiecewiseBias {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Regression {
     /// β_0 at 20 °C, β_1, β_2, β_3.
-    pub coefficients: [f64; 4],
-    pub has_inner: bool,
+    pub(crate) coefficients: [f64; 4],
+    pub(crate) has_inner: bool,
     /// To each side of a row.
-    pub window_s: f64,
+    pub(crate) window_s: f64,
 }
 
 /// Rows to each side of which the slope is taken, tried in turn.

@@ -30,26 +30,26 @@ use nalgebra::DMatrix;
 use crate::chamber::Causal;
 
 /// A hypothesis so much less likely than the best is dropped (natural logarithm).
-pub const LEAST_LOG_WEIGHT: f64 = -10.0;
+pub(crate) const LEAST_LOG_WEIGHT: f64 = -10.0;
 /// Gains this near to those of long ago are those of long ago.
 const NEAR: f64 = 0.01;
 const MOST_AGES: usize = 256;
 /// Places within a row at which noise of the slope comes in.
 const PLACES: usize = 16;
 /// Without a reading for so many rows the next one begins anew.
-pub const FORGOTTEN_ROWS: usize = 300;
+pub(crate) const FORGOTTEN_ROWS: usize = 300;
 
 /// What the pack and the sensor do from row to row.
 #[derive(Debug, Clone)]
-pub struct Dynamics {
+pub(crate) struct Dynamics {
     /// F.
-    pub transition: DMatrix<f64>,
+    pub(crate) transition: DMatrix<f64>,
     /// ω.
-    pub rate: DMatrix<f64>,
+    pub(crate) rate: DMatrix<f64>,
     /// h.
-    pub reading: DMatrix<f64>,
+    pub(crate) reading: DMatrix<f64>,
     /// Where the air's temperature and, if there is one, the sensor's are.
-    pub level_states: Vec<usize>,
+    pub(crate) level_states: Vec<usize>,
     /// Covariance of states and newest rate error for a unit shock of the slope somewhere within the row; and for all other
     /// noise of the air in a row.
     shock: DMatrix<f64>,
@@ -58,7 +58,7 @@ pub struct Dynamics {
 
 impl Dynamics {
     /// Of a chamber's system; the rate error is the change of its functional over the last `window_s` of each row, per second.
-    pub fn new(causal: &Causal, interval_s: f64, window_s: f64) -> Self {
+    pub(crate) fn new(causal: &Causal, interval_s: f64, window_s: f64) -> Self {
         let n = causal.states;
         let dynamics = DMatrix::from_row_slice(n, n, &causal.dynamics);
         let functional = DMatrix::from_row_slice(1, n, &causal.functional);
@@ -101,25 +101,25 @@ impl Dynamics {
 
 /// What the gains depend on.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tuning {
+pub(crate) struct Tuning {
     /// How much the air's slope wanders between breaks, in a row [(K/s)²].
-    pub slope_variance: f64,
+    pub(crate) slope_variance: f64,
     /// That the slope breaks in a row, and by how much [(K/s)²].
-    pub break_probability: f64,
-    pub break_variance: f64,
-    pub noise_k: f64,
-    pub delay_rows: usize,
+    pub(crate) break_probability: f64,
+    pub(crate) break_variance: f64,
+    pub(crate) noise_k: f64,
+    pub(crate) delay_rows: usize,
     /// At least 1; with 1 there are no breaks.
-    pub hypotheses: usize,
+    pub(crate) hypotheses: usize,
 }
 
 /// Gains so many rows after a break.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Gains {
+pub(crate) struct Gains {
     /// k, then κ: states, then the row itself and the rows of delay.
-    pub gain: Vec<f64>,
+    pub(crate) gain: Vec<f64>,
     /// f.
-    pub variance: f64,
+    pub(crate) variance: f64,
 }
 
 #[derive(Debug, Clone)]
@@ -170,18 +170,18 @@ impl Rows {
 pub struct Filter {
     n: usize,
     /// Row-major.
-    pub transition: Vec<f64>,
-    pub rate: Vec<f64>,
-    pub reading: Vec<f64>,
-    pub level_states: Vec<usize>,
-    pub most_hypotheses: usize,
-    pub break_probability: f64,
+    pub(crate) transition: Vec<f64>,
+    pub(crate) rate: Vec<f64>,
+    pub(crate) reading: Vec<f64>,
+    pub(crate) level_states: Vec<usize>,
+    pub(crate) most_hypotheses: usize,
+    pub(crate) break_probability: f64,
     /// F, and below it ω.
     forwards: Rows,
     /// Logarithms of no break in a row and of a break.
     log_priors: (f64, f64),
     /// By age; the last one is for long ago.
-    pub gains: Vec<Gains>,
+    pub(crate) gains: Vec<Gains>,
     /// −½ ln f by age.
     log_factors: Vec<f64>,
     hypotheses: Vec<Hypothesis>,
@@ -315,7 +315,7 @@ fn schedule(dynamics: &Dynamics, tuning: &Tuning) -> Vec<Gains> {
 }
 
 impl Filter {
-    pub fn new(dynamics: &Dynamics, tuning: &Tuning) -> Self {
+    pub(crate) fn new(dynamics: &Dynamics, tuning: &Tuning) -> Self {
         let gains = schedule(dynamics, tuning);
         let n = dynamics.states();
         let transition = dynamics.transition.transpose().as_slice().to_vec();
@@ -343,7 +343,7 @@ impl Filter {
     }
 
     /// Forgets every reading.
-    pub fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         self.hypotheses.clear();
     }
 
@@ -353,7 +353,7 @@ impl Filter {
     }
 
     /// The states, given all readings until now; empty before the first.
-    pub fn state(&self) -> Vec<f64> {
+    pub(crate) fn state(&self) -> Vec<f64> {
         if self.hypotheses.is_empty() {
             return Vec::new();
         }

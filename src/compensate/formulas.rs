@@ -16,14 +16,14 @@ use crate::effect::{DeclaredEffect, Effect, Memory, PackState, Subject};
 use crate::rate::CoilModel;
 
 /// Further columns that formulas may read.
-pub const MOST_COLUMNS: usize = 8;
+pub(crate) const MOST_COLUMNS: usize = 8;
 
 /// A row's values of them; None where there is none.
 pub type Columns = [Option<f64>; MOST_COLUMNS];
 
 /// What a rate sees of a column: its mean over the time that the rate is a mean over, at most that since the row before, by a
 /// straight line from there.
-pub fn seen(now: f64, before: f64, since_s: f64, rate_mean_s: f64) -> f64 {
+pub(crate) fn seen(now: f64, before: f64, since_s: f64, rate_mean_s: f64) -> f64 {
     if before.is_finite() && since_s > 0.0 {
         now - (now - before) * 0.5 * rate_mean_s.min(since_s) / since_s
     } else {
@@ -32,13 +32,13 @@ pub fn seen(now: f64, before: f64, since_s: f64, rate_mean_s: f64) -> f64 {
 }
 
 /// [`seen`] of each column; one that is missing stays so.
-pub fn columns_seen(now: &Columns, before: &Columns, since_s: f64, rate_mean_s: f64) -> Columns {
+pub(crate) fn columns_seen(now: &Columns, before: &Columns, since_s: f64, rate_mean_s: f64) -> Columns {
     std::array::from_fn(|i| now[i].map(|value| seen(value, before[i].unwrap_or(f64::NAN), since_s, rate_mean_s)))
 }
 
 /// The formulas of a model and what they need of the pack.
 #[derive(Debug, Clone)]
-pub struct Formulas {
+pub(crate) struct Formulas {
     effects: Vec<DeclaredEffect>,
     coil: Coil,
     columns: Vec<String>,
@@ -46,14 +46,14 @@ pub struct Formulas {
 
 impl Formulas {
     /// The model without its formulas, and those.
-    pub fn split(model: &CoilModel) -> (CoilModel, Vec<DeclaredEffect>) {
+    pub(crate) fn split(model: &CoilModel) -> (CoilModel, Vec<DeclaredEffect>) {
         let is_formula = |e: &DeclaredEffect| matches!(e.subject(), Subject::Formula(_));
         let (formulas, rest) = model.effects.iter().cloned().partition(is_formula);
         (CoilModel { effects: rest, ..model.clone() }, formulas)
     }
 
     /// None where there are no formulas.
-    pub fn new(coil: &Coil, effects: Vec<DeclaredEffect>) -> Option<Self> {
+    pub(crate) fn new(coil: &Coil, effects: Vec<DeclaredEffect>) -> Option<Self> {
         let mut columns: Vec<String> = Vec::new();
         for name in effects.iter().flat_map(DeclaredEffect::channels) {
             if !columns.contains(&name) {
@@ -64,16 +64,16 @@ impl Formulas {
     }
 
     /// At most [`MOST_COLUMNS`] of them are read.
-    pub fn columns(&self) -> &[String] {
+    pub(crate) fn columns(&self) -> &[String] {
         &self.columns
     }
 
-    pub fn effects(&self) -> &[DeclaredEffect] {
+    pub(crate) fn effects(&self) -> &[DeclaredEffect] {
         &self.effects
     }
 
     /// `temperatures`: layers × states; `dynamics` states × states; places of the air and its slope among the states.
-    pub fn at_work(&self, temperatures: DMatrix<f64>, dynamics: &DMatrix<f64>, air: (usize, usize)) -> AtWork {
+    pub(crate) fn at_work(&self, temperatures: DMatrix<f64>, dynamics: &DMatrix<f64>, air: (usize, usize)) -> AtWork {
         let rates = &temperatures * dynamics;
         AtWork {
             bound: self.effects.iter().map(|e| e.bind(&self.coil, &self.columns)).collect(),
@@ -98,7 +98,7 @@ struct Seen {
 
 /// Formulas on their way through a stream.
 #[derive(Debug)]
-pub struct AtWork {
+pub(crate) struct AtWork {
     bound: Vec<Box<dyn Effect>>,
     memories: Vec<Memory>,
     lengths_m: Vec<f64>,
@@ -112,23 +112,23 @@ pub struct AtWork {
 
 impl AtWork {
     /// Layers × states: the rows of temperatures and of their rates.
-    pub fn rows(&self) -> (&DMatrix<f64>, &DMatrix<f64>) {
+    pub(crate) fn rows(&self) -> (&DMatrix<f64>, &DMatrix<f64>) {
         (&self.temperatures, &self.rates)
     }
 
     /// Each layer's share of the fibre.
-    pub fn shares(&self) -> Vec<f64> {
+    pub(crate) fn shares(&self) -> Vec<f64> {
         let whole_m: f64 = self.lengths_m.iter().sum();
         self.lengths_m.iter().map(|l| l / whole_m).collect()
     }
 
     /// Places of the air's temperature and its slope among the states.
-    pub fn air(&self) -> (usize, usize) {
+    pub(crate) fn air(&self) -> (usize, usize) {
         self.air
     }
 
     /// Takes in the states after one more row; none before the first reading. `kept` rows are remembered.
-    pub fn see(&mut self, state: &[f64], kept: usize) {
+    pub(crate) fn see(&mut self, state: &[f64], kept: usize) {
         let seen = (state.len() == self.temperatures.ncols()).then(|| {
             let x = DVector::from_column_slice(state);
             Seen {
@@ -142,14 +142,20 @@ impl AtWork {
     }
 
     /// Forgets everything.
-    pub fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         self.seen.clear();
         self.memories.iter_mut().for_each(|m| *m = Memory::default());
     }
 
     /// What the formulas add to the rate of the row `lag` rows ago; rows must be asked for in their order. A formula without a
     /// value (a column that is missing) adds nothing.
-    pub fn rate_rad_per_s(&mut self, lag: usize, time_s: f64, thermal_rate_rad_per_s: f64, columns: &Columns) -> f64 {
+    pub(crate) fn rate_rad_per_s(
+        &mut self,
+        lag: usize,
+        time_s: f64,
+        thermal_rate_rad_per_s: f64,
+        columns: &Columns,
+    ) -> f64 {
         let Some(Some(seen)) = self.seen.get(lag) else { return 0.0 };
         let whole_m: f64 = self.lengths_m.iter().sum();
         let mean = |values: &[f64]| values.iter().zip(&self.lengths_m).map(|(v, l)| v * l).sum::<f64>() / whole_m;

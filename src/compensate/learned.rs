@@ -32,18 +32,18 @@ const LEAST_ROWS: usize = BLOCKS * 2 * (COLUMNS + 1);
 /// In-sample and cross-validated errors further apart than this factor: it only fits.
 pub(crate) const ONLY_FITS: f64 = 1.5;
 /// Steps this many times the usual one begin anew.
-pub const LONGEST_GAP: f64 = 1000.0;
+pub(crate) const LONGEST_GAP: f64 = 1000.0;
 
 /// Ready for any record of the same gyro.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Learned {
     /// β_0, then one a column.
-    pub coefficients: Vec<f64>,
+    pub(crate) coefficients: Vec<f64>,
     /// Of the record that it was fitted to, of several the longest; the shortest lag follows it.
-    pub interval_s: f64,
+    pub(crate) interval_s: f64,
     /// Root mean square of what it leaves of what it was fitted to, and of the blocks (or whole records) that it was not shown.
-    pub left_rad_per_s: f64,
-    pub cross_validated_rad_per_s: f64,
+    pub(crate) left_rad_per_s: f64,
+    pub(crate) cross_validated_rad_per_s: f64,
 }
 
 /// Normal equations of some rows.
@@ -133,7 +133,7 @@ impl Learned {
     }
 
     /// Whether it does clearly worse on what it was not shown.
-    pub fn only_fits(&self) -> bool {
+    pub(crate) fn only_fits(&self) -> bool {
         self.cross_validated_rad_per_s > ONLY_FITS * self.left_rad_per_s
     }
 

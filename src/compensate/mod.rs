@@ -7,7 +7,7 @@
 //! fitted with is taken out too.
 
 pub mod empirical;
-pub mod filter;
+pub(crate) mod filter;
 pub mod formulas;
 mod heating;
 pub mod learned;
@@ -207,7 +207,7 @@ impl Compensator {
     ///
     /// # Errors
     /// A model that is not linear.
-    pub fn in_known_surroundings(
+    pub(crate) fn in_known_surroundings(
         model: &CoilModel,
         pattern: &Pattern,
         learned: &chamber::Learned,

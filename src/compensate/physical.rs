@@ -53,7 +53,7 @@ const WANDER_HALF_DECADES: std::ops::RangeInclusive<i32> = 12..=24;
 /// Rows that tell delay, wander and offset.
 const MOST_ROWS_TUNED: usize = 20_000;
 /// The most rows that a compensator looks ahead.
-pub const MOST_DELAY_ROWS: usize = 512;
+pub(crate) const MOST_DELAY_ROWS: usize = 512;
 const TABLE_FROM_K: f64 = REFERENCE_TEMPERATURE_K - 100.0;
 const TABLE_ROWS: usize = 201;
 
@@ -79,7 +79,7 @@ pub struct Physical {
     linearised: Option<Linearised>,
     /// At least 1; with 1 it is one difference equation without breaks.
     pub hypotheses: usize,
-    pub delay_s: f64,
+    pub(crate) delay_s: f64,
     pub offset_rad_per_s: f64,
 }
 
@@ -106,7 +106,7 @@ impl Physical {
     ///
     /// # Errors
     /// A model that is not linear in the rates, or whose heat path cannot be solved.
-    pub fn new(model: &CoilModel, pattern: &Pattern) -> Result<Self, CompensateError> {
+    pub(crate) fn new(model: &CoilModel, pattern: &Pattern) -> Result<Self, CompensateError> {
         Self::within(model, pattern, Surroundings::usual(), None)
     }
 
@@ -114,7 +114,7 @@ impl Physical {
     ///
     /// # Errors
     /// As [`Physical::new`].
-    pub fn within(
+    pub(crate) fn within(
         model: &CoilModel,
         pattern: &Pattern,
         surroundings: Surroundings,
@@ -175,7 +175,7 @@ impl Physical {
 
     /// Chooses delay and offset so that the records' rates are compensated best, each about its own mean, and how much more the
     /// air's slope wanders to a filter that does not know beforehand when it breaks. The offset is the mean of all.
-    pub fn tune(&mut self, records: &[&Record]) {
+    pub(crate) fn tune(&mut self, records: &[&Record]) {
         let most = MOST_ROWS_TUNED / records.len().max(1);
         let interval_s = records.iter().map(|record| record.interval_s()).fold(0.0, f64::max);
         let part = |record: &&Record| {
@@ -208,10 +208,6 @@ impl Physical {
         self.surroundings = surroundings;
         self.delay_s = lag as f64 * interval_s;
         self.offset_rad_per_s = means[lag];
-    }
-
-    pub fn surroundings(&self) -> &Surroundings {
-        &self.surroundings
     }
 
     /// Variance about each record's own mean, and the mean, of the compensated rate at each lag.
@@ -309,7 +305,7 @@ impl Physical {
     }
 
     /// The time that a rate is a mean over \[s\].
-    pub fn rate_mean_s(&self) -> f64 {
+    pub(crate) fn rate_mean_s(&self) -> f64 {
         self.rate_mean_s
     }
 
@@ -344,7 +340,7 @@ impl Physical {
     }
 
     /// Whether the difference equation, and formulas beside it, are all there is.
-    pub fn is_linear(&self) -> bool {
+    pub(crate) fn is_linear(&self) -> bool {
         self.bias.is_none() && self.factor.is_none() && self.heating.is_none() && self.channels.is_empty()
     }
 }

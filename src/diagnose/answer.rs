@@ -18,13 +18,13 @@ const HALF: f64 = 0.5;
 
 /// An explanation with the fits of the held-out records.
 pub(super) struct Settled<'e> {
-    pub explanation: &'e Explanation,
+    pub(crate) explanation: &'e Explanation,
     /// One a held-out record, in their order.
-    pub held_out: Vec<Fit>,
+    pub(crate) held_out: Vec<Fit>,
 }
 
 impl<'e> Settled<'e> {
-    pub fn new(question: &Question, explanation: &'e Explanation) -> Result<Self, DiagnoseError> {
+    pub(crate) fn new(question: &Question, explanation: &'e Explanation) -> Result<Self, DiagnoseError> {
         let fits: Result<Vec<Fit>, _> =
             question.held_out.par_iter().map(|&r| question.chamber.held_out(&explanation.fit, r)).collect();
         Ok(Self { explanation, held_out: fits? })

@@ -1,35 +1,35 @@
 //! What may be missing: the effects that a model lacks, as things to fit.
 
-use crate::effect::{Acts, CATALOGUE, DeclaredEffect, EffectSpec, NOT_SOUGHT, Nature, Subject};
+use crate::effect::{Acts, CATALOGUE, DeclaredEffect, EffectSpec, NOT_SOUGHT, Subject};
 use crate::rate::CoilModel;
 use crate::record::{Record, TABLE_RATE};
 use crate::units::Unit;
 
 /// An effect to try, with the parameters to fit and the points to start from.
 #[derive(Debug, Clone)]
-pub struct Candidate {
-    pub effect: DeclaredEffect,
+pub(crate) struct Candidate {
+    pub(crate) effect: DeclaredEffect,
     /// Indices of the fitted parameters; the others keep their values.
-    pub free: Vec<usize>,
+    pub(crate) free: Vec<usize>,
     /// All parameters in SI, one vector a start.
-    pub starts: Vec<Vec<f64>>,
+    pub(crate) starts: Vec<Vec<f64>>,
 }
 
 /// Starts a candidate has at most.
 const MAX_STARTS: usize = 6;
 
 impl Candidate {
-    pub fn kind(&self) -> String {
+    pub(crate) fn kind(&self) -> String {
         self.effect.kind()
     }
 
     /// Whether it is about one of the coil's layers, and so has a sister for every other one.
-    pub fn is_of_layer(&self) -> bool {
+    pub(crate) fn is_of_layer(&self) -> bool {
         self.effect.layer().is_some()
     }
 
     /// Whether it is another with more of its parameters free.
-    pub fn is_fuller_than(&self, other: &Self) -> bool {
+    pub(crate) fn is_fuller_than(&self, other: &Self) -> bool {
         self.free.len() > other.free.len()
             && self.kind() == other.kind()
             && self.effect.choices() == other.effect.choices()
@@ -37,24 +37,15 @@ impl Candidate {
     }
 
     /// Whether it says the same of a neighbouring layer.
-    pub fn is_next_to(&self, other: &Self) -> bool {
+    pub(crate) fn is_next_to(&self, other: &Self) -> bool {
         let apart = self.effect.layer().zip(other.effect.layer()).map(|(a, b)| a.abs_diff(b));
         self.kind() == other.kind() && apart == Some(1)
     }
 }
 
-pub fn is_empirical(effect: &DeclaredEffect) -> bool {
-    effect.spec().nature == Nature::Empirical
-}
-
-/// Whether an effect is a factor on a declared number.
-pub fn is_declared_number(effect: &DeclaredEffect) -> bool {
-    effect.spec().nature == Nature::DeclaredNumber
-}
-
 /// Everything of the catalogue that the model does not have and that is looked for, and every further column that all
 /// records share.
-pub fn candidates(model: &CoilModel, records: &[&Record]) -> Vec<Candidate> {
+pub(crate) fn candidates(model: &CoilModel, records: &[&Record]) -> Vec<Candidate> {
     let mut all = all_candidates(model, records);
     all.retain(|c| NOT_SOUGHT.iter().all(|spec| spec.kind != c.effect.spec().kind));
     all

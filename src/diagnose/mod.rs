@@ -16,16 +16,16 @@
 mod answer;
 mod candidate;
 mod describe;
-pub mod discover;
-pub mod experiment;
+pub(crate) mod discover;
+pub(crate) mod experiment;
 mod joint;
-pub mod plain;
+pub(crate) mod plain;
 mod standing;
 mod terms;
 #[cfg(test)]
 mod tests;
 mod together;
-pub mod trim;
+pub(crate) mod trim;
 
 use thiserror::Error;
 
@@ -41,12 +41,10 @@ use crate::units::Unit;
 
 use experiment::Contest;
 use joint::Question;
-
-pub use candidate::{is_declared_number, is_empirical};
-pub use plain::{Plain, Shape};
-pub use standing::{Standing, is_adequate, standing};
+pub(crate) use plain::{Plain, Shape};
+pub(crate) use standing::{Standing, standing};
 pub use terms::Terms;
-pub use together::{Together, declared_with, extend_together};
+pub(crate) use together::{declared_with, extend_together};
 
 /// What is asked.
 #[derive(Debug, Clone, Copy)]
@@ -78,13 +76,13 @@ pub enum Verdict {
 #[derive(Debug, Clone, PartialEq)]
 pub struct FittedParameter {
     pub key: String,
-    pub unit: Unit,
+    pub(crate) unit: Unit,
     pub value: f64,
     /// With the residuals' autocorrelation; None at a bound or where the records do not determine it.
     pub standard_error: Option<f64>,
-    pub at_bound: bool,
+    pub(crate) at_bound: bool,
     /// Whether it was fitted at all.
-    pub fitted: bool,
+    pub(crate) fitted: bool,
 }
 
 /// Another effect that would do in the place of an accepted one.
@@ -92,11 +90,11 @@ pub struct FittedParameter {
 pub struct Equivalent {
     pub effect: DeclaredEffect,
     /// By how much χ² is larger with it, over all records, hold-out included.
-    pub chi_square_more: f64,
+    pub(crate) chi_square_more: f64,
     /// Cosine of the angle between the two responses in these records.
-    pub correlation: f64,
+    pub(crate) correlation: f64,
     /// The declared model with it and with the other effects as fitted beside it.
-    pub extended: CoilModel,
+    pub(crate) extended: CoilModel,
 }
 
 /// An accepted effect.
@@ -106,14 +104,14 @@ pub struct Finding {
     pub parameters: Vec<FittedParameter>,
     pub equivalents: Vec<Equivalent>,
     /// By how much χ² rises without it.
-    pub chi_square_less: f64,
+    pub(crate) chi_square_less: f64,
     /// By how much χ² of data that it was not fitted to rises without it.
-    pub confirmed_by: f64,
+    pub(crate) confirmed_by: f64,
 }
 
 impl Finding {
     /// An effect at values that no record was asked about.
-    pub fn unfitted(effect: DeclaredEffect) -> Self {
+    pub(crate) fn unfitted(effect: DeclaredEffect) -> Self {
         let parameters = effect
             .parameters()
             .into_iter()
@@ -134,36 +132,36 @@ impl Finding {
 /// One step of the ladder.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rung {
-    pub effects: Vec<String>,
-    pub rmse_rad_per_s: f64,
+    pub(crate) effects: Vec<String>,
+    pub(crate) rmse_rad_per_s: f64,
     pub holdout_rmse_rad_per_s: Option<f64>,
-    pub reduced_chi_square: f64,
+    pub(crate) reduced_chi_square: f64,
     /// Of the records that were held out, nothing being fitted to them but their offsets.
-    pub holdout_reduced_chi_square: Option<f64>,
-    pub bic: f64,
+    pub(crate) holdout_reduced_chi_square: Option<f64>,
+    pub(crate) bic: f64,
 }
 
 /// One candidate by itself.
 #[derive(Debug, Clone)]
-pub struct Contender {
-    pub effect: DeclaredEffect,
-    pub reduced_chi_square: f64,
-    pub bic: f64,
+pub(crate) struct Contender {
+    pub(crate) effect: DeclaredEffect,
+    pub(crate) reduced_chi_square: f64,
+    pub(crate) bic: f64,
     /// By how much χ² falls with it alone.
-    pub chi_square_less: f64,
+    pub(crate) chi_square_less: f64,
 }
 
 /// What is left over.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Unexplained {
+pub(crate) struct Unexplained {
     /// Root mean square beyond the noise [rad/s].
-    pub excess_rad_per_s: f64,
+    pub(crate) excess_rad_per_s: f64,
     /// Share of the declared model's excess that is left.
-    pub share_of_excess: f64,
+    pub(crate) share_of_excess: f64,
     /// Correlations with t, T, dT/dt, d(T_out − T_in)/dt and further columns; strongest first.
-    pub correlations: Vec<(String, f64)>,
+    pub(crate) correlations: Vec<(String, f64)>,
     /// Plain functions of time that fit it best.
-    pub plain: Vec<Plain>,
+    pub(crate) plain: Vec<Plain>,
 }
 
 /// Something that a reader of the answer should know.
@@ -208,75 +206,75 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     pub effects: Vec<Finding>,
     pub ladder: Vec<Rung>,
-    pub candidates: Vec<Contender>,
+    pub(crate) candidates: Vec<Contender>,
     /// Over all records that were fitted.
-    pub noise_floor_rad_per_s: f64,
-    pub unexplained: Option<Unexplained>,
-    pub suggested_experiment: Option<String>,
+    pub(crate) noise_floor_rad_per_s: f64,
+    pub(crate) unexplained: Option<Unexplained>,
+    pub(crate) suggested_experiment: Option<String>,
     pub cautions: Vec<Caution>,
     /// The declared model with the accepted effects.
-    pub extended: CoilModel,
+    pub(crate) extended: CoilModel,
     /// Sets of explanations and what they hold, largest first.
-    pub posterior: Vec<Share>,
+    pub(crate) posterior: Vec<Share>,
     /// Numbers that the model file states and the records contradict.
-    pub refitted: Vec<Refitted>,
+    pub(crate) refitted: Vec<Refitted>,
     /// What is no effect and yet explains the records.
-    pub hypothesis: Option<Hypothesis>,
+    pub(crate) hypothesis: Option<Hypothesis>,
     /// Fitted records first, then those held out.
-    pub noise: Vec<RecordNoise>,
+    pub(crate) noise: Vec<RecordNoise>,
     /// Formulas that explain what no listed effect does, best first.
     pub proposals: Vec<discover::Proposal>,
     /// What the fitted records say of film, offset and chamber, with the accepted effects.
-    pub boundary: Learned,
+    pub(crate) boundary: Learned,
 }
 
 /// What one set of explanations holds of the posterior mass.
 #[derive(Debug, Clone)]
-pub struct Share {
-    pub effects: Vec<String>,
-    pub probability: f64,
+pub(crate) struct Share {
+    pub(crate) effects: Vec<String>,
+    pub(crate) probability: f64,
     /// All effects of the model that the set makes of the declared one, the declared ones first.
-    pub members: Vec<DeclaredEffect>,
+    pub(crate) members: Vec<DeclaredEffect>,
     /// Of the members' parameters.
-    pub estimates: EffectEstimates,
+    pub(crate) estimates: EffectEstimates,
 }
 
 /// A stated number that the records contradict; SI.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Refitted {
-    pub kind: String,
-    pub parameter: String,
-    pub unit: Unit,
-    pub declared: f64,
-    pub value: f64,
-    pub standard_error: Option<f64>,
+pub(crate) struct Refitted {
+    pub(crate) kind: String,
+    pub(crate) parameter: String,
+    pub(crate) unit: Unit,
+    pub(crate) declared: f64,
+    pub(crate) value: f64,
+    pub(crate) standard_error: Option<f64>,
 }
 
 /// What is no effect of the catalogue.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Hypothesis {
+pub(crate) struct Hypothesis {
     /// The classic that the coil seems to be wound as.
-    pub winding: Option<&'static str>,
+    pub(crate) winding: Option<&'static str>,
     /// Connected the other way round.
-    pub reversed: bool,
+    pub(crate) reversed: bool,
     /// Two layers that changed places, counted from 1 innermost.
-    pub exchanged: Option<(usize, usize)>,
-    pub offset_steps: Vec<OffsetStep>,
+    pub(crate) exchanged: Option<(usize, usize)>,
+    pub(crate) offset_steps: Vec<OffsetStep>,
 }
 
 /// A step of the offset.
 #[derive(Debug, Clone, PartialEq)]
-pub struct OffsetStep {
-    pub record: String,
-    pub time_s: f64,
-    pub size_rad_per_s: f64,
+pub(crate) struct OffsetStep {
+    pub(crate) record: String,
+    pub(crate) time_s: f64,
+    pub(crate) size_rad_per_s: f64,
 }
 
 /// Noise told apart, of one record.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RecordNoise {
-    pub record: String,
-    pub noise: Noise,
+pub(crate) struct RecordNoise {
+    pub(crate) record: String,
+    pub(crate) noise: Noise,
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
@@ -312,20 +310,18 @@ const LEAST_ROWS: usize = 100;
 
 /// An effect that was asked for, fitted to records.
 #[derive(Debug, Clone)]
-pub struct Extension {
-    pub finding: Finding,
+pub(crate) struct Extension {
+    pub(crate) finding: Finding,
     /// The declared model with the effect; an effect of the same kind that it had is replaced.
-    pub extended: CoilModel,
-    pub reduced_chi_square_before: f64,
-    pub reduced_chi_square_after: f64,
-    pub boundary: Learned,
+    pub(crate) extended: CoilModel,
+    pub(crate) boundary: Learned,
 }
 
 /// Fits one kind of effect, whatever the evidence says about it; a custom effect starts from the values given.
 ///
 /// # Errors
 /// As [`diagnose`]; an effect that cannot be fitted to these records.
-pub fn extend(request: &Request, effect: &DeclaredEffect) -> Result<Extension, DiagnoseError> {
+pub(crate) fn extend(request: &Request, effect: &DeclaredEffect) -> Result<Extension, DiagnoseError> {
     let mut without = request.model.clone();
     without.effects.retain(|e| e.kind() != effect.kind());
     let records = checked(request)?;
@@ -342,13 +338,10 @@ pub fn extend(request: &Request, effect: &DeclaredEffect) -> Result<Extension, D
         held_out: Vec::new(),
         depth: 1,
     };
-    let (best, reduced) =
-        joint::settle_one(&question, &base).ok_or_else(|| DiagnoseError::NoFit { kind: effect.kind() })?;
+    let best = joint::settle_one(&question, &base).ok_or_else(|| DiagnoseError::NoFit { kind: effect.kind() })?;
     Ok(Extension {
         finding: describe::alone(&question, &best, &base),
         extended: best.fit.assumed.model.clone(),
-        reduced_chi_square_before: reduced.0,
-        reduced_chi_square_after: reduced.1,
         boundary: chamber.learned(&best.fit)?,
     })
 }
@@ -477,7 +470,7 @@ fn beyond(
 ///
 /// # Errors
 /// Records that say nothing, models that cannot be solved.
-pub fn contest(request: &Request, diagnosis: &Diagnosis) -> Result<Contest, DiagnoseError> {
+pub(crate) fn contest(request: &Request, diagnosis: &Diagnosis) -> Result<Contest, DiagnoseError> {
     Contest::new(request, diagnosis)
 }
 

@@ -16,27 +16,25 @@ use crate::rate::CoilModel;
 use crate::record::Record;
 
 /// What the declared model must hold of the posterior mass.
-pub const CERTAIN: f64 = 0.95;
+pub(crate) const CERTAIN: f64 = 0.95;
 /// Standard errors by which a white noise may differ from the declared one: 95 % of them.
 const WITHIN_ERRORS: f64 = 2.0;
 
 /// How a declared model stands beside everything else that may be.
 #[derive(Debug, Clone)]
-pub struct Standing {
-    pub adequate: bool,
-    /// Of the declared model.
-    pub probability: f64,
+pub(crate) struct Standing {
+    pub(crate) adequate: bool,
     /// What the effect that is worth most gains in log likelihood, where no wander shows already that something is missing. Which
     /// one that is takes a whole search.
-    pub wanted: Option<f64>,
+    pub(crate) wanted: Option<f64>,
     /// Whether the rate wanders more than gyros do.
-    pub wanders: bool,
+    pub(crate) wanders: bool,
     /// Of each fitted record.
-    pub noise: Vec<Noise>,
+    pub(crate) noise: Vec<Noise>,
 }
 
 /// The definition. `declared_white_rad_per_s`: white noise of one rate by the gyro's angle random walk, where it is declared.
-pub fn is_adequate(probability: f64, noise: &[Noise], declared_white_rad_per_s: Option<f64>) -> bool {
+pub(crate) fn is_adequate(probability: f64, noise: &[Noise], declared_white_rad_per_s: Option<f64>) -> bool {
     let white = declared_white_rad_per_s.is_none_or(|declared| {
         noise.iter().all(|n| {
             let relative = n.white_standard_error_rad_per_s / n.white_rad_per_s;
@@ -50,7 +48,7 @@ pub fn is_adequate(probability: f64, noise: &[Noise], declared_white_rad_per_s: 
 ///
 /// # Errors
 /// A model that cannot be solved.
-pub fn standing(
+pub(crate) fn standing(
     model: &CoilModel,
     pattern: &Pattern,
     chamber: &Chamber,
@@ -73,7 +71,6 @@ pub fn standing(
     let noise = noise?;
     Ok(Standing {
         adequate: is_adequate(probability, &noise, declared_white_rad_per_s),
-        probability,
         wanted: best.map(|b| b.gain),
         wanders: beside.iter().any(|b| b.candidate.is_none()),
         noise,

@@ -9,15 +9,15 @@ use crate::units::Unit;
 
 /// Effects that were fitted together.
 #[derive(Debug, Clone)]
-pub struct Together {
+pub(crate) struct Together {
     /// In the order in which they were given.
-    pub findings: Vec<Finding>,
+    pub(crate) findings: Vec<Finding>,
     /// The declared model with them.
-    pub extended: CoilModel,
+    pub(crate) extended: CoilModel,
 }
 
 /// Declares effects at their values; listed ones in the place of their own kind.
-pub fn declared_with(model: &CoilModel, effects: &[DeclaredEffect]) -> CoilModel {
+pub(crate) fn declared_with(model: &CoilModel, effects: &[DeclaredEffect]) -> CoilModel {
     let mut with = model.clone();
     let replaces =
         |own: &DeclaredEffect| effects.iter().any(|e| e.kind() == own.kind() && e.subject() == own.subject());
@@ -30,7 +30,7 @@ pub fn declared_with(model: &CoilModel, effects: &[DeclaredEffect]) -> CoilModel
 ///
 /// # Errors
 /// As [`super::diagnose`]; effects that cannot be fitted to these records.
-pub fn extend_together(request: &Request, effects: &[DeclaredEffect]) -> Result<Together, DiagnoseError> {
+pub(crate) fn extend_together(request: &Request, effects: &[DeclaredEffect]) -> Result<Together, DiagnoseError> {
     let records = checked(request)?;
     let with = declared_with(request.model, effects);
     let first = with.effects.len() - effects.len();

@@ -26,27 +26,27 @@ use crate::record::Record;
 
 /// Which end of the fibre.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum End {
+pub(crate) enum End {
     A,
     B,
 }
 
 /// What to cut, and what is then left.
 #[derive(Debug, Clone)]
-pub struct Trim {
-    pub finding: Finding,
+pub(crate) struct Trim {
+    pub(crate) finding: Finding,
     /// Surplus at end A; negative at end B.
-    pub asymmetric_length_m: f64,
-    pub standard_error_m: Option<f64>,
-    pub cut_m: f64,
-    pub end: End,
+    pub(crate) asymmetric_length_m: f64,
+    pub(crate) standard_error_m: Option<f64>,
+    pub(crate) cut_m: f64,
+    pub(crate) end: End,
     /// As many turns more on the outermost layer at the other end do the same.
-    pub turns_at_other_end: f64,
+    pub(crate) turns_at_other_end: f64,
     /// The largest rate error under the records' temperatures: of the coil as it is, and after the cut.
-    pub present_rad_per_s: f64,
-    pub predicted_rad_per_s: f64,
+    pub(crate) present_rad_per_s: f64,
+    pub(crate) predicted_rad_per_s: f64,
     /// The largest that an error of one standard deviation in the cut would add.
-    pub uncertain_rad_per_s: Option<f64>,
+    pub(crate) uncertain_rad_per_s: Option<f64>,
 }
 
 fn in_record(record: &Record, error: PredictError) -> DiagnoseError {
@@ -57,7 +57,7 @@ fn in_record(record: &Record, error: PredictError) -> DiagnoseError {
 ///
 /// # Errors
 /// As [`extend`].
-pub fn trim(request: &Request) -> Result<Trim, DiagnoseError> {
+pub(crate) fn trim(request: &Request) -> Result<Trim, DiagnoseError> {
     let extension = extend(request, &DeclaredEffect::at_start(OFFSET_OF_MIDDLE.spec))?;
     let place = OFFSET_OF_MIDDLE.parameter;
     let fitted = &extension.finding.parameters[place];

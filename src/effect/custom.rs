@@ -45,15 +45,15 @@ pub(super) const SPEC: EffectSpec = EffectSpec {
 };
 
 /// The variables that every formula may use, besides those of single layers.
-pub const VARIABLES: [&str; 10] =
+pub(crate) const VARIABLES: [&str; 10] =
     ["t", "T", "dT_dt", "T_in", "T_inner", "T_mean", "mean_rate", "T_ambient", "dT_ambient_dt", THERMAL_RATE];
 
 /// The model's own thermal rate error.
-pub const THERMAL_RATE: &str = "thermal_rate";
+pub(crate) const THERMAL_RATE: &str = "thermal_rate";
 
 /// A variable of one layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum OfLayer {
+pub(crate) enum OfLayer {
     /// Index 0 is the innermost.
     Temperature(usize),
     Rate(usize),
@@ -61,7 +61,7 @@ pub enum OfLayer {
 
 impl OfLayer {
     /// `T_layer_K` or `dT_layer_K_dt`, K counted from 1 innermost; None for any other name.
-    pub fn named(name: &str) -> Option<Self> {
+    pub(crate) fn named(name: &str) -> Option<Self> {
         let number = |digits: &str| {
             let plain = !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit()) && !digits.starts_with('0');
             digits.parse::<usize>().ok().filter(|_| plain).map(|n| n - 1)
@@ -73,7 +73,7 @@ impl OfLayer {
     }
 
     /// Index 0 is the innermost.
-    pub fn layer(self) -> usize {
+    pub(crate) fn layer(self) -> usize {
         match self {
             OfLayer::Temperature(layer) | OfLayer::Rate(layer) => layer,
         }
@@ -81,7 +81,7 @@ impl OfLayer {
 }
 
 /// Whether a name is a variable that the model gives a value to.
-pub fn is_variable(name: &str) -> bool {
+pub(crate) fn is_variable(name: &str) -> bool {
     VARIABLES.contains(&name) || OfLayer::named(name).is_some()
 }
 
@@ -107,7 +107,7 @@ pub enum FormulaError {
 
 impl FormulaError {
     /// Where in the formula (bytes), if it is one place.
-    pub fn at(&self) -> Option<std::ops::Range<usize>> {
+    pub(crate) fn at(&self) -> Option<std::ops::Range<usize>> {
         match self {
             FormulaError::Expression(error) => error.at(),
             FormulaError::NoSuchLayer { at, .. } => Some(at.clone()),
@@ -138,29 +138,29 @@ impl Formula {
         Ok(Self { expression, parameters, channels })
     }
 
-    pub fn expression(&self) -> &Expression {
+    pub(crate) fn expression(&self) -> &Expression {
         &self.expression
     }
 
     /// In the order in which values are given.
-    pub fn parameters(&self) -> &[String] {
+    pub(crate) fn parameters(&self) -> &[String] {
         &self.parameters
     }
 
     /// The columns of a record that the formula reads.
-    pub fn channels(&self) -> &[String] {
+    pub(crate) fn channels(&self) -> &[String] {
         &self.channels
     }
 
     /// Whether a parameter is nothing but a time constant or a half width, and so above zero.
-    pub fn is_size(&self, parameter: &str) -> bool {
+    pub(crate) fn is_size(&self, parameter: &str) -> bool {
         let variable = self.expression.variables().iter().position(|v| v.name == parameter);
         variable.is_some_and(|v| self.expression.is_size(v))
     }
 
     /// # Errors
     /// A variable of a layer that a coil of so many layers lacks.
-    pub fn check_layers(&self, layers: usize) -> Result<(), FormulaError> {
+    pub(crate) fn check_layers(&self, layers: usize) -> Result<(), FormulaError> {
         let beyond = |v: &&crate::numeric::expression::Variable| {
             OfLayer::named(&v.name).is_some_and(|of| of.layer() >= layers) && !self.parameters.contains(&v.name)
         };
@@ -178,7 +178,7 @@ impl Formula {
 
     /// The largest size [rad/s] under any profile without columns whose rates stay within a bound; infinite where it has none.
     /// `values` in the order of the parameters.
-    pub fn bound_rad_per_s(&self, values: &[f64], max_rate_k_per_s: f64) -> f64 {
+    pub(crate) fn bound_rad_per_s(&self, values: &[f64], max_rate_k_per_s: f64) -> f64 {
         if !self.channels.is_empty() {
             return 0.0;
         }

@@ -23,11 +23,11 @@ pub struct DeclaredEffect {
 /// One parameter of a declared effect, whether its spec or the user names it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DeclaredParameter {
-    pub key: String,
-    pub unit: Unit,
+    pub(crate) key: String,
+    pub(crate) unit: Unit,
     /// SI.
-    pub lower: f64,
-    pub upper: f64,
+    pub(crate) lower: f64,
+    pub(crate) upper: f64,
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
@@ -76,7 +76,7 @@ impl DeclaredEffect {
 
     /// # Errors
     /// A layer that a coil of so many layers has not, or above which there is none.
-    pub fn check_layers(&self, layers: usize) -> Result<(), EffectError> {
+    pub(crate) fn check_layers(&self, layers: usize) -> Result<(), EffectError> {
         let most = layers - usize::from(self.spec.acts == Acts::HeatPath);
         for (parameter, &found) in self.spec.parameters.iter().zip(&self.values) {
             if parameter.unit == Unit::Layer && found > most as f64 {
@@ -87,7 +87,7 @@ impl DeclaredEffect {
     }
 
     /// The layer that it is about, counted from 1 innermost, where it is about one.
-    pub fn layer(&self) -> Option<usize> {
+    pub(crate) fn layer(&self) -> Option<usize> {
         let of_layer = self.spec.parameters.iter().position(|p| p.unit == Unit::Layer)?;
         self.values.get(of_layer).map(|v| v.round() as usize)
     }
@@ -103,19 +103,19 @@ impl DeclaredEffect {
     }
 
     /// The ambient air behind a film at the outer surface.
-    pub fn film(film_w_per_m2_k: f64) -> Self {
+    pub(crate) fn film(film_w_per_m2_k: f64) -> Self {
         let spec = FILM.spec;
         Self { spec, values: vec![film_w_per_m2_k], choices: Vec::new(), subject: Subject::None }
     }
 
     /// Linear in a further column of the record.
-    pub fn channel(name: impl Into<String>, gain_rad_per_s_per_unit: f64) -> Self {
+    pub(crate) fn channel(name: impl Into<String>, gain_rad_per_s_per_unit: f64) -> Self {
         let subject = Subject::Channel(name.into());
         Self { spec: CHANNEL, values: vec![gain_rad_per_s_per_unit], choices: Vec::new(), subject }
     }
 
     /// The thermal stress of what the coil is made of.
-    pub fn thermal_stress(materials: Materials) -> Self {
+    pub(crate) fn thermal_stress(materials: Materials) -> Self {
         let subject = thermal_stress::subject(materials);
         Self { spec: THERMAL_STRESS, values: Vec::new(), choices: Vec::new(), subject }
     }
@@ -136,7 +136,7 @@ impl DeclaredEffect {
     ///
     /// # Errors
     /// As [`DeclaredEffect::new`].
-    pub fn with_values(&self, values: Vec<f64>) -> Result<Self, EffectError> {
+    pub(crate) fn with_values(&self, values: Vec<f64>) -> Result<Self, EffectError> {
         match &self.subject {
             Subject::None => Self::new(self.spec, values, self.choices.clone()),
             Subject::Channel(name) => match values[..] {
@@ -159,12 +159,12 @@ impl DeclaredEffect {
         }
     }
 
-    pub fn subject(&self) -> &Subject {
+    pub(crate) fn subject(&self) -> &Subject {
         &self.subject
     }
 
     /// In the order of [`DeclaredEffect::values`]; bounds in SI.
-    pub fn parameters(&self) -> Vec<DeclaredParameter> {
+    pub(crate) fn parameters(&self) -> Vec<DeclaredParameter> {
         match &self.subject {
             Subject::Formula(formula) => formula
                 .parameters()
@@ -191,7 +191,7 @@ impl DeclaredEffect {
     }
 
     /// The record's columns that it reads, besides the needed ones.
-    pub fn channels(&self) -> Vec<String> {
+    pub(crate) fn channels(&self) -> Vec<String> {
         match &self.subject {
             Subject::None | Subject::Materials(_) => Vec::new(),
             Subject::Channel(name) => vec![name.clone()],
@@ -199,21 +199,21 @@ impl DeclaredEffect {
         }
     }
 
-    pub fn spec(&self) -> &'static EffectSpec {
+    pub(crate) fn spec(&self) -> &'static EffectSpec {
         self.spec
     }
 
     /// Whether it is the effect that an address leads to.
-    pub fn is_at(&self, address: Address) -> bool {
+    pub(crate) fn is_at(&self, address: Address) -> bool {
         self.spec.kind == address.spec.kind
     }
 
     /// SI, in the order of the spec's parameters.
-    pub fn values(&self) -> &[f64] {
+    pub(crate) fn values(&self) -> &[f64] {
         &self.values
     }
 
-    pub fn choices(&self) -> &[usize] {
+    pub(crate) fn choices(&self) -> &[usize] {
         &self.choices
     }
 

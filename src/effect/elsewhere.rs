@@ -35,7 +35,7 @@ const SET_ELSEWHERE: &[(&str, &str)] = &[
 ];
 
 /// Where a model file states what is no effect by that name; none where nothing is known by it.
-pub fn set_elsewhere(word: &str) -> Option<&'static str> {
+pub(crate) fn set_elsewhere(word: &str) -> Option<&'static str> {
     SET_ELSEWHERE.iter().find(|(known, _)| *known == word).map(|(_, place)| *place)
 }
 

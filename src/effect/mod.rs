@@ -40,9 +40,9 @@ mod turn_mismatch;
 mod turning;
 mod unsteady_start;
 
-pub use crate::numeric::expression::Memory;
+pub(crate) use crate::numeric::expression::Memory;
 pub use declared::{DeclaredEffect, DeclaredParameter, EffectError};
-pub use elsewhere::set_elsewhere;
+pub(crate) use elsewhere::set_elsewhere;
 
 use crate::coil::Coil;
 use crate::numeric::expression::{Degree, EvaluationError};
@@ -85,7 +85,7 @@ pub const CATALOGUE: &[&EffectSpec] = &[
 /// Effects that a diagnosis does not look for by itself: what a housing, a spool's flanges or an unsteady start do to one record
 /// others do too (a film and a lag; a heated flange; the start that every fit leaves free). Declared or asked for by name, they
 /// are fitted as any other.
-pub const NOT_SOUGHT: &[&EffectSpec] =
+pub(crate) const NOT_SOUGHT: &[&EffectSpec] =
     &[&spool_flange::SPEC, &spool_conduction::SPEC, &housing::SPEC, &unsteady_start::SPEC];
 
 /// An effect of any further column of a record; one declaration a column, `channel:NAME`.
@@ -99,32 +99,32 @@ pub const THERMAL_STRESS: &EffectSpec = &thermal_stress::SPEC;
 
 /// One parameter of one effect: what a spread of built coils varies.
 #[derive(Debug, Clone, Copy)]
-pub struct Address {
-    pub spec: &'static EffectSpec,
+pub(crate) struct Address {
+    pub(crate) spec: &'static EffectSpec,
     /// Index among the spec's parameters.
-    pub parameter: usize,
+    pub(crate) parameter: usize,
     /// The value at which the effect changes nothing, SI.
-    pub neutral: f64,
+    pub(crate) neutral: f64,
 }
 
 /// The effect that gives a half space the end of a pack.
-pub const END_OF_PACK: &EffectSpec = &finite_pack::SPEC;
+pub(crate) const END_OF_PACK: &EffectSpec = &finite_pack::SPEC;
 
 /// δ of the surplus fibre at one end.
-pub const OFFSET_OF_MIDDLE: Address = Address { spec: &midpoint_offset::SPEC, parameter: 0, neutral: 0.0 };
+pub(crate) const OFFSET_OF_MIDDLE: Address = Address { spec: &midpoint_offset::SPEC, parameter: 0, neutral: 0.0 };
 /// The factor on the pack's diffusivity.
-pub const DIFFUSIVITY_FACTOR: Address = Address { spec: &diffusivity::SPEC, parameter: 0, neutral: 1.0 };
+pub(crate) const DIFFUSIVITY_FACTOR: Address = Address { spec: &diffusivity::SPEC, parameter: 0, neutral: 1.0 };
 /// The film coefficient at the pack's outer surface.
-pub const FILM: Address = Address { spec: &surface_film::SPEC, parameter: 0, neutral: 0.0 };
+pub(crate) const FILM: Address = Address { spec: &surface_film::SPEC, parameter: 0, neutral: 0.0 };
 /// The film at a heated flange; one effect a flange.
-pub const FLANGE_FILM: Address = Address { spec: &axial_gradient::SPEC, parameter: 0, neutral: 0.0 };
+pub(crate) const FLANGE_FILM: Address = Address { spec: &axial_gradient::SPEC, parameter: 0, neutral: 0.0 };
 /// The heat capacity of the spool at the bore; without one nothing is held there.
-pub const SPOOL: Address = Address { spec: &spool_mass::SPEC, parameter: 0, neutral: 0.0 };
+pub(crate) const SPOOL: Address = Address { spec: &spool_mass::SPEC, parameter: 0, neutral: 0.0 };
 /// The relative difference of the fibre's halves.
-pub const MISMATCH_OF_HALVES: Address = Address { spec: &strain_mismatch::SPEC, parameter: 0, neutral: 0.0 };
+pub(crate) const MISMATCH_OF_HALVES: Address = Address { spec: &strain_mismatch::SPEC, parameter: 0, neutral: 0.0 };
 
 /// The factor on dn/dT.
-pub const THERMO_OPTIC_FACTOR: Address = Address { spec: &thermo_optic::SPEC, parameter: 0, neutral: 1.0 };
+pub(crate) const THERMO_OPTIC_FACTOR: Address = Address { spec: &thermo_optic::SPEC, parameter: 0, neutral: 1.0 };
 
 /// What an effect does to a model. Every method's default is "nothing".
 pub trait Effect: std::fmt::Debug + Send + Sync {
@@ -229,14 +229,14 @@ pub struct PackState<'a> {
 
 impl PackState<'_> {
     /// d(T_out − T_in)/dt: outermost less innermost layer.
-    pub fn gradient_rate_k_per_s(&self) -> f64 {
+    pub(crate) fn gradient_rate_k_per_s(&self) -> f64 {
         self.rates_k_per_s[self.rates_k_per_s.len() - 1] - self.rates_k_per_s[0]
     }
 }
 
 /// What the surplus fibre's temperature follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Lead {
+pub(crate) enum Lead {
     Ambient,
     Isothermal,
 }
@@ -245,13 +245,13 @@ pub enum Lead {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurplusFibre {
     /// δ > 0: at end A.
-    pub offset_m: f64,
-    pub lead: Lead,
+    pub(crate) offset_m: f64,
+    pub(crate) lead: Lead,
 }
 
 /// What an effect is about, where its kind alone does not say.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub enum Subject {
+pub(crate) enum Subject {
     #[default]
     None,
     /// A further column of a record.
@@ -264,16 +264,16 @@ pub enum Subject {
 
 /// What an effect is bound to before it acts.
 #[derive(Debug, Clone, Copy)]
-pub struct Binding<'a> {
-    pub coil: &'a Coil,
-    pub subject: &'a Subject,
+pub(crate) struct Binding<'a> {
+    pub(crate) coil: &'a Coil,
+    pub(crate) subject: &'a Subject,
     /// Names of a record's further columns, in the order of [`PackState::channels`].
-    pub channels: &'a [String],
+    pub(crate) channels: &'a [String],
 }
 
 /// Which part of the model an effect changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Acts {
+pub(crate) enum Acts {
     /// The temperature field changes.
     HeatPath,
     /// The coil's geometry changes.
@@ -313,7 +313,7 @@ pub struct ParameterSpec {
     pub upper: f64,
     pub start: f64,
     /// Where a model file need not state it.
-    pub default: Option<f64>,
+    pub(crate) default: Option<f64>,
 }
 
 /// A parameter that is one of a few words.
@@ -325,7 +325,7 @@ pub struct ChoiceSpec {
 }
 
 /// Makes an effect from its values in SI (in the order of the spec's parameters), its choices and what it is bound to.
-pub type Build = fn(&[f64], &[usize], &Binding) -> Box<dyn Effect>;
+pub(crate) type Build = fn(&[f64], &[usize], &Binding) -> Box<dyn Effect>;
 
 /// All that is to be said about an effect.
 #[derive(Debug, Clone, Copy)]
@@ -335,7 +335,7 @@ pub struct EffectSpec {
     /// One line: what it adds.
     pub summary: &'static str,
     pub equation: &'static str,
-    pub acts: Acts,
+    pub(crate) acts: Acts,
     pub nature: Nature,
     pub parameters: &'static [ParameterSpec],
     pub choices: &'static [ChoiceSpec],
@@ -343,12 +343,12 @@ pub struct EffectSpec {
     /// What it looks like in a record.
     pub signature: &'static str,
     /// One plain sentence: what happens in the coil or beside it.
-    pub happens: &'static str,
+    pub(crate) happens: &'static str,
     /// One plain sentence: what to do about it.
-    pub remedy: &'static str,
+    pub(crate) remedy: &'static str,
     /// Which experiment would isolate it.
     pub experiment: &'static str,
-    pub build: Build,
+    pub(crate) build: Build,
 }
 
 /// The spec of an effect by its name in files.

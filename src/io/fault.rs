@@ -20,11 +20,11 @@ pub struct Fault {
 }
 
 impl Fault {
-    pub fn new(message: impl Into<String>, span: Option<Range<usize>>) -> Self {
+    pub(crate) fn new(message: impl Into<String>, span: Option<Range<usize>>) -> Self {
         Self { message: message.into(), span, note: None }
     }
 
-    pub fn with_note(mut self, note: impl Into<String>) -> Self {
+    pub(crate) fn with_note(mut self, note: impl Into<String>) -> Self {
         self.note = Some(note.into());
         self
     }
@@ -40,12 +40,12 @@ pub struct Faults {
 
 impl Faults {
     /// A file that could not be read as text at all.
-    pub fn of_file(file: impl Into<String>, message: impl Into<String>) -> Self {
+    pub(crate) fn of_file(file: impl Into<String>, message: impl Into<String>) -> Self {
         Self { file: file.into(), source: String::new(), faults: vec![Fault::new(message, None)] }
     }
 
     /// One fault in a source text that is known.
-    pub fn one(file: impl Into<String>, source: impl Into<String>, fault: Fault) -> Self {
+    pub(crate) fn one(file: impl Into<String>, source: impl Into<String>, fault: Fault) -> Self {
         Self { file: file.into(), source: source.into(), faults: vec![fault] }
     }
 }

@@ -29,7 +29,7 @@ pub enum WriteError {
 }
 
 /// The folder in which a file of that path lies.
-pub fn folder_of(path: &Path) -> PathBuf {
+pub(crate) fn folder_of(path: &Path) -> PathBuf {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
         _ => PathBuf::from("."),
@@ -40,7 +40,7 @@ pub fn folder_of(path: &Path) -> PathBuf {
 ///
 /// # Errors
 /// A file that is missing, a folder, empty, binary or too large.
-pub fn read_text(path: &Path) -> Result<String, Faults> {
+pub(crate) fn read_text(path: &Path) -> Result<String, Faults> {
     read_text_up_to(path, LARGEST_TEXT_BYTES)
 }
 
@@ -48,7 +48,7 @@ pub fn read_text(path: &Path) -> Result<String, Faults> {
 ///
 /// # Errors
 /// As [`read_text`].
-pub fn read_text_up_to(path: &Path, largest_bytes: u64) -> Result<String, Faults> {
+pub(crate) fn read_text_up_to(path: &Path, largest_bytes: u64) -> Result<String, Faults> {
     let shown = path.display().to_string();
     let fault = |message: String| Faults::of_file(&shown, message);
     let found = std::fs::metadata(path).map_err(|e| fault(format!("cannot be read: {e}")))?;
@@ -147,7 +147,7 @@ impl NewFile {
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn sync(&self) -> Result<(), WriteError> {
+    pub(crate) fn sync(&self) -> Result<(), WriteError> {
         self.file.sync_all().map_err(|source| WriteError::File { path: self.path.clone(), source })
     }
 

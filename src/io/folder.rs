@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::files::{NewFile, WriteError, claimed, folder_of, is_temporary};
 
 /// The file that is locked while a run writes into a folder; it goes with the run.
-pub const LOCK_FILE: &str = ".coilwright.lock";
+pub(crate) const LOCK_FILE: &str = ".coilwright.lock";
 
 /// A folder that no other run writes into as long as this lives.
 ///
@@ -92,7 +92,7 @@ pub fn check_file<'a>(written: &Path, read: impl IntoIterator<Item = &'a Path>) 
 ///
 /// # Errors
 /// As said.
-pub fn check_ours(folder: &Path, name: &str, marks: &[&str]) -> Result<(), WriteError> {
+pub(crate) fn check_ours(folder: &Path, name: &str, marks: &[&str]) -> Result<(), WriteError> {
     let path = folder.join(name);
     if path.is_file() && !marks.iter().chain(&[LOCK_FILE]).any(|mark| folder.join(mark).is_file()) {
         return Err(WriteError::NotOurs { path });
@@ -104,7 +104,7 @@ pub fn check_ours(folder: &Path, name: &str, marks: &[&str]) -> Result<(), Write
 ///
 /// # Errors
 /// A folder that cannot be read, or a file that cannot be removed.
-pub fn clear_left_behind(folder: &Path) -> std::io::Result<()> {
+pub(crate) fn clear_left_behind(folder: &Path) -> std::io::Result<()> {
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();
         if path.file_name().and_then(|name| name.to_str()).is_some_and(is_temporary)
@@ -127,7 +127,7 @@ pub struct Replacement<'a> {
 }
 
 impl<'a> Replacement<'a> {
-    pub fn of(folder: &'a Path) -> Self {
+    pub(crate) fn of(folder: &'a Path) -> Self {
         Self { folder, staged: Vec::new() }
     }
 
@@ -143,7 +143,7 @@ impl<'a> Replacement<'a> {
 
     /// # Errors
     /// A file that cannot be written.
-    pub fn add(&mut self, name: impl AsRef<Path>, contents: &[u8]) -> Result<(), WriteError> {
+    pub(crate) fn add(&mut self, name: impl AsRef<Path>, contents: &[u8]) -> Result<(), WriteError> {
         let path = self.folder.join(name);
         let mut file = NewFile::create(&path)?;
         file.write_all(contents).map_err(|source| WriteError::File { path, source })?;
@@ -156,7 +156,7 @@ impl<'a> Replacement<'a> {
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn add_list(&mut self, name: &str, contents: &[u8]) -> Result<(), WriteError> {
+    pub(crate) fn add_list(&mut self, name: &str, contents: &[u8]) -> Result<(), WriteError> {
         self.add(name, contents)?;
         self.staged.rotate_right(1);
         Ok(())
@@ -166,7 +166,7 @@ impl<'a> Replacement<'a> {
     ///
     /// # Errors
     /// A file that cannot be written, removed or renamed.
-    pub fn commit(self, kinds: &[&str]) -> Result<(), WriteError> {
+    pub(crate) fn commit(self, kinds: &[&str]) -> Result<(), WriteError> {
         for file in &self.staged {
             file.sync()?;
         }
@@ -179,7 +179,7 @@ impl<'a> Replacement<'a> {
 ///
 /// # Errors
 /// A file that cannot be removed.
-pub fn remove_numbered(folder: &Path, above: usize) -> Result<(), WriteError> {
+pub(crate) fn remove_numbered(folder: &Path, above: usize) -> Result<(), WriteError> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
     let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
     let number = |name: &str| name.strip_suffix(".json").and_then(|digits| digits.parse::<usize>().ok());
@@ -191,7 +191,7 @@ pub fn remove_numbered(folder: &Path, above: usize) -> Result<(), WriteError> {
 ///
 /// # Errors
 /// A file that cannot be removed.
-pub fn remove_kinds(folder: &Path, kinds: &[&str]) -> Result<(), WriteError> {
+pub(crate) fn remove_kinds(folder: &Path, kinds: &[&str]) -> Result<(), WriteError> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
     let names: Vec<String> = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok()).collect();
     // In the order of the kinds: what stands for the whole is named first.

@@ -8,6 +8,6 @@ pub mod folder;
 pub mod json;
 pub mod model;
 pub mod read;
-pub mod record_format;
-pub mod table;
+pub(crate) mod record_format;
+pub(crate) mod table;
 pub mod write;

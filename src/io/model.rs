@@ -61,13 +61,8 @@ impl ModelFile {
         self
     }
 
-    /// What a search behind a learned film should say.
-    pub fn learned_film_note(&self) -> Option<&Advice> {
-        self.advice.iter().find(|a| matches!(a, Advice::LearnedFilm { .. }))
-    }
-
     /// The film that records showed, where the model declares none and is not driven by the air already.
-    pub fn learned_film(&self) -> Option<Estimate> {
+    pub(crate) fn learned_film(&self) -> Option<Estimate> {
         let film = self.learned.as_ref()?.film_w_per_m2_k?;
         let path = self.model.heat_path().ok()?;
         (path.location == Location::OuterLayer && path.film_w_per_m2_k.is_none()).then_some(film)
@@ -146,11 +141,11 @@ pub enum Advice {
 /// A value outside the range in which it usually lies.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unusual {
-    pub key: &'static str,
-    pub found: f64,
-    pub low: f64,
-    pub high: f64,
-    pub unit: &'static str,
+    pub(crate) key: &'static str,
+    pub(crate) found: f64,
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+    pub(crate) unit: &'static str,
 }
 
 impl fmt::Display for Unusual {

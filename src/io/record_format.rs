@@ -45,7 +45,7 @@ impl SensorPlace {
     ];
 
     /// As a mapping names it: `layer_7`, `spool`.
-    pub fn named(role: &str) -> Option<Self> {
+    pub(crate) fn named(role: &str) -> Option<Self> {
         let of_layer = role.strip_prefix("layer_").filter(|digits| !digits.starts_with(['0', '+']));
         match of_layer.and_then(|digits| digits.parse::<usize>().ok()) {
             Some(layer) => Some(SensorPlace::Layer(layer)),
@@ -54,7 +54,7 @@ impl SensorPlace {
     }
 
     /// The record's further column that holds it, in °C.
-    pub fn channel(self) -> String {
+    pub(crate) fn channel(self) -> String {
         match self {
             SensorPlace::Layer(layer) => layer_channel(layer),
             other => {
@@ -212,7 +212,7 @@ impl Kind {
 }
 
 /// Every name that a header may have without a mapping, quantity by quantity.
-pub fn accepted_names() -> Vec<String> {
+pub(crate) fn accepted_names() -> Vec<String> {
     let names = Quantity::STEMS.iter().flat_map(|(stem, quantity)| {
         let of = Kind::of(*quantity);
         UNITS
@@ -256,7 +256,7 @@ impl RecordFormat {
     ///
     /// # Errors
     /// What is wrong with it, in words.
-    pub fn map(&mut self, role: &str, target: &str) -> Result<(), String> {
+    pub(crate) fn map(&mut self, role: &str, target: &str) -> Result<(), String> {
         let (role, target) = (role.trim(), target.trim());
         if role == "scale" {
             let scale = target.replace(',', ".").parse::<f64>().ok().filter(|s| s.is_finite() && *s != 0.0);
@@ -306,12 +306,12 @@ impl RecordFormat {
     }
 
     /// Raw outputs that are a degree an hour, where the rate is raw.
-    pub fn scale(&self) -> Option<f64> {
+    pub(crate) fn scale(&self) -> Option<f64> {
         self.scale
     }
 
     /// Whether columns that are not mapped may hold words.
-    pub fn has_mapping(&self) -> bool {
+    pub(crate) fn has_mapping(&self) -> bool {
         !self.mapped.is_empty()
     }
 }

@@ -7,7 +7,7 @@ use crate::text::sink::{Cell, TomlComment};
 
 /// A table in memory, row by row.
 #[derive(Debug)]
-pub struct Table {
+pub(crate) struct Table {
     writer: csv::Writer<Vec<u8>>,
 }
 
@@ -21,7 +21,7 @@ impl Default for Table {
 
 impl Table {
     /// The names of the columns, which are the program's own.
-    pub fn with_header<'h>(header: impl IntoIterator<Item = &'h str>) -> Self {
+    pub(crate) fn with_header<'h>(header: impl IntoIterator<Item = &'h str>) -> Self {
         let mut table = Self::default();
         table.row(header.into_iter().map(Cell::plain));
         table
@@ -29,11 +29,11 @@ impl Table {
 
     /// # Panics
     /// Where a row has another number of cells than the ones before.
-    pub fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
+    pub(crate) fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
         self.writer.write_record(cells).expect(IN_MEMORY);
     }
 
-    pub fn into_bytes(self) -> Vec<u8> {
+    pub(crate) fn into_bytes(self) -> Vec<u8> {
         self.writer.into_inner().expect(IN_MEMORY)
     }
 }
@@ -42,7 +42,7 @@ impl Table {
 ///
 /// # Errors
 /// Rows that are no flat records.
-pub fn rows_as_csv<T: Serialize>(rows: impl IntoIterator<Item = T>) -> Result<Vec<u8>, csv::Error> {
+pub(crate) fn rows_as_csv<T: Serialize>(rows: impl IntoIterator<Item = T>) -> Result<Vec<u8>, csv::Error> {
     let mut plain = csv::Writer::from_writer(Vec::new());
     for row in rows {
         plain.serialize(row)?;
@@ -59,7 +59,7 @@ pub fn rows_as_csv<T: Serialize>(rows: impl IntoIterator<Item = T>) -> Result<Ve
 ///
 /// # Errors
 /// No table of such rows.
-pub fn rows_of_csv<T: DeserializeOwned>(text: &str) -> Result<Vec<T>, csv::Error> {
+pub(crate) fn rows_of_csv<T: DeserializeOwned>(text: &str) -> Result<Vec<T>, csv::Error> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let header = reader.headers()?.iter().map(Cell::read).collect::<csv::StringRecord>();
     reader
@@ -70,14 +70,14 @@ pub fn rows_of_csv<T: DeserializeOwned>(text: &str) -> Result<Vec<T>, csv::Error
 
 /// How rows of a table that somebody else wrote are passed on: as they stand, but for what would act.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct PassedRow {
-    pub separator: u8,
-    pub decimal_comma: bool,
+pub(crate) struct PassedRow {
+    pub(crate) separator: u8,
+    pub(crate) decimal_comma: bool,
 }
 
 impl PassedRow {
     /// A row by its text and its cells.
-    pub fn cells<'r>(self, text: &str, cells: impl Iterator<Item = &'r str> + Clone) -> String {
+    pub(crate) fn cells<'r>(self, text: &str, cells: impl Iterator<Item = &'r str> + Clone) -> String {
         let passed = |cell: &'r str| if self.is_number(cell) { Cell::plain(cell) } else { Cell::text(cell) };
         if cells.clone().all(|cell| Cell::leaves(cell) || self.is_number(cell)) {
             return text.to_owned();
@@ -89,13 +89,13 @@ impl PassedRow {
     }
 
     /// What is no row, as the first of so many cells.
-    pub fn one_cell(self, text: &str, columns: usize) -> String {
+    pub(crate) fn one_cell(self, text: &str, columns: usize) -> String {
         let rest = char::from(self.separator).to_string().repeat(columns.saturating_sub(1));
         format!("\"{}\"{rest}", Cell::text(text).as_str().replace('"', "\"\""))
     }
 
     /// A comment; a spreadsheet divides it into cells, too.
-    pub fn aside(self, line: &str) -> String {
+    pub(crate) fn aside(self, line: &str) -> String {
         let line = TomlComment::of(line).into_string();
         let separator = char::from(self.separator);
         let acts = |part: &str| {

@@ -14,19 +14,19 @@
 use super::scale_factor::Estimate;
 
 /// Of the earth \[rad/s\].
-pub const EARTH_RATE_RAD_PER_S: f64 = 7.292_115e-5;
+pub(crate) const EARTH_RATE_RAD_PER_S: f64 = 7.292_115e-5;
 
 /// Where a gyro stands and how its sensitive axis points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Attitude {
-    pub latitude_rad: f64,
-    pub elevation_rad: f64,
-    pub azimuth_rad: f64,
+    pub(crate) latitude_rad: f64,
+    pub(crate) elevation_rad: f64,
+    pub(crate) azimuth_rad: f64,
 }
 
 impl Attitude {
     /// E \[rad/s\].
-    pub fn earth_rad_per_s(&self) -> f64 {
+    pub(crate) fn earth_rad_per_s(&self) -> f64 {
         let (sin_latitude, cos_latitude) = self.latitude_rad.sin_cos();
         let (sin_elevation, cos_elevation) = self.elevation_rad.sin_cos();
         EARTH_RATE_RAD_PER_S * (sin_latitude * sin_elevation + cos_latitude * cos_elevation * self.azimuth_rad.cos())
@@ -35,15 +35,15 @@ impl Attitude {
 
 /// What the offset's steps between attitudes show.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Positions {
+pub(crate) struct Positions {
     /// ε, of one; its standard error is infinite where two attitudes determine it just so.
-    pub scale_error: Estimate,
+    pub(crate) scale_error: Estimate,
     /// D.
-    pub bias_rad_per_s: f64,
+    pub(crate) bias_rad_per_s: f64,
 }
 
 /// The line through offsets over the earth's rates; None where all attitudes have the same.
-pub fn positions(earth_rad_per_s: &[f64], offset_rad_per_s: &[f64]) -> Option<Positions> {
+pub(crate) fn positions(earth_rad_per_s: &[f64], offset_rad_per_s: &[f64]) -> Option<Positions> {
     let count = earth_rad_per_s.len() as f64;
     let mean = |values: &[f64]| values.iter().sum::<f64>() / count;
     let (e0, b0) = (mean(earth_rad_per_s), mean(offset_rad_per_s));

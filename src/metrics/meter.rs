@@ -35,7 +35,7 @@ const LEAST_LED_ROWS: usize = 400;
 
 /// Takes rows in the order of their times.
 #[derive(Debug)]
-pub struct Meter {
+pub(crate) struct Meter {
     average_s: f64,
     first: Vec<Row>,
     running: Option<Running>,
@@ -44,7 +44,7 @@ pub struct Meter {
 impl Meter {
     /// # Errors
     /// An averaging time that is not positive.
-    pub fn new(average_s: f64) -> Result<Self, MetricsError> {
+    pub(crate) fn new(average_s: f64) -> Result<Self, MetricsError> {
         if !(average_s > 0.0 && average_s.is_finite()) {
             return Err(MetricsError::Average { found_s: average_s });
         }
@@ -52,7 +52,7 @@ impl Meter {
     }
 
     /// Times must increase; the caller has checked that.
-    pub fn push(&mut self, row: Row) {
+    pub(crate) fn push(&mut self, row: Row) {
         match &mut self.running {
             Some(running) => running.push(row),
             None => {
@@ -76,7 +76,7 @@ impl Meter {
 
     /// # Errors
     /// Too few rows.
-    pub fn finish(mut self) -> Result<Metrics, MetricsError> {
+    pub(crate) fn finish(mut self) -> Result<Metrics, MetricsError> {
         if self.running.is_none() {
             if self.first.len() < MIN_ROWS {
                 return Err(MetricsError::TooShort { needed: MIN_ROWS, found: self.first.len() });

@@ -25,14 +25,14 @@
 //! Thesis chapter on FOG drift compensation (2021), Eqs. (3-1) to (3-7), which leave open which test point m is: the
 //! standards for gyros (GJB 2426A, IEEE Std 952) take room temperature. Bs there is the deviation of the output itself.
 
-pub mod earth;
+pub(crate) mod earth;
 mod meter;
-pub mod scale_factor;
-pub mod thermal;
+pub(crate) mod scale_factor;
+pub(crate) mod thermal;
 
 use thiserror::Error;
 
-pub use meter::Meter;
+pub(crate) use meter::Meter;
 
 use crate::numeric::allan::AllanPoint;
 use crate::numeric::coloured::NoiseStrengths;
@@ -43,52 +43,52 @@ use scale_factor::ScaleFactor;
 
 /// The measures of one record.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Metrics {
-    pub rows: usize,
-    pub duration_s: f64,
+pub(crate) struct Metrics {
+    pub(crate) rows: usize,
+    pub(crate) duration_s: f64,
     /// The usual one.
-    pub interval_s: f64,
-    pub gaps: usize,
+    pub(crate) interval_s: f64,
+    pub(crate) gaps: usize,
     /// Steps that differ from the usual interval.
-    pub irregular_steps: usize,
-    pub bias_rad_per_s: f64,
+    pub(crate) irregular_steps: usize,
+    pub(crate) bias_rad_per_s: f64,
     /// None where there are not two means.
-    pub bias_stability_rad_per_s: Option<f64>,
+    pub(crate) bias_stability_rad_per_s: Option<f64>,
     /// What the stability was really averaged over.
-    pub average_s: f64,
-    pub peak_to_peak_rad_per_s: f64,
+    pub(crate) average_s: f64,
+    pub(crate) peak_to_peak_rad_per_s: f64,
     /// Of the means over `average_s`.
-    pub averaged_peak_to_peak_rad_per_s: f64,
+    pub(crate) averaged_peak_to_peak_rad_per_s: f64,
     /// The rate integrated over the record, each value standing for the time before it.
-    pub drift_angle_rad: f64,
-    pub temperature_range_k: f64,
+    pub(crate) drift_angle_rad: f64,
+    pub(crate) temperature_range_k: f64,
     /// None where the record holds one test point only.
-    pub temperature_sensitivity_rad_per_s_per_k: Option<f64>,
-    pub temperature_points: Vec<TemperaturePoint>,
-    pub allan: Option<Allan>,
+    pub(crate) temperature_sensitivity_rad_per_s_per_k: Option<f64>,
+    pub(crate) temperature_points: Vec<TemperaturePoint>,
+    pub(crate) allan: Option<Allan>,
     /// None for a record too short to tell noises apart.
-    pub noises: Option<NoiseStrengths>,
+    pub(crate) noises: Option<NoiseStrengths>,
     /// None where no table turned the gyro at several rates.
-    pub scale_factor: Option<ScaleFactor>,
+    pub(crate) scale_factor: Option<ScaleFactor>,
 }
 
 /// Mean rate over a band of temperature.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TemperaturePoint {
-    pub temperature_k: f64,
-    pub bias_rad_per_s: f64,
-    pub rows: usize,
+pub(crate) struct TemperaturePoint {
+    pub(crate) temperature_k: f64,
+    pub(crate) bias_rad_per_s: f64,
+    pub(crate) rows: usize,
 }
 
 /// The Allan deviation and what it says.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Allan {
-    pub points: Vec<AllanPoint>,
+pub(crate) struct Allan {
+    pub(crate) points: Vec<AllanPoint>,
     /// The point with the smallest deviation.
-    pub minimum: AllanPoint,
+    pub(crate) minimum: AllanPoint,
     /// Of the stretch without a gap that it was computed from.
-    pub rows: usize,
-    pub interval_s: f64,
+    pub(crate) rows: usize,
+    pub(crate) interval_s: f64,
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
@@ -108,13 +108,13 @@ const POINT_SHARE: f64 = 0.02;
 
 impl Metrics {
     /// Of a gyro on a table what it shows beside the turning; of one at rest its bias.
-    pub fn offset_rad_per_s(&self) -> f64 {
+    pub(crate) fn offset_rad_per_s(&self) -> f64 {
         self.scale_factor.as_ref().map_or(self.bias_rad_per_s, |scale| scale.offset_rad_per_s)
     }
 
     /// # Errors
     /// An averaging time that is not positive.
-    pub fn of(record: &Record, average_s: f64) -> Result<Self, MetricsError> {
+    pub(crate) fn of(record: &Record, average_s: f64) -> Result<Self, MetricsError> {
         let mut meter = Meter::new(average_s)?;
         record.each_row().for_each(|row| meter.push(row));
         meter.finish()
@@ -125,7 +125,7 @@ impl Metrics {
 ///
 /// # Errors
 /// No record at all.
-pub fn repeatability_rad_per_s(records: &[Metrics]) -> Result<Option<f64>, MetricsError> {
+pub(crate) fn repeatability_rad_per_s(records: &[Metrics]) -> Result<Option<f64>, MetricsError> {
     if records.is_empty() {
         return Err(MetricsError::Nothing);
     }

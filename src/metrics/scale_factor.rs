@@ -43,45 +43,45 @@ const MOST_STRETCHES: usize = 100_000;
 
 /// A stretch in which the table turned evenly.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stretch {
-    pub table_rad_per_s: f64,
+pub(crate) struct Stretch {
+    pub(crate) table_rad_per_s: f64,
     /// What the gyro showed beside the table's rate.
-    pub beside_rad_per_s: f64,
-    pub temperature_k: f64,
-    pub rows: usize,
+    pub(crate) beside_rad_per_s: f64,
+    pub(crate) temperature_k: f64,
+    pub(crate) rows: usize,
     /// +1 where it got warmer last, −1 cooler, 0 before either.
     direction: f64,
 }
 
 /// A value with its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate {
-    pub value: f64,
-    pub standard_error: f64,
+pub(crate) struct Estimate {
+    pub(crate) value: f64,
+    pub(crate) standard_error: f64,
 }
 
 /// What a record on a rate table says of the scale factor. Ratios are of one.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ScaleFactor {
-    pub error: Estimate,
+pub(crate) struct ScaleFactor {
+    pub(crate) error: Estimate,
     /// At which temperature that is.
-    pub at_k: f64,
-    pub offset_rad_per_s: f64,
+    pub(crate) at_k: f64,
+    pub(crate) offset_rad_per_s: f64,
     /// None where the temperature did not change.
-    pub per_k: Option<Estimate>,
+    pub(crate) per_k: Option<Estimate>,
     /// None where it did not get both warmer and cooler.
-    pub hysteresis: Option<Estimate>,
-    pub nonlinearity: f64,
+    pub(crate) hysteresis: Option<Estimate>,
+    pub(crate) nonlinearity: f64,
     /// None where the table turned one way only.
-    pub asymmetry: Option<Estimate>,
+    pub(crate) asymmetry: Option<Estimate>,
     /// None where the rates were gone through once.
-    pub repeatability: Option<f64>,
-    pub runs: usize,
-    pub stretches: Vec<Stretch>,
+    pub(crate) repeatability: Option<f64>,
+    pub(crate) runs: usize,
+    pub(crate) stretches: Vec<Stretch>,
     /// One a stretch.
-    pub residual_rad_per_s: Vec<f64>,
+    pub(crate) residual_rad_per_s: Vec<f64>,
     /// Stretches beyond those that were kept.
-    pub left_out: usize,
+    pub(crate) left_out: usize,
 }
 
 /// Takes rows in the order of their times.
@@ -105,7 +105,7 @@ struct Current {
 }
 
 impl Stretches {
-    pub fn push(&mut self, row: Row) {
+    pub(crate) fn push(&mut self, row: Row) {
         let Some(table) = row.table_rad_per_s else { return };
         let goes_on = |c: &Current| {
             (table - c.level_rad_per_s).abs() <= EVEN * c.level_rad_per_s.abs() + STILL_RAD_PER_S
@@ -152,7 +152,7 @@ impl Stretches {
     }
 
     /// None where the table turned at one rate only.
-    pub fn finish(mut self) -> Option<ScaleFactor> {
+    pub(crate) fn finish(mut self) -> Option<ScaleFactor> {
         self.end();
         scale_factor(self.done, self.left_out)
     }

@@ -19,7 +19,7 @@
 use crate::record::Row;
 
 /// Number of lags.
-pub const LAGS: usize = 10;
+pub(crate) const LAGS: usize = 10;
 const LONGEST_LAG_S: f64 = 3e4;
 const SHORTEST_LAG_ROWS: f64 = 2.0;
 /// Shorter lags than this have no thermal meaning in a coil.
@@ -32,13 +32,13 @@ pub(crate) const SLOPES: [(usize, usize); 2] = [(2, 4), (4, 6)];
 pub(crate) const WARM_UPS: [usize; 4] = [3, 5, 6, 8];
 
 /// Sizes of the groups: what follows linearly, what is curved, warming up.
-pub const GROUPS: [usize; 3] = [LAGS + 1, 3 + 3 * SLOPES.len(), WARM_UPS.len()];
+pub(crate) const GROUPS: [usize; 3] = [LAGS + 1, 3 + 3 * SLOPES.len(), WARM_UPS.len()];
 /// Columns altogether.
-pub const COLUMNS: usize = GROUPS[0] + GROUPS[1] + GROUPS[2];
+pub(crate) const COLUMNS: usize = GROUPS[0] + GROUPS[1] + GROUPS[2];
 
 /// Follows one temperature row by row.
 #[derive(Debug, Clone)]
-pub struct ThermalColumns {
+pub(crate) struct ThermalColumns {
     lags_s: [f64; LAGS],
     behind_k: [f64; LAGS],
     first_k: f64,
@@ -51,7 +51,7 @@ pub struct ThermalColumns {
 }
 
 /// τ_k for rows of an interval \[s\].
-pub fn lags_s(interval_s: f64) -> [f64; LAGS] {
+pub(crate) fn lags_s(interval_s: f64) -> [f64; LAGS] {
     let shortest_s = (SHORTEST_LAG_ROWS * interval_s).max(SHORTEST_LAG_S);
     let ratio = (LONGEST_LAG_S / shortest_s).max(2.0).powf(1.0 / (LAGS - 1) as f64);
     std::array::from_fn(|k| shortest_s * ratio.powi(k as i32))
@@ -59,7 +59,7 @@ pub fn lags_s(interval_s: f64) -> [f64; LAGS] {
 
 impl ThermalColumns {
     /// At rest at the first row's temperature.
-    pub fn new(first: Row, interval_s: f64) -> Self {
+    pub(crate) fn new(first: Row, interval_s: f64) -> Self {
         Self {
             lags_s: lags_s(interval_s),
             behind_k: [first.temperature_k; LAGS],
@@ -72,7 +72,7 @@ impl ThermalColumns {
         }
     }
 
-    pub fn advance(&mut self, row: Row) {
+    pub(crate) fn advance(&mut self, row: Row) {
         let step_s = row.time_s - self.last_s;
         // Steps of equal length differ by rounding.
         if (step_s - self.step_s).abs() > 1e-9 * step_s.abs() {
@@ -88,7 +88,7 @@ impl ThermalColumns {
 
     /// # Shapes
     /// `into` has [`COLUMNS`] places.
-    pub fn write(&self, into: &mut [f64]) {
+    pub(crate) fn write(&self, into: &mut [f64]) {
         let from_first = self.temperature_k - self.first_k;
         let u = from_first / USUAL_K;
         // Neighbouring lags differ in one band of frequencies each: columns that are nearly independent.

@@ -27,7 +27,7 @@ pub struct AllanPoint {
     /// How many pairs of means it was estimated from.
     pub pairs: usize,
     /// One standard error, from the degrees of freedom of independent pairs.
-    pub standard_error: f64,
+    pub(crate) standard_error: f64,
 }
 
 /// Overlapping Allan deviation at averaging factors `factors` of a rate that is sampled every `interval_s`.
@@ -73,7 +73,7 @@ fn degrees_of_freedom(n: usize, m: usize) -> f64 {
 }
 
 /// Averaging factors in steps of about a tenth of a decade, up to a third of the values.
-pub fn factors(values: usize) -> Vec<usize> {
+pub(crate) fn factors(values: usize) -> Vec<usize> {
     let mut factors: Vec<usize> = (0..)
         .map(|i| 10f64.powf(0.1 * f64::from(i)).round() as usize)
         .take_while(|&m| 3 * m <= values.max(3))
@@ -84,12 +84,12 @@ pub fn factors(values: usize) -> Vec<usize> {
 
 /// The strengths of the five noises; zero where a noise does not show.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct NoiseModel {
-    pub quantisation: f64,
-    pub white: f64,
-    pub flicker: f64,
-    pub random_walk: f64,
-    pub ramp: f64,
+pub(crate) struct NoiseModel {
+    pub(crate) quantisation: f64,
+    pub(crate) white: f64,
+    pub(crate) flicker: f64,
+    pub(crate) random_walk: f64,
+    pub(crate) ramp: f64,
 }
 
 /// σ² of a unit of each noise, in the order of [`NoiseModel`]'s fields.
@@ -100,7 +100,7 @@ fn unit_variances(tau_s: f64) -> [f64; 5] {
 
 impl NoiseModel {
     /// σ(τ) of the model.
-    pub fn deviation(&self, tau_s: f64) -> f64 {
+    pub(crate) fn deviation(&self, tau_s: f64) -> f64 {
         let strengths = [self.quantisation, self.white, self.flicker, self.random_walk, self.ramp];
         strengths.iter().zip(unit_variances(tau_s)).map(|(s, unit)| s * s * unit).sum::<f64>().sqrt()
     }
@@ -112,7 +112,7 @@ impl NoiseModel {
 /// factors up to [`MOST_NEAR`] are still taken at every value, the longer ones at every `stride`-th, which costs nothing that
 /// overlapping had won.
 #[derive(Debug, Clone)]
-pub struct RunningAllan {
+pub(crate) struct RunningAllan {
     interval_s: f64,
     /// Taken off each value before it is summed: it cancels, but not in rounding.
     level: f64,
@@ -126,23 +126,23 @@ pub struct RunningAllan {
 }
 
 /// Angles that are kept: 16 MB.
-pub const MOST_ANGLES: usize = 1 << 21;
+pub(crate) const MOST_ANGLES: usize = 1 << 21;
 /// The longest averaging factor that is taken at every value of a long sequence.
-pub const MOST_NEAR: usize = 1024;
+pub(crate) const MOST_NEAR: usize = 1024;
 
 impl RunningAllan {
     /// `level` is about the mean of what will come.
-    pub fn new(interval_s: f64, level: f64) -> Self {
+    pub(crate) fn new(interval_s: f64, level: f64) -> Self {
         let near = factors(3 * MOST_NEAR).into_iter().map(|m| (m, 0.0)).collect();
         let ring = vec![0.0; 2 * MOST_NEAR + 1];
         Self { interval_s, level, angle: 0.0, values: 0, stride: 1, angles: vec![0.0], ring, near }
     }
 
-    pub fn values(&self) -> usize {
+    pub(crate) fn values(&self) -> usize {
         self.values
     }
 
-    pub fn push(&mut self, value: f64) {
+    pub(crate) fn push(&mut self, value: f64) {
         self.angle += value - self.level;
         self.values += 1;
         let size = self.ring.len();
@@ -163,7 +163,7 @@ impl RunningAllan {
     }
 
     /// The points at [`factors`] of all values.
-    pub fn points(&self) -> Vec<AllanPoint> {
+    pub(crate) fn points(&self) -> Vec<AllanPoint> {
         let factors = factors(self.values);
         if self.stride == 1 {
             return of_angles(&self.angles, 1, self.values, self.interval_s, &factors);

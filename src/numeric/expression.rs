@@ -18,11 +18,11 @@ use thiserror::Error;
 mod grammar {
     #[derive(pest_derive::Parser)]
     #[grammar = "numeric/expression.pest"]
-    pub struct FormulaParser;
+    pub(crate) struct FormulaParser;
 }
 use grammar::{FormulaParser, Rule};
 
-pub use analysis::{Degree, EvaluationError, Interval};
+pub(crate) use analysis::{Degree, EvaluationError, Interval};
 pub use memory::Memory;
 use memory::{AtRest, Keeper, Recall};
 
@@ -42,8 +42,8 @@ pub struct Expression {
 /// A name in a formula, and where it first stands (bytes).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Variable {
-    pub name: String,
-    pub at: Range<usize>,
+    pub(crate) name: String,
+    pub(crate) at: Range<usize>,
 }
 
 /// What is wrong with a formula, and where (bytes).
@@ -65,7 +65,7 @@ const LONGEST: usize = 2000;
 const DEEPEST: usize = 64;
 
 /// Name and arity of every function.
-pub const FUNCTIONS: [(&str, usize); 17] = [
+pub(crate) const FUNCTIONS: [(&str, usize); 17] = [
     ("abs", 1),
     ("sign", 1),
     ("sqrt", 1),
@@ -117,7 +117,7 @@ enum Operator {
 
 impl ExpressionError {
     /// Where in the formula, if it is one place.
-    pub fn at(&self) -> Option<Range<usize>> {
+    pub(crate) fn at(&self) -> Option<Range<usize>> {
         match self {
             ExpressionError::TooLong { .. } => None,
             ExpressionError::TooDeep { at }
@@ -145,7 +145,7 @@ impl Expression {
         Ok(Self { source: source.to_owned(), root, variables: parts.variables, memories: parts.memories })
     }
 
-    pub fn source(&self) -> &str {
+    pub(crate) fn source(&self) -> &str {
         &self.source
     }
 
@@ -165,7 +165,7 @@ impl Expression {
     }
 
     /// Whether its value depends on earlier ones.
-    pub fn remembers(&self) -> bool {
+    pub(crate) fn remembers(&self) -> bool {
         self.memories > 0
     }
 }

@@ -16,12 +16,12 @@ const ITERATIONS: usize = 50;
 
 /// Nodes, weights and the matrix of derivatives of one order p.
 #[derive(Debug, Clone)]
-pub struct Lobatto {
+pub(crate) struct Lobatto {
     /// p + 1, ascending from −1 to 1.
-    pub nodes: Vec<f64>,
-    pub weights: Vec<f64>,
+    pub(crate) nodes: Vec<f64>,
+    pub(crate) weights: Vec<f64>,
     /// D_ij = ℓ_j'(x_i).
-    pub derivative: DMatrix<f64>,
+    pub(crate) derivative: DMatrix<f64>,
     /// Of the barycentric formula.
     barycentric: Vec<f64>,
 }
@@ -39,7 +39,7 @@ fn legendre(order: usize, x: f64) -> (f64, f64) {
 impl Lobatto {
     /// # Panics
     /// If `order` is 0.
-    pub fn new(order: usize) -> Self {
+    pub(crate) fn new(order: usize) -> Self {
         assert!(order > 0, "a polynomial through both ends has at least degree one");
         let p = order as f64;
         let nodes: Vec<f64> = (0..=order)
@@ -75,7 +75,7 @@ impl Lobatto {
     }
 
     /// ℓ_j(x) of every node.
-    pub fn basis(&self, x: f64) -> Vec<f64> {
+    pub(crate) fn basis(&self, x: f64) -> Vec<f64> {
         if let Some(at) = self.nodes.iter().position(|node| *node == x) {
             return (0..self.nodes.len()).map(|j| f64::from(j == at)).collect();
         }
@@ -86,7 +86,7 @@ impl Lobatto {
 }
 
 /// Nodes and weights of Gauss on −1 … 1.
-pub fn gauss(count: usize) -> Vec<(f64, f64)> {
+pub(crate) fn gauss(count: usize) -> Vec<(f64, f64)> {
     let n = count as f64;
     (0..count)
         .map(|i| {

@@ -2,21 +2,21 @@
 
 /// The place and the value of a maximum.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Maximum {
-    pub at: f64,
-    pub value: f64,
+pub(crate) struct Maximum {
+    pub(crate) at: f64,
+    pub(crate) value: f64,
 }
 
 /// Golden-section search for a maximum of `f` in [`low`, `high`], where `f` is unimodal.
 ///
 /// Stops when the bracket is shorter than 1e-10 of its own start, or than rounding at its place lets it become; a
 /// maximum's value is then off by the square of that, so by rounding only. Returns the best point that was evaluated.
-pub fn golden_section(f: impl FnMut(f64) -> f64, low: f64, high: f64) -> Maximum {
+pub(crate) fn golden_section(f: impl FnMut(f64) -> f64, low: f64, high: f64) -> Maximum {
     golden_section_within(f, low, high, 1e-10)
 }
 
 /// The same until the bracket is shorter than a share of its start.
-pub fn golden_section_within(mut f: impl FnMut(f64) -> f64, low: f64, high: f64, share: f64) -> Maximum {
+pub(crate) fn golden_section_within(mut f: impl FnMut(f64) -> f64, low: f64, high: f64, share: f64) -> Maximum {
     let ratio = (5.0_f64.sqrt() - 1.0) / 2.0;
     let (mut a, mut b) = (low, high);
     let mut left = Maximum { at: b - ratio * (b - a), value: 0.0 };

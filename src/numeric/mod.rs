@@ -3,12 +3,12 @@
 pub mod allan;
 pub mod coloured;
 pub mod expression;
-pub mod lobatto;
-pub mod maximise;
-pub mod noise;
+pub(crate) mod lobatto;
+pub(crate) mod maximise;
+pub(crate) mod noise;
 pub mod piecewise;
 pub mod pyramid;
-pub mod quantiles;
-pub mod spectrum;
+pub(crate) mod quantiles;
+pub(crate) mod spectrum;
 pub mod statistics;
 pub mod tridiagonal;

@@ -30,7 +30,7 @@ pub struct WhiteNoise {
     pub deviation: f64,
     pub standard_error: f64,
     /// Of the windows, those that hold nothing but noise and a quadratic.
-    pub kept_share: f64,
+    pub(crate) kept_share: f64,
 }
 
 const WINDOW: usize = 11;
@@ -46,7 +46,7 @@ const MOST_ROUNDS: usize = 100;
 /// White noise of `values` at `places`, which increase.
 ///
 /// Not finite for fewer than three values.
-pub fn white_noise(places: &[f64], values: &[f64]) -> WhiteNoise {
+pub(crate) fn white_noise(places: &[f64], values: &[f64]) -> WhiteNoise {
     let n = values.len().min(places.len());
     let window = WINDOW.min(n);
     // Three values leave a straight line one degree of freedom.

@@ -48,11 +48,11 @@ impl PiecewiseLinear {
         &self.knots
     }
 
-    pub fn values(&self) -> &[f64] {
+    pub(crate) fn values(&self) -> &[f64] {
         &self.values
     }
 
-    pub fn first_value(&self) -> f64 {
+    pub(crate) fn first_value(&self) -> f64 {
         self.values[0]
     }
 
@@ -70,7 +70,7 @@ impl PiecewiseLinear {
     }
 
     /// The slope of the piece that begins at knot `i`; zero behind the last knot.
-    pub fn slope_of(&self, i: usize) -> f64 {
+    pub(crate) fn slope_of(&self, i: usize) -> f64 {
         if i + 1 >= self.knots.len() {
             return 0.0;
         }
@@ -78,12 +78,12 @@ impl PiecewiseLinear {
     }
 
     /// The slope just after `x`.
-    pub fn slope_after(&self, x: f64) -> f64 {
+    pub(crate) fn slope_after(&self, x: f64) -> f64 {
         self.piece(x).map_or(0.0, |i| self.slope_of(i))
     }
 
     /// The slope just before `x`.
-    pub fn slope_before(&self, x: f64) -> f64 {
+    pub(crate) fn slope_before(&self, x: f64) -> f64 {
         match self.knots.partition_point(|&k| k < x).checked_sub(1) {
             None => 0.0,
             Some(i) => self.slope_of(i),
@@ -97,7 +97,7 @@ impl PiecewiseLinear {
 /// ```text
 /// y_k = (1/τ) ∫_{x_k − τ}^{x_k} y dx;   for τ no longer than the step h:  y_k − (y_k − y_{k−1}) τ / (2 h)
 /// ```
-pub fn trailing_means(places: &[f64], values: &[f64], over: f64) -> Vec<f64> {
+pub(crate) fn trailing_means(places: &[f64], values: &[f64], over: f64) -> Vec<f64> {
     if !(over > 0.0) {
         return values.to_vec();
     }

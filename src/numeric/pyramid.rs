@@ -22,10 +22,10 @@
 #[derive(Debug, Clone, PartialEq)]
 pub struct Level {
     /// Coefficients.
-    pub count: f64,
+    pub(crate) count: f64,
     /// How many columns `products` is of: 1 below the bottom.
-    pub columns: usize,
-    pub products: Vec<f64>,
+    pub(crate) columns: usize,
+    pub(crate) products: Vec<f64>,
 }
 
 impl Level {
@@ -34,7 +34,7 @@ impl Level {
     }
 
     /// Of columns `a` ≤ `b`.
-    pub fn product(&self, a: usize, b: usize) -> f64 {
+    pub(crate) fn product(&self, a: usize, b: usize) -> f64 {
         let before = a * self.columns - a * a.saturating_sub(1) / 2;
         self.products[before + b - a]
     }

@@ -4,7 +4,7 @@
 //! [`EXACT_SHARE`] leaves above it and 50 values more, and the quantile's place lies among what no part has left out. (That a part of
 //! independent values holds more than that above the quantile of all is 16 standard deviations away for parts of ten thousand, and
 //! more for larger ones; of a small part everything is kept.) Below, a quantile is read from the counts, off by at most
-//! [`GRID_STEP`] of itself. How values are split into parts changes nothing of either.
+//! 2⁻¹⁰ of itself. How values are split into parts changes nothing of either.
 //!
 //! # Source
 //! Distribution-free interval of a quantile between order statistics: David, Nagaraja, Order Statistics (2003), section 7.1.
@@ -12,20 +12,17 @@
 use std::collections::BTreeMap;
 
 /// Quantiles above this are exact: P99 and, of some thousand values, the lower end of its interval.
-pub const EXACT_SHARE: f64 = 0.985;
+pub(crate) const EXACT_SHARE: f64 = 0.985;
 
-/// Bits of a value's fraction that tell the steps of the grid apart.
+/// Bits of a value's fraction that tell the steps of the grid apart: a step is at most 2⁻¹⁰ wide, over its values.
 const GRID_BITS: u32 = 10;
-
-/// How wide a step of the grid is at most, over its values.
-pub const GRID_STEP: f64 = 1.0 / (1 << GRID_BITS) as f64;
 
 /// What each part keeps of its largest values, at the least.
 const FURTHER: u64 = 50;
 
 /// Values of which the largest and the counts are kept.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct QuantileSketch {
+pub(crate) struct QuantileSketch {
     count: u64,
     steps: BTreeMap<u64, u64>,
     /// Descending.
@@ -36,7 +33,7 @@ pub struct QuantileSketch {
 
 impl QuantileSketch {
     /// Of a part's values, which must be finite and not negative; none if one is not.
-    pub fn of(values: &[f64]) -> Option<Self> {
+    pub(crate) fn of(values: &[f64]) -> Option<Self> {
         if values.iter().any(|v| !v.is_finite() || *v < 0.0) {
             return None;
         }
@@ -51,7 +48,7 @@ impl QuantileSketch {
     }
 
     /// As it was written down.
-    pub fn from_parts(steps: impl Iterator<Item = (u64, u64)>, largest: Vec<f64>) -> Self {
+    pub(crate) fn from_parts(steps: impl Iterator<Item = (u64, u64)>, largest: Vec<f64>) -> Self {
         let steps: BTreeMap<u64, u64> = steps.collect();
         let count = steps.values().sum();
         let is_all = largest.len() as u64 == count;
@@ -59,22 +56,22 @@ impl QuantileSketch {
         Self { count, steps, largest, complete_above }
     }
 
-    pub fn count(&self) -> u64 {
+    pub(crate) fn count(&self) -> u64 {
         self.count
     }
 
     /// Step of the grid and how many values lie in it, ascending.
-    pub fn steps(&self) -> impl Iterator<Item = (u64, u64)> {
+    pub(crate) fn steps(&self) -> impl Iterator<Item = (u64, u64)> {
         self.steps.iter().map(|(step, count)| (*step, *count))
     }
 
     /// Descending.
-    pub fn largest(&self) -> &[f64] {
+    pub(crate) fn largest(&self) -> &[f64] {
         &self.largest
     }
 
     /// Takes another part in.
-    pub fn add(&mut self, other: &Self) {
+    pub(crate) fn add(&mut self, other: &Self) {
         if self.count == 0 {
             *self = other.clone();
             return;
@@ -90,7 +87,7 @@ impl QuantileSketch {
     }
 
     /// The value that a share of all does not exceed, between the order statistics.
-    pub fn quantile(&self, share: f64) -> f64 {
+    pub(crate) fn quantile(&self, share: f64) -> f64 {
         let place = share.clamp(0.0, 1.0) * (self.count - 1) as f64;
         let (below, above) = (place.floor(), place.ceil());
         let (a, b) = (self.ordered(below as u64), self.ordered(above as u64));
@@ -99,7 +96,7 @@ impl QuantileSketch {
 
     /// Between which values the quantile of what was drawn from lies with a probability of at least `confidence`, whatever the
     /// distribution; none where there are too few values for a bound.
-    pub fn interval(&self, share: f64, confidence: f64) -> (Option<f64>, Option<f64>) {
+    pub(crate) fn interval(&self, share: f64, confidence: f64) -> (Option<f64>, Option<f64>) {
         let (low, high) = binomial_range(self.count, share, 0.5 * (1.0 - confidence));
         let low = (low > 0).then(|| self.ordered(low - 1));
         let high = (high < self.count).then(|| self.ordered(high));
@@ -208,7 +205,7 @@ mod tests {
             assert_eq!(whole.quantile(share), exact(share), "{share}");
         }
         for share in [0.01, 0.5, 0.95] {
-            assert!((whole.quantile(share) / exact(share) - 1.0).abs() < GRID_STEP, "{share}");
+            assert!((whole.quantile(share) / exact(share) - 1.0).abs() < f64::from(1 << GRID_BITS).recip(), "{share}");
         }
         for size in [7, 1000, 10_000] {
             let parts = of_parts(&values, size);

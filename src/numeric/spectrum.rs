@@ -18,15 +18,15 @@ use std::f64::consts::PI;
 
 /// One frequency's density.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Density {
-    pub frequency_hz: f64,
-    pub density: f64,
+pub(crate) struct Density {
+    pub(crate) frequency_hz: f64,
+    pub(crate) density: f64,
 }
 
 /// At `count` frequencies, evenly spaced in their logarithm from one cycle in a third of a stretch to half the sampling rate.
 ///
 /// Empty where the values do not fill a stretch.
-pub fn power_spectral_density(values: &[f64], interval_s: f64, stretch: usize, count: usize) -> Vec<Density> {
+pub(crate) fn power_spectral_density(values: &[f64], interval_s: f64, stretch: usize, count: usize) -> Vec<Density> {
     if values.len() < stretch || stretch < 8 || count < 2 {
         return Vec::new();
     }

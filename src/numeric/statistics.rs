@@ -5,7 +5,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 /// Makes a median absolute deviation the standard deviation of a Gaussian: 1/Φ⁻¹(¾).
 const GAUSSIAN_PER_MAD: f64 = 1.482_602_218_505_602;
 
-pub fn mean(values: &[f64]) -> f64 {
+pub(crate) fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
@@ -15,7 +15,7 @@ pub fn rms(values: &[f64]) -> f64 {
 }
 
 /// With n − 1; NaN for fewer than two values.
-pub fn standard_deviation(values: &[f64]) -> f64 {
+pub(crate) fn standard_deviation(values: &[f64]) -> f64 {
     if values.len() < 2 {
         return f64::NAN;
     }
@@ -28,14 +28,14 @@ pub fn standard_deviation(values: &[f64]) -> f64 {
 /// # Source
 /// Welford, Technometrics 4 (1962) 419.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct RunningDeviation {
+pub(crate) struct RunningDeviation {
     count: f64,
     mean: f64,
     square: f64,
 }
 
 impl RunningDeviation {
-    pub fn push(&mut self, value: f64) {
+    pub(crate) fn push(&mut self, value: f64) {
         self.count += 1.0;
         let from_mean = value - self.mean;
         self.mean += from_mean / self.count;
@@ -43,7 +43,7 @@ impl RunningDeviation {
     }
 
     /// With n − 1; None for fewer than two values.
-    pub fn deviation(&self) -> Option<f64> {
+    pub(crate) fn deviation(&self) -> Option<f64> {
         (self.count > 1.5).then(|| (self.square / (self.count - 1.0)).sqrt())
     }
 }
@@ -55,7 +55,7 @@ pub fn median(values: &[f64]) -> f64 {
 }
 
 /// As [`median`]; the values are then in another order.
-pub fn median_in_place(values: &mut [f64]) -> f64 {
+pub(crate) fn median_in_place(values: &mut [f64]) -> f64 {
     let n = values.len();
     if n == 0 {
         return f64::NAN;
@@ -65,14 +65,14 @@ pub fn median_in_place(values: &mut [f64]) -> f64 {
 }
 
 /// Median absolute deviation about the median, scaled to a Gaussian's standard deviation.
-pub fn robust_deviation(values: &[f64]) -> f64 {
+pub(crate) fn robust_deviation(values: &[f64]) -> f64 {
     let centre = median(values);
     let mut sizes: Vec<f64> = values.iter().map(|v| (v - centre).abs()).collect();
     GAUSSIAN_PER_MAD * median_in_place(&mut sizes)
 }
 
 /// Pearson's correlation over the places where both are finite; None where one of them does not vary.
-pub fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
+pub(crate) fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
     let pairs: Vec<(f64, f64)> =
         a.iter().copied().zip(b.iter().copied()).filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
     let n = pairs.len() as f64;
@@ -92,7 +92,7 @@ pub fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
 }
 
 /// Autocorrelation at lags 0 … `lags`, about the mean.
-pub fn autocorrelation(values: &[f64], lags: usize) -> Vec<f64> {
+pub(crate) fn autocorrelation(values: &[f64], lags: usize) -> Vec<f64> {
     let mean = mean(values);
     let centred: Vec<f64> = values.iter().map(|v| v - mean).collect();
     let square: f64 = centred.iter().map(|v| v * v).sum();
@@ -105,7 +105,7 @@ pub fn autocorrelation(values: &[f64], lags: usize) -> Vec<f64> {
 }
 
 /// Half width of the band that 99 % of the autocorrelations of `n` white values keep to: Φ⁻¹(0.995)/√n.
-pub fn autocorrelation_band_99(n: usize) -> f64 {
+pub(crate) fn autocorrelation_band_99(n: usize) -> f64 {
     2.575_829_303_548_901 / (n.max(1) as f64).sqrt()
 }
 
@@ -118,16 +118,16 @@ pub fn autocorrelation_band_99(n: usize) -> f64 {
 /// # Source
 /// Ljung and Box, Biometrika 65 (1978) 297.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LjungBox {
-    pub statistic: f64,
-    pub lags: usize,
+pub(crate) struct LjungBox {
+    pub(crate) statistic: f64,
+    pub(crate) lags: usize,
     /// The probability of so large a statistic from white values.
-    pub p_value: f64,
+    pub(crate) p_value: f64,
 }
 
 impl LjungBox {
     /// `correlations` at lags 0, 1, …, of `n` values.
-    pub fn new(correlations: &[f64], n: usize) -> Self {
+    pub(crate) fn new(correlations: &[f64], n: usize) -> Self {
         let n = n as f64;
         let tail = correlations.get(1..).unwrap_or(&[]);
         let sum: f64 = tail.iter().enumerate().map(|(i, r)| r * r / (n - (i + 1) as f64)).sum();
@@ -137,7 +137,7 @@ impl LjungBox {
 }
 
 /// P(χ²_ν > x); 1 for a ν that is no number of degrees of freedom.
-pub fn chi_square_tail(x: f64, degrees_of_freedom: f64) -> f64 {
+pub(crate) fn chi_square_tail(x: f64, degrees_of_freedom: f64) -> f64 {
     ChiSquared::new(degrees_of_freedom).map_or(1.0, |distribution| distribution.sf(x.max(0.0)))
 }
 
@@ -150,7 +150,7 @@ pub fn chi_square_tail(x: f64, degrees_of_freedom: f64) -> f64 {
 ///
 /// # Source
 /// Hampel, J. Am. Stat. Assoc. 69 (1974) 383; the running form after Pearson, IEEE Trans. Control Syst. 10 (2002) 55.
-pub fn gross_errors(values: &[f64], half_width: usize, factor: f64, floor: f64) -> Vec<usize> {
+pub(crate) fn gross_errors(values: &[f64], half_width: usize, factor: f64, floor: f64) -> Vec<usize> {
     let mut window = Vec::with_capacity(2 * half_width + 1);
     (0..values.len())
         .filter(|&i| {
@@ -176,7 +176,7 @@ pub fn gross_errors(values: &[f64], half_width: usize, factor: f64, floor: f64) 
 }
 
 /// A straight line through points by least squares: intercept and slope; None where the points are all at one place.
-pub fn line(points: impl Iterator<Item = (f64, f64)>) -> Option<(f64, f64)> {
+pub(crate) fn line(points: impl Iterator<Item = (f64, f64)>) -> Option<(f64, f64)> {
     let points: Vec<(f64, f64)> = points.collect();
     let n = points.len() as f64;
     let (mean_x, mean_y) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);

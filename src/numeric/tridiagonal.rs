@@ -28,7 +28,7 @@ const MAX_SWEEPS: usize = 60;
 ///
 /// # Errors
 /// As [`diagonalise`].
-pub fn diagonalise_full(matrix: DMatrix<f64>, rows: &mut DMatrix<f64>) -> Result<Vec<f64>, NotConverged> {
+pub(crate) fn diagonalise_full(matrix: DMatrix<f64>, rows: &mut DMatrix<f64>) -> Result<Vec<f64>, NotConverged> {
     let n = matrix.nrows();
     // Reflections from the largest entries on, then rotations from the smallest: so small eigenvalues of a matrix whose scales
     // differ keep their own digits, and not only those that the largest one leaves.

@@ -102,7 +102,7 @@ impl Classic {
     }
 
     /// The layer counts that this winding fits are the multiples of this.
-    pub fn multiple(self) -> usize {
+    pub(crate) fn multiple(self) -> usize {
         self.word().map_or(2, <[Half]>::len)
     }
 

@@ -17,11 +17,11 @@ pub struct EndTurns {
 }
 
 impl EndTurns {
-    pub fn is_none(self) -> bool {
+    pub(crate) fn is_none(self) -> bool {
         self == Self::default()
     }
 
-    pub fn of(self, end: Half) -> i32 {
+    pub(crate) fn of(self, end: Half) -> i32 {
         match end {
             Half::A => self.a,
             Half::B => self.b,
@@ -39,11 +39,11 @@ impl std::fmt::Display for EndTurns {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WoundPiece {
     /// Index 0 is the innermost.
-    pub layer: usize,
+    pub(crate) layer: usize,
     /// Of an added piece the segment that it goes on from.
-    pub segment: usize,
+    pub(crate) segment: usize,
     /// The end whose turns were added here, on a layer that is another segment's.
-    pub added_at: Option<Half>,
+    pub(crate) added_at: Option<Half>,
 }
 
 impl Pattern {
@@ -89,7 +89,7 @@ impl Pattern {
     }
 
     /// The pieces of the fibre in the order of arclength from end A.
-    pub fn pieces(&self) -> Vec<WoundPiece> {
+    pub(crate) fn pieces(&self) -> Vec<WoundPiece> {
         let of_segment = |(s, layer): (usize, usize)| WoundPiece { layer, segment: s + 1, added_at: None };
         let mut pieces: Vec<WoundPiece> = self.layers_by_segment().into_iter().enumerate().map(of_segment).collect();
         let layer = self.layers() - 1;
@@ -104,7 +104,7 @@ impl Pattern {
     }
 
     /// Places among [`Pattern::pieces`] in the order of winding: layer by layer outwards, what is added last.
-    pub fn winding_order(&self) -> Vec<usize> {
+    pub(crate) fn winding_order(&self) -> Vec<usize> {
         let before = usize::from(matches!(self.added_turns(), Some((Half::A, _))));
         let mut order: Vec<usize> = self.segments.iter().map(|segment| segment - 1 + before).collect();
         match self.added_turns() {
@@ -117,7 +117,7 @@ impl Pattern {
 
     /// Whether arclength grows away from the first flange on a piece: +1, or −1. An added piece runs against the segment that
     /// it goes on from.
-    pub fn direction_of(&self, piece: &WoundPiece) -> f64 {
+    pub(crate) fn direction_of(&self, piece: &WoundPiece) -> f64 {
         match piece.added_at {
             None => self.axial_direction(piece.layer),
             Some(_) => -self.axial_direction(self.layers_by_segment()[piece.segment - 1]),

@@ -1,7 +1,7 @@
 //! Winding patterns: which segment of the fibre lies in which layer.
 
 pub mod classic;
-pub mod ends;
+pub(crate) mod ends;
 pub mod windability;
 
 use thiserror::Error;
@@ -39,7 +39,7 @@ pub enum Half {
 }
 
 impl Half {
-    pub fn other(self) -> Self {
+    pub(crate) fn other(self) -> Self {
         match self {
             Half::A => Half::B,
             Half::B => Half::A,
@@ -107,12 +107,12 @@ impl Pattern {
     }
 
     /// The segment on a layer (index 0 is the innermost).
-    pub fn segment(&self, layer: usize) -> usize {
+    pub(crate) fn segment(&self, layer: usize) -> usize {
         self.segments[layer]
     }
 
     /// P⁻¹ as layer indices: entry s−1 is the layer of segment s.
-    pub fn layers_by_segment(&self) -> Vec<usize> {
+    pub(crate) fn layers_by_segment(&self) -> Vec<usize> {
         let mut layers = vec![0; self.layers()];
         for (layer, &segment) in self.segments.iter().enumerate() {
             layers[segment - 1] = layer;
@@ -120,7 +120,7 @@ impl Pattern {
         layers
     }
 
-    pub fn half(&self, layer: usize) -> Half {
+    pub(crate) fn half(&self, layer: usize) -> Half {
         if self.segments[layer] <= self.layers() / 2 { Half::A } else { Half::B }
     }
 
@@ -135,7 +135,7 @@ impl Pattern {
     ///
     /// The fibre fills a layer from flange to flange, so segments alternate. Layer 1 starts with the end of its
     /// segment that is nearer to the fibre's middle, or with the fibre's own end if it is wound with that.
-    pub fn axial_direction(&self, layer: usize) -> f64 {
+    pub(crate) fn axial_direction(&self, layer: usize) -> f64 {
         axial_direction(&self.segments, layer)
     }
 }

@@ -13,16 +13,16 @@ use super::Pattern;
 
 /// A segment on its layer, both counted from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Placement {
-    pub segment: usize,
-    pub layer: usize,
+pub(crate) struct Placement {
+    pub(crate) segment: usize,
+    pub(crate) layer: usize,
 }
 
 /// The fibre passing from one segment to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Crossover {
+pub(crate) struct Crossover {
     /// How many layers lie between the two, counted outwards or inwards alike.
-    pub climb: usize,
+    pub(crate) climb: usize,
 }
 
 /// The fibre's continuity drawn over the layers.
@@ -57,7 +57,7 @@ pub struct Windability {
     /// Largest number of layers that a crossover climbs.
     pub max_climb: usize,
     /// Crossovers that climb over at least one other layer.
-    pub long_crossovers: usize,
+    pub(crate) long_crossovers: usize,
 }
 
 /// How much a winding shop will put up with.
@@ -121,11 +121,6 @@ impl WindingGraph {
         }
         let order = pattern.winding_order().into_iter().map(|piece| nodes[piece]).collect();
         Self { graph, order }
-    }
-
-    /// The graph itself, for drawing and for questions not asked here.
-    pub fn graph(&self) -> &UnGraph<Placement, Crossover> {
-        &self.graph
     }
 
     /// What each step of winding finds and leaves, from the innermost layer outwards.
@@ -207,9 +202,9 @@ impl WindingGraph {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CaptiveRun {
     /// Counted from 1.
-    pub after_layer: usize,
-    pub first_segment: usize,
-    pub last_segment: usize,
+    pub(crate) after_layer: usize,
+    pub(crate) first_segment: usize,
+    pub(crate) last_segment: usize,
 }
 
 impl std::fmt::Display for CaptiveRun {

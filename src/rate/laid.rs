@@ -19,33 +19,33 @@ use crate::pattern::{EndTurns, Half, Pattern};
 
 /// One stretch of fibre on one layer.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LaidPiece {
+pub(crate) struct LaidPiece {
     /// Index 0 is the innermost.
-    pub layer: usize,
-    pub segment: usize,
+    pub(crate) layer: usize,
+    pub(crate) segment: usize,
     /// The end whose turns were added here, on a layer that is another segment's.
-    pub added_at: Option<Half>,
-    pub turns: f64,
+    pub(crate) added_at: Option<Half>,
+    pub(crate) turns: f64,
     /// Turns that would fit between the first flange and the piece.
-    pub free_turns: f64,
+    pub(crate) free_turns: f64,
     /// Arclength from end A.
-    pub from_m: f64,
-    pub to_m: f64,
-    pub length_m: f64,
+    pub(crate) from_m: f64,
+    pub(crate) to_m: f64,
+    pub(crate) length_m: f64,
     /// Whether arclength grows away from the first flange: +1, or −1.
-    pub direction: f64,
+    pub(crate) direction: f64,
     /// ζ̄ and f.
-    pub middle: f64,
-    pub share: f64,
+    pub(crate) middle: f64,
+    pub(crate) share: f64,
 }
 
 /// A coil wound in a pattern.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Laid {
+pub(crate) struct Laid {
     /// With the turns that each layer then has.
-    pub coil: Coil,
+    pub(crate) coil: Coil,
     /// In the order of arclength.
-    pub pieces: Vec<LaidPiece>,
+    pub(crate) pieces: Vec<LaidPiece>,
 }
 
 impl Laid {
@@ -53,7 +53,7 @@ impl Laid {
     ///
     /// # Errors
     /// A pattern of another layer count, ends that leave a layer no turns or put more on it than it holds.
-    pub fn new(coil: &Coil, pattern: &Pattern) -> Result<Self, RateError> {
+    pub(crate) fn new(coil: &Coil, pattern: &Pattern) -> Result<Self, RateError> {
         if coil.layers() != pattern.layers() {
             return Err(RateError::Layers { pattern: pattern.layers(), coil: coil.layers() });
         }

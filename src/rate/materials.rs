@@ -7,7 +7,7 @@ use crate::units::REFERENCE_TEMPERATURE_K;
 
 impl CoilModel {
     /// What the coil is made of, where the model states it.
-    pub fn materials(&self) -> Option<&Materials> {
+    pub(crate) fn materials(&self) -> Option<&Materials> {
         self.effects.iter().find_map(|effect| match effect.subject() {
             Subject::Materials(materials) => Some(materials.as_ref()),
             _ => None,

@@ -21,13 +21,13 @@ pub(super) fn formula_of(effect: &DeclaredEffect) -> String {
 
 impl CoilModel {
     /// Whether the rate depends on states that came before.
-    pub fn remembers(&self) -> bool {
+    pub(crate) fn remembers(&self) -> bool {
         self.effects.iter().any(|e| e.bind(&self.coil, &[]).remembers())
     }
 
     /// The model without formulas that are not linear in the rates of temperature, which have no guaranteed worst case
     /// together with the coil; and each of those with the largest size it may have [rad/s], infinite where it has none.
-    pub fn without_unguaranteed(&self, max_rate_k_per_s: f64) -> (Self, Vec<(String, f64)>) {
+    pub(crate) fn without_unguaranteed(&self, max_rate_k_per_s: f64) -> (Self, Vec<(String, f64)>) {
         let (mut rest, mut left_out) = (self.clone(), Vec::new());
         rest.effects.retain(|effect| {
             let Subject::Formula(formula) = effect.subject() else { return true };
@@ -44,7 +44,7 @@ impl CoilModel {
 
 impl RateModel {
     /// Whether the rate depends on states that came before.
-    pub fn remembers(&self) -> bool {
+    pub(crate) fn remembers(&self) -> bool {
         self.effects.iter().any(|e| e.remembers())
     }
 
@@ -60,7 +60,7 @@ impl RateModel {
 
     /// # Errors
     /// A formula that is not linear in the coil's own rate: no sum over layer weights holds it.
-    pub fn check_searchable(&self) -> Result<(), RateError> {
+    pub(crate) fn check_searchable(&self) -> Result<(), RateError> {
         match self.effects.iter().position(|e| e.degree_in_thermal_rate() == Degree::Beyond) {
             Some(place) => Err(RateError::NotSearchable { formula: self.formulas[place].clone() }),
             None => Ok(()),
@@ -68,7 +68,7 @@ impl RateModel {
     }
 
     /// Which formula has no value at a state, and why; None where all have one. The past is what was before.
-    pub fn fault(&self, state: &PackState, past: &Past) -> Option<RateError> {
+    pub(crate) fn fault(&self, state: &PackState, past: &Past) -> Option<RateError> {
         let coil = self.thermal_rate_rad_per_s(state);
         let state = PackState { thermal_rate_rad_per_s: coil, ..*state };
         let at_rest = Memory::default();
@@ -80,7 +80,7 @@ impl RateModel {
 
     /// # Errors
     /// What [`RateModel::fault`] says, where a rate is no number.
-    pub fn checked_after(&self, state: &PackState, past: &mut Past) -> Result<f64, RateError> {
+    pub(crate) fn checked_after(&self, state: &PackState, past: &mut Past) -> Result<f64, RateError> {
         let before = self.has_formulas().then(|| past.clone());
         let rate = self.rate_error_after(state, past);
         match before.filter(|_| !rate.is_finite()).and_then(|before| self.fault(state, &before)) {
@@ -90,7 +90,7 @@ impl RateModel {
     }
 
     /// Whether the user's own formulas are part of it.
-    pub fn has_formulas(&self) -> bool {
+    pub(crate) fn has_formulas(&self) -> bool {
         self.formulas.iter().any(|f| !f.is_empty())
     }
 }

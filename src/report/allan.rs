@@ -12,7 +12,7 @@ const LINE_POINTS: usize = 200;
 const MARGIN: f64 = 1.6;
 
 /// Log-log, with error bars, and with the lines of the noises that were found in it.
-pub fn allan_chart(record: &RecordMetricsJson) -> Chart {
+pub(crate) fn allan_chart(record: &RecordMetricsJson) -> Chart {
     let points: Vec<(f64, f64)> = record.allan.iter().map(|p| (p.tau_s, p.deviation_deg_per_h)).collect();
     let errors = record.allan.iter().map(|p| p.standard_error_deg_per_h).collect();
     let mut chart = Chart::new(format!("Allan deviation of {}", record.file))

@@ -12,7 +12,7 @@ use crate::io::json::campaign::CampaignJson;
 const MOST_CURVES: usize = 8;
 
 /// Header and rows, one a model and pattern, in °/h.
-pub fn built_coils_table(models: &[BuiltCoilsJson]) -> (Vec<&'static str>, Vec<Vec<String>>) {
+pub(crate) fn built_coils_table(models: &[BuiltCoilsJson]) -> (Vec<&'static str>, Vec<Vec<String>>) {
     let header = vec![
         "model",
         "coils",
@@ -98,7 +98,7 @@ fn chart(model: &BuiltCoilsJson) -> String {
 }
 
 /// The whole page.
-pub fn built_coils_page(answer: &CampaignJson) -> String {
+pub(crate) fn built_coils_page(answer: &CampaignJson) -> String {
     let models = &answer.built_coils;
     let (header, rows) = built_coils_table(models);
     let body = html! {

@@ -85,7 +85,7 @@ fn unit(objective: &str) -> &'static str {
 }
 
 /// For each model and objective what to wind, in a sentence.
-pub fn recommendations(results: &[CellJson]) -> Vec<String> {
+pub(crate) fn recommendations(results: &[CellJson]) -> Vec<String> {
     let groups = groups(results);
     let mut sentences = Vec::new();
     for objective in distinct(groups.iter().map(|g| g.best.objective.as_str())) {
@@ -124,7 +124,7 @@ fn sentence(model: &str, objective: &str, own: &[&Group]) -> Option<String> {
 }
 
 /// One picture an objective: bars of the coils, one a class.
-pub fn charts(results: &[CellJson]) -> Vec<(String, String)> {
+pub(crate) fn charts(results: &[CellJson]) -> Vec<(String, String)> {
     let groups = groups(results);
     let objectives = distinct(groups.iter().map(|g| g.best.objective.as_str()));
     objectives.into_iter().map(|objective| (objective.to_owned(), chart(&groups, objective))).collect()
@@ -161,7 +161,7 @@ fn chart(groups: &[Group], objective: &str) -> String {
 }
 
 /// The whole page.
-pub fn campaign_page(answer: &CampaignJson) -> String {
+pub(crate) fn campaign_page(answer: &CampaignJson) -> String {
     let groups = groups(&answer.results);
     let failed: Vec<&CellJson> = answer.results.iter().filter(|found| found.failure.is_some()).collect();
     let body = html! {

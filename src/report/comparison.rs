@@ -17,14 +17,14 @@ const WIDTH_PX: u32 = 860;
 const OVER_TIME: usize = 3;
 
 /// A picture with the name of its file.
-pub struct Picture {
-    pub file: String,
-    pub svg: String,
-    pub caption: String,
+pub(crate) struct Picture {
+    pub(crate) file: String,
+    pub(crate) svg: String,
+    pub(crate) caption: String,
 }
 
 /// The pictures of the `number`-th record, counted from 1.
-pub fn pictures(number: usize, record: &RecordComparisonJson, rows: &[ComparisonRow]) -> Vec<Picture> {
+pub(crate) fn pictures(number: usize, record: &RecordComparisonJson, rows: &[ComparisonRow]) -> Vec<Picture> {
     let picture = |name: &str, chart: Chart, caption: String| Picture {
         file: format!("record-{number}-{name}.svg"),
         svg: chart.svg_to_read(),

@@ -7,7 +7,7 @@ use crate::units::{deg_per_h_from_rad_per_s, h_from_s};
 const MOST_POINTS: usize = 1500;
 
 /// One curve a method, in means, so that they can be told apart.
-pub fn compensation_chart(times_s: &[f64], curves: &[(&str, Vec<f64>)]) -> Chart {
+pub(crate) fn compensation_chart(times_s: &[f64], curves: &[(&str, Vec<f64>)]) -> Chart {
     let rows = times_s.len().div_ceil(MOST_POINTS).max(1);
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let chart = Chart::new("Rate before and after compensation").size(860, 460).x(Axis::linear("time [h]")).y(

@@ -19,16 +19,16 @@ const COLOURS: [&str; 8] = ["#2f7fd6", "#d9730d", "#1a9850", "#9b5fc0", "#d64550
 
 /// What the colours of a drawing say of layers: which half of the fibre, or which reel.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Groups {
+pub(crate) struct Groups {
     /// As the legend has them.
-    pub names: Vec<String>,
+    pub(crate) names: Vec<String>,
     /// A place in `names` for each layer, innermost first.
-    pub of_layer: Vec<usize>,
+    pub(crate) of_layer: Vec<usize>,
 }
 
 impl Groups {
     /// The halves of the fibre.
-    pub fn halves(pattern: &Pattern) -> Self {
+    pub(crate) fn halves(pattern: &Pattern) -> Self {
         Self {
             names: vec!["half A".to_owned(), "half B".to_owned()],
             of_layer: (0..pattern.layers()).map(|layer| usize::from(pattern.half(layer) == Half::B)).collect(),
@@ -44,7 +44,7 @@ pub fn cross_section(title: &str, pattern: &Pattern) -> String {
 }
 
 /// As [`cross_section`], coloured by other groups of layers.
-pub fn cross_section_in_groups(title: &str, pattern: &Pattern, groups: &Groups) -> String {
+pub(crate) fn cross_section_in_groups(title: &str, pattern: &Pattern, groups: &Groups) -> String {
     let layers = pattern.layers();
     let height_px = TOP_PX + ROW_PX * layers as f64 + 44.0;
     let middle_px = |layer: usize| TOP_PX + ROW_PX * (layers - 1 - layer) as f64 + ROW_PX / 2.0;

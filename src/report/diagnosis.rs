@@ -14,7 +14,7 @@ use crate::units::{h_from_s, min_from_s, percent_from_fraction};
 const CANDIDATES_SHOWN: usize = 12;
 
 /// The verdict as a sentence.
-pub fn verdict_in_words(body: &DiagnosisJson) -> String {
+pub(crate) fn verdict_in_words(body: &DiagnosisJson) -> String {
     let kinds = || body.effects.iter().map(|e| e.kind.as_str()).collect::<Vec<_>>().join(" and ");
     match body.verdict.as_str() {
         "adequate" => "adequate — these records show nothing that the model lacks".to_owned(),
@@ -38,7 +38,7 @@ pub fn verdict_in_words(body: &DiagnosisJson) -> String {
 }
 
 /// Another winding, a reversed coil, steps of the offset: a line each.
-pub fn hypothesis_in_words(body: &DiagnosisJson) -> Vec<String> {
+pub(crate) fn hypothesis_in_words(body: &DiagnosisJson) -> Vec<String> {
     let Some(said) = &body.hypothesis else { return Vec::new() };
     let mut lines = Vec::new();
     match (&said.winding, said.reversed) {
@@ -64,7 +64,7 @@ pub fn hypothesis_in_words(body: &DiagnosisJson) -> Vec<String> {
 }
 
 /// Stated numbers that the records contradict: a line each, with the old and the new value.
-pub fn refitted_in_words(body: &DiagnosisJson) -> Vec<String> {
+pub(crate) fn refitted_in_words(body: &DiagnosisJson) -> Vec<String> {
     let line = |r: &RefittedJson| {
         let error = r.standard_error.map_or_else(String::new, |e| format!(" ± {e:.2}"));
         let unit = if r.unit == "1" { String::new() } else { format!(" {}", r.unit) };
@@ -77,7 +77,7 @@ pub fn refitted_in_words(body: &DiagnosisJson) -> Vec<String> {
 }
 
 /// The sets that hold the posterior mass, a line each.
-pub fn posterior_in_words(body: &DiagnosisJson) -> Vec<String> {
+pub(crate) fn posterior_in_words(body: &DiagnosisJson) -> Vec<String> {
     let shown = body.posterior.iter().filter(|s| s.probability > 0.005);
     shown
         .map(|s| {
@@ -88,7 +88,7 @@ pub fn posterior_in_words(body: &DiagnosisJson) -> Vec<String> {
 }
 
 /// With its error, and whether a bound holds it.
-pub fn value_in_words(parameter: &ParameterJson) -> String {
+pub(crate) fn value_in_words(parameter: &ParameterJson) -> String {
     let mut text = format!("{:.5e}", parameter.value);
     if let Some(error) = parameter.standard_error {
         text += &format!(" ± {error:.1e}");
@@ -103,7 +103,7 @@ pub fn value_in_words(parameter: &ParameterJson) -> String {
 }
 
 /// What happens in the coil and what to do about it, an effect a line: those that were accepted and what does as well.
-pub fn explanations(found: &[FindingJson]) -> Vec<(&str, String)> {
+pub(crate) fn explanations(found: &[FindingJson]) -> Vec<(&str, String)> {
     let mut said: Vec<(&str, String)> = Vec::new();
     for effect in found {
         let own = (effect.kind.as_str(), effect.happens.as_str(), effect.remedy.as_str());
@@ -119,7 +119,7 @@ pub fn explanations(found: &[FindingJson]) -> Vec<(&str, String)> {
 }
 
 /// What is left over, a line a statement; none where everything is explained.
-pub fn rest_in_words(body: &DiagnosisJson) -> Vec<String> {
+pub(crate) fn rest_in_words(body: &DiagnosisJson) -> Vec<String> {
     let Some(rest) = &body.unexplained else { return Vec::new() };
     let mut first = format!("left over: {:.4} °/h beyond the noise", rest.excess_deg_per_h);
     if let Some(strongest) = rest.correlations.first() {
@@ -137,7 +137,7 @@ pub fn rest_in_words(body: &DiagnosisJson) -> Vec<String> {
 }
 
 /// A record's residual before and after the accepted effects.
-pub fn before_and_after_chart(title: &str, rows: &[DiagnosisRow], noise_deg_per_h: f64) -> Chart {
+pub(crate) fn before_and_after_chart(title: &str, rows: &[DiagnosisRow], noise_deg_per_h: f64) -> Chart {
     let points = |value: fn(&DiagnosisRow) -> f64| -> Vec<(f64, f64)> {
         rows.iter().map(|row| (min_from_s(row.time_s), value(row))).collect()
     };
@@ -152,7 +152,7 @@ pub fn before_and_after_chart(title: &str, rows: &[DiagnosisRow], noise_deg_per_
 }
 
 /// Where the residuals of the `number`-th record go, counted from 1 over fitted records and hold-outs.
-pub fn before_and_after_name(number: usize) -> String {
+pub(crate) fn before_and_after_name(number: usize) -> String {
     format!("before-after-{number}.svg")
 }
 

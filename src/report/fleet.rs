@@ -11,7 +11,7 @@ use crate::io::json::fleet::{FleetEffectJson, FleetJson, GyroValueJson, MeasureJ
 const MOST_DRAWN: usize = 60;
 
 /// The whole page.
-pub fn fleet_page(name: &str, fleet: &FleetJson, gyros: &[GyroJson]) -> String {
+pub(crate) fn fleet_page(name: &str, fleet: &FleetJson, gyros: &[GyroJson]) -> String {
     let (common, others): (Vec<&String>, Vec<&String>) =
         fleet.sentences.iter().partition(|s| s.starts_with("common: "));
     let failed: Vec<&GyroJson> = gyros.iter().filter(|gyro| gyro.failure.is_some()).collect();

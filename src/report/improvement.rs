@@ -14,7 +14,7 @@ use crate::units::min_from_s;
 const MOST_POINTS: usize = 1000;
 
 /// One page that opens offline; the folders beside it hold the steps' own pages.
-pub fn improvement_page(body: &ImproveJson, rows: &[PredictedRow]) -> String {
+pub(crate) fn improvement_page(body: &ImproveJson, rows: &[PredictedRow]) -> String {
     let words = |value: &Value| value.as_str().unwrap_or_default().to_owned();
     let list = |value: &Value| value.as_array().cloned().unwrap_or_default();
     let content = html! {

@@ -7,7 +7,7 @@ use crate::io::json::diagnosis::DiagnosisJson;
 const SAME_FLOOR: f64 = 0.08;
 
 /// Lying bars, a step below the other: the error on fitted records and on the hold-out, with the noise floor.
-pub fn ladder_chart(body: &DiagnosisJson) -> Chart {
+pub(crate) fn ladder_chart(body: &DiagnosisJson) -> Chart {
     let steps = body.steps();
     let names = steps.iter().enumerate().map(|(i, added)| match i {
         0 => "as declared".to_owned(),

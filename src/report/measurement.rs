@@ -9,7 +9,7 @@ use crate::io::json::inputs::InputsJson;
 use crate::io::write::measurement_folder::Measurements;
 
 /// One page that opens offline.
-pub fn measurement_page(found: &Measurements) -> String {
+pub(crate) fn measurement_page(found: &Measurements) -> String {
     let name = found.comparison.as_ref().map(|(c, _)| format!("{} with {}", c.model, c.pattern));
     let name = name.or_else(|| found.diagnosis.as_ref().map(|(d, _)| d.model.clone()));
     let title = match name {

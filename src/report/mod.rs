@@ -1,23 +1,23 @@
 //! What a reader sees: charts, drawings and pages.
 
-pub mod allan;
-pub mod built_coils;
-pub mod campaign;
-pub mod comparison;
-pub mod compensation;
+pub(crate) mod allan;
+pub(crate) mod built_coils;
+pub(crate) mod campaign;
+pub(crate) mod comparison;
+pub(crate) mod compensation;
 pub mod cross_section;
-pub mod diagnosis;
-pub mod explorer;
-pub mod fleet;
-pub mod improvement;
-pub mod ladder;
-pub mod measurement;
-pub mod noise;
+pub(crate) mod diagnosis;
+pub(crate) mod explorer;
+pub(crate) mod fleet;
+pub(crate) mod improvement;
+pub(crate) mod ladder;
+pub(crate) mod measurement;
+pub(crate) mod noise;
 pub mod page;
 pub mod plot;
-pub mod proposal;
-pub mod search_run;
-pub mod temperatures;
+pub(crate) mod proposal;
+pub(crate) mod search_run;
+pub(crate) mod temperatures;
 pub mod thesis2021;
 pub mod traveller;
 mod words;

@@ -4,7 +4,7 @@ use super::plot::{Axis, Chart, Series};
 use crate::io::json::diagnosis::{DiagnosisJson, NoiseJson};
 
 /// Lying bars: what the rate of each record consists of beside the coil, and how much the air would leave unseen otherwise.
-pub fn noise_chart(body: &DiagnosisJson) -> Chart {
+pub(crate) fn noise_chart(body: &DiagnosisJson) -> Chart {
     let mut names: Vec<String> = ["white noise", "wander", "unresolved air", "model error"].map(str::to_owned).to_vec();
     let changes: Vec<String> =
         body.noise.first().map(|n| n.remedies.iter().map(|r| r.change.clone()).collect()).unwrap_or_default();
@@ -65,7 +65,7 @@ fn limit(n: &NoiseJson) -> Limit {
 }
 
 /// White noise, wander, unresolved air and model error of each record, what limits it most and what would help.
-pub fn noise_in_words(body: &DiagnosisJson) -> Vec<String> {
+pub(crate) fn noise_in_words(body: &DiagnosisJson) -> Vec<String> {
     let line = |n: &NoiseJson| {
         let own = limit(n);
         let best = n.remedies.first().filter(|r| r.unresolved_air_deg_per_h < n.unresolved_air_deg_per_h);

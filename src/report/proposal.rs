@@ -15,7 +15,7 @@ fn parameter_in_words(key: &str, parameter: &TermParameterJson) -> String {
 }
 
 /// A proposal, a line a statement.
-pub fn proposal_in_words(proposal: &ProposalJson) -> Vec<String> {
+pub(crate) fn proposal_in_words(proposal: &ProposalJson) -> Vec<String> {
     let mut lines = vec![format!(
         "proposed: rate error = {} [°/h], {:.1} % of the posterior",
         proposal.formula,
@@ -43,7 +43,7 @@ pub fn proposal_in_words(proposal: &ProposalJson) -> Vec<String> {
 const ALTERNATIVES_SHOWN: usize = 6;
 
 /// What is left against a term's variable: points, the fitted curve, and its band of two standard errors.
-pub fn term_chart(term: &TermJson) -> Option<Chart> {
+pub(crate) fn term_chart(term: &TermJson) -> Option<Chart> {
     let first = term.shown.first()?;
     let amplitude = term.parameters.get("a");
     let share = amplitude.and_then(|a| Some(2.0 * a.standard_error? / a.value.abs())).unwrap_or(0.0);

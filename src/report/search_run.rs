@@ -36,7 +36,7 @@ pub enum ReportError {
 ///
 /// # Errors
 /// A summary that does not fit its model.
-pub fn search_page(run: &Run, explorer: Option<&str>) -> Result<String, ReportError> {
+pub(crate) fn search_page(run: &Run, explorer: Option<&str>) -> Result<String, ReportError> {
     let summary = &run.summary;
     let best = Pattern::new(summary.best.segments.clone())?;
     let qua = summary.baselines.iter().find(|p| p.name == "qua");

@@ -8,14 +8,14 @@ use crate::units::min_from_s;
 const LINES: usize = 6;
 
 /// The temperature of some layers, and of the ambient.
-pub fn temperature_chart(body: &TemperaturesJson) -> Chart {
+pub(crate) fn temperature_chart(body: &TemperaturesJson) -> Chart {
     let ambient = body.times_s.iter().zip(&body.ambient_c).map(|(t, v)| (min_from_s(*t), *v)).collect();
     layers(body, &body.temperatures_c, "Layer temperatures", "temperature [°C]")
         .with(Series::dashed("ambient or drive", ambient))
 }
 
 /// The rate of some layers.
-pub fn rate_chart(body: &TemperaturesJson) -> Chart {
+pub(crate) fn rate_chart(body: &TemperaturesJson) -> Chart {
     layers(body, &body.rates_c_per_h, "Rates of the layers' temperatures", "rate [°C/h]")
 }
 

@@ -8,33 +8,33 @@ use crate::reproduce::thesis2021::{BAND_DEG_PER_S, LINES, Reproduction, TITLE};
 
 #[derive(Debug, Serialize)]
 pub struct ReproductionJson {
-    pub publication: &'static str,
-    pub record: &'static str,
-    pub comparisons: Vec<ComparisonJson>,
-    pub errata: Vec<ErratumJson>,
-    pub files: Vec<String>,
+    pub(crate) publication: &'static str,
+    pub(crate) record: &'static str,
+    pub(crate) comparisons: Vec<ComparisonJson>,
+    pub(crate) errata: Vec<ErratumJson>,
+    pub(crate) files: Vec<String>,
 }
 
 #[derive(Debug, Serialize)]
-pub struct ComparisonJson {
-    pub place: &'static str,
-    pub what: &'static str,
-    pub unit: &'static str,
+pub(crate) struct ComparisonJson {
+    pub(crate) place: &'static str,
+    pub(crate) what: &'static str,
+    pub(crate) unit: &'static str,
     /// Null where the chapter gives an equation without a number.
-    pub published: Option<f64>,
-    pub computed: f64,
-    pub explanation: &'static str,
+    pub(crate) published: Option<f64>,
+    pub(crate) computed: f64,
+    pub(crate) explanation: &'static str,
 }
 
 #[derive(Debug, Serialize)]
-pub struct ErratumJson {
-    pub place: &'static str,
-    pub printed: &'static str,
-    pub used: &'static str,
+pub(crate) struct ErratumJson {
+    pub(crate) place: &'static str,
+    pub(crate) printed: &'static str,
+    pub(crate) used: &'static str,
 }
 
 /// What the numbers are of.
-pub const RECORD: &str = "simulated from the chapter's stated numbers: it prints no record";
+pub(crate) const RECORD: &str = "simulated from the chapter's stated numbers: it prints no record";
 
 impl ReproductionJson {
     pub fn new(reproduction: &Reproduction, files: Vec<String>) -> Self {
@@ -51,10 +51,11 @@ impl ReproductionJson {
     }
 }
 
-pub const TABLE_HEAD: [&str; 6] = ["place", "what", "published", "computed", "unit", "why they differ, or what it is"];
+pub(crate) const TABLE_HEAD: [&str; 6] =
+    ["place", "what", "published", "computed", "unit", "why they differ, or what it is"];
 
 /// Published beside computed.
-pub fn table_rows(reproduction: &Reproduction) -> Vec<Vec<String>> {
+pub(crate) fn table_rows(reproduction: &Reproduction) -> Vec<Vec<String>> {
     let row = |c: &crate::reproduce::thesis2021::Comparison| {
         let published = c.published.map_or_else(|| "–".to_owned(), |value| format!("{value}"));
         [c.place, c.what, &published, &digits(c.computed), c.unit, c.explanation].map(str::to_owned).to_vec()

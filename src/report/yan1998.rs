@@ -12,35 +12,35 @@ use crate::units::{c_per_h_from_k_per_s, deg_per_h_from_rad_per_s, min_from_s, m
 /// A file of the reproduction, by its name in the folder of results.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ReproductionFile {
-    pub name: String,
-    pub contents: String,
+    pub(crate) name: String,
+    pub(crate) contents: String,
 }
 
 #[derive(Debug, Serialize)]
 pub struct ReproductionJson {
-    pub publication: &'static str,
-    pub table_2: Vec<PeakJson>,
-    pub discrepancies: Vec<String>,
-    pub errata: Vec<ErratumJson>,
-    pub files: Vec<String>,
+    pub(crate) publication: &'static str,
+    pub(crate) table_2: Vec<PeakJson>,
+    pub(crate) discrepancies: Vec<String>,
+    pub(crate) errata: Vec<ErratumJson>,
+    pub(crate) files: Vec<String>,
 }
 
 #[derive(Debug, Serialize)]
-pub struct PeakJson {
-    pub length_m: f64,
-    pub winding: &'static str,
-    pub published_deg_per_h: f64,
-    pub computed_deg_per_h: f64,
-    pub computed_at_s: f64,
-    pub hard_bound_deg_per_h: f64,
-    pub published_is_possible: bool,
+pub(crate) struct PeakJson {
+    pub(crate) length_m: f64,
+    pub(crate) winding: &'static str,
+    pub(crate) published_deg_per_h: f64,
+    pub(crate) computed_deg_per_h: f64,
+    pub(crate) computed_at_s: f64,
+    pub(crate) hard_bound_deg_per_h: f64,
+    pub(crate) published_is_possible: bool,
 }
 
 #[derive(Debug, Serialize)]
-pub struct ErratumJson {
-    pub place: &'static str,
-    pub printed: &'static str,
-    pub used: &'static str,
+pub(crate) struct ErratumJson {
+    pub(crate) place: &'static str,
+    pub(crate) printed: &'static str,
+    pub(crate) used: &'static str,
 }
 
 impl ReproductionJson {
@@ -70,10 +70,10 @@ fn rounded(published_deg_per_h: f64) -> f64 {
 }
 
 /// The rows of Table 2: length, winding, printed, computed, when, bound, verdict.
-pub const TABLE_HEAD: [&str; 7] =
+pub(crate) const TABLE_HEAD: [&str; 7] =
     ["length m", "winding", "published °/h", "computed °/h", "at s", "hard bound °/h", "published value"];
 
-pub fn table_rows(reproduction: &Reproduction) -> Vec<Vec<String>> {
+pub(crate) fn table_rows(reproduction: &Reproduction) -> Vec<Vec<String>> {
     let row = |peak: &crate::reproduce::yan1998::Peak| {
         vec![
             peak.length_m.to_string(),
@@ -89,7 +89,7 @@ pub fn table_rows(reproduction: &Reproduction) -> Vec<Vec<String>> {
 }
 
 /// One sentence.
-pub fn discrepancy_words(discrepancy: &Discrepancy) -> String {
+pub(crate) fn discrepancy_words(discrepancy: &Discrepancy) -> String {
     let upper = |winding: Classic| winding.key().to_uppercase();
     match *discrepancy {
         Discrepancy::BeyondHardBound { winding, length_m, published_rad_per_s, bound_rad_per_s } => format!(

@@ -29,15 +29,15 @@ use crate::numeric::statistics::{line, mean, rms, standard_deviation};
 use crate::record::{Record, RecordError};
 use crate::units::{celsius_from_kelvin, kelvin_from_celsius, rad_per_s_from_deg_per_h, rad_per_s_from_deg_per_s};
 
-pub const TITLE: &str = "Master's thesis on a line-of-sight stabilisation with a fibre-optic gyro (2021), chapter 3: \
+pub(crate) const TITLE: &str = "Master's thesis on a line-of-sight stabilisation with a fibre-optic gyro (2021), chapter 3: \
                          temperature drift of the gyro and its compensation";
 
 /// Slope \[bit/°C] and value at 0 °C [bit\] of Eq. (3-11), and where each line ends [°C]; 100 outputs a second.
-pub const LINES: [(f64, f64, f64); 3] =
+pub(crate) const LINES: [(f64, f64, f64); 3] =
     [(0.3386, -7.3229, 23.6), (0.1045, -2.0033, 30.0), (0.4082, -11.492, f64::INFINITY)];
 /// What is left after compensation \[bit\], and the same in °/s: the only place where the two units meet.
-pub const BAND_BIT: f64 = 2.5;
-pub const BAND_DEG_PER_S: f64 = 0.0076;
+pub(crate) const BAND_BIT: f64 = 2.5;
+pub(crate) const BAND_DEG_PER_S: f64 = 0.0076;
 const RANGE_C: (f64, f64) = (14.0, 42.0);
 const ROWS: usize = 18_000;
 /// Of one row [bit]: with it 3600 filtered means stay within the printed band.
@@ -55,24 +55,24 @@ const STRETCH: usize = 2048;
 
 /// A printed number beside the computed one.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Comparison {
-    pub place: &'static str,
-    pub what: &'static str,
-    pub unit: &'static str,
+pub(crate) struct Comparison {
+    pub(crate) place: &'static str,
+    pub(crate) what: &'static str,
+    pub(crate) unit: &'static str,
     /// None where the chapter gives the equation, but no number.
-    pub published: Option<f64>,
-    pub computed: f64,
-    pub explanation: &'static str,
+    pub(crate) published: Option<f64>,
+    pub(crate) computed: f64,
+    pub(crate) explanation: &'static str,
 }
 
 /// Everything that the chapter shows, computed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reproduction {
-    pub comparisons: Vec<Comparison>,
+    pub(crate) comparisons: Vec<Comparison>,
     /// Of the filtered means: time, temperature [°C], rate before and after [°/s].
-    pub rows: Vec<[f64; 4]>,
-    pub spectrum: Vec<Density>,
-    pub errata: &'static [(&'static str, &'static str, &'static str)],
+    pub(crate) rows: Vec<[f64; 4]>,
+    pub(crate) spectrum: Vec<Density>,
+    pub(crate) errata: &'static [(&'static str, &'static str, &'static str)],
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
@@ -86,7 +86,7 @@ pub enum ThesisError {
 }
 
 /// Place, what is printed, what is used.
-pub const ERRATA: &[(&str, &str, &str)] = &[
+pub(crate) const ERRATA: &[(&str, &str, &str)] = &[
     (
         "break points, text before Eq. (3-11)",
         "the three lines are said to meet at 23.6 and 30 °C; those that are printed meet at 22.72 and 31.24 °C",

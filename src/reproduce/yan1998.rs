@@ -22,17 +22,17 @@ use crate::units::{
     REFERENCE_TEMPERATURE_K, k_per_s_from_c_per_h, m_from_mm, m_from_nm, m_from_um, rad_per_s_from_deg_per_h,
 };
 
-pub const TITLE: &str = "Yan, Lan, Jian, \"Investigation of the Temperature Compensated Method for Fiber Optic Gyros\", \
+pub(crate) const TITLE: &str = "Yan, Lan, Jian, \"Investigation of the Temperature Compensated Method for Fiber Optic Gyros\", \
                          Acta Optica Sinica (received 1998-04-06)";
 
-pub const LENGTHS_M: [f64; 2] = [200.0, 800.0];
-pub const LAYERS: usize = 12;
+pub(crate) const LENGTHS_M: [f64; 2] = [200.0, 800.0];
+pub(crate) const LAYERS: usize = 12;
 /// k0, as the paper states it.
 const RAMP_C_PER_H: f64 = 10.0;
 /// t0.
-pub const RAMP_S: f64 = 1500.0;
+pub(crate) const RAMP_S: f64 = 1500.0;
 /// As long as the profiles of the examples; the paper does not say where its Fig. 3 ends.
-pub const DURATION_S: f64 = 6000.0;
+pub(crate) const DURATION_S: f64 = 6000.0;
 /// From the middle of Table 1's r, ρ and b; peaks do not depend on it.
 const DIFFUSIVITY_M2_PER_S: f64 = 2.7e-7;
 
@@ -40,7 +40,7 @@ const DIFFUSIVITY_M2_PER_S: f64 = 2.7e-7;
 const PUBLISHED_DEG_PER_H: [[f64; 4]; 2] = [[19.380, 14.899, 5.144, 5.136], [40.660, 30.069, 20.575, 20.542]];
 
 /// The windings of Table 2, with SYM as Eq. (14) has it and as the text describes it.
-pub const WINDINGS: [Classic; 5] = [Classic::Zyl, Classic::Sym, Classic::SymText, Classic::Dip, Classic::Qua];
+pub(crate) const WINDINGS: [Classic; 5] = [Classic::Zyl, Classic::Sym, Classic::SymText, Classic::Dip, Classic::Qua];
 
 /// The column of Table 2 that a winding is to be compared with.
 fn published_column(winding: Classic) -> Option<usize> {
@@ -55,18 +55,18 @@ fn published_column(winding: Classic) -> Option<usize> {
 
 /// One field of Table 2.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Peak {
-    pub length_m: f64,
-    pub winding: Classic,
-    pub published_rad_per_s: f64,
-    pub computed_rad_per_s: f64,
+pub(crate) struct Peak {
+    pub(crate) length_m: f64,
+    pub(crate) winding: Classic,
+    pub(crate) published_rad_per_s: f64,
+    pub(crate) computed_rad_per_s: f64,
     /// When the computed error is largest; 0 is the right limit at the ramp's start.
-    pub computed_at_s: f64,
-    pub hard_bound_rad_per_s: f64,
+    pub(crate) computed_at_s: f64,
+    pub(crate) hard_bound_rad_per_s: f64,
 }
 
 impl Peak {
-    pub fn is_possible(&self) -> bool {
+    pub(crate) fn is_possible(&self) -> bool {
         self.published_rad_per_s <= self.hard_bound_rad_per_s
     }
 }
@@ -75,37 +75,37 @@ impl Peak {
 #[derive(Debug)]
 pub struct Reproduction {
     /// Length by length, in the order of [`WINDINGS`].
-    pub peaks: Vec<Peak>,
-    pub discrepancies: Vec<Discrepancy>,
+    pub(crate) peaks: Vec<Peak>,
+    pub(crate) discrepancies: Vec<Discrepancy>,
     /// Fig. 2: Ṫ in every layer; it does not depend on the length.
-    pub layer_rates: LayerRates,
+    pub(crate) layer_rates: LayerRates,
     /// Fig. 3 (a) and (b).
-    pub errors: Vec<ErrorOverTime>,
+    pub(crate) errors: Vec<ErrorOverTime>,
 }
 
 /// Temperature rate by depth at a number of times.
 #[derive(Debug, Clone, PartialEq)]
-pub struct LayerRates {
+pub(crate) struct LayerRates {
     /// Of every layer, the outermost first, as the paper counts them.
-    pub depths_m: Vec<f64>,
-    pub times_s: Vec<f64>,
+    pub(crate) depths_m: Vec<f64>,
+    pub(crate) times_s: Vec<f64>,
     /// One row a time, in the order of `depths_m`.
-    pub rates_k_per_s: Vec<Vec<f64>>,
+    pub(crate) rates_k_per_s: Vec<Vec<f64>>,
 }
 
 /// The rate error of the windings of one coil.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ErrorOverTime {
-    pub length_m: f64,
+pub(crate) struct ErrorOverTime {
+    pub(crate) length_m: f64,
     /// Both sides of the ramp's end are in, so that the jump there is seen.
-    pub times_s: Vec<f64>,
+    pub(crate) times_s: Vec<f64>,
     /// One series a winding, in the order of [`WINDINGS`].
-    pub rates_rad_per_s: Vec<Vec<f64>>,
+    pub(crate) rates_rad_per_s: Vec<Vec<f64>>,
 }
 
 /// What the printed table and the paper's equations disagree (or agree) about.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Discrepancy {
+pub(crate) enum Discrepancy {
     /// A printed value that no coil of this size can have.
     BeyondHardBound { winding: Classic, length_m: f64, published_rad_per_s: f64, bound_rad_per_s: f64 },
     /// The printed ratio of the two lengths, where the equations give exactly that of the lengths.
@@ -122,21 +122,21 @@ pub enum Discrepancy {
 
 /// The computed SYM/ZYL for the two windings that the paper calls SYM.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SymRatio {
-    pub eq14: f64,
-    pub text: f64,
+pub(crate) struct SymRatio {
+    pub(crate) eq14: f64,
+    pub(crate) text: f64,
 }
 
 /// An equation that cannot stand as printed, and what the program computes instead.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Erratum {
-    pub place: &'static str,
-    pub printed: &'static str,
-    pub used: &'static str,
+pub(crate) struct Erratum {
+    pub(crate) place: &'static str,
+    pub(crate) printed: &'static str,
+    pub(crate) used: &'static str,
 }
 
 /// Found by working the paper's equations through.
-pub const ERRATA: &[Erratum] = &[
+pub(crate) const ERRATA: &[Erratum] = &[
     Erratum {
         place: "Eqs. (4), (13)–(16)",
         printed: "ΔT, a temperature",
@@ -188,7 +188,7 @@ pub const ERRATA: &[Erratum] = &[
 ///
 /// # Errors
 /// A length that is not positive.
-pub fn model(length_m: f64) -> Result<CoilModel, CoilError> {
+pub(crate) fn model(length_m: f64) -> Result<CoilModel, CoilError> {
     model_of_layers(length_m, LAYERS)
 }
 

@@ -12,7 +12,7 @@
 //!
 //! Leaves out: the length of the crossovers themselves, the helix' slant, and fibre beyond the pack.
 
-pub mod production;
+pub(crate) mod production;
 mod reels;
 
 use crate::coil::Coil;
@@ -20,49 +20,49 @@ use crate::pattern::windability::WindingGraph;
 use crate::pattern::{Half, Pattern};
 use crate::rate::{Laid, RateError};
 use crate::thermal::Flange;
-pub use reels::{Reel, ReelName};
+pub(crate) use reels::{Reel, ReelName};
 use reels::{Reels, Start};
 
 /// One layer's winding.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
     /// Counted from 1, as layers and segments are.
-    pub step: usize,
-    pub layer: usize,
-    pub half: Half,
-    pub segment: usize,
-    pub supply_reel: ReelName,
+    pub(crate) step: usize,
+    pub(crate) layer: usize,
+    pub(crate) half: Half,
+    pub(crate) segment: usize,
+    pub(crate) supply_reel: ReelName,
     /// The flange at which the layer starts; it ends at the other one.
-    pub from_flange: Flange,
+    pub(crate) from_flange: Flange,
     /// How the spool turns, seen from the first flange, so that all fibre circulates the same way along arclength.
-    pub rotation: Rotation,
-    pub turns: f64,
+    pub(crate) rotation: Rotation,
+    pub(crate) turns: f64,
     /// Turns that would fit between the first flange and where the layer's turns begin; 0 but for a layer with turns left off.
-    pub free_turns: f64,
+    pub(crate) free_turns: f64,
     /// Turns left free between the flange at which the layer starts and its first turn: above 0 only where the fibre's own end,
     /// with turns left off, is wound first.
-    pub start_gap_turns: f64,
+    pub(crate) start_gap_turns: f64,
     /// Arclength from end A: the segment's low end, whichever end is wound first.
-    pub fibre_from_m: f64,
-    pub fibre_to_m: f64,
-    pub length_m: f64,
-    pub radius_m: f64,
+    pub(crate) fibre_from_m: f64,
+    pub(crate) fibre_to_m: f64,
+    pub(crate) length_m: f64,
+    pub(crate) radius_m: f64,
     /// Largest climb of the crossovers that this step completes \[layers\].
-    pub climb: usize,
+    pub(crate) climb: usize,
     /// The crossovers that this step completes, the one at its start first.
-    pub crossovers: Vec<Crossing>,
+    pub(crate) crossovers: Vec<Crossing>,
     /// Drawn from the supply reel so far, this step included.
-    pub cumulative_m: f64,
+    pub(crate) cumulative_m: f64,
     /// Wound of half A less wound of half B, this step included.
-    pub balance_m: f64,
+    pub(crate) balance_m: f64,
     /// Reels with fibre on them after this step, and how many of them are captive.
-    pub reels_left: usize,
-    pub captive_left: usize,
+    pub(crate) reels_left: usize,
+    pub(crate) captive_left: usize,
 }
 
 /// Seen from the first flange.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Rotation {
+pub(crate) enum Rotation {
     /// A layer that is wound from its low end.
     Clockwise,
     /// A layer that is wound from its high end.
@@ -71,25 +71,12 @@ pub enum Rotation {
 
 /// The fibre passing from a layer that is wound to this one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Crossing {
-    pub flange: Flange,
+pub(crate) struct Crossing {
+    pub(crate) flange: Flange,
     /// Counted from 1.
-    pub from_layer: usize,
+    pub(crate) from_layer: usize,
     /// In layers, inwards or outwards alike.
-    pub climb: usize,
-}
-
-impl Step {
-    pub fn to_flange(&self) -> Flange {
-        other(self.from_flange)
-    }
-}
-
-fn other(flange: Flange) -> Flange {
-    match flange {
-        Flange::First => Flange::Second,
-        Flange::Second => Flange::First,
-    }
+    pub(crate) climb: usize,
 }
 
 /// A coil's winding, step by step.
@@ -183,7 +170,7 @@ impl Schedule {
         })
     }
 
-    pub fn pattern(&self) -> &Pattern {
+    pub(crate) fn pattern(&self) -> &Pattern {
         &self.pattern
     }
 
@@ -192,17 +179,17 @@ impl Schedule {
     }
 
     /// In the order in which they come into use.
-    pub fn reels(&self) -> &[Reel] {
+    pub(crate) fn reels(&self) -> &[Reel] {
         &self.reels
     }
 
     /// L.
-    pub fn length_m(&self) -> f64 {
+    pub(crate) fn length_m(&self) -> f64 {
         self.length_m
     }
 
     /// The layer (counted from 1) in which the fibre's middle lies; the inner one where it lies between two.
-    pub fn midpoint_layer(&self) -> usize {
+    pub(crate) fn midpoint_layer(&self) -> usize {
         let middle_m = 0.5 * self.length_m;
         let rounding_m = 1e-10 * self.length_m;
         let holds = |s: &&Step| s.fibre_from_m <= middle_m + rounding_m && s.fibre_to_m >= middle_m - rounding_m;
@@ -210,13 +197,13 @@ impl Schedule {
     }
 
     /// The place of the fibre that is fixed at the first flange before layer 1: the midpoint, for most windings.
-    pub fn start_mark_m(&self) -> f64 {
+    pub(crate) fn start_mark_m(&self) -> f64 {
         self.start_mark_m
     }
 
     /// Segments of half A less those of half B: this much must be trimmed from end A (or, below zero, end B) for the
     /// joint of the halves to be the middle of the fibre. Nothing where the pattern itself says how many turns its ends have.
-    pub fn expected_trim_m(&self) -> f64 {
+    pub(crate) fn expected_trim_m(&self) -> f64 {
         if !self.pattern.end_turns().is_none() {
             return 0.0;
         }
@@ -301,8 +288,8 @@ mod tests {
             let schedule = Schedule::new(&coil, &pattern).unwrap();
             let end_at = |segment: usize, high: bool| {
                 let step = &schedule.steps()[pattern.layers_by_segment()[segment - 1]];
-                let low = if pattern.axial_direction(step.layer - 1) > 0.0 { Flange::First } else { Flange::Second };
-                if high { other(low) } else { low }
+                let rises = pattern.axial_direction(step.layer - 1) > 0.0;
+                if high == rises { Flange::Second } else { Flange::First }
             };
             for segment in 1..6 {
                 assert_eq!(end_at(segment, true), end_at(segment + 1, false), "{pattern}");

@@ -3,22 +3,22 @@
 /// The shop's settings for one coil.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Production {
-    pub part_number: String,
-    pub revision: String,
+    pub(crate) part_number: String,
+    pub(crate) revision: String,
     /// The spool's drawing number or name.
-    pub spool: String,
-    pub tension_n: f64,
+    pub(crate) spool: String,
+    pub(crate) tension_n: f64,
     /// The tension falls by this share of the first layer's from layer to layer.
-    pub tension_taper_per_layer: f64,
+    pub(crate) tension_taper_per_layer: f64,
     /// How far the tension may be from its set-point, as a share of it.
-    pub tension_limit: f64,
+    pub(crate) tension_limit: f64,
     /// Surplus on each reel, for leads and splices.
-    pub allowance_m: f64,
-    pub adhesive: String,
+    pub(crate) allowance_m: f64,
+    pub(crate) adhesive: String,
     /// Adhesive is applied after so many layers; 0: only after the last.
-    pub potting_every_layers: usize,
-    pub cure: String,
-    pub winding_speed_turns_per_min: f64,
+    pub(crate) potting_every_layers: usize,
+    pub(crate) cure: String,
+    pub(crate) winding_speed_turns_per_min: f64,
 }
 
 impl Default for Production {
@@ -42,18 +42,18 @@ impl Default for Production {
 
 impl Production {
     /// Set-point for a layer, counted from 1.
-    pub fn tension_n_at(&self, layer: usize) -> f64 {
+    pub(crate) fn tension_n_at(&self, layer: usize) -> f64 {
         self.tension_n * (1.0 - self.tension_taper_per_layer * (layer.max(1) - 1) as f64).max(0.0)
     }
 
     /// The least and the largest tension at a layer, counted from 1.
-    pub fn tension_limits_n_at(&self, layer: usize) -> [f64; 2] {
+    pub(crate) fn tension_limits_n_at(&self, layer: usize) -> [f64; 2] {
         let set_n = self.tension_n_at(layer);
         [set_n * (1.0 - self.tension_limit), set_n * (1.0 + self.tension_limit)]
     }
 
     /// Whether adhesive is applied after a layer, counted from 1, of so many.
-    pub fn pots_after(&self, layer: usize, layers: usize) -> bool {
+    pub(crate) fn pots_after(&self, layer: usize, layers: usize) -> bool {
         layer == layers || (self.potting_every_layers > 0 && layer.is_multiple_of(self.potting_every_layers))
     }
 }

@@ -2,7 +2,7 @@
 
 /// A supply reel's name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum ReelName {
+pub(crate) enum ReelName {
     /// Holds the run with end A.
     A,
     /// Holds the run with end B.
@@ -23,15 +23,15 @@ impl std::fmt::Display for ReelName {
 
 /// A supply reel and the fibre that it holds when it comes into use.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Reel {
-    pub name: ReelName,
-    pub captive: bool,
+pub(crate) struct Reel {
+    pub(crate) name: ReelName,
+    pub(crate) captive: bool,
     /// Loaded before this step; counted from 1.
-    pub prepared_before_step: usize,
+    pub(crate) prepared_before_step: usize,
     /// The reel from which its fibre was spooled over; none for the fibre's first reels.
-    pub taken_from: Option<ReelName>,
-    pub from_m: f64,
-    pub to_m: f64,
+    pub(crate) taken_from: Option<ReelName>,
+    pub(crate) from_m: f64,
+    pub(crate) to_m: f64,
 }
 
 /// With which end a segment begins, by arclength.

@@ -37,7 +37,7 @@ impl Ended {
 
 /// What came upon the best pattern.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FoundBy {
+pub(crate) enum FoundBy {
     Classic,
     Annealing,
     /// A search for another objective.
@@ -48,7 +48,7 @@ pub enum FoundBy {
 
 impl FoundBy {
     /// As written in results.
-    pub fn key(self) -> &'static str {
+    pub(crate) fn key(self) -> &'static str {
         match self {
             FoundBy::Classic => "classic",
             FoundBy::Annealing => "annealing",
@@ -60,33 +60,33 @@ impl FoundBy {
 
 /// What is proved about the best pattern.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Proof {
-    pub status: Status,
+pub(crate) struct Proof {
+    pub(crate) status: Status,
     /// No pattern of the class is below this; zero where nothing is proved.
-    pub lower_bound_rad_per_s: f64,
+    pub(crate) lower_bound_rad_per_s: f64,
     /// By how much the grid may put the best pattern's rate, and that of any other, off the continuum's.
-    pub grid_margin_rad_per_s: f64,
+    pub(crate) grid_margin_rad_per_s: f64,
     /// The time was over before the proof was.
-    pub was_cut_short: bool,
+    pub(crate) was_cut_short: bool,
 }
 
 impl Proof {
-    pub const NONE: Proof =
+    pub(crate) const NONE: Proof =
         Proof { status: Status::None, lower_bound_rad_per_s: 0.0, grid_margin_rad_per_s: 0.0, was_cut_short: false };
 
-    pub fn of(certificate: &Certificate) -> Self {
+    pub(crate) fn of(certificate: &Certificate) -> Self {
         let Certificate { status, lower_bound_rad_per_s, .. } = *certificate;
         Self { status, lower_bound_rad_per_s, grid_margin_rad_per_s: 0.0, was_cut_short: status != Status::Optimal }
     }
 
     /// With what the grid may be off for any pattern: the lower bound then holds for the continuum.
-    pub fn beside_grid(self, grid_margin_rad_per_s: f64) -> Self {
+    pub(crate) fn beside_grid(self, grid_margin_rad_per_s: f64) -> Self {
         let lower_bound_rad_per_s = (self.lower_bound_rad_per_s - grid_margin_rad_per_s).max(0.0);
         Self { lower_bound_rad_per_s, grid_margin_rad_per_s, ..self }
     }
 
     /// To be said after how good the best pattern is under the objective.
-    pub fn words(&self, objective: Objective) -> String {
+    pub(crate) fn words(&self, objective: Objective) -> String {
         let (what, unit) = (objective.title(), objective.unit());
         match self.status {
             Status::Optimal => format!(" Proved: no pattern of the class has a smaller {what} at any time."),
@@ -101,22 +101,22 @@ impl Proof {
 
 /// A former pattern under the model of this search.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Former {
-    pub judged: Judged,
+pub(crate) struct Former {
+    pub(crate) judged: Judged,
     /// Whether the best pattern of this search is better by more than rounding.
-    pub best_changed: bool,
-    pub statement: String,
+    pub(crate) best_changed: bool,
+    pub(crate) statement: String,
 }
 
 /// What patterns promise where the model is not known for certain.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Outlook {
+pub(crate) struct Outlook {
     /// Models that may be the true one.
-    pub models: usize,
+    pub(crate) models: usize,
     /// By their names; the best first.
-    pub prospects: Vec<(String, Prospect)>,
+    pub(crate) prospects: Vec<(String, Prospect)>,
     /// Of the recommended pattern over the former one, or over QUA where there is none.
-    pub gain: Option<Gain>,
+    pub(crate) gain: Option<Gain>,
 }
 
 /// The answer of `super::run`.
@@ -124,38 +124,38 @@ pub struct Outlook {
 pub struct Answer {
     pub best: Judged,
     /// The classics that fit the layer count.
-    pub baselines: Vec<Judged>,
+    pub(crate) baselines: Vec<Judged>,
     /// QUA's objective over the best pattern's; none where QUA does not fit the layer count or the error is zero.
-    pub improvement_over_qua: Option<f64>,
-    pub statement: String,
+    pub(crate) improvement_over_qua: Option<f64>,
+    pub(crate) statement: String,
     /// None where the temperature has no grid or the search was interrupted.
-    pub grid_check: Option<GridCheck>,
+    pub(crate) grid_check: Option<GridCheck>,
     /// None where no former pattern was given.
-    pub compared_with: Option<Former>,
-    pub proof: Proof,
-    pub found_by: FoundBy,
+    pub(crate) compared_with: Option<Former>,
+    pub(crate) proof: Proof,
+    pub(crate) found_by: FoundBy,
     /// Moves judged in all, by when the best was known, and in this run.
-    pub evaluations: u64,
-    pub evaluations_when_found: u64,
-    pub evaluations_now: u64,
-    pub state: State,
-    pub ended: Ended,
+    pub(crate) evaluations: u64,
+    pub(crate) evaluations_when_found: u64,
+    pub(crate) evaluations_now: u64,
+    pub(crate) state: State,
+    pub(crate) ended: Ended,
     /// None where the search was interrupted.
-    pub validation: Option<Validation>,
-    pub recommendation: Option<Recommendation>,
+    pub(crate) validation: Option<Validation>,
+    pub(crate) recommendation: Option<Recommendation>,
     /// None where the model is known or the search was interrupted.
-    pub outlook: Option<Outlook>,
+    pub(crate) outlook: Option<Outlook>,
     /// What the candidates would cost with the other boundary; none for a half space or an interrupted search.
-    pub boundary: Option<OtherBoundary>,
+    pub(crate) boundary: Option<OtherBoundary>,
     /// None unless worst admissible profiles were to join the searched ones.
-    pub cuts: Option<Cuts>,
+    pub(crate) cuts: Option<Cuts>,
     /// None unless turns at the ends were to be chosen, and where the search was interrupted.
-    pub ends: Option<WithEnds>,
+    pub(crate) ends: Option<WithEnds>,
 }
 
 impl Answer {
     /// Whether the same request ends here on every machine.
-    pub fn is_reproducible(&self) -> bool {
+    pub(crate) fn is_reproducible(&self) -> bool {
         matches!(self.ended, Ended::Rule(_)) && !self.proof.was_cut_short
     }
 }

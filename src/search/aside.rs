@@ -12,15 +12,15 @@ const GRID_CAUTION: f64 = 0.005;
 
 /// A rate on the model's grid and on one twice as fine.
 #[derive(Debug, Clone, PartialEq)]
-pub struct GridChecked {
-    pub name: String,
-    pub rate_rad_per_s: f64,
-    pub finer_rad_per_s: f64,
+pub(crate) struct GridChecked {
+    pub(crate) name: String,
+    pub(crate) rate_rad_per_s: f64,
+    pub(crate) finer_rad_per_s: f64,
 }
 
 impl GridChecked {
     /// By how much the finer grid changes the rate, over the rate.
-    pub fn change(&self) -> f64 {
+    pub(crate) fn change(&self) -> f64 {
         if self.rate_rad_per_s == 0.0 { 0.0 } else { self.finer_rad_per_s / self.rate_rad_per_s - 1.0 }
     }
 }
@@ -28,17 +28,17 @@ impl GridChecked {
 /// The rates of a search's best pattern, first, and of QUA on two grids: a search makes use of whatever a coarse grid
 /// hides, so its best gains most from the grid's error.
 #[derive(Debug, Clone, PartialEq)]
-pub struct GridCheck {
+pub(crate) struct GridCheck {
     /// Whether the rates are guaranteed ones, because the search was for them; the worst over the profiles otherwise.
-    pub is_of_guaranteed: bool,
-    pub cells_per_layer: usize,
-    pub finer_cells_per_layer: usize,
-    pub patterns: Vec<GridChecked>,
+    pub(crate) is_of_guaranteed: bool,
+    pub(crate) cells_per_layer: usize,
+    pub(crate) finer_cells_per_layer: usize,
+    pub(crate) patterns: Vec<GridChecked>,
 }
 
 impl GridCheck {
     /// What to say where the grid matters.
-    pub fn caution(&self) -> Option<String> {
+    pub(crate) fn caution(&self) -> Option<String> {
         let best = self.patterns.first().filter(|best| best.change().abs() > GRID_CAUTION)?;
         Some(format!(
             "Caution: with {} instead of {} cells a layer its {} rate error is {:.4} °/h, {:.1} % {}. \
@@ -56,30 +56,30 @@ impl GridCheck {
 
 /// What the rate error of a pattern adds up to.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PointingError {
+pub(crate) struct PointingError {
     /// The largest over all profiles and times, with its sign.
-    pub worst_rad: f64,
+    pub(crate) worst_rad: f64,
     /// None for models that have no bound over all profiles.
-    pub guaranteed_rad: Option<f64>,
+    pub(crate) guaranteed_rad: Option<f64>,
 }
 
 /// What is worked out once a model for what stands beside rates.
 #[derive(Debug)]
-pub struct Aside {
-    pub margin: GridMargin,
-    pub ramp: Option<EndlessRamp>,
+pub(crate) struct Aside {
+    pub(crate) margin: GridMargin,
+    pub(crate) ramp: Option<EndlessRamp>,
 }
 
 impl Aside {
     /// # Errors
     /// Heat paths that cannot be solved.
-    pub fn new(model: &CoilModel, solved: &SolvedProfiles) -> Result<Self, SearchError> {
+    pub(crate) fn new(model: &CoilModel, solved: &SolvedProfiles) -> Result<Self, SearchError> {
         Ok(Self { margin: GridMargin::new(model, solved)?, ramp: EndlessRamp::new(model)? })
     }
 
     /// # Errors
     /// A pattern of another layer count.
-    pub fn pointing(
+    pub(crate) fn pointing(
         &self,
         model: &CoilModel,
         solved: &SolvedProfiles,

@@ -31,7 +31,7 @@ const REFINING_SHARE: u64 = 2;
 
 impl<'a> Evaluator<'a> {
     /// The same model judged by another objective.
-    pub fn under(&self, objective: Objective) -> Evaluator<'a> {
+    pub(crate) fn under(&self, objective: Objective) -> Evaluator<'a> {
         Evaluator { objective, ..*self }
     }
 
@@ -40,7 +40,7 @@ impl<'a> Evaluator<'a> {
     ///
     /// # Errors
     /// Rates that are not finite.
-    pub fn companions(
+    pub(crate) fn companions(
         &self,
         class: WindabilityClass,
         plan: &Plan,

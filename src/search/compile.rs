@@ -34,7 +34,7 @@ impl Evaluator<'_> {
     ///
     /// # Errors
     /// Rates that are not finite; an objective that the model has not.
-    pub fn search(
+    pub(crate) fn search(
         &self,
         class: WindabilityClass,
         plan: Plan,

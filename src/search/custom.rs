@@ -25,7 +25,7 @@ use super::run::{Halt, Observer};
 use crate::pattern::classic::Classic;
 
 /// Layers that a caller's array or function may have.
-pub const MOST_LAYERS: usize = 400;
+pub(crate) const MOST_LAYERS: usize = 400;
 
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum CustomError {

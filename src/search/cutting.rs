@@ -23,7 +23,7 @@ use crate::profile::{Profile, ProfileSpec};
 use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
 
 /// Sampled and guaranteed agree when they are this close.
-pub const AGREE: f64 = 0.01;
+pub(crate) const AGREE: f64 = 0.01;
 
 /// Short searches, each of which lets the worst profiles of what it found join.
 const SHORT_SEARCHES: usize = 12;
@@ -39,19 +39,19 @@ const SETS: usize = 8;
 
 /// What cutting planes have come to.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Cuts {
+pub(crate) struct Cuts {
     /// Worst admissible profiles that joined the searched ones.
-    pub joined: Vec<Profile>,
+    pub(crate) joined: Vec<Profile>,
     /// The best pattern's worst rate over the searched profiles and those that joined.
-    pub sampled_rad_per_s: f64,
+    pub(crate) sampled_rad_per_s: f64,
     /// Over all admissible profiles, or over those drawn to stand for them.
-    pub worst_rad_per_s: f64,
+    pub(crate) worst_rad_per_s: f64,
     /// Whether the model has a guaranteed worst rate.
-    pub is_guaranteed: bool,
+    pub(crate) is_guaranteed: bool,
 }
 
 impl Cuts {
-    pub fn agree(&self) -> bool {
+    pub(crate) fn agree(&self) -> bool {
         self.worst_rad_per_s <= self.sampled_rad_per_s * (1.0 + AGREE)
     }
 }
@@ -97,7 +97,7 @@ impl Observer for Quiet<'_> {
 ///
 /// # Errors
 /// As [`run`].
-pub fn run_with_cuts(request: &Request, observer: &mut dyn Observer) -> Result<Option<Answer>, RunError> {
+pub(crate) fn run_with_cuts(request: &Request, observer: &mut dyn Observer) -> Result<Option<Answer>, RunError> {
     let mut spec = request.profiles.clone();
     let own = spec.listed.len();
     let adversary = adversary(request)?;

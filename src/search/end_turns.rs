@@ -31,13 +31,13 @@ pub struct EndChoice {
 
 /// The best pattern with turns of its own at the ends.
 #[derive(Debug, Clone, PartialEq)]
-pub struct WithEnds {
-    pub choice: EndChoice,
+pub(crate) struct WithEnds {
+    pub(crate) choice: EndChoice,
     /// Without such turns where none make it better.
-    pub judged: Judged,
+    pub(crate) judged: Judged,
     /// The same order of whole layers, by its name and objective.
-    pub whole: (String, f64),
-    pub statement: String,
+    pub(crate) whole: (String, f64),
+    pub(crate) statement: String,
 }
 
 /// Patterns that are tried: the best of the search, the classics, and what else it found; fewer where each is judged on many coils.
@@ -45,7 +45,7 @@ const PATTERNS: usize = 12;
 const PATTERNS_OVER_COILS: usize = 3;
 
 impl EndChoice {
-    pub fn is_any(self) -> bool {
+    pub(crate) fn is_any(self) -> bool {
         self.shares_outermost || self.most_left_off > 0
     }
 
@@ -62,7 +62,7 @@ impl Evaluator<'_> {
     ///
     /// # Errors
     /// None that a model which could be solved would cause.
-    pub fn with_ends(
+    pub(crate) fn with_ends(
         &self,
         choice: EndChoice,
         class: WindabilityClass,
@@ -104,7 +104,7 @@ impl Evaluator<'_> {
     ///
     /// # Errors
     /// None that a model which could be solved would cause.
-    pub fn best_ends(
+    pub(crate) fn best_ends(
         &self,
         choice: EndChoice,
         class: WindabilityClass,

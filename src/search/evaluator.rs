@@ -33,20 +33,20 @@ pub enum JudgeError {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judged {
     pub name: String,
-    pub pattern: Pattern,
-    pub worst: WorstCase,
+    pub(crate) pattern: Pattern,
+    pub(crate) worst: WorstCase,
     /// Δφ at the worst rate \[rad\].
-    pub phase_rad: f64,
+    pub(crate) phase_rad: f64,
     /// None for models that have no guaranteed worst case.
-    pub guaranteed_rad_per_s: Option<f64>,
+    pub(crate) guaranteed_rad_per_s: Option<f64>,
     /// The 95 % quantile over built coils, where it is the objective.
-    pub p95_rad_per_s: Option<f64>,
+    pub(crate) p95_rad_per_s: Option<f64>,
     /// The objective by the reference, in rad/s.
     pub objective_rad_per_s: f64,
     /// By how much the worst and the guaranteed rate may be off the continuum's; None before it was asked for.
-    pub grid_margin_rad_per_s: Option<f64>,
+    pub(crate) grid_margin_rad_per_s: Option<f64>,
     /// None before it was asked for.
-    pub pointing: Option<PointingError>,
+    pub(crate) pointing: Option<PointingError>,
 }
 
 /// What a pattern is judged by.
@@ -83,7 +83,7 @@ const BEAM_WIDTH: usize = 1 << 14;
 const MOST_STARTS: usize = 6;
 
 /// Relative difference below which two patterns count as equally good.
-pub const EQUALLY_GOOD: f64 = 1e-9;
+pub(crate) const EQUALLY_GOOD: f64 = 1e-9;
 
 impl Evaluator<'_> {
     /// # Errors
@@ -97,7 +97,7 @@ impl Evaluator<'_> {
     ///
     /// # Errors
     /// As [`Evaluator::judge`].
-    pub fn judge_all(&self, named: &[(String, Pattern)]) -> Result<Vec<Judged>, JudgeError> {
+    pub(crate) fn judge_all(&self, named: &[(String, Pattern)]) -> Result<Vec<Judged>, JudgeError> {
         let p95_rad_per_s = if self.objective == Objective::P95 {
             let patterns: Vec<Pattern> = named.iter().map(|(_, pattern)| pattern.clone()).collect();
             self.coils()?.p95_rad_per_s(&patterns)?.into_iter().map(Some).collect()
@@ -163,7 +163,7 @@ impl Evaluator<'_> {
     ///
     /// # Errors
     /// None that a model which could be solved would cause.
-    pub fn grid_check(&self, best: &Judged, baselines: &[Judged]) -> Result<Option<GridCheck>, SearchError> {
+    pub(crate) fn grid_check(&self, best: &Judged, baselines: &[Judged]) -> Result<Option<GridCheck>, SearchError> {
         let path = self.model.heat_path()?;
         if path.extent == Extent::HalfSpace {
             return Ok(None);
@@ -213,7 +213,7 @@ impl Evaluator<'_> {
     ///
     /// # Errors
     /// None that a model which could be solved would cause.
-    pub fn completed(&self, aside: &Aside, judged: Judged) -> Result<Judged, SearchError> {
+    pub(crate) fn completed(&self, aside: &Aside, judged: Judged) -> Result<Judged, SearchError> {
         let steepest = self.steepest_k_per_s();
         let grid_margin_rad_per_s = Some(aside.margin.of(self.solved, &judged.pattern, steepest)?);
         let pointing =
@@ -222,7 +222,7 @@ impl Evaluator<'_> {
     }
 
     /// The largest rate of the drive that any number here is about.
-    pub fn steepest_k_per_s(&self) -> f64 {
+    pub(crate) fn steepest_k_per_s(&self) -> f64 {
         let of_profiles = self.solved.profiles().iter().map(|p| p.profile.max_rate_k_per_s());
         of_profiles.fold(self.profiles.max_rate_k_per_s, f64::max)
     }
@@ -231,7 +231,7 @@ impl Evaluator<'_> {
     ///
     /// # Errors
     /// None that a model which could be solved would cause.
-    pub fn margin_of_any(&self, aside: &Aside) -> Result<f64, SearchError> {
+    pub(crate) fn margin_of_any(&self, aside: &Aside) -> Result<f64, SearchError> {
         let of_rate = aside.margin.of_any(self.steepest_k_per_s())?;
         let longest_s = self.solved.profiles().iter().map(|p| p.profile.duration_s()).fold(0.0, f64::max);
         // A rate that is off by no more at any time adds up to no more.
@@ -240,7 +240,7 @@ impl Evaluator<'_> {
 
     /// What a proof for the objective is about; `None` for a quantile over built coils, and for a guaranteed worst case
     /// that the model has not.
-    pub fn goal(&self) -> Option<Goal<'_>> {
+    pub(crate) fn goal(&self) -> Option<Goal<'_>> {
         match self.objective {
             Objective::WorstRate | Objective::WorstPhase => Some(Goal::WorstRate),
             Objective::RootMeanSquare => Some(Goal::RootMeanSquare),
@@ -251,12 +251,12 @@ impl Evaluator<'_> {
     }
 
     /// What a proof for the objective is about, in a class; `None` as for [`Evaluator::goal`].
-    pub fn task(&self, class: WindabilityClass) -> Option<Task<'_>> {
+    pub(crate) fn task(&self, class: WindabilityClass) -> Option<Task<'_>> {
         self.goal().map(|goal| Task { model: self.model, solved: self.solved, class, goal })
     }
 
     /// Whether [`Evaluator::improved`] can be expected to prove what is best, so that a search may try it early.
-    pub fn is_provable(&self, class: WindabilityClass) -> bool {
+    pub(crate) fn is_provable(&self, class: WindabilityClass) -> bool {
         let layers = self.model.coil.layers();
         let lengths_m = self.model.coil.layer_lengths_m();
         let has_equal_layers = lengths_m.iter().all(|l| *l == lengths_m[0]);
@@ -276,7 +276,7 @@ impl Evaluator<'_> {
     ///
     /// # Errors
     /// None that a model which could be solved would cause.
-    pub fn improved(
+    pub(crate) fn improved(
         &self,
         class: WindabilityClass,
         best: Judged,
@@ -346,7 +346,7 @@ impl Evaluator<'_> {
     }
 
     /// In words: how much better than QUA, under which class, boundary and objective.
-    pub fn statement(&self, best: &Judged, baselines: &[Judged], class: WindabilityClass) -> String {
+    pub(crate) fn statement(&self, best: &Judged, baselines: &[Judged], class: WindabilityClass) -> String {
         let boundary = match self.model.location {
             Location::OuterLayer => "with the outermost layer's temperature prescribed",
             Location::Ambient => "with the ambient temperature prescribed",
@@ -399,14 +399,14 @@ impl Evaluator<'_> {
 }
 
 /// The name of a pattern that a search found: the same pattern has the same name in every search, another one another.
-pub fn name_of(pattern: &Pattern) -> String {
+pub(crate) fn name_of(pattern: &Pattern) -> String {
     // FNV-1a, folded to sixteen bits.
     let hash = pattern.segments().iter().fold(0x811c_9dc5_u32, |h, &s| (h ^ s as u32).wrapping_mul(0x0100_0193));
     format!("searched-{}-{:04x}", pattern.layers(), (hash >> 16) ^ (hash & 0xffff))
 }
 
 /// QUA's objective over the best pattern's; none where QUA does not fit the layer count or the error is zero.
-pub fn improvement_over_qua(best: &Judged, baselines: &[Judged]) -> Option<f64> {
+pub(crate) fn improvement_over_qua(best: &Judged, baselines: &[Judged]) -> Option<f64> {
     let qua = baselines.iter().find(|b| b.name == Classic::Qua.key())?;
     (best.objective_rad_per_s > 0.0).then(|| qua.objective_rad_per_s / best.objective_rad_per_s)
 }

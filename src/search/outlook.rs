@@ -124,11 +124,11 @@ impl Evaluator<'_> {
 
 /// The worst rates of patterns with the boundary that the model has not.
 #[derive(Debug, Clone, PartialEq)]
-pub struct OtherBoundary {
+pub(crate) struct OtherBoundary {
     /// Which boundary that is.
-    pub words: String,
+    pub(crate) words: String,
     /// By the patterns' names: guaranteed where the model has that, else over the profiles.
-    pub worst_rad_per_s: Vec<(String, f64)>,
+    pub(crate) worst_rad_per_s: Vec<(String, f64)>,
 }
 
 impl OtherBoundary {
@@ -136,7 +136,7 @@ impl OtherBoundary {
     ///
     /// # Errors
     /// Models that cannot be solved.
-    pub fn under(
+    pub(crate) fn under(
         model: &CoilModel,
         profiles: &ProfileSpec,
         named: &[(String, Pattern)],
@@ -158,12 +158,12 @@ impl OtherBoundary {
     }
 
     /// The pattern that would be best there, and its worst rate.
-    pub fn best(&self) -> Option<&(String, f64)> {
+    pub(crate) fn best(&self) -> Option<&(String, f64)> {
         self.worst_rad_per_s.iter().min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     /// Whether a pattern that is wound for the model's own boundary is as good as any here.
-    pub fn sentence(&self, name: &str) -> Option<String> {
+    pub(crate) fn sentence(&self, name: &str) -> Option<String> {
         let mine = self.worst_rad_per_s.iter().find(|(own, _)| own == name)?.1;
         let (best, least) = self.best()?;
         let (words, shown) = (&self.words, deg_per_h_from_rad_per_s);

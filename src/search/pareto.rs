@@ -5,16 +5,16 @@ use crate::search::evaluator::Judged;
 
 /// A pattern with everything that it is weighed by; less is better throughout.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Point {
-    pub judged: Judged,
-    pub windability: Windability,
+pub(crate) struct Point {
+    pub(crate) judged: Judged,
+    pub(crate) windability: Windability,
 }
 
 /// Errors this close count as equal, so that rounding makes no trade-off.
 const SAME_ERROR: f64 = 1e-6;
 
 impl Point {
-    pub fn new(judged: Judged) -> Self {
+    pub(crate) fn new(judged: Judged) -> Self {
         let windability = WindingGraph::new(&judged.pattern).windability();
         Self { judged, windability }
     }
@@ -40,7 +40,7 @@ impl Point {
 const KNEE: f64 = 0.8;
 
 /// Whether a point buys much: its error is well below that of every point that asks no more of the winding shop.
-pub fn is_knee(point: &Point, points: &[Point]) -> bool {
+pub(crate) fn is_knee(point: &Point, points: &[Point]) -> bool {
     let effort = |p: &Point| [p.windability.captive, p.windability.max_climb, p.windability.long_crossovers];
     let error = |p: &Point| p.judged.objective_rad_per_s;
     let is_easier = |p: &&Point| {
@@ -54,7 +54,7 @@ fn is_same(a: f64, b: f64) -> bool {
 }
 
 /// The points that no other beats, smallest error first; of several that are equal in every respect the first.
-pub fn front(points: &[Point]) -> Vec<Point> {
+pub(crate) fn front(points: &[Point]) -> Vec<Point> {
     let mut kept: Vec<Point> = Vec::new();
     for (index, point) in points.iter().enumerate() {
         let beaten = points.iter().any(|other| other.beats(point));

@@ -30,26 +30,26 @@ const HANDED_ON: usize = 3;
 
 /// A pattern's worst rate over the models that may be the true one.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Prospect {
-    pub expected_rad_per_s: f64,
-    pub p95_rad_per_s: f64,
+pub(crate) struct Prospect {
+    pub(crate) expected_rad_per_s: f64,
+    pub(crate) p95_rad_per_s: f64,
 }
 
 /// How many times smaller the new pattern's error is than the old one's.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gain {
+pub(crate) struct Gain {
     /// Under the model as it is.
-    pub value: f64,
+    pub(crate) value: f64,
     /// 5 and 95 % of the drawn models lie below.
-    pub low: f64,
-    pub high: f64,
+    pub(crate) low: f64,
+    pub(crate) high: f64,
 }
 
 /// The worst rate of each pattern under a model: guaranteed where it has that, else over the profiles.
 ///
 /// # Errors
 /// A model that cannot be solved.
-pub fn worst_rates_rad_per_s(
+pub(crate) fn worst_rates_rad_per_s(
     model: &CoilModel,
     profiles: &ProfileSpec,
     patterns: &[Pattern],
@@ -82,7 +82,7 @@ fn under_each(
 ///
 /// # Errors
 /// Models that cannot be solved.
-pub fn prospects(
+pub(crate) fn prospects(
     models: &[CoilModel],
     profiles: &ProfileSpec,
     patterns: &[Pattern],
@@ -106,7 +106,7 @@ pub fn prospects(
 ///
 /// # Errors
 /// Models that cannot be solved.
-pub fn predicted_gain(
+pub(crate) fn predicted_gain(
     model: &CoilModel,
     drawn: &[CoilModel],
     profiles: &ProfileSpec,

@@ -42,34 +42,34 @@ const TIED_BY_THE_BOUNDARY: &str = " (with the outermost layer's temperature pre
 
 /// What to wind.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Recommendation {
-    pub name: String,
-    pub pattern: Pattern,
-    pub sentence: String,
-    pub reasons: Vec<String>,
+pub(crate) struct Recommendation {
+    pub(crate) name: String,
+    pub(crate) pattern: Pattern,
+    pub(crate) sentence: String,
+    pub(crate) reasons: Vec<String>,
 }
 
 /// What a search has come to.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Context<'a> {
-    pub class: WindabilityClass,
-    pub best: &'a Judged,
-    pub baselines: &'a [Judged],
-    pub proof: &'a Proof,
+    pub(crate) class: WindabilityClass,
+    pub(crate) best: &'a Judged,
+    pub(crate) baselines: &'a [Judged],
+    pub(crate) proof: &'a Proof,
     /// The pattern that was wound so far, by its name.
-    pub former: Option<&'a (String, Pattern)>,
+    pub(crate) former: Option<&'a (String, Pattern)>,
     /// Models that may be the true one.
-    pub uncertain: &'a [CoilModel],
-    pub seed: u64,
+    pub(crate) uncertain: &'a [CoilModel],
+    pub(crate) seed: u64,
 }
 
 /// What a search has to say on what it was not searched on.
 #[derive(Debug)]
 pub(super) struct Advised {
-    pub validation: Validation,
-    pub recommendation: Recommendation,
-    pub outlook: Option<Outlook>,
-    pub boundary: Option<OtherBoundary>,
+    pub(crate) validation: Validation,
+    pub(crate) recommendation: Recommendation,
+    pub(crate) outlook: Option<Outlook>,
+    pub(crate) boundary: Option<OtherBoundary>,
 }
 
 impl Evaluator<'_> {

@@ -12,13 +12,13 @@ use crate::thermal::Instant;
 
 /// A pattern with two layers exchanged.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Swap {
+pub(crate) struct Swap {
     /// Counted from 1, the inner one first.
-    pub layers: (usize, usize),
-    pub pattern: Pattern,
+    pub(crate) layers: (usize, usize),
+    pub(crate) pattern: Pattern,
     /// By the samples it was judged on, and the cost without the exchange [rad/s].
-    pub cost_rad_per_s: f64,
-    pub before_rad_per_s: f64,
+    pub(crate) cost_rad_per_s: f64,
+    pub(crate) before_rad_per_s: f64,
 }
 
 /// The exchange of two layers that makes the cost smallest; none where no exchange makes it smaller. With `as_easy` only
@@ -26,7 +26,7 @@ pub struct Swap {
 ///
 /// # Errors
 /// A pattern of another layer count.
-pub fn best_swap(
+pub(crate) fn best_swap(
     model: &CoilModel,
     matrix: &SampleMatrix,
     norm: Norm,
@@ -65,18 +65,18 @@ pub fn best_swap(
 
 /// What adds up to the rate error at an instant [rad/s].
 #[derive(Debug, Clone, PartialEq)]
-pub struct Shares {
+pub(crate) struct Shares {
     /// Of each layer, innermost first.
-    pub layers_rad_per_s: Vec<f64>,
+    pub(crate) layers_rad_per_s: Vec<f64>,
     /// Lead and everything outside the coil.
-    pub rest_rad_per_s: f64,
+    pub(crate) rest_rad_per_s: f64,
 }
 
 /// What each layer adds to the rate error of a pattern at an instant of a profile.
 ///
 /// # Errors
 /// A pattern of another layer count; formulas that are not linear in the coil's own rate.
-pub fn shares(
+pub(crate) fn shares(
     model: &CoilModel,
     profile: &SolvedProfile,
     pattern: &Pattern,

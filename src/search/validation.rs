@@ -30,20 +30,20 @@ pub(super) enum Draw {
 
 /// The best pattern and QUA on unseen profiles.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Validation {
+pub(crate) struct Validation {
     /// Unseen ones; the listed profiles count besides.
-    pub profiles: usize,
-    pub seed: u64,
-    pub best_rad_per_s: f64,
+    pub(crate) profiles: usize,
+    pub(crate) seed: u64,
+    pub(crate) best_rad_per_s: f64,
     /// None where QUA does not fit the layer count.
-    pub qua_rad_per_s: Option<f64>,
+    pub(crate) qua_rad_per_s: Option<f64>,
 }
 
 /// The worst rate of patterns on each set of unseen profiles and the listed ones.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Unseen {
-    pub profiles: usize,
-    pub seed: u64,
+pub(crate) struct Unseen {
+    pub(crate) profiles: usize,
+    pub(crate) seed: u64,
     /// # Shapes
     /// Patterns × sets.
     worst_rad_per_s: Vec<Vec<f64>>,
@@ -51,12 +51,12 @@ pub struct Unseen {
 
 impl Unseen {
     /// The worst rate of a pattern over all sets.
-    pub fn worst_rad_per_s(&self, pattern: usize) -> f64 {
+    pub(crate) fn worst_rad_per_s(&self, pattern: usize) -> f64 {
         self.worst_rad_per_s[pattern].iter().copied().fold(0.0, f64::max)
     }
 
     /// The largest worst rate of a pattern over that of the best of others on the same set.
-    pub fn largest_ratio(&self, pattern: usize, others: &[usize]) -> Option<f64> {
+    pub(crate) fn largest_ratio(&self, pattern: usize, others: &[usize]) -> Option<f64> {
         let sets = 0..self.worst_rad_per_s[pattern].len();
         let ratio = |set: usize| {
             let least = others.iter().map(|&o| self.worst_rad_per_s[o][set]).reduce(f64::min)?;
@@ -81,7 +81,7 @@ impl Evaluator<'_> {
 
     /// # Errors
     /// None that a model which could be solved would cause.
-    pub fn unseen(&self, patterns: &[Pattern]) -> Result<Unseen, SearchError> {
+    pub(crate) fn unseen(&self, patterns: &[Pattern]) -> Result<Unseen, SearchError> {
         let spec = self.drawn_spec(SETS, Draw::Validation);
         let profiles = spec.profiles();
         let (listed, drawn) = profiles.split_at(spec.listed.len());

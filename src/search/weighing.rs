@@ -8,21 +8,21 @@ use super::prospect::Prospect;
 use crate::pattern::windability::Windability;
 
 /// Two figures closer than this count as equal: less than what a coil's own material values are known to.
-pub const TIE: f64 = 0.02;
+pub(crate) const TIE: f64 = 0.02;
 
 /// A pattern with all that it is weighed by.
 #[derive(Debug, Clone)]
 pub(super) struct Weighed {
-    pub judged: Judged,
-    pub windability: Windability,
-    pub is_classic: bool,
-    pub unseen_rad_per_s: f64,
-    pub p95_rad_per_s: Option<f64>,
-    pub yield_share: Option<f64>,
+    pub(crate) judged: Judged,
+    pub(crate) windability: Windability,
+    pub(crate) is_classic: bool,
+    pub(crate) unseen_rad_per_s: f64,
+    pub(crate) p95_rad_per_s: Option<f64>,
+    pub(crate) yield_share: Option<f64>,
     /// Where the model is not known for certain.
-    pub prospect: Option<Prospect>,
+    pub(crate) prospect: Option<Prospect>,
     /// Over the best classic of the class, the worst of all figures and sets of unseen profiles; 1: nowhere behind.
-    pub regret: f64,
+    pub(crate) regret: f64,
 }
 
 impl Weighed {

@@ -25,25 +25,25 @@ use super::material::Elastic;
 
 /// A ring of the cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ring {
-    pub outer_radius_m: f64,
-    pub material: Elastic,
+pub(crate) struct Ring {
+    pub(crate) outer_radius_m: f64,
+    pub(crate) material: Elastic,
 }
 
 /// Hill's moduli of a layer, transversely isotropic about its fibre, and its stress per kelvin at no strain.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LayerModuli {
-    pub plane_bulk_pa: f64,
-    pub cross_pa: f64,
-    pub axial_pa: f64,
-    pub shear_pa: f64,
-    pub transverse_pa_per_k: f64,
-    pub axial_pa_per_k: f64,
+pub(crate) struct LayerModuli {
+    pub(crate) plane_bulk_pa: f64,
+    pub(crate) cross_pa: f64,
+    pub(crate) axial_pa: f64,
+    pub(crate) shear_pa: f64,
+    pub(crate) transverse_pa_per_k: f64,
+    pub(crate) axial_pa_per_k: f64,
 }
 
 impl LayerModuli {
     /// Of an isotropic material.
-    pub fn isotropic(material: &Elastic) -> Self {
+    pub(crate) fn isotropic(material: &Elastic) -> Self {
         Self {
             plane_bulk_pa: material.plane_bulk_pa(),
             cross_pa: material.lame_pa(),
@@ -55,7 +55,7 @@ impl LayerModuli {
     }
 
     /// Expansion along and across the fibre where nothing holds it \[1/K\].
-    pub fn free_expansion_per_k(&self) -> (f64, f64) {
+    pub(crate) fn free_expansion_per_k(&self) -> (f64, f64) {
         // [2k l; 2l n] (ε_t, ε_a) = (β_t, β_a).
         let determinant = 2.0 * (self.plane_bulk_pa * self.axial_pa - self.cross_pa * self.cross_pa);
         let transverse = (self.axial_pa * self.transverse_pa_per_k - self.cross_pa * self.axial_pa_per_k) / determinant;
@@ -67,23 +67,23 @@ impl LayerModuli {
 
 /// The transverse strain of the glass: of each unit of what the layer does.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GlassStrain {
-    pub per_transverse: f64,
-    pub per_axial: f64,
-    pub per_k: f64,
+pub(crate) struct GlassStrain {
+    pub(crate) per_transverse: f64,
+    pub(crate) per_axial: f64,
+    pub(crate) per_k: f64,
 }
 
 /// A layer's material at one temperature.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Cell {
-    pub moduli: LayerModuli,
-    pub glass: GlassStrain,
-    pub glass_expansion_per_k: f64,
+pub(crate) struct Cell {
+    pub(crate) moduli: LayerModuli,
+    pub(crate) glass: GlassStrain,
+    pub(crate) glass_expansion_per_k: f64,
 }
 
 impl Cell {
     /// From the glass outwards; `hole_radius_m` is 0 where the glass is solid.
-    pub fn new(hole_radius_m: f64, rings: &[Ring]) -> Self {
+    pub(crate) fn new(hole_radius_m: f64, rings: &[Ring]) -> Self {
         let (first, last) = (rings[0], rings[rings.len() - 1]);
         let radius_m = last.outer_radius_m;
         // Unit loads: transverse strain, axial strain, one kelvin.
@@ -123,7 +123,7 @@ impl Cell {
     }
 
     /// Between two cells: whatever is linear in the share.
-    pub fn between(&self, other: &Self, share: f64) -> Self {
+    pub(crate) fn between(&self, other: &Self, share: f64) -> Self {
         let mix = |a: f64, b: f64| a + share * (b - a);
         let (m, n) = (&self.moduli, &other.moduli);
         let (g, h) = (&self.glass, &other.glass);

@@ -7,34 +7,34 @@ use crate::units::{m_from_nm, m_from_um};
 
 /// A fibre of the library.
 #[derive(Debug, Clone, Copy)]
-pub struct FibreEntry {
-    pub name: &'static str,
+pub(crate) struct FibreEntry {
+    pub(crate) name: &'static str,
     /// solid, polarisation-maintaining, thin or hollow-core.
-    pub kind: &'static str,
-    pub refractive_index: f64,
-    pub group_index: f64,
-    pub thermo_optic_per_k: f64,
-    pub wavelength_nm: f64,
-    pub glass_diameter_um: f64,
+    pub(crate) kind: &'static str,
+    pub(crate) refractive_index: f64,
+    pub(crate) group_index: f64,
+    pub(crate) thermo_optic_per_k: f64,
+    pub(crate) wavelength_nm: f64,
+    pub(crate) glass_diameter_um: f64,
     /// 0 where light runs in the glass.
-    pub hole_diameter_um: f64,
+    pub(crate) hole_diameter_um: f64,
     /// Materials of the library, each with its outer diameter \[µm\].
-    pub coatings: &'static [(&'static str, f64)],
-    pub source: Source,
+    pub(crate) coatings: &'static [(&'static str, f64)],
+    pub(crate) source: Source,
 }
 
 /// p11 and p12 of silica fibre: Bertholds and Dändliker, J. Lightwave Technol. 6, 17 (1988).
-pub const STRAIN_OPTIC: (f64, f64) = (0.113, 0.252);
+pub(crate) const STRAIN_OPTIC: (f64, f64) = (0.113, 0.252);
 
 const GLASS: &str = "silica";
 
 impl FibreEntry {
-    pub fn outer_diameter_um(&self) -> f64 {
+    pub(crate) fn outer_diameter_um(&self) -> f64 {
         self.coatings.last().map_or(self.glass_diameter_um, |(_, outer_um)| *outer_um)
     }
 
     /// Its optics; expansion is left to the materials.
-    pub fn optics(&self) -> Fibre {
+    pub(crate) fn optics(&self) -> Fibre {
         Fibre {
             refractive_index: self.refractive_index,
             group_index: Some(self.group_index),
@@ -46,7 +46,7 @@ impl FibreEntry {
     }
 
     /// What it is made of; none if a name is in no library, which a test excludes.
-    pub fn made_of(&self) -> Option<CoatedFibre> {
+    pub(crate) fn made_of(&self) -> Option<CoatedFibre> {
         let coatings =
             self.coatings.iter().map(|(name, outer_um)| Some((find(name)?.material(), m_from_um(0.5 * outer_um))));
         let (p11, p12) = if self.hole_diameter_um > 0.0 { (0.0, 0.0) } else { STRAIN_OPTIC };
@@ -66,7 +66,7 @@ const fn usual(text: &'static str) -> Source {
 }
 
 /// Every fibre, thickest solid one first.
-pub const FIBRES: &[FibreEntry] = &[
+pub(crate) const FIBRES: &[FibreEntry] = &[
     FibreEntry {
         name: "standard-125-245",
         kind: "solid",
@@ -134,7 +134,7 @@ pub const FIBRES: &[FibreEntry] = &[
 ];
 
 /// A fibre by its name.
-pub fn find_fibre(name: &str) -> Option<&'static FibreEntry> {
+pub(crate) fn find_fibre(name: &str) -> Option<&'static FibreEntry> {
     FIBRES.iter().find(|entry| entry.name == name)
 }
 

@@ -8,7 +8,7 @@ use crate::units::kelvin_from_celsius;
 
 /// What a material is used for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Use {
+pub(crate) enum Use {
     Glass,
     Coating,
     Adhesive,
@@ -16,7 +16,7 @@ pub enum Use {
 }
 
 impl Use {
-    pub fn word(self) -> &'static str {
+    pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Glass => "glass",
             Self::Coating => "coating",
@@ -56,10 +56,10 @@ enum Beside {
 
 /// Where numbers are from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Source {
-    pub text: &'static str,
+pub(crate) struct Source {
+    pub(crate) text: &'static str,
     /// Whether an accessible text with these numbers was read.
-    pub was_read: bool,
+    pub(crate) was_read: bool,
 }
 
 const fn read(text: &'static str) -> Source {
@@ -73,12 +73,12 @@ const fn usual(text: &'static str) -> Source {
 /// A material of the library.
 #[derive(Debug, Clone, Copy)]
 pub struct Entry {
-    pub name: &'static str,
-    pub used_as: Use,
+    pub(crate) name: &'static str,
+    pub(crate) used_as: Use,
     youngs_pa: Stated,
     beside: Beside,
     expansion_per_k: Stated,
-    pub source: Source,
+    pub(crate) source: Source,
 }
 
 impl Entry {
@@ -96,7 +96,7 @@ impl Entry {
 }
 
 /// Every material, by use.
-pub const MATERIALS: &[Entry] = &[
+pub(crate) const MATERIALS: &[Entry] = &[
     Entry {
         name: "silica",
         used_as: Use::Glass,

@@ -4,7 +4,7 @@ use crate::units::REFERENCE_TEMPERATURE_K;
 
 /// A property over temperature.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Property {
+pub(crate) enum Property {
     Constant(f64),
     /// Temperatures \[K\], rising, and values; held beyond the ends, straight between.
     Points(Vec<(f64, f64)>),
@@ -48,7 +48,7 @@ impl Property {
     }
 
     /// Whether it changes with temperature at all.
-    pub fn is_constant(&self) -> bool {
+    pub(crate) fn is_constant(&self) -> bool {
         match self {
             Self::Constant(_) => true,
             Self::Points(points) => points.windows(2).all(|two| two[0].1 == two[1].1),
@@ -59,7 +59,7 @@ impl Property {
 
 /// What is stated beside Young's modulus.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Compression {
+pub(crate) enum Compression {
     /// ν.
     PoissonRatio(Property),
     /// K \[Pa\]: what a polymer keeps while its Young's modulus falls through the glass transition.
@@ -69,47 +69,47 @@ pub enum Compression {
 /// An isotropic material.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {
-    pub name: String,
+    pub(crate) name: String,
     /// E \[Pa\].
-    pub youngs_modulus_pa: Property,
-    pub compression: Compression,
+    pub(crate) youngs_modulus_pa: Property,
+    pub(crate) compression: Compression,
     /// α \[1/K\].
-    pub expansion_per_k: Property,
+    pub(crate) expansion_per_k: Property,
 }
 
 /// A material at one temperature.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Elastic {
-    pub youngs_modulus_pa: f64,
-    pub poisson_ratio: f64,
-    pub expansion_per_k: f64,
+pub(crate) struct Elastic {
+    pub(crate) youngs_modulus_pa: f64,
+    pub(crate) poisson_ratio: f64,
+    pub(crate) expansion_per_k: f64,
 }
 
 impl Elastic {
     /// μ.
-    pub fn shear_pa(&self) -> f64 {
+    pub(crate) fn shear_pa(&self) -> f64 {
         self.youngs_modulus_pa / (2.0 * (1.0 + self.poisson_ratio))
     }
 
     /// Lamé's λ.
-    pub fn lame_pa(&self) -> f64 {
+    pub(crate) fn lame_pa(&self) -> f64 {
         let nu = self.poisson_ratio;
         self.youngs_modulus_pa * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
     }
 
     /// k = λ + μ, the bulk modulus in plane strain.
-    pub fn plane_bulk_pa(&self) -> f64 {
+    pub(crate) fn plane_bulk_pa(&self) -> f64 {
         self.lame_pa() + self.shear_pa()
     }
 
     /// 3 K α: stress per kelvin of what cannot expand.
-    pub fn thermal_stress_pa_per_k(&self) -> f64 {
+    pub(crate) fn thermal_stress_pa_per_k(&self) -> f64 {
         (3.0 * self.lame_pa() + 2.0 * self.shear_pa()) * self.expansion_per_k
     }
 }
 
 /// A Poisson's ratio at which nothing can be computed any more lies beyond this.
-pub const MOST_POISSON_RATIO: f64 = 0.49995;
+pub(crate) const MOST_POISSON_RATIO: f64 = 0.49995;
 
 impl Material {
     pub fn constant(name: &str, youngs_modulus_pa: f64, poisson_ratio: f64, expansion_per_k: f64) -> Self {
@@ -121,7 +121,7 @@ impl Material {
         }
     }
 
-    pub fn at(&self, temperature_k: f64) -> Elastic {
+    pub(crate) fn at(&self, temperature_k: f64) -> Elastic {
         let youngs_modulus_pa = self.youngs_modulus_pa.at(temperature_k, Scale::Logarithmic);
         let poisson_ratio = match &self.compression {
             Compression::PoissonRatio(ratio) => ratio.at(temperature_k, Scale::Linear),
@@ -137,13 +137,13 @@ impl Material {
     }
 
     /// Whether stiffness and expansion are the same at every temperature.
-    pub fn is_constant(&self) -> bool {
+    pub(crate) fn is_constant(&self) -> bool {
         let (Compression::PoissonRatio(beside) | Compression::BulkModulus(beside)) = &self.compression;
         self.youngs_modulus_pa.is_constant() && beside.is_constant() && self.expansion_per_k.is_constant()
     }
 
     /// The least Poisson's ratio between two temperatures: what is stated as E and K may contradict itself.
-    pub fn least_poisson_ratio(&self, from_k: f64, to_k: f64) -> f64 {
+    pub(crate) fn least_poisson_ratio(&self, from_k: f64, to_k: f64) -> f64 {
         let steps = 100;
         (0..=steps)
             .map(|i| self.at(from_k + (to_k - from_k) * f64::from(i) / f64::from(steps)).poisson_ratio)
@@ -152,8 +152,8 @@ impl Material {
 }
 
 /// Between these temperatures a coil is looked at.
-pub const COLDEST_K: f64 = REFERENCE_TEMPERATURE_K - 220.0;
-pub const HOTTEST_K: f64 = REFERENCE_TEMPERATURE_K + 180.0;
+pub(crate) const COLDEST_K: f64 = REFERENCE_TEMPERATURE_K - 220.0;
+pub(crate) const HOTTEST_K: f64 = REFERENCE_TEMPERATURE_K + 180.0;
 
 #[cfg(test)]
 mod tests {

@@ -22,11 +22,11 @@
 //! Strain and phase: Butter and Hocker, Appl. Opt. 17, 2867 (1978); the coil's error: Mohr and Schadt, Proc. SPIE 5502, 410
 //! (2004).
 
-pub mod cell;
-pub mod fibres;
+pub(crate) mod cell;
+pub(crate) mod fibres;
 pub mod library;
 pub mod material;
-pub mod ring;
+pub(crate) mod ring;
 
 use std::sync::OnceLock;
 
@@ -67,7 +67,7 @@ pub struct Materials {
 
 impl Materials {
     /// Whether nothing depends on temperature, so that the rate error stays linear.
-    pub fn is_constant(&self) -> bool {
+    pub(crate) fn is_constant(&self) -> bool {
         self.fibre.glass.is_constant()
             && self.fibre.coatings.iter().all(|(m, _)| m.is_constant())
             && self.adhesive.is_constant()
@@ -117,7 +117,7 @@ impl CoatedFibre {
 /// A coated fibre that nothing holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FreeFibre {
-    pub expansion_per_k: f64,
+    pub(crate) expansion_per_k: f64,
     /// κ.
     pub path_per_k: f64,
 }
@@ -126,7 +126,7 @@ pub struct FreeFibre {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LayerChange {
     pub strain: Strain,
-    pub glass_transverse: f64,
+    pub(crate) glass_transverse: f64,
     pub path: f64,
 }
 
@@ -228,7 +228,7 @@ impl PackStress {
     }
 
     /// κ on average over the layers, by their lengths, where the whole coil changes its temperature.
-    pub fn mean_path_per_k(&self, coil: &Coil, temperature_k: f64) -> f64 {
+    pub(crate) fn mean_path_per_k(&self, coil: &Coil, temperature_k: f64) -> f64 {
         let layers = self.per_kelvin(temperature_k);
         let sum: f64 = layers.iter().zip(coil.layer_lengths_m()).map(|(layer, l)| layer.path * l).sum();
         sum / coil.length_m()

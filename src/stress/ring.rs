@@ -23,12 +23,12 @@ use super::cell::LayerModuli;
 
 /// One annulus, from within outwards.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Annulus {
-    pub inner_m: f64,
-    pub outer_m: f64,
-    pub moduli: LayerModuli,
+pub(crate) struct Annulus {
+    pub(crate) inner_m: f64,
+    pub(crate) outer_m: f64,
+    pub(crate) moduli: LayerModuli,
     /// Whether the fibre lies in it, along θ; else it is isotropic.
-    pub is_wound: bool,
+    pub(crate) is_wound: bool,
 }
 
 /// Strains of an annulus: hoop and radial at its middle and over its thickness, axial.
@@ -109,7 +109,7 @@ impl Element {
 
 /// A ring ready for any temperatures.
 #[derive(Debug, Clone)]
-pub struct LayeredRing {
+pub(crate) struct LayeredRing {
     elements: Vec<Element>,
     /// Pivots and multipliers of the tridiagonal part.
     pivot: Vec<f64>,
@@ -122,7 +122,7 @@ pub struct LayeredRing {
 
 impl LayeredRing {
     /// Of annuli that touch one another, from within outwards.
-    pub fn new(annuli: &[Annulus]) -> Self {
+    pub(crate) fn new(annuli: &[Annulus]) -> Self {
         let elements: Vec<Element> = annuli.iter().map(Element::new).collect();
         let nodes = elements.len() + 1;
         let (mut diagonal, mut below, mut above) = (vec![0.0; nodes], vec![0.0; nodes], vec![0.0; nodes]);
@@ -171,7 +171,7 @@ impl LayeredRing {
     }
 
     /// Strains of every annulus for changes of temperature, or their rates for its rates.
-    pub fn strains(&self, changes_k: &[f64]) -> Vec<Strain> {
+    pub(crate) fn strains(&self, changes_k: &[f64]) -> Vec<Strain> {
         let mut load = vec![0.0; self.pivot.len()];
         for (i, (element, change)) in self.elements.iter().zip(changes_k).enumerate() {
             load[i] += element.force[0][3] * change;

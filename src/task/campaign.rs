@@ -13,16 +13,16 @@ use super::TaskError;
 mod batch;
 #[cfg(feature = "report")]
 pub mod carrying_out;
-pub mod coils;
-pub mod gyros;
+pub(crate) mod coils;
+pub(crate) mod gyros;
 mod measures;
-pub mod search;
+pub(crate) mod search;
 
 /// Some of a campaign's cells, in the grid's order.
 #[derive(Debug, Clone)]
 pub struct Part<'a> {
-    pub campaign: &'a CampaignFile,
-    pub cells: Vec<&'a Cell>,
+    pub(crate) campaign: &'a CampaignFile,
+    pub(crate) cells: Vec<&'a Cell>,
 }
 
 impl<'a> Part<'a> {
@@ -92,7 +92,7 @@ impl<'a> Part<'a> {
     }
 
     /// The answer about a whole campaign, and its table if nothing is missing.
-    pub fn merged(&self, folder: &Path, searched: usize) -> (CampaignJson, Option<Table>) {
+    pub(crate) fn merged(&self, folder: &Path, searched: usize) -> (CampaignJson, Option<Table>) {
         let mut answer = self.answer(Some(folder), searched);
         if !answer.missing.is_empty() {
             return (answer, None);
@@ -150,10 +150,10 @@ impl<'a> Part<'a> {
 
 /// What a table is written from beside the answer.
 #[derive(Debug)]
-pub struct Table {
-    pub csv: Vec<u8>,
+pub(crate) struct Table {
+    pub(crate) csv: Vec<u8>,
     /// Of a fleet.
-    pub gyros: Vec<GyroJson>,
+    pub(crate) gyros: Vec<GyroJson>,
 }
 
 /// A cell's result.

@@ -51,7 +51,7 @@ impl<'a> Request<'a> {
 pub struct Answer {
     pub compensator: Compensator,
     /// The fitted records, without their gross errors.
-    pub fitted: Vec<Record>,
+    pub(crate) fitted: Vec<Record>,
     model: String,
     /// The model's effects on the scale factor, which no compensator holds.
     on_scale_factor: Vec<String>,
@@ -238,7 +238,7 @@ pub fn compensate_record(compensator: &Compensator, record: &Record) -> Result<C
 }
 
 /// A rate before compensation, and what each method leaves of it, row by row.
-pub type Curves = Vec<(&'static str, Vec<f64>)>;
+pub(crate) type Curves = Vec<(&'static str, Vec<f64>)>;
 
 /// Every method, fitted to some records and tried on others.
 #[derive(Debug)]
@@ -247,7 +247,7 @@ pub struct AllMethods {
     /// In rad/s.
     pub curves: Curves,
     /// Of the curves' rows: those of the record that was not fitted, or of the fitted ones, each left out in turn, one behind the other.
-    pub times_s: Vec<f64>,
+    pub(crate) times_s: Vec<f64>,
 }
 
 /// Fits every method to the request's records and tries it on another record where one is given; and, where there are several to fit

@@ -56,10 +56,10 @@ impl<'a> Request<'a> {
 #[derive(Debug)]
 pub struct Answer {
     pub document: DiagnosisJson,
-    pub diagnosis: Diagnosis,
+    pub(crate) diagnosis: Diagnosis,
     /// None where it was not asked for or there is nothing to tell apart.
-    pub experiment: Option<Experiment>,
-    pub pattern: Pattern,
+    pub(crate) experiment: Option<Experiment>,
+    pub(crate) pattern: Pattern,
     records: Vec<Record>,
     holdout: Vec<Record>,
 }
@@ -144,7 +144,7 @@ pub(super) fn remarks(effect: &FindingJson) -> Vec<Remark> {
 }
 
 impl Answer {
-    pub fn is_adequate(&self) -> bool {
+    pub(crate) fn is_adequate(&self) -> bool {
         self.diagnosis.verdict == Verdict::Adequate
     }
 
@@ -170,7 +170,7 @@ impl Answer {
     ///
     /// # Errors
     /// A text that is no model file.
-    pub fn proposed_source(&self, model: &ModelFile) -> Result<Option<String>, TaskError> {
+    pub(crate) fn proposed_source(&self, model: &ModelFile) -> Result<Option<String>, TaskError> {
         let Some((proposal, shown)) = self.diagnosis.proposals.first().zip(self.document.proposals.first()) else {
             return Ok(None);
         };

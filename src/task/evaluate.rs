@@ -33,9 +33,9 @@ pub struct Answer {
 
 /// What is worked out once a model, for any of its windings.
 #[derive(Debug)]
-pub struct Groundwork {
-    pub solved: SolvedProfiles,
-    pub step: Result<UnitStep, GuaranteedError>,
+pub(crate) struct Groundwork {
+    pub(crate) solved: SolvedProfiles,
+    pub(crate) step: Result<UnitStep, GuaranteedError>,
     guaranteed_model: CoilModel,
     guaranteed_beside: Vec<GuaranteedBesideJson>,
     steepest_k_per_s: f64,
@@ -44,10 +44,10 @@ pub struct Groundwork {
 
 /// A winding, judged.
 #[derive(Debug)]
-pub struct Judged {
-    pub body: PatternJson,
-    pub worst: WorstCase,
-    pub bound: Option<Guaranteed>,
+pub(crate) struct Judged {
+    pub(crate) body: PatternJson,
+    pub(crate) worst: WorstCase,
+    pub(crate) bound: Option<Guaranteed>,
 }
 
 impl Groundwork {
@@ -55,7 +55,7 @@ impl Groundwork {
     ///
     /// # Errors
     /// A model that cannot be solved.
-    pub fn on(solved: SolvedProfiles, file: &ModelFile) -> Result<Self, TaskError> {
+    pub(crate) fn on(solved: SolvedProfiles, file: &ModelFile) -> Result<Self, TaskError> {
         let (guaranteed_model, left_out) = file.model.without_unguaranteed(file.profiles.max_rate_k_per_s);
         let steepest = solved.profiles().iter().map(|p| p.profile.max_rate_k_per_s());
         Ok(Self {
@@ -72,7 +72,11 @@ impl Groundwork {
     ///
     /// # Errors
     /// A pattern of another layer count.
-    pub fn judge(&self, file: &ModelFile, NamedPattern { name, pattern }: &NamedPattern) -> Result<Judged, TaskError> {
+    pub(crate) fn judge(
+        &self,
+        file: &ModelFile,
+        NamedPattern { name, pattern }: &NamedPattern,
+    ) -> Result<Judged, TaskError> {
         let worst = self.solved.worst_case(&file.model, pattern)?;
         let phase_rad = RateModel::new(&file.model, pattern, &[])?.phase_rad(worst.rate_rad_per_s);
         let bound = match &self.step {
@@ -87,7 +91,7 @@ impl Groundwork {
     }
 
     /// What a reader of the guaranteed rates should know.
-    pub fn notes(&self) -> Vec<String> {
+    pub(crate) fn notes(&self) -> Vec<String> {
         let beside = self.guaranteed_beside.iter().map(|formula| format!("note: {}", formula.in_words()));
         let unbounded = self.step.as_ref().err().filter(|e| matches!(e, GuaranteedError::Effect { .. }));
         beside.chain(unbounded.map(|reason| format!("note: {reason}"))).collect()
@@ -136,7 +140,7 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
 }
 
 /// What the table of windings says of one, under [`COLUMNS`].
-pub fn cells(p: &PatternJson) -> [String; 11] {
+pub(crate) fn cells(p: &PatternJson) -> [String; 11] {
     [
         p.name.clone(),
         format!("{:.4}", p.worst_rate_deg_per_h),
@@ -154,7 +158,7 @@ pub fn cells(p: &PatternJson) -> [String; 11] {
 }
 
 /// The heads of the table of windings.
-pub const COLUMNS: [&str; 11] = [
+pub(crate) const COLUMNS: [&str; 11] = [
     "pattern",
     "worst °/h",
     "guaranteed °/h",

@@ -44,11 +44,11 @@ impl<'a> Request<'a> {
 /// What was proved.
 #[derive(Debug)]
 pub struct Answer {
-    pub certificate: Certificate,
+    pub(crate) certificate: Certificate,
     /// A classic winding's own, else one made of the layer count.
-    pub name: String,
+    pub(crate) name: String,
     /// Profiles that the proof is over.
-    pub profiles: usize,
+    pub(crate) profiles: usize,
     proof: Proof,
     best: PatternJson,
     model: String,
@@ -74,7 +74,7 @@ impl Answer {
         }
     }
 
-    pub fn is_optimal(&self) -> bool {
+    pub(crate) fn is_optimal(&self) -> bool {
         self.certificate.status == Status::Optimal
     }
 
@@ -82,7 +82,7 @@ impl Answer {
     ///
     /// # Errors
     /// Effects that leave a layer no turns.
-    pub fn samples(&self, model: &ModelFile) -> Result<Option<String>, TaskError> {
+    pub(crate) fn samples(&self, model: &ModelFile) -> Result<Option<String>, TaskError> {
         let coil = model.model.wound_coil().map_err(RateError::from)?;
         Ok(print_samples(&self.certificate.rows, coil.layer_lengths_m()))
     }

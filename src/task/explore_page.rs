@@ -12,13 +12,13 @@ use crate::report::explorer::explorer_page;
 use super::TaskError;
 
 /// The page that `explore` writes where no other name is given.
-pub const EXPLORER_FILE: &str = "explorer.html";
+pub(crate) const EXPLORER_FILE: &str = "explorer.html";
 
 /// The page; the first of the windings is shown, then the model's own.
 ///
 /// # Errors
 /// A model's source that cannot be edited.
-pub fn page(file: &ModelFile, patterns: &[NamedPattern]) -> Result<String, TaskError> {
+pub(crate) fn page(file: &ModelFile, patterns: &[NamedPattern]) -> Result<String, TaskError> {
     let path =
         file.path.file_name().map_or_else(|| "model.toml".to_owned(), |name| name.to_string_lossy().into_owned());
     // A pattern that stands in a file of its own comes along by its segments.

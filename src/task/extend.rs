@@ -42,11 +42,11 @@ pub struct Request<'a> {
 pub struct Answer {
     /// With the file's comments and layout kept.
     pub source: String,
-    pub effect: FindingJson,
+    pub(crate) effect: FindingJson,
     /// What the records said of film, offset and chamber; none without a record to fit to.
-    pub boundary: Option<BoundaryJson>,
-    pub before: CompareJson,
-    pub after: CompareJson,
+    pub(crate) boundary: Option<BoundaryJson>,
+    pub(crate) before: CompareJson,
+    pub(crate) after: CompareJson,
 }
 
 impl Answer {

@@ -41,7 +41,7 @@ impl PatternUnderField {
 ///
 /// # Errors
 /// Another layer count than the coil's, no rows, times that do not increase, numbers that are not finite.
-pub fn check(model: &ModelFile, field: &ThermalHistory) -> Result<(), TaskError> {
+pub(crate) fn check(model: &ModelFile, field: &ThermalHistory) -> Result<(), TaskError> {
     let fault = |message: String| Err(TaskError::Field { message });
     let layers = model.model.coil.layers();
     if field.layers != layers {

@@ -22,13 +22,13 @@ pub(super) struct Trial<'t> {
 
 impl Trial<'_> {
     /// Fitted to all records, but for one where it is said which.
-    pub fn fit(&self, method: Method, without: Option<usize>) -> Result<Compensator, CompensateError> {
+    pub(super) fn fit(&self, method: Method, without: Option<usize>) -> Result<Compensator, CompensateError> {
         let others = self.days.iter().enumerate().filter(|(place, _)| Some(*place) != without);
         Compensator::fit_to(method, self.model, self.pattern, &others.map(|(_, day)| day).collect::<Vec<_>>())
     }
 
     /// What a compensator leaves of a record.
-    pub fn tried(&self, compensator: &Compensator, record: &Record) -> Result<Vec<f64>, CompensateError> {
+    pub(super) fn tried(&self, compensator: &Compensator, record: &Record) -> Result<Vec<f64>, CompensateError> {
         let has = |name: &str| record.channels().iter().any(|c| c.name == name);
         match compensator.channel_names().into_iter().find(|name| !has(name)) {
             Some(name) => Err(CompensateError::MissingChannel { name: name.to_owned() }),

@@ -55,12 +55,12 @@ impl Measurement {
     }
 
     /// What a document says of it.
-    pub fn input(&self, role: &str) -> RecordInputJson {
+    pub(crate) fn input(&self, role: &str) -> RecordInputJson {
         RecordInputJson { file: self.file.clone(), sha256: self.sha256.clone(), role: role.to_owned() }
     }
 
     /// Says what was skipped, assumed or looks odd.
-    pub fn say(&self, model: Option<&ModelFile>, observer: &dyn Observer) {
+    pub(crate) fn say(&self, model: Option<&ModelFile>, observer: &dyn Observer) {
         let contradiction = model.and_then(|m| contradicts_mean(self.record.interval_s(), m.model.rate_mean_s));
         say_read(&self.file, self.skipped_rows, self.remarks.iter().chain(&contradiction), observer);
     }
@@ -69,7 +69,7 @@ impl Measurement {
     ///
     /// # Errors
     /// Too few rows left.
-    pub fn noticed(
+    pub(crate) fn noticed(
         &self,
         wish: GrossErrors,
         model: Option<&ModelFile>,
@@ -93,14 +93,14 @@ impl Measurement {
 
 /// A record as it is used, and what was noticed.
 #[derive(Debug)]
-pub struct Noticed {
-    pub record: Record,
-    pub gross_errors: Vec<GrossErrorJson>,
-    pub gaps: usize,
+pub(crate) struct Noticed {
+    pub(crate) record: Record,
+    pub(crate) gross_errors: Vec<GrossErrorJson>,
+    pub(crate) gaps: usize,
 }
 
 /// Says what reading a record noticed.
-pub fn say_read<'r>(
+pub(crate) fn say_read<'r>(
     file: &str,
     skipped_rows: usize,
     remarks: impl IntoIterator<Item = &'r String>,
@@ -117,7 +117,13 @@ pub fn say_read<'r>(
 }
 
 /// Says how many gross errors there are and what becomes of them.
-pub fn say_gross(file: &str, count: usize, first: Option<&GrossErrorJson>, dropped: bool, observer: &dyn Observer) {
+pub(crate) fn say_gross(
+    file: &str,
+    count: usize,
+    first: Option<&GrossErrorJson>,
+    dropped: bool,
+    observer: &dyn Observer,
+) {
     let Some(first) = first else { return };
     let fate = if dropped { "left out" } else { "used all the same: --gross-errors drop leaves them out" };
     observer.note(&format!(

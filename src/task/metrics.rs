@@ -14,7 +14,7 @@ use super::measurement::{GrossErrors, Measurement, say_gross, say_read};
 use super::{Observer, TaskError};
 
 /// The averaging time of the bias stability.
-pub const DEFAULT_AVERAGE_S: f64 = 10.0;
+pub(crate) const DEFAULT_AVERAGE_S: f64 = 10.0;
 
 /// How records are measured.
 #[derive(Debug, Clone, Copy)]

@@ -16,11 +16,11 @@ pub mod metrics;
 pub mod optimise;
 pub mod pareto;
 pub mod schedule;
-pub mod stress;
+pub(crate) mod stress;
 pub mod temperatures;
 pub mod tolerance;
 pub mod trim;
-pub mod under_fields;
+pub(crate) mod under_fields;
 
 // They leave pages, pictures and words that pages share.
 #[cfg(feature = "report")]
@@ -159,7 +159,7 @@ pub enum TaskError {
 
 impl TaskError {
     /// Whether it is shown as several lines of its own making, with the source lines drawn.
-    pub fn is_drawn(&self) -> bool {
+    pub(crate) fn is_drawn(&self) -> bool {
         matches!(self, TaskError::Faults(_) | TaskError::Resolve(ResolveError::File(_)))
     }
 }
@@ -174,12 +174,12 @@ impl From<serde_json::Error> for TaskError {
 ///
 /// # Errors
 /// Neither is there.
-pub fn pattern_or_own(model: &ModelFile, stated: Option<&NamedPattern>) -> Result<NamedPattern, TaskError> {
+pub(crate) fn pattern_or_own(model: &ModelFile, stated: Option<&NamedPattern>) -> Result<NamedPattern, TaskError> {
     stated.or(model.pattern.as_ref()).cloned().ok_or(TaskError::PatternMissing)
 }
 
 /// The model's own pattern first, unless it is a classic anyway; then the classics that fit.
-pub fn own_and_classics(file: &ModelFile) -> Vec<NamedPattern> {
+pub(crate) fn own_and_classics(file: &ModelFile) -> Vec<NamedPattern> {
     let layers = file.model.coil.layers();
     let classics = Classic::ALL.into_iter().filter_map(|classic| {
         let pattern = classic.pattern(layers).ok()?;

@@ -43,11 +43,11 @@ pub struct Wishes {
 pub const DRAWN_MODELS: usize = 40;
 
 impl Wishes {
-    pub fn class(&self, file: &ModelFile) -> WindabilityClass {
+    pub(crate) fn class(&self, file: &ModelFile) -> WindabilityClass {
         self.class.unwrap_or(file.search.windability)
     }
 
-    pub fn objective(&self, file: &ModelFile) -> Objective {
+    pub(crate) fn objective(&self, file: &ModelFile) -> Objective {
         self.objective.unwrap_or(file.search.objective)
     }
 
@@ -55,7 +55,7 @@ impl Wishes {
     ///
     /// # Errors
     /// A pattern to begin with that is not of the class, a target below zero.
-    pub fn plan(&self, file: &ModelFile) -> Result<Plan, TaskError> {
+    pub(crate) fn plan(&self, file: &ModelFile) -> Result<Plan, TaskError> {
         let class = self.class(file);
         let starts = match &self.start {
             None => Vec::new(),

@@ -25,8 +25,8 @@ use crate::search::pareto::{Point, front, is_knee};
 use super::{Observer, TaskError};
 
 /// The most captive reels that are tried one by one, and rounds of restarts a class.
-pub const DEFAULT_MOST_CAPTIVE: u8 = 2;
-pub const DEFAULT_ROUNDS: u64 = 3;
+pub(crate) const DEFAULT_MOST_CAPTIVE: u8 = 2;
+pub(crate) const DEFAULT_ROUNDS: u64 = 3;
 
 /// What is to be weighed.
 #[derive(Debug, Clone, Copy)]
@@ -51,7 +51,7 @@ impl<'a> Request<'a> {
 /// The front, smallest error first, each point under a name of its own.
 #[derive(Debug)]
 pub struct Answer {
-    pub points: Vec<Point>,
+    pub(crate) points: Vec<Point>,
     model: String,
     seed: u64,
 }

@@ -26,8 +26,8 @@ use super::{Observer, TaskError, pattern_or_own};
 /// An effect to declare, with what stands behind its values.
 #[derive(Debug, Clone)]
 pub struct Proposed {
-    pub effect: DeclaredEffect,
-    pub remarks: Vec<Remark>,
+    pub(crate) effect: DeclaredEffect,
+    pub(crate) remarks: Vec<Remark>,
 }
 
 /// What is to be added, and what it is fitted to.
@@ -47,9 +47,9 @@ pub struct Request<'a> {
 #[derive(Debug)]
 pub struct Answer {
     pub source: String,
-    pub effects: Vec<FindingJson>,
-    pub before: CompareJson,
-    pub after: CompareJson,
+    pub(crate) effects: Vec<FindingJson>,
+    pub(crate) before: CompareJson,
+    pub(crate) after: CompareJson,
 }
 
 impl Answer {

@@ -31,8 +31,8 @@ pub struct Request<'a> {
 #[derive(Debug)]
 pub struct Answer {
     pub document: ScheduleJson,
-    pub schedule: Schedule,
-    pub pattern: NamedPattern,
+    pub(crate) schedule: Schedule,
+    pub(crate) pattern: NamedPattern,
 }
 
 /// Plans the winding.
@@ -55,7 +55,7 @@ impl Answer {
     ///
     /// # Errors
     /// None that a schedule causes.
-    pub fn tables(&self) -> Result<Vec<(&'static str, String)>, TaskError> {
+    pub(crate) fn tables(&self) -> Result<Vec<(&'static str, String)>, TaskError> {
         Ok(vec![("schedule.csv", csv(&self.document)?), ("schedule.json", json(&self.document)?)])
     }
 }

@@ -32,7 +32,7 @@ struct Step {
 
 impl Steps {
     /// What was taken before.
-    pub fn of(folder: &Path) -> Self {
+    pub(crate) fn of(folder: &Path) -> Self {
         let path = folder.join(STEPS);
         // A file that cannot be understood says nothing: all steps are taken again.
         let taken = read_text(&path).ok().and_then(|text| serde_json::from_str(&text).ok());
@@ -40,7 +40,7 @@ impl Steps {
     }
 
     /// Whether a step was taken of the same and its results are there as it left them.
-    pub fn is_taken(&self, into: &Path, made_of: &str, results: &[&str]) -> bool {
+    pub(crate) fn is_taken(&self, into: &Path, made_of: &str, results: &[&str]) -> bool {
         let Some(step) = self.taken.get(&name_of(into)).filter(|step| step.made_of == made_of) else { return false };
         results.iter().all(|result| {
             let there = hash_of(&into.join(result));
@@ -49,7 +49,7 @@ impl Steps {
     }
 
     /// Notes that a step was taken, and what it left.
-    pub fn take(&mut self, step: &Path, made_of: &str, results: &[&str]) -> Result<(), TaskError> {
+    pub(crate) fn take(&mut self, step: &Path, made_of: &str, results: &[&str]) -> Result<(), TaskError> {
         let hashes = results.iter().filter_map(|result| Some(((*result).to_owned(), hash_of(&step.join(result))?)));
         self.taken.insert(name_of(step), Step { made_of: made_of.to_owned(), left: hashes.collect() });
         let text = serde_json::to_string_pretty(&self.taken)? + "\n";

@@ -19,18 +19,18 @@ use super::{Observer, TaskError, advise, own_and_classics};
 
 /// What is asked of the stress of a coil.
 #[derive(Debug, Clone, Copy)]
-pub struct Request<'a> {
+pub(crate) struct Request<'a> {
     pub model: &'a ModelFile,
     /// Empty for the model's own and all classics that fit.
     pub patterns: &'a [NamedPattern],
-    pub temperatures_k: &'a [f64],
+    pub(crate) temperatures_k: &'a [f64],
 }
 
 /// Works the strains out.
 ///
 /// # Errors
 /// A model without materials, patterns of another layer count.
-pub fn run(request: &Request, observer: &dyn Observer) -> Result<StressJson, TaskError> {
+pub(crate) fn run(request: &Request, observer: &dyn Observer) -> Result<StressJson, TaskError> {
     let file = request.model;
     advise(file, observer);
     let materials = materials_of(file)?;
@@ -118,19 +118,19 @@ fn gradient_strength(model: &CoilModel, paths: &[f64]) -> Option<f64> {
 
 /// Which pottings and spools are to be compared.
 #[derive(Debug, Clone, Copy)]
-pub struct PottingRequest<'a> {
-    pub model: &'a ModelFile,
+pub(crate) struct PottingRequest<'a> {
+    pub(crate) model: &'a ModelFile,
     /// Empty for the model's own and all classics that fit.
-    pub patterns: &'a [NamedPattern],
+    pub(crate) patterns: &'a [NamedPattern],
     /// Every spool of the library too, as thick as the model's; else the declared one alone.
-    pub with_spools: bool,
+    pub(crate) with_spools: bool,
 }
 
 /// Judges every choice by the worst rate error of its best winding.
 ///
 /// # Errors
 /// A model without materials or that cannot be solved, patterns of another layer count.
-pub fn potting(request: &PottingRequest, observer: &dyn Observer) -> Result<PottingJson, TaskError> {
+pub(crate) fn potting(request: &PottingRequest, observer: &dyn Observer) -> Result<PottingJson, TaskError> {
     let file = &request.model.clone().for_search();
     advise(file, observer);
     let declared = materials_of(file)?.clone();

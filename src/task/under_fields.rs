@@ -31,11 +31,11 @@ use super::{Observer, TaskError, own_and_classics};
 /// A field with its origin.
 #[derive(Debug, Clone)]
 pub struct FieldFile {
-    pub field: GivenField,
-    pub file: String,
-    pub sha256: Option<String>,
+    pub(crate) field: GivenField,
+    pub(crate) file: String,
+    pub(crate) sha256: Option<String>,
     /// What was assumed or left out, in words.
-    pub remarks: Vec<String>,
+    pub(crate) remarks: Vec<String>,
 }
 
 impl FieldFile {
@@ -43,25 +43,25 @@ impl FieldFile {
     ///
     /// # Errors
     /// All faults of the file at once.
-    pub fn read(path: &Path) -> Result<Self, TaskError> {
+    pub(crate) fn read(path: &Path) -> Result<Self, TaskError> {
         let read = read_field(path)?;
         let RecordInputJson { file, sha256, .. } = RecordInputJson::new(path, "")?;
         Ok(Self { field: read.field, file, sha256, remarks: read.remarks })
     }
 
     /// Says what was assumed.
-    pub fn say(&self, observer: &dyn Observer) {
+    pub(crate) fn say(&self, observer: &dyn Observer) {
         for remark in &self.remarks {
             observer.note(&format!("note: {}: {remark}", self.file));
         }
     }
 
     /// What a document about measurements says of it.
-    pub fn input(&self) -> RecordInputJson {
+    pub(crate) fn input(&self) -> RecordInputJson {
         RecordInputJson { file: self.file.clone(), sha256: self.sha256.clone(), role: "temperatures".to_owned() }
     }
 
-    pub fn shown(&self) -> FieldJson {
+    pub(crate) fn shown(&self) -> FieldJson {
         let (from_s, to_s) = self.field.span_s();
         FieldJson {
             file: self.file.clone(),
@@ -156,7 +156,7 @@ fn judged(
 ///
 /// # Errors
 /// Fields that do not fit the coil; a formula without a value.
-pub fn evaluate(
+pub(crate) fn evaluate(
     model: &ModelFile,
     fields: &[FieldFile],
     patterns: &[NamedPattern],
@@ -176,27 +176,27 @@ pub fn evaluate(
 
 /// A search under fields.
 #[derive(Debug, Clone)]
-pub struct Search<'a> {
-    pub model: &'a ModelFile,
-    pub fields: &'a [FieldFile],
-    pub class: WindabilityClass,
-    pub objective: Objective,
-    pub plan: Plan,
+pub(crate) struct Search<'a> {
+    pub(crate) model: &'a ModelFile,
+    pub(crate) fields: &'a [FieldFile],
+    pub(crate) class: WindabilityClass,
+    pub(crate) objective: Objective,
+    pub(crate) plan: Plan,
 }
 
 /// The document, and the pattern that it names.
 #[derive(Debug)]
-pub struct Found {
-    pub document: FieldSearchJson,
-    pub best: NamedPattern,
-    pub ended: Ended,
+pub(crate) struct Found {
+    pub(crate) document: FieldSearchJson,
+    pub(crate) best: NamedPattern,
+    pub(crate) ended: Ended,
 }
 
 /// What a search under fields can make small: of a model that asks for something else, the worst rate.
 ///
 /// # Errors
 /// An objective that was asked for on purpose and is about all profiles, or about built coils.
-pub fn objective(model: &ModelFile, stated: Option<Objective>) -> Result<Objective, TaskError> {
+pub(crate) fn objective(model: &ModelFile, stated: Option<Objective>) -> Result<Objective, TaskError> {
     let is_of_rows =
         |o: Objective| matches!(o, Objective::WorstRate | Objective::WorstPhase | Objective::RootMeanSquare);
     match stated {
@@ -216,7 +216,7 @@ pub fn objective(model: &ModelFile, stated: Option<Objective>) -> Result<Objecti
 ///
 /// # Errors
 /// Fields that do not fit the coil; a formula without a value, or one that patterns cannot be searched with.
-pub fn search(
+pub(crate) fn search(
     request: &Search,
     observer: &dyn Observer,
     watch: &mut dyn search::Observer,
@@ -299,7 +299,7 @@ mod folder {
         ///
         /// # Errors
         /// Files that cannot be written.
-        pub fn write(&self, folder: &Path, model: &ModelFile) -> Result<(), TaskError> {
+        pub(crate) fn write(&self, folder: &Path, model: &ModelFile) -> Result<(), TaskError> {
             let checkpoint = folder.join(CHECKPOINT_FILE);
             if checkpoint.exists() {
                 let message = "belongs to a search over profiles: choose another folder";

@@ -21,7 +21,7 @@ pub struct Request<'a> {
 #[derive(Debug)]
 pub struct Answer {
     pub document: VerifyJson,
-    pub profiles: usize,
+    pub(crate) profiles: usize,
 }
 
 /// Checks with code that shares nothing with what emitted the claim.

@@ -8,14 +8,14 @@ pub(crate) mod number;
 pub mod sink;
 
 /// The most characters that a name may have: no drawing number, part or pattern is longer.
-pub const MOST_NAME_CHARACTERS: usize = 200;
+pub(crate) const MOST_NAME_CHARACTERS: usize = 200;
 
 /// What a name may be, in words for messages.
-pub const NAME_RULE: &str = "1 to 200 letters, digits, signs and inner spaces, none of which is invisible (no control, line \
+pub(crate) const NAME_RULE: &str = "1 to 200 letters, digits, signs and inner spaces, none of which is invisible (no control, line \
                              break, direction mark or zero-width character)";
 
 /// The same as a regular expression of JSON Schema: neither end is white space, no character is unseen.
-pub const NAME_PATTERN: &str = "^(?!\\s)[^\\u0000-\\u001f\\u007f-\\u009f\\u00ad\\u061c\\u180e\\u200b\\u200e\\u200f\\u2028-\\u202e\\u2060-\\u206f\\ufeff\\ufff9-\\ufffb\\ufffe\\uffff]{1,200}(?<!\\s)$";
+pub(crate) const NAME_PATTERN: &str = "^(?!\\s)[^\\u0000-\\u001f\\u007f-\\u009f\\u00ad\\u061c\\u180e\\u200b\\u200e\\u200f\\u2028-\\u202e\\u2060-\\u206f\\ufeff\\ufff9-\\ufffb\\ufffe\\uffff]{1,200}(?<!\\s)$";
 
 /// Whether a character is not seen where it stands: controls (C0, DEL, C1), line and paragraph separators, marks of
 /// direction and other format characters, noncharacters.
@@ -50,12 +50,12 @@ pub fn name_fault(text: &str) -> Option<String> {
 }
 
 /// As [`name_fault`], of words that may be left empty.
-pub fn words_fault(text: &str) -> Option<String> {
+pub(crate) fn words_fault(text: &str) -> Option<String> {
     if text.is_empty() { None } else { name_fault(text) }
 }
 
 /// Only what [`name_fault`] says of characters that are not seen.
-pub fn unseen_fault(text: &str) -> Option<String> {
+pub(crate) fn unseen_fault(text: &str) -> Option<String> {
     let (place, c) = text.chars().enumerate().find(|(_, c)| is_unseen(*c))?;
     Some(format!(
         "must not hold the invisible character U+{:04X} (character {} of it): expected {NAME_RULE}",
@@ -65,7 +65,7 @@ pub fn unseen_fault(text: &str) -> Option<String> {
 }
 
 /// The text with every character that is not seen written out, as `\n` or `\u{1b}`; `kept` stays as it is.
-pub fn visible(text: &str, kept: &[char]) -> String {
+pub(crate) fn visible(text: &str, kept: &[char]) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         if !is_unseen(c) || kept.contains(&c) {

@@ -41,11 +41,6 @@ impl Line {
     pub fn of(text: impl std::fmt::Display) -> Self {
         Self(visible(&text.to_string(), &[]))
     }
-
-    /// The name of a file or folder.
-    pub fn of_path(path: &std::path::Path) -> Self {
-        Self::of(path.display())
-    }
 }
 
 /// Lines of a terminal.

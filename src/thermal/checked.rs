@@ -6,7 +6,7 @@ use super::{Extent, HeatPart, HeatPath, Location, Material, ThermalError};
 ///
 /// # Errors
 /// Parts that contradict each other or lack a material property.
-pub fn check(path: &HeatPath) -> Result<(), ThermalError> {
+pub(crate) fn check(path: &HeatPath) -> Result<(), ThermalError> {
     if path.extent == Extent::HalfSpace {
         let extras = [
             (path.location != Location::OuterLayer, HeatPart::AmbientSensor),

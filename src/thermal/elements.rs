@@ -26,14 +26,14 @@ const CLOSE: f64 = 0.3;
 /// The widths of elements along a length: the narrowest at the ends that are `Some`, growing to at most `widest`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Grading {
-    pub at_start: Option<f64>,
-    pub at_end: Option<f64>,
-    pub widest: f64,
+    pub(crate) at_start: Option<f64>,
+    pub(crate) at_end: Option<f64>,
+    pub(crate) widest: f64,
 }
 
 impl Grading {
     /// Ends of elements from 0 to `length`.
-    pub fn breaks(&self, length: f64) -> Vec<f64> {
+    pub(crate) fn breaks(&self, length: f64) -> Vec<f64> {
         let (mut low, mut high) = (vec![0.0], vec![length]);
         let mut start = self.at_start.unwrap_or(self.widest).min(self.widest);
         let mut end = self.at_end.unwrap_or(self.widest).min(self.widest);
@@ -67,7 +67,7 @@ pub(super) struct Elements {
 
 impl Elements {
     /// Between the given ends; at a cut both sides have nodes of their own, and an end is put there.
-    pub fn new(order: usize, mut breaks: Vec<f64>, cuts: &[f64]) -> Self {
+    pub(crate) fn new(order: usize, mut breaks: Vec<f64>, cuts: &[f64]) -> Self {
         for &cut in cuts {
             let after = breaks.partition_point(|b| *b <= cut).clamp(1, breaks.len() - 1);
             let width = breaks[after] - breaks[after - 1];
@@ -95,7 +95,7 @@ impl Elements {
         Self { reference: Lobatto::new(order), pieces, nodes: first + 1 }
     }
 
-    pub fn nodes(&self) -> usize {
+    pub(crate) fn nodes(&self) -> usize {
         self.nodes
     }
 
@@ -104,12 +104,12 @@ impl Elements {
     }
 
     /// Where an element begins at a cut, its first node; the node on the other side is the one before.
-    pub fn node_behind(&self, cut: f64) -> Option<usize> {
+    pub(crate) fn node_behind(&self, cut: f64) -> Option<usize> {
         self.pieces.iter().find(|piece| piece.0 == cut).map(|piece| piece.2)
     }
 
     /// m, with the weight w(x).
-    pub fn masses(&self, weight: impl Fn(f64) -> f64) -> Vec<f64> {
+    pub(crate) fn masses(&self, weight: impl Fn(f64) -> f64) -> Vec<f64> {
         let mut masses = vec![0.0; self.nodes];
         for &(from, to, first) in &self.pieces {
             let half = 0.5 * (to - from);
@@ -121,7 +121,7 @@ impl Elements {
     }
 
     /// s, with the weight w(x).
-    pub fn stiffness(&self, weight: impl Fn(f64) -> f64) -> DMatrix<f64> {
+    pub(crate) fn stiffness(&self, weight: impl Fn(f64) -> f64) -> DMatrix<f64> {
         let mut stiffness = DMatrix::zeros(self.nodes, self.nodes);
         let (order, d) = (self.order(), &self.reference.derivative);
         for &(from, to, first) in &self.pieces {
@@ -144,7 +144,7 @@ impl Elements {
     }
 
     /// Factors of the nodes' values in ∫ w f dx over from … to.
-    pub fn integral(&self, from: f64, to: f64, weight: impl Fn(f64) -> f64) -> Vec<f64> {
+    pub(crate) fn integral(&self, from: f64, to: f64, weight: impl Fn(f64) -> f64) -> Vec<f64> {
         let mut factors = vec![0.0; self.nodes];
         // Exact for the polynomial times a weight of the first degree.
         let points = gauss(self.order() / 2 + 2);

@@ -8,12 +8,12 @@ const NOMINAL_HEAT_CAPACITY_J_PER_M3_K: f64 = 1.7e6;
 
 /// A pack in air of a known course.
 #[derive(Debug, Clone)]
-pub struct Exposure {
+pub(crate) struct Exposure {
     /// As the air, or the outermost layer, drives it.
-    pub path: HeatPath,
-    pub drive: Drive,
+    pub(crate) path: HeatPath,
+    pub(crate) drive: Drive,
     /// What the sensor shows at each time, without noise.
-    pub shown_k: Vec<f64>,
+    pub(crate) shown_k: Vec<f64>,
 }
 
 /// Times at which the sensor's input is worked out between two readings.
@@ -37,7 +37,7 @@ fn behind_film(path: &HeatPath) -> HeatPath {
 ///
 /// # Errors
 /// A heat path that cannot be solved.
-pub fn expose(
+pub(crate) fn expose(
     path: &HeatPath,
     film_w_per_m2_k: Option<f64>,
     lag_s: f64,

@@ -35,7 +35,7 @@ pub struct HalfSpace {
 }
 
 impl HalfSpace {
-    pub fn new(path: &HeatPath) -> Self {
+    pub(crate) fn new(path: &HeatPath) -> Self {
         let layers = path.shape.layers;
         Self {
             diffusivity_m2_per_s: path.material.diffusivity_m2_per_s(),
@@ -67,19 +67,19 @@ impl HalfSpace {
             - depth_m * (time_s / (std::f64::consts::PI * k)).sqrt() * (-u * u).exp()
     }
 
-    pub fn step_rates(&self, time_s: f64, layers: &mut [f64]) {
+    pub(crate) fn step_rates(&self, time_s: f64, layers: &mut [f64]) {
         for (rate, &depth_m) in layers.iter_mut().zip(&self.depths_m) {
             *rate = self.step_rate(depth_m, time_s);
         }
     }
 
     /// The tail is x/√(πKt); behind this time it is smooth and monotonic.
-    pub fn settling_s(&self) -> f64 {
+    pub(crate) fn settling_s(&self) -> f64 {
         let depth_m = self.depths_m[0];
         1e4 * depth_m * depth_m / self.diffusivity_m2_per_s
     }
 
-    pub fn shortest_s(&self) -> f64 {
+    pub(crate) fn shortest_s(&self) -> f64 {
         let pitch_m = self.depths_m[self.depths_m.len() - 2];
         pitch_m * pitch_m / (4.0 * self.diffusivity_m2_per_s)
     }
@@ -95,7 +95,7 @@ pub struct HalfSpaceField {
 }
 
 impl HalfSpaceField {
-    pub fn new(half_space: HalfSpace, drive: &Drive) -> Self {
+    pub(crate) fn new(half_space: HalfSpace, drive: &Drive) -> Self {
         let boundary = &drive.boundary_k;
         let mut previous = 0.0;
         let kinks = boundary

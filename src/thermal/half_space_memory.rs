@@ -45,7 +45,7 @@ pub(super) struct Memory {
 
 impl Memory {
     /// `rise_s` is each layer's exact rise [`RECENT_S`] after a unit change of rate.
-    pub fn new(depths_m: &[f64], rise_s: &[f64], diffusivity_m2_per_s: f64, start_s: f64) -> Self {
+    pub(crate) fn new(depths_m: &[f64], rise_s: &[f64], diffusivity_m2_per_s: f64, start_s: f64) -> Self {
         let largest = (LARGEST_EXPONENT / RECENT_S).sqrt();
         let count = ((largest / LEAST_S).ln() / STEP).ceil() as usize;
         let nodes: Vec<f64> = (0..count).map(|i| LEAST_S * (STEP * i as f64).exp()).collect();
@@ -76,7 +76,7 @@ impl Memory {
     }
 
     /// Moves on to a later time.
-    pub fn advance(&mut self, time_s: f64) {
+    pub(crate) fn advance(&mut self, time_s: f64) {
         let step_s = time_s - self.time_s;
         self.time_s = time_s;
         self.rise += self.slope * step_s;
@@ -88,7 +88,7 @@ impl Memory {
     }
 
     /// Takes in a change of rate that happened some time ago.
-    pub fn absorb(&mut self, change: f64, elapsed_s: f64) {
+    pub(crate) fn absorb(&mut self, change: f64, elapsed_s: f64) {
         self.slope += change;
         self.rise += change * elapsed_s;
         self.step(elapsed_s);
@@ -109,7 +109,7 @@ impl Memory {
     }
 
     /// What the old changes contribute to a layer's rate and to its temperature.
-    pub fn rate_and_rise(&self, layer: usize) -> (f64, f64) {
+    pub(crate) fn rate_and_rise(&self, layer: usize) -> (f64, f64) {
         let row = &self.amplitude[layer * self.content.len()..(layer + 1) * self.content.len()];
         let (mut rate, mut rise) = (self.slope, self.rise - self.slope * self.settled_s[layer]);
         for ((a, content), integral) in row.iter().zip(&self.content).zip(&self.integral) {

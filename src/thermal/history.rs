@@ -10,8 +10,8 @@ pub enum Side {
 /// A time at which a field is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Instant {
-    pub time_s: f64,
-    pub side: Side,
+    pub(crate) time_s: f64,
+    pub(crate) side: Side,
 }
 
 impl Instant {
@@ -62,7 +62,7 @@ impl ThermalHistory {
     }
 
     /// H ← a H + b G, entry by entry, of a history of the same layers and times.
-    pub fn mix(&mut self, a: f64, other: &Self, b: f64) {
+    pub(crate) fn mix(&mut self, a: f64, other: &Self, b: f64) {
         let add = |to: &mut [f64], from: &[f64]| to.iter_mut().zip(from).for_each(|(t, f)| *t = a * *t + b * f);
         add(&mut self.temperature_k, &other.temperature_k);
         add(&mut self.rate_k_per_s, &other.rate_k_per_s);
@@ -73,7 +73,7 @@ impl ThermalHistory {
     }
 
     /// A row of a history of the same layers behind the last.
-    pub fn push_row_of(&mut self, other: &Self, row: usize) {
+    pub(crate) fn push_row_of(&mut self, other: &Self, row: usize) {
         let here = row * other.layers..(row + 1) * other.layers;
         self.times_s.push(other.times_s[row]);
         self.temperature_k.extend_from_slice(other.temperatures_k(row));

@@ -5,11 +5,10 @@
 
 mod bending;
 mod checked;
-mod driven;
 mod elements;
-pub mod exposure;
+pub(crate) mod exposure;
 mod given;
-pub mod half_space;
+pub(crate) mod half_space;
 mod half_space_memory;
 mod history;
 mod joined;
@@ -18,8 +17,7 @@ mod network;
 pub mod pack;
 mod panel;
 mod path;
-pub mod reduced;
-mod slope;
+pub(crate) mod reduced;
 mod stepped;
 
 use std::sync::Arc;
@@ -27,9 +25,8 @@ use std::sync::Arc;
 use thiserror::Error;
 
 use crate::numeric::piecewise::PiecewiseLinear;
-pub use checked::check;
-pub use driven::{Driven, Memory};
-pub use given::GivenField;
+pub(crate) use checked::check;
+pub(crate) use given::GivenField;
 use half_space::HalfSpaceField;
 pub use history::{Instant, Side, ThermalHistory};
 use modal::{PackField, Prepared};
@@ -38,7 +35,6 @@ pub use path::{
     BoreHeat, DEFAULT_CELLS_PER_LAYER, Extent, Flange, FlangeFilm, HeatPath, Housing, LayerGap, Location, Material,
     PackShape, Spool, SpoolFlange, SpoolWall, Start,
 };
-pub use slope::{SLOPE_ORDERS, SlopeTerm, slope_powers, slope_series};
 use stepped::SteppedField;
 
 /// What drives the field: temperatures against time, the pack being in a steady state before the first knot.
@@ -55,11 +51,11 @@ impl Drive {
         Self { boundary_k, ambient_k: None }
     }
 
-    pub fn ambient_k(&self) -> &PiecewiseLinear {
+    pub(crate) fn ambient_k(&self) -> &PiecewiseLinear {
         self.ambient_k.as_ref().unwrap_or(&self.boundary_k)
     }
 
-    pub fn start_s(&self) -> f64 {
+    pub(crate) fn start_s(&self) -> f64 {
         self.boundary_k.knots()[0]
     }
 
@@ -177,7 +173,7 @@ impl StepResponse {
     }
 
     /// The shortest time on which the response changes: that of the thinnest cell or spacing.
-    pub fn shortest_s(&self) -> f64 {
+    pub(crate) fn shortest_s(&self) -> f64 {
         match self {
             StepResponse::HalfSpace(half_space) => half_space.shortest_s(),
             StepResponse::Pack(pack) => pack.shortest_s(),
@@ -203,7 +199,7 @@ pub fn solve(path: &HeatPath, drive: &Drive) -> Result<Field, ThermalError> {
 
 /// A heat path ready for any number of drives, which share what does not depend on them.
 #[derive(Debug, Clone)]
-pub struct Solver {
+pub(crate) struct Solver {
     path: HeatPath,
     /// Of a pack that is linear.
     pack: Option<Arc<Prepared>>,
@@ -212,20 +208,20 @@ pub struct Solver {
 impl Solver {
     /// # Errors
     /// As [`solve`].
-    pub fn new(path: &HeatPath) -> Result<Self, ThermalError> {
+    pub(crate) fn new(path: &HeatPath) -> Result<Self, ThermalError> {
         check(path)?;
         let is_modal = path.extent == Extent::Pack && path.conductivity_slope_per_k == 0.0;
         let pack = is_modal.then(|| Ok(Arc::new(Prepared::new(Pack::new(path)?)))).transpose()?;
         Ok(Self { path: path.clone(), pack })
     }
 
-    pub fn path(&self) -> &HeatPath {
+    pub(crate) fn path(&self) -> &HeatPath {
         &self.path
     }
 
     /// # Errors
     /// A conductivity that does not stay positive under the drive.
-    pub fn field(&self, drive: &Drive) -> Result<Field, ThermalError> {
+    pub(crate) fn field(&self, drive: &Drive) -> Result<Field, ThermalError> {
         let path = &self.path;
         if let Some(pack) = &self.pack {
             return Ok(Field::Pack(Box::new(PackField::new(Arc::clone(pack), drive))));

@@ -17,9 +17,9 @@ use crate::numeric::piecewise::PiecewiseLinear;
 /// How one input acts: the outputs' steady response to it and what each mode takes away from that.
 #[derive(Debug, Clone)]
 pub(super) struct Response {
-    pub steady: DVector<f64>,
+    pub(crate) steady: DVector<f64>,
     /// A, outputs × modes.
-    pub amplitude: DMatrix<f64>,
+    pub(crate) amplitude: DMatrix<f64>,
     /// A Λ⁻¹.
     lag: DMatrix<f64>,
     /// A Λ⁻¹ 1.
@@ -30,7 +30,12 @@ pub(super) struct Response {
 
 impl Response {
     /// `at_once`: of the outputs, what a change of the input's rate shows in them before any time has passed, by the grid alone.
-    pub fn new(steady: DVector<f64>, amplitude: DMatrix<f64>, decay_per_s: &[f64], at_once: DVector<f64>) -> Self {
+    pub(crate) fn new(
+        steady: DVector<f64>,
+        amplitude: DMatrix<f64>,
+        decay_per_s: &[f64],
+        at_once: DVector<f64>,
+    ) -> Self {
         let mut lag = amplitude.clone();
         for (mut column, l) in lag.column_iter_mut().zip(decay_per_s) {
             column /= *l;
@@ -39,7 +44,7 @@ impl Response {
         Self { steady, amplitude, lag, lag_sum, at_once }
     }
 
-    pub fn plus(&self, other: &Self) -> Self {
+    pub(crate) fn plus(&self, other: &Self) -> Self {
         Self {
             steady: &self.steady + &other.steady,
             amplitude: &self.amplitude + &other.amplitude,
@@ -66,7 +71,7 @@ pub(super) struct Decay<'a> {
 }
 
 impl<'a> Decay<'a> {
-    pub fn new(decay_per_s: &'a [f64]) -> Self {
+    pub(crate) fn new(decay_per_s: &'a [f64]) -> Self {
         Self { decay_per_s, elapsed_s: 0.0, left: vec![1.0; decay_per_s.len()], remembered: decay_per_s.len() }
     }
 
@@ -96,15 +101,15 @@ pub(super) struct Contents {
 /// An input at one instant.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct InputAt {
-    pub value: f64,
-    pub slope: f64,
+    pub(crate) value: f64,
+    pub(crate) slope: f64,
     /// By how much the slope has changed in this very instant.
-    pub kink: f64,
+    pub(crate) kink: f64,
 }
 
 /// A pack that any number of drives share.
 #[derive(Debug)]
-pub struct Prepared {
+pub(crate) struct Prepared {
     pack: Pack,
     joint: Response,
 }
@@ -147,7 +152,7 @@ impl Track {
 
 impl Contents {
     /// For modes of ascending decays.
-    pub fn new(input: &PiecewiseLinear, decay_per_s: &[f64]) -> Self {
+    pub(crate) fn new(input: &PiecewiseLinear, decay_per_s: &[f64]) -> Self {
         let knots = input.knots();
         let mut content = Vec::with_capacity(knots.len() * decay_per_s.len());
         let mut state = vec![0.0; decay_per_s.len()];
@@ -166,7 +171,7 @@ impl Contents {
     }
 
     /// Writes the modes' contents at an instant; returns the input there.
-    pub fn at(&self, instant: Instant, decay: &mut Decay, state: &mut [f64]) -> InputAt {
+    pub(crate) fn at(&self, instant: Instant, decay: &mut Decay, state: &mut [f64]) -> InputAt {
         let modes = state.len();
         let knots = self.input.knots();
         let past = match instant.side {
@@ -201,7 +206,7 @@ pub struct PackField {
 }
 
 impl PackField {
-    pub fn new(prepared: Arc<Prepared>, drive: &Drive) -> Self {
+    pub(crate) fn new(prepared: Arc<Prepared>, drive: &Drive) -> Self {
         let decay_per_s = &prepared.pack.decay_per_s;
         let tracks = match (&prepared.pack.ambient, &drive.ambient_k) {
             (Some(_), Some(ambient_k)) => vec![

@@ -38,38 +38,38 @@ fn order(first: usize, cells_per_layer: usize) -> usize {
 /// A conductance between two nodes that is not of the material.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Contact {
-    pub nodes: [usize; 2],
-    pub conductance: f64,
+    pub(crate) nodes: [usize; 2],
+    pub(crate) conductance: f64,
 }
 
 /// The radial network, for one place of the axis.
 #[derive(Debug, Clone)]
 pub(super) struct Network {
-    pub conductivity_w_per_m_k: f64,
+    pub(crate) conductivity_w_per_m_k: f64,
     /// One entry a node; the spool (if any) first, housings last.
-    pub capacity: Vec<f64>,
+    pub(crate) capacity: Vec<f64>,
     /// K at the declared conductivity.
-    pub conduction: DMatrix<f64>,
+    pub(crate) conduction: DMatrix<f64>,
     /// Heat that the material conducts into each node per kelvin of the drive, where the drive is the outermost node.
-    pub from_drive: Vec<f64>,
-    pub contacts: Vec<Contact>,
+    pub(crate) from_drive: Vec<f64>,
+    pub(crate) contacts: Vec<Contact>,
     /// What else joins each node to the drive, and what joins it to the ambient.
-    pub to_drive: Vec<f64>,
-    pub to_ambient: Vec<f64>,
+    pub(crate) to_drive: Vec<f64>,
+    pub(crate) to_ambient: Vec<f64>,
     /// The bore's heat enters node 0; this is its share per unit flux.
-    pub heated: f64,
+    pub(crate) heated: f64,
     /// Nodes in front of the pack's first one.
-    pub spool_nodes: usize,
-    pub pack_nodes: usize,
-    pub layers: usize,
+    pub(crate) spool_nodes: usize,
+    pub(crate) pack_nodes: usize,
+    pub(crate) layers: usize,
     /// The share of each node in a layer's mean, layers × nodes …
-    pub shares: DMatrix<f64>,
+    pub(crate) shares: DMatrix<f64>,
     /// … and that of the drive.
-    pub drive_share: Vec<f64>,
+    pub(crate) drive_share: Vec<f64>,
 }
 
 impl Network {
-    pub fn new(path: &HeatPath) -> Self {
+    pub(crate) fn new(path: &HeatPath) -> Self {
         let shape = &path.shape;
         let pitch_m = shape.radial_pitch_m;
         let (conductivity, heat_capacity) = match path.material {
@@ -190,22 +190,22 @@ impl Network {
         }
     }
 
-    pub fn nodes(&self) -> usize {
+    pub(crate) fn nodes(&self) -> usize {
         self.capacity.len()
     }
 
     /// Which nodes are the pack's own.
-    pub fn pack(&self) -> std::ops::Range<usize> {
+    pub(crate) fn pack(&self) -> std::ops::Range<usize> {
         self.spool_nodes..self.spool_nodes + self.pack_nodes
     }
 
     /// b: heat into each node per kelvin of the drive.
-    pub fn boundary(&self) -> Vec<f64> {
+    pub(crate) fn boundary(&self) -> Vec<f64> {
         self.from_drive.iter().zip(&self.to_drive).map(|(a, b)| a + b).collect()
     }
 
     /// K + X.
-    pub fn operator(&self) -> DMatrix<f64> {
+    pub(crate) fn operator(&self) -> DMatrix<f64> {
         let mut operator = self.conduction.clone();
         for &Contact { nodes: [a, b], conductance } in &self.contacts {
             operator[(a, a)] += conductance;
@@ -220,7 +220,7 @@ impl Network {
     }
 
     /// C^{−1/2} (K + X + diag(C) `extra`) C^{−1/2} at the declared conductivity, `extra` acting on the pack's nodes only.
-    pub fn symmetrised(&self, extra_per_s: f64) -> DMatrix<f64> {
+    pub(crate) fn symmetrised(&self, extra_per_s: f64) -> DMatrix<f64> {
         let mut matrix = self.operator();
         let roots: Vec<f64> = self.capacity.iter().map(|c| 1.0 / c.sqrt()).collect();
         for (mut column, root) in matrix.column_iter_mut().zip(&roots) {
@@ -237,18 +237,18 @@ impl Network {
 #[derive(Debug, Clone)]
 pub(super) struct Axis {
     /// Shares of the nodes in a mean over the axis.
-    pub masses: Vec<f64>,
+    pub(crate) masses: Vec<f64>,
     /// ∫ ℓ_i' ℓ_j' dz over the height [1/m²].
-    pub stiffness_per_m2: DMatrix<f64>,
+    pub(crate) stiffness_per_m2: DMatrix<f64>,
     /// Weights of ∫ T ζ dζ over −½ … ½.
-    pub moment: Vec<f64>,
+    pub(crate) moment: Vec<f64>,
     /// The flanges' nodes and their films over the height [W/(m³ K)]; where a spool's flange touches the pack, that contact, last.
-    pub flanges: Vec<(usize, f64)>,
+    pub(crate) flanges: Vec<(usize, f64)>,
 }
 
 impl Axis {
     /// None where no flange is heated.
-    pub fn new(path: &HeatPath) -> Option<Self> {
+    pub(crate) fn new(path: &HeatPath) -> Option<Self> {
         let touched =
             path.spool_flanges.iter().map(|f| FlangeFilm { flange: f.flange, film_w_per_m2_k: f.contact_w_per_m2_k });
         let flanges: Vec<FlangeFilm> = path.flange.into_iter().chain(path.opposite_flange).chain(touched).collect();
@@ -272,7 +272,7 @@ impl Axis {
         })
     }
 
-    pub fn nodes(&self) -> usize {
+    pub(crate) fn nodes(&self) -> usize {
         self.masses.len()
     }
 }

@@ -57,9 +57,9 @@ pub struct Pack {
 #[derive(Debug, Clone)]
 pub(super) struct OwnStart {
     /// Outputs × modes: what decays with each mode.
-    pub content: DMatrix<f64>,
+    pub(crate) content: DMatrix<f64>,
     /// The outputs' rates before the start.
-    pub before_k_per_s: DVector<f64>,
+    pub(crate) before_k_per_s: DVector<f64>,
 }
 
 /// A mode whose share of every response is smaller than this is left out: a heated flange makes thousands of them, which
@@ -69,17 +69,17 @@ const NEGLIGIBLE: f64 = 1e-9;
 /// Eigenmodes along the axis; without a heated flange there is one, uniform.
 pub(super) struct AxialModes {
     /// μ_m [1/m²].
-    pub decay_per_m2: Vec<f64>,
+    pub(crate) decay_per_m2: Vec<f64>,
     /// What a mode's content adds to the mean over the axis, and what a uniform input adds to its content.
-    pub mean: Vec<f64>,
-    pub uniform: Vec<f64>,
+    pub(crate) mean: Vec<f64>,
+    pub(crate) uniform: Vec<f64>,
     /// Places of the axis × modes.
-    pub places: DMatrix<f64>,
+    pub(crate) places: DMatrix<f64>,
     /// Mode content per unit of the flange's air [1/m²], and the mode's first moment; both empty without a flange.
     flange_per_m2: Vec<f64>,
-    pub moment: Vec<f64>,
+    pub(crate) moment: Vec<f64>,
     /// Of the pack's material.
-    pub diffusivity_m2_per_s: f64,
+    pub(crate) diffusivity_m2_per_s: f64,
 }
 
 impl AxialModes {
@@ -131,13 +131,13 @@ impl AxialModes {
 
 /// One mode: its decay, what each output sees of it, and what each input puts into it.
 pub(super) struct Mode {
-    pub decay_per_s: f64,
-    pub seen: Vec<f64>,
-    pub boundary: f64,
-    pub ambient: f64,
-    pub heat: f64,
+    pub(crate) decay_per_s: f64,
+    pub(crate) seen: Vec<f64>,
+    pub(crate) boundary: f64,
+    pub(crate) ambient: f64,
+    pub(crate) heat: f64,
     /// Its content at a start that is not even.
-    pub start: f64,
+    pub(crate) start: f64,
 }
 
 impl Pack {
@@ -224,13 +224,8 @@ impl Pack {
     }
 
     /// λ_i [1/s], ascending.
-    pub fn decays_per_s(&self) -> &[f64] {
+    pub(crate) fn decays_per_s(&self) -> &[f64] {
         &self.decay_per_s
-    }
-
-    /// a_ji: what mode `mode` takes away from a layer's steady response while drive and ambient are one temperature.
-    pub fn amplitude(&self, layer: usize, mode: usize) -> f64 {
-        self.boundary.amplitude[(layer, mode)] + self.ambient.as_ref().map_or(0.0, |a| a.amplitude[(layer, mode)])
     }
 
     /// Drive and ambient as one temperature.
@@ -242,7 +237,7 @@ impl Pack {
     }
 
     /// The rate of every layer after a unit step of the drive's rate; the ambient, if apart, does the same step.
-    pub fn step_rates(&self, time_s: f64, layers: &mut [f64]) {
+    pub(crate) fn step_rates(&self, time_s: f64, layers: &mut [f64]) {
         layers.fill(0.0);
         if time_s < 0.0 {
             return;
@@ -261,11 +256,11 @@ impl Pack {
     }
 
     /// Fifty time constants of the slowest mode: nothing is left then but rounding.
-    pub fn settling_s(&self) -> f64 {
+    pub(crate) fn settling_s(&self) -> f64 {
         50.0 / self.decay_per_s[0]
     }
 
-    pub fn shortest_s(&self) -> f64 {
+    pub(crate) fn shortest_s(&self) -> f64 {
         self.shortest_s
     }
 }

@@ -17,7 +17,7 @@ pub enum Material {
 }
 
 impl Material {
-    pub fn diffusivity_m2_per_s(&self) -> f64 {
+    pub(crate) fn diffusivity_m2_per_s(&self) -> f64 {
         match *self {
             Material::Diffusivity { m2_per_s } => m2_per_s,
             Material::Conductivity { w_per_m_k, heat_capacity_j_per_m3_k } => w_per_m_k / heat_capacity_j_per_m3_k,
@@ -25,7 +25,7 @@ impl Material {
     }
 
     /// The same material conducting `factor` times as well.
-    pub fn scaled(self, factor: f64) -> Self {
+    pub(crate) fn scaled(self, factor: f64) -> Self {
         match self {
             Material::Diffusivity { m2_per_s } => Material::Diffusivity { m2_per_s: m2_per_s * factor },
             Material::Conductivity { w_per_m_k, heat_capacity_j_per_m3_k } => {
@@ -112,12 +112,12 @@ pub struct Start {
 
 impl Start {
     /// Whether anything is warmer or colder than the drive.
-    pub fn is_uneven(&self) -> bool {
+    pub(crate) fn is_uneven(&self) -> bool {
         self.pack_above_k != 0.0 || self.spool_above_k != 0.0 || self.housing_above_k != 0.0
     }
 
     /// A course with the ramp before its start.
-    pub fn before(&self, course: &PiecewiseLinear) -> PiecewiseLinear {
+    pub(crate) fn before(&self, course: &PiecewiseLinear) -> PiecewiseLinear {
         let (first_s, first_k) = (course.knots()[0], course.first_value());
         let knots = std::iter::once(first_s - self.lasted_s).chain(course.knots().iter().copied()).collect();
         let begun_k = first_k - self.rate_k_per_s * self.lasted_s;
@@ -129,8 +129,8 @@ impl Start {
 /// Heat into the bore after power-on at the drive's first knot: q∞ (1 − e^{−t/τ}).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoreHeat {
-    pub power_w_per_m2: f64,
-    pub time_constant_s: f64,
+    pub(crate) power_w_per_m2: f64,
+    pub(crate) time_constant_s: f64,
 }
 
 /// Which flange: layer 1 starts at the first.
@@ -157,7 +157,7 @@ pub struct PackShape {
 }
 
 impl PackShape {
-    pub fn of(coil: &Coil) -> Self {
+    pub(crate) fn of(coil: &Coil) -> Self {
         Self {
             layers: coil.layers(),
             bore_radius_m: coil.bore_radius_m(),
@@ -200,8 +200,8 @@ pub struct HeatPath {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LayerGap {
     /// Layers inside it.
-    pub above_layer: usize,
-    pub conductance_w_per_m2_k: f64,
+    pub(crate) above_layer: usize,
+    pub(crate) conductance_w_per_m2_k: f64,
 }
 
 /// A grid that puts guaranteed and worst rates within a few millionths of the continuum (`tests/validation/pack.rs`).
@@ -229,28 +229,24 @@ impl HeatPath {
         }
     }
 
-    pub fn without_flanges(&self) -> Self {
-        Self { flange: None, opposite_flange: None, spool_flanges: Vec::new(), ..self.clone() }
-    }
-
     /// Whether something changes the field that no drive does: heat from the bore, a start that is not steady.
-    pub fn has_own_course(&self) -> bool {
+    pub(crate) fn has_own_course(&self) -> bool {
         self.bore_heat.is_some() || self.start.is_some()
     }
 
     /// As the drive alone moves it.
-    pub fn driven_only(&self) -> Self {
+    pub(crate) fn driven_only(&self) -> Self {
         Self { bore_heat: None, start: None, ..self.clone() }
     }
 
     /// The time constant of what changes by itself, beside the pack's own.
-    pub fn own_course_s(&self) -> f64 {
+    pub(crate) fn own_course_s(&self) -> f64 {
         self.bore_heat.map_or(0.0, |heat| heat.time_constant_s)
     }
 
     /// The housings whose temperature is to be found, and what then joins the outermost of them (or the pack) to the drive;
     /// None where the drive is the surface itself.
-    pub fn enclosure(&self) -> (&[Housing], Option<f64>) {
+    pub(crate) fn enclosure(&self) -> (&[Housing], Option<f64>) {
         let inside = |count: usize| (&self.housings[..count], Some(self.housings[count].gap_w_per_m2_k));
         match self.location {
             Location::OuterLayer => (&[], None),
@@ -264,18 +260,18 @@ impl HeatPath {
     }
 
     /// Whether parts meet that do not share the modes of the axis: one temperature of a flange or a housing faces all places.
-    pub fn is_joined(&self) -> bool {
+    pub(crate) fn is_joined(&self) -> bool {
         let along = self.spool_wall.is_some() || !self.enclosure().0.is_empty();
         !self.spool_flanges.is_empty() || (self.flange.is_some() && along)
     }
 
     /// Whether temperature varies along the axis.
-    pub fn varies_along(&self) -> bool {
+    pub(crate) fn varies_along(&self) -> bool {
         self.flange.is_some() || !self.spool_flanges.is_empty()
     }
 
     /// What lies between the drive and the first layer that does not touch it.
-    pub fn untouched_m(&self) -> f64 {
+    pub(crate) fn untouched_m(&self) -> f64 {
         self.shape.radial_pitch_m * if self.location == Location::OuterLayer { 0.5 } else { 1.0 }
     }
 }

@@ -31,13 +31,13 @@ use super::{BoreHeat, Extent, HeatPath, ThermalError};
 /// Outputs: the layers' means, innermost first, then (with a heated flange) their first axial moments. `amplitude` is
 /// row-major outputs × modes.
 #[derive(Debug, Clone)]
-pub struct Reduced {
-    pub layers: usize,
-    pub outputs: usize,
+pub(crate) struct Reduced {
+    pub(crate) layers: usize,
+    pub(crate) outputs: usize,
     /// Ascending.
-    pub decay_per_s: Vec<f64>,
-    pub amplitude: Vec<f64>,
-    pub residue: Vec<f64>,
+    pub(crate) decay_per_s: Vec<f64>,
+    pub(crate) amplitude: Vec<f64>,
+    pub(crate) residue: Vec<f64>,
     own: Option<OwnCourse>,
 }
 
@@ -57,7 +57,7 @@ impl Reduced {
     ///
     /// # Errors
     /// As [`Pack::new`]; a half space whose fit is singular.
-    pub fn new(path: &HeatPath, modes: usize, shortest_s: f64, longest_s: f64) -> Result<Self, ThermalError> {
+    pub(crate) fn new(path: &HeatPath, modes: usize, shortest_s: f64, longest_s: f64) -> Result<Self, ThermalError> {
         match path.extent {
             Extent::Pack => Ok(Self::of_pack(&Pack::new(path)?, modes)),
             Extent::HalfSpace => Self::of_half_space(path, modes, shortest_s, longest_s),
@@ -126,17 +126,17 @@ impl Reduced {
         Ok(Self { layers, outputs: layers, decay_per_s, amplitude, residue, own })
     }
 
-    pub fn modes(&self) -> usize {
+    pub(crate) fn modes(&self) -> usize {
         self.decay_per_s.len()
     }
 
     /// a_ji of one output.
-    pub fn row(&self, output: usize) -> &[f64] {
+    pub(crate) fn row(&self, output: usize) -> &[f64] {
         &self.amplitude[output * self.modes()..(output + 1) * self.modes()]
     }
 
     /// What the bore's heat, and a start that was not steady, add to each output so long after power-on; None without either.
-    pub fn own_k(&self, since_s: f64) -> Option<Vec<f64>> {
+    pub(crate) fn own_k(&self, since_s: f64) -> Option<Vec<f64>> {
         let own = self.own.as_ref()?;
         let left = DVector::from_iterator(
             own.decay_per_s.len(),

@@ -83,7 +83,7 @@ pub struct SteppedField {
 impl SteppedField {
     /// # Errors
     /// Values so extreme that nothing converges; a conductivity that does not stay positive.
-    pub fn new(path: &HeatPath, drive: &Drive) -> Result<Self, ThermalError> {
+    pub(crate) fn new(path: &HeatPath, drive: &Drive) -> Result<Self, ThermalError> {
         let (given, drive) = (drive, &path.start.map_or_else(|| drive.clone(), |start| drive.after(&start)));
         let values = || drive.boundary_k.values().iter().chain(drive.ambient_k().values()).copied();
         let (lowest_k, highest_k) = values().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));

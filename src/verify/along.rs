@@ -49,7 +49,7 @@ pub(super) struct Along<'h> {
 
 impl<'h> Along<'h> {
     /// None where the states are no sums over ramps.
-    pub fn new(heat: &'h Heat, profile: &Profile) -> Option<Self> {
+    pub(crate) fn new(heat: &'h Heat, profile: &Profile) -> Option<Self> {
         let response = heat.gathered()?;
         let (mut starts_s, mut rises_k) = (vec![0.0], vec![0.0]);
         for piece in profile.pieces() {
@@ -77,7 +77,7 @@ impl<'h> Along<'h> {
     }
 
     /// Goes on to the next piece and gives its number and duration; the last is the moment at which the profile ends.
-    pub fn go_on(&mut self) -> Option<(usize, f64)> {
+    pub(crate) fn go_on(&mut self) -> Option<(usize, f64)> {
         let piece = self.next;
         let start_s = *self.starts_s.get(piece)?;
         let duration_s = self.starts_s.get(piece + 1).map_or(0.0, |end_s| end_s - start_s);
@@ -124,7 +124,7 @@ impl<'h> Along<'h> {
     }
 
     /// So long after the piece that was gone on to began, and within it.
-    pub fn state(&self, since_s: f64) -> State {
+    pub(crate) fn state(&self, since_s: f64) -> State {
         let piece = self.next.saturating_sub(1);
         let start_s = self.starts_s[piece];
         let mut state = self.heat.still(start_s + since_s);

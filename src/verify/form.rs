@@ -7,7 +7,7 @@ use crate::text;
 
 /// What `schedule` writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// The schedule itself.
     Plain,
     Traveller,
@@ -24,7 +24,7 @@ impl Kind {
     }
 
     /// The least kind that holds a column which not all have; none for a column that all have or that none has.
-    pub fn of_column(name: &str) -> Option<Self> {
+    pub(crate) fn of_column(name: &str) -> Option<Self> {
         OF_ROW.iter().find(|(key, ..)| *key == name).map(|(_, kind, _)| *kind)
     }
 }

@@ -38,20 +38,20 @@ const CUTS_BESIDE_FLANGE: [Cut; 2] = [Cut { cells_per_layer: 4, slices: 24 }, Cu
 /// The pack at one time, relative to where the profile starts.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct State {
-    pub time_s: f64,
-    pub rise_k: Vec<f64>,
-    pub rate_k_per_s: Vec<f64>,
+    pub(crate) time_s: f64,
+    pub(crate) rise_k: Vec<f64>,
+    pub(crate) rate_k_per_s: Vec<f64>,
     /// First axial moment of the rate, from −½ at the first flange to ½; empty without a heated flange.
-    pub moment_k_per_s: Vec<f64>,
-    pub ambient_rise_k: f64,
-    pub ambient_rate_k_per_s: f64,
+    pub(crate) moment_k_per_s: Vec<f64>,
+    pub(crate) ambient_rise_k: f64,
+    pub(crate) ambient_rate_k_per_s: f64,
 }
 
 /// A time, and whether a change of ramp at that very time has happened yet.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Moment {
-    pub time_s: f64,
-    pub after: bool,
+    pub(crate) time_s: f64,
+    pub(crate) after: bool,
 }
 
 fn heat_at(heat: Option<BoreHeat>, time_s: f64) -> f64 {
@@ -89,7 +89,7 @@ pub(super) struct Heat {
 }
 
 impl Heat {
-    pub fn new(model: &CoilModel, physics: &Physics, height_m: f64, longest_s: f64) -> Self {
+    pub(crate) fn new(model: &CoilModel, physics: &Physics, height_m: f64, longest_s: f64) -> Self {
         let coil = &model.coil;
         let (layers, pitch_m) = (coil.layers(), coil.radial_pitch_m());
         let diffusivity_m2_per_s = physics.diffusivity_m2_per_s();
@@ -109,12 +109,12 @@ impl Heat {
     }
 
     /// Whether any time can be asked for, free of steps.
-    pub fn is_exact_in_time(&self) -> bool {
+    pub(crate) fn is_exact_in_time(&self) -> bool {
         !matches!(self.solution, Solution::Stepped { .. })
     }
 
     /// The state at a moment of a profile, where [`Heat::is_exact_in_time`]; by steps otherwise.
-    pub fn at(&self, profile: &Profile, moment: Moment) -> State {
+    pub(crate) fn at(&self, profile: &Profile, moment: Moment) -> State {
         if let Solution::Stepped { networks, heat } = &self.solution {
             return self.extrapolated(profile, networks, *heat, Some(moment)).pop().unwrap_or_default();
         }
@@ -203,7 +203,7 @@ impl Heat {
     }
 
     /// The states that a profile leads through where it is stepped.
-    pub fn steps(&self, profile: &Profile) -> Vec<State> {
+    pub(crate) fn steps(&self, profile: &Profile) -> Vec<State> {
         match &self.solution {
             Solution::Stepped { networks, heat } => self.extrapolated(profile, networks, *heat, None),
             Solution::HalfSpace { .. } | Solution::Linear(_) => Vec::new(),
@@ -211,7 +211,7 @@ impl Heat {
     }
 
     /// The same by few steps and on the coarser network only, to see which profiles can hold the worst rate error.
-    pub fn few_steps(&self, profile: &Profile) -> Vec<State> {
+    pub(crate) fn few_steps(&self, profile: &Profile) -> Vec<State> {
         match &self.solution {
             Solution::Stepped { networks, heat } => self.stepped(profile, &networks[0], *heat, None, FEW_STEPS),
             Solution::HalfSpace { .. } | Solution::Linear(_) => Vec::new(),

@@ -44,7 +44,7 @@ pub(super) struct Response {
 }
 
 impl Response {
-    pub fn new(pack: &Layers, heat: Option<BoreHeat>, longest_s: f64) -> Self {
+    pub(crate) fn new(pack: &Layers, heat: Option<BoreHeat>, longest_s: f64) -> Self {
         Self {
             has_moments: pack.has_moments(),
             ..Self::of(pack.layers, pack.outermost_is_drive, longest_s, |s| pack.transform(heat, s))
@@ -52,7 +52,7 @@ impl Response {
     }
 
     /// Of layers at so many depths below the boundary of a half space, the outermost at it: 1/s e^{−x√(s/K)}.
-    pub fn half_space(depths_m: &[f64], diffusivity_m2_per_s: f64, longest_s: f64) -> Self {
+    pub(crate) fn half_space(depths_m: &[f64], diffusivity_m2_per_s: f64, longest_s: f64) -> Self {
         let transform = |s: Complex<f64>| {
             let q = (s / diffusivity_m2_per_s).sqrt();
             let at = |depth_m: &f64| match *depth_m {
@@ -92,13 +92,13 @@ impl Response {
         Self { layers, outermost_is_drive, has_moments: false, ends_s, windows }
     }
 
-    pub fn has_moments(&self) -> bool {
+    pub(crate) fn has_moments(&self) -> bool {
         self.has_moments
     }
 
     /// Adds `factor` times the response to a unit ramp that has lasted for a while (a moment, at 0) to rates,
     /// temperatures (unless there is no place for them) and moments' rates.
-    pub fn add_ramp(&self, factor: f64, lasted_s: f64, rate: &mut [f64], rise: &mut [f64], moment: &mut [f64]) {
+    pub(crate) fn add_ramp(&self, factor: f64, lasted_s: f64, rate: &mut [f64], rise: &mut [f64], moment: &mut [f64]) {
         self.add(factor, lasted_s, |node| Some(&node.ramp), rate, rise, moment);
         if self.outermost_is_drive {
             rate[self.layers - 1] += factor;
@@ -109,18 +109,18 @@ impl Response {
     }
 
     /// The first and the last time of each window, ascending.
-    pub fn windows_s(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+    pub(crate) fn windows_s(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
         let starts_s = std::iter::once(EARLIEST_S).chain(self.ends_s.iter().copied());
         starts_s.zip(self.ends_s.iter().copied())
     }
 
     /// Lets time pass over what ramps have added up to at the nodes of a window.
-    pub fn pass(&self, window: usize, sums: &mut [Complex<f64>], time_s: f64) {
+    pub(crate) fn pass(&self, window: usize, sums: &mut [Complex<f64>], time_s: f64) {
         self.windows[window].iter().zip(sums).for_each(|(node, sum)| *sum *= (node.s * time_s).exp());
     }
 
     /// Adds a ramp that has lasted for a while to what stands at the nodes of a window.
-    pub fn gather(&self, window: usize, sums: &mut Vec<Complex<f64>>, factor: f64, lasted_s: f64) {
+    pub(crate) fn gather(&self, window: usize, sums: &mut Vec<Complex<f64>>, factor: f64, lasted_s: f64) {
         sums.resize(NODES, Complex::new(0.0, 0.0));
         for (node, sum) in self.windows[window].iter().zip(sums) {
             *sum += (node.s * lasted_s).exp() * factor;
@@ -129,7 +129,7 @@ impl Response {
 
     /// As [`Response::add_ramp`] for all ramps that were gathered at a window's nodes, so much later; without what an outermost
     /// layer that is the drive itself does.
-    pub fn add_gathered(
+    pub(crate) fn add_gathered(
         &self,
         window: usize,
         sums: &[Complex<f64>],
@@ -143,12 +143,12 @@ impl Response {
         }
     }
 
-    pub fn outermost_is_drive(&self) -> bool {
+    pub(crate) fn outermost_is_drive(&self) -> bool {
         self.outermost_is_drive
     }
 
     /// Adds what the bore's heat has done since it began.
-    pub fn add_heat(&self, lasted_s: f64, rate: &mut [f64], rise: &mut [f64], moment: &mut [f64]) {
+    pub(crate) fn add_heat(&self, lasted_s: f64, rate: &mut [f64], rise: &mut [f64], moment: &mut [f64]) {
         self.add(1.0, lasted_s, |node| node.heated.as_ref(), rate, rise, moment);
     }
 
@@ -201,7 +201,7 @@ pub(super) mod tests {
     use crate::thermal::{Extent, Location, Material};
     use crate::verify::physics::Physics;
 
-    pub fn model() -> CoilModel {
+    pub(crate) fn model() -> CoilModel {
         let fibre = Fibre {
             refractive_index: 1.45,
             thermo_optic_per_k: 1e-5,

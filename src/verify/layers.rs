@@ -34,8 +34,8 @@ const MOST_COSINES: usize = 400;
 /// The pack as plain numbers, per radian and height.
 #[derive(Debug, Clone)]
 pub(super) struct Layers {
-    pub layers: usize,
-    pub outermost_is_drive: bool,
+    pub(crate) layers: usize,
+    pub(crate) outermost_is_drive: bool,
     /// Faces from the bore outwards; the last is where the drive is, or its film.
     faces_m: Vec<f64>,
     conductivity_w_per_m_k: f64,
@@ -72,7 +72,7 @@ struct Piece {
 }
 
 impl Layers {
-    pub fn new(model: &CoilModel, physics: &Physics, height_m: f64) -> Self {
+    pub(crate) fn new(model: &CoilModel, physics: &Physics, height_m: f64) -> Self {
         let coil = &model.coil;
         let (layers, bore_m, pitch_m) = (coil.layers(), coil.bore_radius_m(), coil.radial_pitch_m());
         let outermost_is_drive = !physics.driven_from_outside;
@@ -131,12 +131,12 @@ impl Layers {
         }
     }
 
-    pub fn has_moments(&self) -> bool {
+    pub(crate) fn has_moments(&self) -> bool {
         self.cosines.is_some()
     }
 
     /// s T̂ of every layer (and of its moment) under a unit ramp, and under the bore's heat.
-    pub fn transform(&self, heat: Option<BoreHeat>, s: C) -> (Vec<C>, Option<Vec<C>>) {
+    pub(crate) fn transform(&self, heat: Option<BoreHeat>, s: C) -> (Vec<C>, Option<Vec<C>>) {
         let outputs = self.layers * if self.has_moments() { 2 } else { 1 };
         let zero = C::new(0.0, 0.0);
         let mut ramp = vec![zero; outputs];

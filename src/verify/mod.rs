@@ -29,105 +29,105 @@ use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;
 use crate::units::{deg_per_h_from_rad_per_s, mm_from_m};
 
-pub use form::Kind;
+pub(crate) use form::Kind;
 
 /// What a file claims, in SI; what its kind of file says must be there, and nothing else.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Claim {
     /// None only where nothing was read yet.
-    pub kind: Option<Kind>,
+    pub(crate) kind: Option<Kind>,
     /// Whether the file says more of the whole than a table's last columns can.
-    pub is_document: bool,
+    pub(crate) is_document: bool,
     /// What wrote the file.
-    pub program: Option<String>,
-    pub model: Option<String>,
-    pub model_sha256: Option<String>,
-    pub pattern: Option<String>,
+    pub(crate) program: Option<String>,
+    pub(crate) model: Option<String>,
+    pub(crate) model_sha256: Option<String>,
+    pub(crate) pattern: Option<String>,
     /// Of the pattern's name and segments.
-    pub pattern_sha256: Option<String>,
-    pub segments: Option<Vec<i64>>,
+    pub(crate) pattern_sha256: Option<String>,
+    pub(crate) segments: Option<Vec<i64>>,
     /// Turns more or fewer at end A and at end B.
-    pub end_turns: [Option<i64>; 2],
-    pub class: Option<String>,
-    pub reels: Option<i64>,
-    pub captive: Option<i64>,
-    pub max_climb: Option<i64>,
-    pub worst_rate_rad_per_s: Option<f64>,
-    pub worst_profile: Option<String>,
-    pub worst_time_s: Option<f64>,
+    pub(crate) end_turns: [Option<i64>; 2],
+    pub(crate) class: Option<String>,
+    pub(crate) reels: Option<i64>,
+    pub(crate) captive: Option<i64>,
+    pub(crate) max_climb: Option<i64>,
+    pub(crate) worst_rate_rad_per_s: Option<f64>,
+    pub(crate) worst_profile: Option<String>,
+    pub(crate) worst_time_s: Option<f64>,
     /// The fibre in words.
-    pub fibre: Option<String>,
-    pub length_m: Option<f64>,
-    pub midpoint_m: Option<f64>,
-    pub midpoint_layer: Option<i64>,
-    pub start_mark_m: Option<f64>,
-    pub expected_trim_m: Option<f64>,
-    pub supply: Option<Vec<ClaimedReel>>,
-    pub shop: Option<Shop>,
-    pub rows: Vec<Row>,
+    pub(crate) fibre: Option<String>,
+    pub(crate) length_m: Option<f64>,
+    pub(crate) midpoint_m: Option<f64>,
+    pub(crate) midpoint_layer: Option<i64>,
+    pub(crate) start_mark_m: Option<f64>,
+    pub(crate) expected_trim_m: Option<f64>,
+    pub(crate) supply: Option<Vec<ClaimedReel>>,
+    pub(crate) shop: Option<Shop>,
+    pub(crate) rows: Vec<Row>,
     /// The page as its file has it, where the file is one.
-    pub page: Option<String>,
+    pub(crate) page: Option<String>,
     /// The lines of a machine program, where the file is one; its rows are what these wind.
-    pub code: Option<String>,
+    pub(crate) code: Option<String>,
     /// What was found where the file was read.
-    pub unread: Vec<Violation>,
+    pub(crate) unread: Vec<Violation>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub struct ClaimedReel {
-    pub name: String,
-    pub captive: bool,
-    pub prepared_before_step: i64,
-    pub taken_from: Option<String>,
-    pub from_m: f64,
-    pub to_m: f64,
-    pub load_m: Option<f64>,
+pub(crate) struct ClaimedReel {
+    pub(crate) name: String,
+    pub(crate) captive: bool,
+    pub(crate) prepared_before_step: i64,
+    pub(crate) taken_from: Option<String>,
+    pub(crate) from_m: f64,
+    pub(crate) to_m: f64,
+    pub(crate) load_m: Option<f64>,
 }
 
 /// One row of a schedule; further columns are checked where they are present.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Row {
-    pub step: i64,
-    pub layer: i64,
-    pub half: String,
-    pub segment: i64,
-    pub supply_reel: String,
-    pub direction: String,
-    pub turns: f64,
+pub(crate) struct Row {
+    pub(crate) step: i64,
+    pub(crate) layer: i64,
+    pub(crate) half: String,
+    pub(crate) segment: i64,
+    pub(crate) supply_reel: String,
+    pub(crate) direction: String,
+    pub(crate) turns: f64,
     /// From the first flange to the nearest turn, where a program says so.
-    pub free_m: Option<f64>,
-    pub fibre_from_m: f64,
-    pub fibre_to_m: f64,
-    pub length_m: f64,
-    pub radius_m: f64,
-    pub climb: i64,
-    pub cumulative_m: f64,
-    pub crossover: Option<String>,
-    pub balance_m: Option<f64>,
-    pub rotation: Option<String>,
-    pub axial_pitch_m: Option<f64>,
-    pub tension_n: Option<f64>,
-    pub tension_min_n: Option<f64>,
-    pub tension_max_n: Option<f64>,
-    pub turns_per_min: Option<f64>,
-    pub reel_change: Option<bool>,
-    pub potting: Option<bool>,
+    pub(crate) free_m: Option<f64>,
+    pub(crate) fibre_from_m: f64,
+    pub(crate) fibre_to_m: f64,
+    pub(crate) length_m: f64,
+    pub(crate) radius_m: f64,
+    pub(crate) climb: i64,
+    pub(crate) cumulative_m: f64,
+    pub(crate) crossover: Option<String>,
+    pub(crate) balance_m: Option<f64>,
+    pub(crate) rotation: Option<String>,
+    pub(crate) axial_pitch_m: Option<f64>,
+    pub(crate) tension_n: Option<f64>,
+    pub(crate) tension_min_n: Option<f64>,
+    pub(crate) tension_max_n: Option<f64>,
+    pub(crate) turns_per_min: Option<f64>,
+    pub(crate) reel_change: Option<bool>,
+    pub(crate) potting: Option<bool>,
     /// Entered by hand.
-    pub measured_length_m: Option<String>,
-    pub checked_by: Option<String>,
+    pub(crate) measured_length_m: Option<String>,
+    pub(crate) checked_by: Option<String>,
 }
 
 /// The winding shop's settings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shop {
     /// Words that are copied, not computed, each with its name.
-    pub words: Vec<(&'static str, String)>,
-    pub tension_n: f64,
-    pub tension_taper_per_layer: f64,
-    pub tension_limit: f64,
-    pub allowance_m: f64,
-    pub potting_every_layers: i64,
-    pub winding_speed_turns_per_min: f64,
+    pub(crate) words: Vec<(&'static str, String)>,
+    pub(crate) tension_n: f64,
+    pub(crate) tension_taper_per_layer: f64,
+    pub(crate) tension_limit: f64,
+    pub(crate) allowance_m: f64,
+    pub(crate) potting_every_layers: i64,
+    pub(crate) winding_speed_turns_per_min: f64,
 }
 
 /// What the schedule should be for.
@@ -143,11 +143,11 @@ pub struct Truth<'a> {
 /// What the program's pages hold besides their words; SHA-256 as 64 hexadecimal digits.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Assets {
-    pub style_sha256: String,
-    pub drawing_style_sha256: String,
-    pub script_sha256: String,
+    pub(crate) style_sha256: String,
+    pub(crate) drawing_style_sha256: String,
+    pub(crate) script_sha256: String,
     /// What a browser may load and run.
-    pub policy: String,
+    pub(crate) policy: String,
 }
 
 /// One thing that is not as it should be.
@@ -156,9 +156,9 @@ pub struct Violation {
     /// Counted from 1; none for the file as a whole.
     pub row: Option<usize>,
     pub field: String,
-    pub expected: String,
-    pub found: String,
-    pub remedy: &'static str,
+    pub(crate) expected: String,
+    pub(crate) found: String,
+    pub(crate) remedy: &'static str,
 }
 
 impl std::fmt::Display for Violation {
@@ -178,7 +178,7 @@ pub struct Verification {
     pub checks: usize,
     pub rate_check: RateCheck,
     /// What was worked out again by code of this module's own.
-    pub recomputed: Vec<&'static str>,
+    pub(crate) recomputed: Vec<&'static str>,
     /// What was not.
     pub taken_as_given: Vec<&'static str>,
 }

@@ -14,9 +14,9 @@ use crate::rate::CoilModel;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cut {
     /// Even, so that a layer's middle is a face between cells.
-    pub cells_per_layer: usize,
+    pub(crate) cells_per_layer: usize,
     /// Along the axis, where a flange is heated.
-    pub slices: usize,
+    pub(crate) slices: usize,
 }
 
 /// A way for heat: through the material, then through a contact or a film.
@@ -29,7 +29,7 @@ pub(super) struct Link {
 }
 
 impl Link {
-    pub fn conductance(self, conductivity_w_per_m_k: f64) -> f64 {
+    pub(crate) fn conductance(self, conductivity_w_per_m_k: f64) -> f64 {
         1.0 / (self.log_ratio / conductivity_w_per_m_k + self.rest)
     }
 }
@@ -37,37 +37,37 @@ impl Link {
 /// Everything per radian and per height.
 #[derive(Debug, Clone)]
 pub(super) struct Network {
-    pub layers: usize,
-    pub cells_per_layer: usize,
+    pub(crate) layers: usize,
+    pub(crate) cells_per_layer: usize,
     /// The spool's node, if there is one, comes first.
-    pub spool: usize,
-    pub capacity: Vec<f64>,
+    pub(crate) spool: usize,
+    pub(crate) capacity: Vec<f64>,
     /// Between node i and the next one; the last leads to the drive.
-    pub links: Vec<Link>,
-    pub mount: f64,
-    pub bore_radius_m: f64,
-    pub outermost_is_drive: bool,
-    pub conductivity_w_per_m_k: f64,
-    pub slope_per_k: f64,
-    pub axis: Option<Axis>,
+    pub(crate) links: Vec<Link>,
+    pub(crate) mount: f64,
+    pub(crate) bore_radius_m: f64,
+    pub(crate) outermost_is_drive: bool,
+    pub(crate) conductivity_w_per_m_k: f64,
+    pub(crate) slope_per_k: f64,
+    pub(crate) axis: Option<Axis>,
 }
 
 /// The cut along the axis.
 #[derive(Debug, Clone)]
 pub(super) struct Axis {
-    pub slices: usize,
+    pub(crate) slices: usize,
     /// k/(ρc Δz²) [1/s].
-    pub exchange_per_s: f64,
+    pub(crate) exchange_per_s: f64,
     /// Δz ρc [J/(m² K)] and Δz/2 [m].
-    pub slice_capacity_j_per_m2_k: f64,
-    pub half_slice_m: f64,
+    pub(crate) slice_capacity_j_per_m2_k: f64,
+    pub(crate) half_slice_m: f64,
     /// Slices that touch a heated flange, with its film [W/(m² K)].
-    pub heated: Vec<(usize, f64)>,
+    pub(crate) heated: Vec<(usize, f64)>,
 }
 
 impl Axis {
     /// From a slice to the air behind its flange, if it has one [1/s].
-    pub fn film_per_s(&self, slice: usize, conductivity_w_per_m_k: f64) -> f64 {
+    pub(crate) fn film_per_s(&self, slice: usize, conductivity_w_per_m_k: f64) -> f64 {
         let of = |film: f64| {
             let resistance = self.half_slice_m / conductivity_w_per_m_k + 1.0 / film;
             1.0 / (resistance * self.slice_capacity_j_per_m2_k)
@@ -76,7 +76,7 @@ impl Axis {
     }
 
     /// First moment over ζ = −½ … ½ of what the slices hold, exact for what is linear in ζ.
-    pub fn moment_weights(&self) -> Vec<f64> {
+    pub(crate) fn moment_weights(&self) -> Vec<f64> {
         let n = self.slices as f64;
         let centres: Vec<f64> = (0..self.slices).map(|m| (m as f64 + 0.5) / n - 0.5).collect();
         let of_linear: f64 = centres.iter().map(|c| c * c).sum();
@@ -85,7 +85,7 @@ impl Axis {
 }
 
 impl Network {
-    pub fn new(model: &CoilModel, physics: &Physics, height_m: f64, cut: Cut) -> Self {
+    pub(crate) fn new(model: &CoilModel, physics: &Physics, height_m: f64, cut: Cut) -> Self {
         let coil = &model.coil;
         let (layers, bore_m, pitch_m) = (coil.layers(), coil.bore_radius_m(), coil.radial_pitch_m());
         let cells = cut.cells_per_layer;
@@ -146,17 +146,17 @@ impl Network {
         }
     }
 
-    pub fn nodes(&self) -> usize {
+    pub(crate) fn nodes(&self) -> usize {
         self.capacity.len()
     }
 
     /// Layers that nodes stand for; the last one may be the drive.
-    pub fn solved_layers(&self) -> usize {
+    pub(crate) fn solved_layers(&self) -> usize {
         self.layers - usize::from(self.outermost_is_drive)
     }
 
     /// The share of each of a layer's nodes in its mean, with the node's index.
-    pub fn shares(&self, layer: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+    pub(crate) fn shares(&self, layer: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let first = self.spool + layer * self.cells_per_layer;
         let nodes = first..first + self.cells_per_layer;
         let whole: f64 = self.capacity[nodes.clone()].iter().sum();

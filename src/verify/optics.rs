@@ -37,7 +37,7 @@ pub(super) struct Optics {
 
 impl Optics {
     /// `pieces` in the order of arclength.
-    pub fn new(coil: &Coil, physics: &Physics, pieces: &[Piece]) -> Self {
+    pub(crate) fn new(coil: &Coil, physics: &Physics, pieces: &[Piece]) -> Self {
         let layers = coil.layers();
         let length_m = pieces.iter().map(|piece| piece.length_m).sum::<f64>();
         let middle_m = 0.5 * length_m;
@@ -92,13 +92,13 @@ impl Optics {
     }
 
     /// What one layer alone could make of a rate [rad/s per K/s].
-    pub fn largest_layer_rad_per_k(&self) -> f64 {
+    pub(crate) fn largest_layer_rad_per_k(&self) -> f64 {
         let sizes = self.weights_m2.iter().flatten().map(|w| w.abs());
         self.scale_per_m2 * self.kappa_per_k * sizes.fold(0.0, f64::max)
     }
 
     /// Whether a user's formula is part of the rate error.
-    pub fn has_formula(&self) -> bool {
+    pub(crate) fn has_formula(&self) -> bool {
         self.physics.biases.iter().any(|bias| matches!(bias, Bias::Formula { .. }))
     }
 
@@ -127,7 +127,7 @@ impl Optics {
     }
 
     /// Ω; the profile begins at 20 °C.
-    pub fn rate_rad_per_s(&self, state: &State) -> f64 {
+    pub(crate) fn rate_rad_per_s(&self, state: &State) -> f64 {
         let length_m: f64 = self.lengths_m.iter().sum();
         let mean = |values: &[f64]| values.iter().zip(&self.lengths_m).map(|(v, l)| v * l).sum::<f64>() / length_m;
         let mean_rate = mean(&state.rate_k_per_s);

@@ -16,71 +16,71 @@ use crate::thermal::{Extent, Location, Material};
 #[derive(Debug, Clone)]
 pub(super) struct Physics {
     /// Ends at a bore, instead of a half space.
-    pub is_pack: bool,
-    pub conductivity_w_per_m_k: f64,
-    pub heat_capacity_j_per_m3_k: f64,
+    pub(crate) is_pack: bool,
+    pub(crate) conductivity_w_per_m_k: f64,
+    pub(crate) heat_capacity_j_per_m3_k: f64,
     /// The profile is the air's (or, without a film, the surface's) instead of the outermost layer's.
-    pub driven_from_outside: bool,
-    pub film_w_per_m2_k: Option<f64>,
-    pub spool: Option<SpoolMass>,
-    pub bore_heat: Option<BoreHeat>,
+    pub(crate) driven_from_outside: bool,
+    pub(crate) film_w_per_m2_k: Option<f64>,
+    pub(crate) spool: Option<SpoolMass>,
+    pub(crate) bore_heat: Option<BoreHeat>,
     /// One, or one at either end.
-    pub flanges: Vec<HeatedFlange>,
+    pub(crate) flanges: Vec<HeatedFlange>,
     /// Layer below a gap, counted from 1 innermost, and conductance per area [W/(m²K)].
-    pub gaps: Vec<(usize, f64)>,
+    pub(crate) gaps: Vec<(usize, f64)>,
     /// Layer, counted from 1 innermost, and relative change of its κ.
-    pub layer_changes: Vec<(usize, f64)>,
+    pub(crate) layer_changes: Vec<(usize, f64)>,
     /// Heat capacity and conductance inwards per area of the pack's outer surface, from the coil outwards.
-    pub housings: Vec<[f64; 2]>,
+    pub(crate) housings: Vec<[f64; 2]>,
     /// Parts that are not worked out a second time: a spool's flanges and wall, an uneven start, a sensor on spool or flange.
-    pub is_beyond: bool,
-    pub conductivity_slope_per_k: f64,
+    pub(crate) is_beyond: bool,
+    pub(crate) conductivity_slope_per_k: f64,
     /// Missing on every second layer, the innermost being the first.
-    pub missing_turns: f64,
+    pub(crate) missing_turns: f64,
     /// Factor on κ everywhere.
-    pub path_factor: f64,
-    pub stress_strengths: Vec<f64>,
-    pub mismatches: Vec<Mismatch>,
-    pub path_slopes_per_k: Vec<f64>,
-    pub asymmetries: Vec<f64>,
-    pub surplus: Vec<Surplus>,
-    pub biases: Vec<Bias>,
+    pub(crate) path_factor: f64,
+    pub(crate) stress_strengths: Vec<f64>,
+    pub(crate) mismatches: Vec<Mismatch>,
+    pub(crate) path_slopes_per_k: Vec<f64>,
+    pub(crate) asymmetries: Vec<f64>,
+    pub(crate) surplus: Vec<Surplus>,
+    pub(crate) biases: Vec<Bias>,
     /// What the coil is made of, where its stress is to be worked out.
-    pub materials: Option<Arc<Materials>>,
+    pub(crate) materials: Option<Arc<Materials>>,
 }
 
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SpoolMass {
-    pub heat_capacity_j_per_m2_k: f64,
-    pub contact_w_per_m2_k: f64,
-    pub mount_w_per_m2_k: f64,
+    pub(crate) heat_capacity_j_per_m2_k: f64,
+    pub(crate) contact_w_per_m2_k: f64,
+    pub(crate) mount_w_per_m2_k: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BoreHeat {
-    pub power_w_per_m2: f64,
-    pub time_constant_s: f64,
+    pub(crate) power_w_per_m2: f64,
+    pub(crate) time_constant_s: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
 pub(super) struct HeatedFlange {
-    pub is_first: bool,
-    pub film_w_per_m2_k: f64,
+    pub(crate) is_first: bool,
+    pub(crate) film_w_per_m2_k: f64,
 }
 
 /// κ_B − κ_A = m κ, everywhere or below a transition.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Mismatch {
-    pub relative: f64,
+    pub(crate) relative: f64,
     /// Middle \[K\] and width \[K\].
-    pub below: Option<(f64, f64)>,
+    pub(crate) below: Option<(f64, f64)>,
 }
 
 /// Fibre 2δ beyond end A (δ > 0) or end B.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Surplus {
-    pub offset_m: f64,
-    pub follows_ambient: bool,
+    pub(crate) offset_m: f64,
+    pub(crate) follows_ambient: bool,
 }
 
 /// What adds to the rate without being the coil's.
@@ -95,7 +95,7 @@ pub(super) enum Bias {
 impl Physics {
     /// # Errors
     /// The name of an effect that is not known here.
-    pub fn read(model: &CoilModel) -> Result<Self, &'static str> {
+    pub(crate) fn read(model: &CoilModel) -> Result<Self, &'static str> {
         let (conductivity, heat_capacity) = match model.material {
             Material::Conductivity { w_per_m_k, heat_capacity_j_per_m3_k } => (w_per_m_k, heat_capacity_j_per_m3_k),
             // Nothing but the ratio can matter then.
@@ -207,7 +207,7 @@ impl Physics {
     }
 
     /// Whether a rate error depends on temperatures themselves, not only on their rates.
-    pub fn depends_on_temperature(&self) -> bool {
+    pub(crate) fn depends_on_temperature(&self) -> bool {
         let of_bias = |b: &Bias| matches!(b, Bias::Temperature { .. } | Bias::Formula { .. });
         !self.path_slopes_per_k.is_empty()
             || self.materials.as_ref().is_some_and(|m| !m.is_constant())
@@ -215,7 +215,7 @@ impl Physics {
             || self.biases.iter().any(of_bias)
     }
 
-    pub fn diffusivity_m2_per_s(&self) -> f64 {
+    pub(crate) fn diffusivity_m2_per_s(&self) -> f64 {
         self.conductivity_w_per_m_k / self.heat_capacity_j_per_m3_k
     }
 }

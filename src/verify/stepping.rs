@@ -20,9 +20,9 @@ const FLANGE_STEP: f64 = 16.0;
 /// What drives the network at one time.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Drive {
-    pub rise_k: f64,
-    pub rate_k_per_s: f64,
-    pub heat_w_per_m2: f64,
+    pub(crate) rise_k: f64,
+    pub(crate) rate_k_per_s: f64,
+    pub(crate) heat_w_per_m2: f64,
 }
 
 /// −back·x_{i−1} + diagonal·x_i − ahead·x_{i+1} = known.
@@ -157,12 +157,19 @@ impl Network {
     }
 
     /// A network that has not warmed yet.
-    pub fn still(&self) -> Vec<f64> {
+    pub(crate) fn still(&self) -> Vec<f64> {
         vec![0.0; self.nodes() * self.slices()]
     }
 
     /// From one time to a later one, in as many steps as it takes; `closer`: the longest step is so many times shorter.
-    pub fn advance(&self, nodes: &mut Vec<f64>, from_s: f64, to_s: f64, closer: usize, drive: &dyn Fn(f64) -> Drive) {
+    pub(crate) fn advance(
+        &self,
+        nodes: &mut Vec<f64>,
+        from_s: f64,
+        to_s: f64,
+        closer: usize,
+        drive: &dyn Fn(f64) -> Drive,
+    ) {
         let longest = FLANGE_STEP / closer as f64;
         let longest_s = self.axis.as_ref().map_or(f64::INFINITY, |axis| longest / axis.exchange_per_s);
         let parts = ((to_s - from_s) / longest_s).ceil().max(1.0);
@@ -172,7 +179,7 @@ impl Network {
         }
     }
 
-    pub fn means(&self, nodes: &[f64], drive: Drive) -> Means {
+    pub(crate) fn means(&self, nodes: &[f64], drive: Drive) -> Means {
         let (n, slices) = (self.nodes(), self.slices());
         let slopes = self.slope(nodes, drive);
         let even = vec![1.0 / slices as f64; slices];

@@ -253,7 +253,7 @@ impl Annulus {
 }
 
 impl Strain {
-    pub fn new(materials: &Materials, coil: &Coil) -> Self {
+    pub(crate) fn new(materials: &Materials, coil: &Coil) -> Self {
         let fibre = coil.fibre();
         let area_m2 = coil.radial_pitch_m() * coil.axial_pitch_m();
         Self {
@@ -296,7 +296,7 @@ impl Strain {
     }
 
     /// Change of optical path per metre of fibre and second, a layer.
-    pub fn paths(&self, temperatures_k: &[f64], rates_k_per_s: &[f64]) -> Vec<f64> {
+    pub(crate) fn paths(&self, temperatures_k: &[f64], rates_k_per_s: &[f64]) -> Vec<f64> {
         let mut annuli = Vec::with_capacity(rates_k_per_s.len() + 1);
         let mut changes = Vec::with_capacity(rates_k_per_s.len() + 1);
         if let Some(spool) = &self.materials.spool {

@@ -17,31 +17,31 @@ const ROOM: &str =
 #[derive(Debug, Clone)]
 pub(super) struct Piece {
     /// Counted from 0, innermost first.
-    pub layer: usize,
-    pub is_of_half_a: bool,
-    pub turns: f64,
-    pub whole_turns: f64,
+    pub(crate) layer: usize,
+    pub(crate) is_of_half_a: bool,
+    pub(crate) turns: f64,
+    pub(crate) whole_turns: f64,
     /// Turns that would fit between the first flange and the piece.
-    pub free_turns: f64,
-    pub from_m: f64,
-    pub to_m: f64,
-    pub length_m: f64,
-    pub outbound: bool,
+    pub(crate) free_turns: f64,
+    pub(crate) from_m: f64,
+    pub(crate) to_m: f64,
+    pub(crate) length_m: f64,
+    pub(crate) outbound: bool,
     /// Begins with its low end where it continues nothing.
-    pub begins_low: bool,
+    pub(crate) begins_low: bool,
 }
 
 /// A winding of a coil.
 #[derive(Debug, Clone)]
 pub(super) struct Winding {
     /// By layer, innermost first.
-    pub segments: Vec<usize>,
+    pub(crate) segments: Vec<usize>,
     /// Turns more or fewer at end A and at end B.
-    pub ends: [i64; 2],
+    pub(crate) ends: [i64; 2],
     /// In the order of arclength from end A.
-    pub pieces: Vec<Piece>,
+    pub(crate) pieces: Vec<Piece>,
     /// Of each row, its place among the pieces.
-    pub order: Vec<usize>,
+    pub(crate) order: Vec<usize>,
 }
 
 /// Rows that could be a winding.

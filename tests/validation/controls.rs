@@ -17,7 +17,6 @@ fn assert_adequate(name: &str) {
     let terms = Terms::default();
     let request = Request { model: &file.model, pattern: &pattern, records: &records, holdout: &holdout, terms };
     let found = diagnose(&request, &|_| ()).unwrap();
-    println!("{name}: {:?}", found.posterior.iter().map(|s| (&s.effects, s.probability)).collect::<Vec<_>>());
     assert_eq!(found.verdict, Verdict::Adequate, "{name}");
     assert!(found.effects.is_empty() && found.proposals.is_empty(), "{name}");
 }

@@ -14,7 +14,6 @@ mod fog_v7;
 mod grid;
 mod heat_paths;
 mod memory;
-mod nist_strd;
 mod pack;
 mod paper;
 mod records;

@@ -59,7 +59,7 @@ impl Physical {
     }
 
     /// Columns that formulas read, at most as many as a row holds for them.
-    pub fn formula_columns(&self) -> impl Iterator<Item = &str> {
+    pub(crate) fn formula_columns(&self) -> impl Iterator<Item = &str> {
         self.formulas.iter().flat_map(|f| f.columns().iter().take(MOST_COLUMNS).map(String::as_str))
     }
 
@@ -74,7 +74,7 @@ impl Physical {
     }
 
     /// The formulas beside the difference equation, with their rows for one interval; None where there are none.
-    pub fn formulas(&self, interval_s: f64) -> Option<(&Formulas, AtWork)> {
+    pub(crate) fn formulas(&self, interval_s: f64) -> Option<(&Formulas, AtWork)> {
         Some((self.formulas.as_ref()?, self.formulas_at_work(interval_s)?))
     }
 }

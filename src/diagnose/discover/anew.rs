@@ -21,7 +21,7 @@ use crate::diagnose::joint::{Explanation, Found, Question, fitted};
 ///
 /// # Errors
 /// A chamber that cannot be looked through with the set.
-pub fn anew<'a>(
+pub(crate) fn anew<'a>(
     question: &Question<'a>,
     found: &Found,
     allowed: &Allowed,

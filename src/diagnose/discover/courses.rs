@@ -17,7 +17,7 @@ struct Course {
 
 /// The variables of all records of a chamber.
 #[derive(Debug, Clone)]
-pub struct Courses {
+pub(crate) struct Courses {
     records: Vec<Course>,
     /// Of those that were fitted.
     fitted: Vec<usize>,
@@ -29,7 +29,7 @@ impl Courses {
     ///
     /// # Errors
     /// A pattern of another layer count.
-    pub fn new(chamber: &Chamber, fit: &Fit, days: &[Fit], lengths_m: &[f64]) -> Result<Self, ChamberError> {
+    pub(crate) fn new(chamber: &Chamber, fit: &Fit, days: &[Fit], lengths_m: &[f64]) -> Result<Self, ChamberError> {
         let mut records = Vec::new();
         for record in 0..chamber.records() {
             let of = std::iter::once(fit).chain(days).find(|f| f.records.contains(&record));
@@ -66,21 +66,21 @@ impl Courses {
             .collect()
     }
 
-    pub fn columns(&self) -> Vec<(String, f64)> {
+    pub(crate) fn columns(&self) -> Vec<(String, f64)> {
         self.columns.clone()
     }
 
-    pub fn times_s(&self, record: usize) -> &[f64] {
+    pub(crate) fn times_s(&self, record: usize) -> &[f64] {
         &self.records[record].times_s
     }
 
     /// Empty where there is no such name.
-    pub fn of(&self, name: &str, record: usize) -> &[f64] {
+    pub(crate) fn of(&self, name: &str, record: usize) -> &[f64] {
         self.records[record].of.iter().find(|(n, _)| n == name).map_or(&[], |(_, values)| values)
     }
 
     /// Least and largest value over the fitted records; of a difference too.
-    pub fn range(&self, name: &str) -> Option<(f64, f64)> {
+    pub(crate) fn range(&self, name: &str) -> Option<(f64, f64)> {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         let mut see = |v: f64| (low, high) = (low.min(v), high.max(v));
         for &r in &self.fitted {
@@ -93,7 +93,7 @@ impl Courses {
     }
 
     /// The longest fitted record [s].
-    pub fn longest_s(&self) -> f64 {
+    pub(crate) fn longest_s(&self) -> f64 {
         let span = |r: &usize| {
             let times = self.times_s(*r);
             times.last().zip(times.first()).map_or(0.0, |(b, a)| b - a)
@@ -102,7 +102,7 @@ impl Courses {
     }
 
     /// A term as a column of the chamber: its amplitude is then that of the formula, in °/h.
-    pub fn column(&self, term: &Term) -> Column {
+    pub(crate) fn column(&self, term: &Term) -> Column {
         let of = |r: usize| {
             let values = term.course(self, r);
             let first = values.iter().copied().find(|v| v.is_finite()).unwrap_or(0.0);

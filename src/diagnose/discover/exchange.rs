@@ -12,7 +12,7 @@ const ALIKE: usize = 6;
 
 impl Tools<'_, '_> {
     /// The set with each of its listed effects exchanged for what else promises much in its place.
-    pub fn exchanged(&self, set: &Set) -> Vec<Set> {
+    pub(crate) fn exchanged(&self, set: &Set) -> Vec<Set> {
         let mut all = Vec::new();
         for place in 0..set.explanation.members.len() {
             let Some(fewer) = self.without(set, place) else { continue };

@@ -2,7 +2,7 @@
 
 /// What kind of thing a variable is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Class {
+pub(crate) enum Class {
     Temperature,
     Difference,
     Rate,
@@ -14,20 +14,20 @@ pub enum Class {
 
 /// A variable as it stands in a formula.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Variable {
+pub(crate) struct Variable {
     /// With parentheses where it is a sum.
-    pub text: String,
+    pub(crate) text: String,
     /// The names of which it is made.
-    pub name: String,
-    pub class: Class,
-    pub unit: String,
-    pub low: f64,
-    pub high: f64,
+    pub(crate) name: String,
+    pub(crate) class: Class,
+    pub(crate) unit: String,
+    pub(crate) low: f64,
+    pub(crate) high: f64,
 }
 
 /// A number within a form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Inner {
+pub(crate) enum Inner {
     TimeConstant,
     HalfWidth,
     Knee,
@@ -36,7 +36,7 @@ pub enum Inner {
 }
 
 impl Inner {
-    pub fn key(self) -> &'static str {
+    pub(crate) fn key(self) -> &'static str {
         match self {
             Inner::TimeConstant => "tau_s",
             Inner::HalfWidth => "half_width",
@@ -47,12 +47,12 @@ impl Inner {
     }
 
     /// Whether it is a size, which is refined by its logarithm.
-    pub fn is_size(self) -> bool {
+    pub(crate) fn is_size(self) -> bool {
         self != Inner::At
     }
 
     /// Where to look for it first.
-    pub fn grid(self, x: &Variable, longest_s: f64) -> Vec<f64> {
+    pub(crate) fn grid(self, x: &Variable, longest_s: f64) -> Vec<f64> {
         let range = x.high - x.low;
         let largest = x.low.abs().max(x.high.abs());
         match self {
@@ -71,18 +71,18 @@ fn spaced(from: f64, to: f64, count: usize) -> Vec<f64> {
 
 /// One shape of a term.
 #[derive(Debug)]
-pub struct Form {
-    pub key: &'static str,
+pub(crate) struct Form {
+    pub(crate) key: &'static str,
     /// With {x}, {y} for variables and the keys of inner numbers.
-    pub template: &'static str,
-    pub inner: &'static [Inner],
-    pub of: &'static [Class],
+    pub(crate) template: &'static str,
+    pub(crate) inner: &'static [Inner],
+    pub(crate) of: &'static [Class],
     /// The second factor of a product.
-    pub with: &'static [Class],
+    pub(crate) with: &'static [Class],
     /// In plain words: what such a term is likely to be.
-    pub reading: &'static str,
+    pub(crate) reading: &'static str,
     /// Where that is said; None where it is a guess.
-    pub source: Option<&'static str>,
+    pub(crate) source: Option<&'static str>,
 }
 
 use Class::{Centred, Column, Difference, Rate, Temperature, Time};
@@ -103,7 +103,7 @@ const GLASS_SOURCE: Option<&str> =
     Some("Ferry, Viscoelastic Properties of Polymers (1980), chapter 11: softening at a transition");
 
 /// Every form that is tried; the simplest of equals comes first.
-pub const FORMS: &[Form] = &[
+pub(crate) const FORMS: &[Form] = &[
     form(
         "linear",
         "{x}",

@@ -10,33 +10,33 @@ use crate::effect::custom::Formula;
 use crate::numeric::expression::{Expression, Memory};
 
 use super::courses::Courses;
-pub use super::forms::{Class, FORMS, Form, Inner, Variable};
+pub(crate) use super::forms::{Class, FORMS, Form, Inner, Variable};
 use Class::{Centred, Column, Difference, Rate, Temperature, Time};
 use Inner::{At, HalfWidth, Knee, TimeConstant, Width};
 
 /// A form of certain variables: candidates that differ in their inner numbers only.
 #[derive(Debug, Clone)]
-pub struct Family {
-    pub form: &'static Form,
-    pub x: Variable,
-    pub y: Option<Variable>,
+pub(crate) struct Family {
+    pub(crate) form: &'static Form,
+    pub(crate) x: Variable,
+    pub(crate) y: Option<Variable>,
     /// Without the amplitude.
-    pub text: String,
+    pub(crate) text: String,
     expression: Expression,
 }
 
 /// A term: a family with its inner numbers.
 #[derive(Debug, Clone)]
-pub struct Term {
-    pub family: Family,
-    pub inner: Vec<f64>,
+pub(crate) struct Term {
+    pub(crate) family: Family,
+    pub(crate) inner: Vec<f64>,
 }
 
 /// Centres of temperatures [°C].
 const REFERENCE_C: f64 = 20.0;
 
 /// The variables of a set of records.
-pub fn variables(courses: &Courses) -> Vec<Variable> {
+pub(crate) fn variables(courses: &Courses) -> Vec<Variable> {
     let mut all = Vec::new();
     let mut add = |text: &str, name: &str, class, unit: &str, shift: f64| {
         let Some((low, high)) = courses.range(name) else { return };
@@ -79,14 +79,14 @@ fn rounded(value: f64) -> f64 {
 
 /// What may be restricted.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Allowed {
+pub(crate) struct Allowed {
     /// Keys of forms and names of variables; empty: all.
-    pub words: Vec<String>,
+    pub(crate) words: Vec<String>,
 }
 
 impl Allowed {
     /// All words that mean something for some records.
-    pub fn known(channels: &[String]) -> Vec<String> {
+    pub(crate) fn known(channels: &[String]) -> Vec<String> {
         let mut all: Vec<String> = FORMS.iter().map(|f| f.key.to_owned()).collect();
         all.extend(["T_mean", "T_in", "T", "mean_rate", "dT_dt", "t"].map(str::to_owned));
         all.extend(channels.iter().cloned());
@@ -104,7 +104,7 @@ impl Allowed {
 }
 
 /// All families of some variables.
-pub fn families(variables: &[Variable], allowed: &Allowed) -> Vec<Family> {
+pub(crate) fn families(variables: &[Variable], allowed: &Allowed) -> Vec<Family> {
     let mut all: Vec<Family> = Vec::new();
     for form in FORMS {
         for (place, x) in variables.iter().enumerate().filter(|(_, v)| form.of.contains(&v.class)) {
@@ -144,13 +144,13 @@ impl Family {
     }
 
     /// The names that it reads, without its inner numbers.
-    pub fn variables(&self) -> Vec<String> {
+    pub(crate) fn variables(&self) -> Vec<String> {
         let own = self.expression.variables().iter().map(|v| v.name.clone());
         own.filter(|name| !self.form.inner.iter().any(|i| i.key() == name)).collect()
     }
 
     /// Points of the grid of its inner numbers.
-    pub fn grid(&self, longest_s: f64) -> Vec<Vec<f64>> {
+    pub(crate) fn grid(&self, longest_s: f64) -> Vec<Vec<f64>> {
         let mut points = vec![Vec::new()];
         for inner in self.form.inner {
             let values = inner.grid(&self.x, longest_s);
@@ -165,7 +165,7 @@ impl Family {
     }
 
     /// Bounds of an inner number.
-    pub fn bounds(&self, place: usize, longest_s: f64) -> (f64, f64) {
+    pub(crate) fn bounds(&self, place: usize, longest_s: f64) -> (f64, f64) {
         let range = self.x.high - self.x.low;
         let largest = self.x.low.abs().max(self.x.high.abs());
         match self.form.inner[place] {
@@ -178,12 +178,12 @@ impl Family {
     }
 
     /// Whether it depends on nothing but time.
-    pub fn is_of_time_alone(&self) -> bool {
+    pub(crate) fn is_of_time_alone(&self) -> bool {
         self.x.class == Time
     }
 
     /// The unit of the form's value.
-    pub fn unit(&self) -> String {
+    pub(crate) fn unit(&self) -> String {
         let x = &self.x.unit;
         match (self.form.key, &self.y) {
             (_, Some(y)) => format!("({x})·({})", y.unit),
@@ -194,7 +194,7 @@ impl Family {
         }
     }
 
-    pub fn inner_unit(&self, place: usize) -> String {
+    pub(crate) fn inner_unit(&self, place: usize) -> String {
         match self.form.inner[place] {
             TimeConstant => "s".to_owned(),
             At if self.x.class == Temperature => "°C".to_owned(),
@@ -205,23 +205,23 @@ impl Family {
 
 impl Term {
     /// The formula with its amplitude: what a custom effect declares.
-    pub fn formula_text(&self) -> String {
+    pub(crate) fn formula_text(&self) -> String {
         let sum = self.family.form.template.contains(" - ") && !self.family.text.starts_with("max(");
         let bare = &self.family.text;
         if sum && !bare.starts_with("width") { format!("a*({bare})") } else { format!("a*{bare}") }
     }
 
     /// Names of its parameters, the amplitude first.
-    pub fn parameter_names(&self) -> Vec<String> {
+    pub(crate) fn parameter_names(&self) -> Vec<String> {
         std::iter::once("a").chain(self.family.form.inner.iter().map(|i| i.key())).map(str::to_owned).collect()
     }
 
-    pub fn formula(&self) -> Option<Formula> {
+    pub(crate) fn formula(&self) -> Option<Formula> {
         Formula::new(&self.formula_text(), self.parameter_names()).ok()
     }
 
     /// With its numbers in the place of names, the amplitude in front.
-    pub fn in_numbers(&self, amplitude: f64) -> String {
+    pub(crate) fn in_numbers(&self, amplitude: f64) -> String {
         let inner = |name: &str| self.family.form.inner.iter().position(|i| i.key() == name);
         let shown = |name: &str| match inner(name) {
             Some(place) => Some(short(self.inner[place])),
@@ -232,7 +232,7 @@ impl Term {
     }
 
     /// Its value at each row of a record.
-    pub fn course(&self, courses: &Courses, record: usize) -> Vec<f64> {
+    pub(crate) fn course(&self, courses: &Courses, record: usize) -> Vec<f64> {
         enum Source<'a> {
             Rows(&'a [f64]),
             Number(f64),
@@ -269,13 +269,13 @@ impl Term {
     }
 
     /// Whether two say nearly the same of the same names.
-    pub fn is_sister_of(&self, other: &Self) -> bool {
+    pub(crate) fn is_sister_of(&self, other: &Self) -> bool {
         self.family.text == other.family.text
     }
 }
 
 /// Four digits, as a person writes them.
-pub fn short(value: f64) -> String {
+pub(crate) fn short(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }

@@ -18,10 +18,9 @@ mod search;
 use crate::chamber::{Chamber, ChamberError, Effort, Fit};
 use crate::diagnose::joint::{Explanation, Found, Member, Question, Winding};
 
-pub use forms::FORMS;
-pub use grammar::Allowed;
+pub(crate) use grammar::Allowed;
 pub(in crate::diagnose) use proposal::amend;
-pub use proposal::{Alternative, NO_WINDING, Proposal, ProposedTerm, Shown, TermParameter};
+pub(crate) use proposal::{NO_WINDING, Proposal, ProposedTerm, Shown, TermParameter};
 
 use courses::Courses;
 use search::{MOST_TERMS, Set, Tools};
@@ -29,22 +28,22 @@ use search::{MOST_TERMS, Set, Tools};
 /// What won against everything that is listed.
 #[derive(Debug)]
 pub(in crate::diagnose) struct Discovered {
-    pub best: Set,
+    pub(crate) best: Set,
     /// The best set, refitted to all records.
-    pub settled: Set,
+    pub(crate) settled: Set,
     /// Standard errors of inner numbers, a list a term.
-    pub inner_errors: Vec<Vec<f64>>,
+    pub(crate) inner_errors: Vec<Vec<f64>>,
     /// Of the best set, and of the sets that do nearly as well.
-    pub probability: f64,
-    pub alternatives: Vec<(Set, f64)>,
+    pub(crate) probability: f64,
+    pub(crate) alternatives: Vec<(Set, f64)>,
     /// What all records that are not fitted have in common with the best set, frozen.
-    pub days: Vec<Fit>,
-    pub courses: Courses,
+    pub(crate) days: Vec<Fit>,
+    pub(crate) courses: Courses,
 }
 
 impl Discovered {
     /// The best set's, as it was fitted.
-    pub fn fit(&self) -> &Fit {
+    pub(crate) fn fit(&self) -> &Fit {
         &self.best.explanation.fit
     }
 }

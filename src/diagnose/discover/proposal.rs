@@ -1,6 +1,6 @@
 //! What a user gets of an unlisted effect: the formula with its numbers, what it is likely to be, whether it predicts.
 
-use super::grammar::{Class, Family, Term, short};
+use super::grammar::{Class, Family, Term};
 use super::search::Set;
 use super::{Discovered, Question};
 use crate::chamber::{Fit, Place};
@@ -23,37 +23,35 @@ pub struct Proposal {
     /// Whether it may be used on another record; otherwise it describes these.
     pub predicts: bool,
     /// Why it only describes.
-    pub only_describes: Option<String>,
-    pub probability: f64,
-    pub rmse_rad_per_s: f64,
-    pub holdout_rmse_rad_per_s: Option<f64>,
+    pub(crate) only_describes: Option<String>,
+    pub(crate) probability: f64,
+    pub(crate) rmse_rad_per_s: f64,
+    pub(crate) holdout_rmse_rad_per_s: Option<f64>,
     /// What would tell it from its alternatives.
-    pub experiment: Option<String>,
-    /// Whether a winding changes it: a bias does not depend on the pattern.
-    pub depends_on_winding: bool,
+    pub(crate) experiment: Option<String>,
     /// The declared model with the listed effects and the terms.
     pub proposed: CoilModel,
 }
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Alternative {
-    pub formula: String,
-    pub probability: f64,
+    pub(crate) formula: String,
+    pub(crate) probability: f64,
 }
 
 /// One term of a proposal.
 #[derive(Debug, Clone)]
 pub struct ProposedTerm {
     /// With its parameters by name.
-    pub text: String,
+    pub(crate) text: String,
     pub form: &'static str,
-    pub variables: Vec<String>,
+    pub(crate) variables: Vec<String>,
     pub parameters: Vec<TermParameter>,
-    pub reading: String,
+    pub(crate) reading: String,
     /// As a custom effect at the fitted values.
-    pub effect: DeclaredEffect,
+    pub(crate) effect: DeclaredEffect,
     /// What is left of each fitted record without the term, against its first variable.
-    pub shown: Vec<Shown>,
+    pub(crate) shown: Vec<Shown>,
 }
 
 /// A parameter of a formula, as the formula states it.
@@ -61,8 +59,8 @@ pub struct ProposedTerm {
 pub struct TermParameter {
     pub key: String,
     pub value: f64,
-    pub standard_error: Option<f64>,
-    pub unit: String,
+    pub(crate) standard_error: Option<f64>,
+    pub(crate) unit: String,
 }
 
 /// One record for a picture: rows of what is left and of the term.
@@ -70,17 +68,18 @@ pub struct TermParameter {
 /// # Shapes
 /// One entry a row that has a rate.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Shown {
-    pub record: String,
-    pub variable: String,
-    pub x: Vec<f64>,
+pub(crate) struct Shown {
+    pub(crate) record: String,
+    pub(crate) variable: String,
+    pub(crate) x: Vec<f64>,
     /// Measured less everything but the term [rad/s].
-    pub left_rad_per_s: Vec<f64>,
-    pub term_rad_per_s: Vec<f64>,
+    pub(crate) left_rad_per_s: Vec<f64>,
+    pub(crate) term_rad_per_s: Vec<f64>,
 }
 
 /// What stands behind every proposal of a bias.
-pub const NO_WINDING: &str = "it does not come from the coil's own thermal error: no winding changes it; compensate it";
+pub(crate) const NO_WINDING: &str =
+    "it does not come from the coil's own thermal error: no winding changes it; compensate it";
 
 impl Term {
     fn effect(&self, amplitude: f64) -> Option<DeclaredEffect> {
@@ -250,7 +249,6 @@ fn proposal(
         probability: discovered.probability,
         rmse_rad_per_s,
         holdout_rmse_rad_per_s,
-        depends_on_winding: false,
         proposed,
     })
 }
@@ -371,22 +369,5 @@ fn alone(own: &Family) -> String {
             "the same cycle begun an hour after switch-on: what follows time stays behind".to_owned()
         }
         _ => format!("a record in which {} takes three levels while everything else stands still", own.x.name),
-    }
-}
-
-impl ProposedTerm {
-    /// The size of the term over the records that are shown [rad/s].
-    pub fn size_rad_per_s(&self) -> f64 {
-        let all: Vec<f64> = self.shown.iter().flat_map(|s| s.term_rad_per_s.iter().copied()).collect();
-        size(&all)
-    }
-}
-
-impl TermParameter {
-    pub fn in_words(&self) -> String {
-        match self.standard_error {
-            Some(error) => format!("{} = {} ± {} {}", self.key, short(self.value), short(error), self.unit),
-            None => format!("{} = {} {}", self.key, short(self.value), self.unit),
-        }
     }
 }

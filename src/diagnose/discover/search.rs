@@ -24,48 +24,48 @@ use crate::numeric::maximise::golden_section_within;
 
 /// A set of listed effects and unlisted terms, fitted.
 #[derive(Debug, Clone)]
-pub struct Set {
+pub(crate) struct Set {
     /// Its members are the listed ones; the terms are the last inputs of its fit.
-    pub explanation: Explanation,
-    pub terms: Vec<Term>,
+    pub(crate) explanation: Explanation,
+    pub(crate) terms: Vec<Term>,
     /// Prices of the terms included.
-    pub merit: f64,
-    pub held_out: Option<f64>,
+    pub(crate) merit: f64,
+    pub(crate) held_out: Option<f64>,
     /// By how much the held-out records gained with the last member.
-    pub held_out_gain: Option<f64>,
+    pub(crate) held_out_gain: Option<f64>,
 }
 
 impl Set {
-    pub fn total(&self) -> f64 {
+    pub(crate) fn total(&self) -> f64 {
         self.merit + self.held_out.unwrap_or(0.0)
     }
 
     /// °/h per unit of the term's form.
-    pub fn amplitude(&self, term: usize) -> f64 {
+    pub(crate) fn amplitude(&self, term: usize) -> f64 {
         self.explanation.fit.assumed.inputs[self.first_input() + term].amplitude
     }
 
-    pub fn first_input(&self) -> usize {
+    pub(crate) fn first_input(&self) -> usize {
         self.explanation.fit.assumed.inputs.len() - self.terms.len()
     }
 
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.explanation.members.len() + self.terms.len()
     }
 }
 
 /// What a search over terms works with.
-pub struct Tools<'q, 'a> {
-    pub question: &'q Question<'a>,
-    pub windings: &'q [Winding],
-    pub courses: Courses,
-    pub families: Vec<Family>,
+pub(crate) struct Tools<'q, 'a> {
+    pub(crate) question: &'q Question<'a>,
+    pub(crate) windings: &'q [Winding],
+    pub(crate) courses: Courses,
+    pub(crate) families: Vec<Family>,
     /// All points of all grids.
-    pub candidates: usize,
+    pub(crate) candidates: usize,
 }
 
 /// Terms in a set at most.
-pub const MOST_TERMS: usize = 4;
+pub(crate) const MOST_TERMS: usize = 4;
 /// Families that are refined after each score test, and fitted as far as they promise enough.
 const REFINED: usize = 12;
 const TRIED: usize = 4;
@@ -74,7 +74,7 @@ const REFINED_SHARE: f64 = 0.02;
 /// Listed effects that are fitted beside them.
 const LISTED_TRIED: usize = 2;
 /// … if they promise so much; terms, if they promise this share of what the first does.
-pub const WORTH_LISTED: f64 = 8.0;
+pub(crate) const WORTH_LISTED: f64 = 8.0;
 const WORTH_BESIDE: f64 = 0.25;
 /// Sets whose held-out records are looked at after each stage, and with them those that the fitted records hardly tell from the best.
 const HELD_OUT_TRIED: usize = 2;
@@ -82,7 +82,7 @@ const ALIKE_TRIED: usize = 6;
 /// A step must gain so much more than it costs, and the held-out records anything at all.
 const WORTH_A_STEP: f64 = 2.0;
 /// A first term that is further behind than this is given up: the window of the search over listed effects.
-pub const WITHIN_REACH: f64 = 20.0;
+pub(crate) const WITHIN_REACH: f64 = 20.0;
 /// An amplitude is likely to make a term of so many of the record's noises.
 const LIKELY_NOISES: f64 = 10.0;
 /// Rounds in which inner numbers follow the fitted amplitude; a step below this share of its error ends them.
@@ -93,13 +93,13 @@ const STEP_SHARE: f64 = 0.02;
 
 /// A term that promises something at a fit.
 #[derive(Debug, Clone)]
-pub struct Promise {
-    pub term: Term,
+pub(crate) struct Promise {
+    pub(crate) term: Term,
     /// Rise of the log likelihood at the best amplitude, and that amplitude.
-    pub gain: f64,
-    pub amplitude: f64,
+    pub(crate) gain: f64,
+    pub(crate) amplitude: f64,
     /// The gain less what the term costs.
-    pub worth: f64,
+    pub(crate) worth: f64,
 }
 
 impl Tools<'_, '_> {
@@ -135,7 +135,7 @@ impl Tools<'_, '_> {
     }
 
     /// The best of each family at a fit, refined; most worth first.
-    pub fn promises(&self, scorer: &Scorer, fit: &Fit) -> Vec<Promise> {
+    pub(crate) fn promises(&self, scorer: &Scorer, fit: &Fit) -> Vec<Promise> {
         let rows = self.rows(fit);
         let longest_s = self.courses.longest_s();
         let mut best: Vec<Promise> = self
@@ -210,14 +210,14 @@ impl Tools<'_, '_> {
     }
 
     /// The prices of terms taken off what their fit is worth.
-    pub fn set(&self, explanation: Explanation, terms: Vec<Term>) -> Set {
+    pub(crate) fn set(&self, explanation: Explanation, terms: Vec<Term>) -> Set {
         let rows = self.rows(&explanation.fit);
         let merit = explanation.merit - terms.iter().map(|t| self.price(t, rows)).sum::<f64>();
         Set { explanation, terms, merit, held_out: None, held_out_gain: None }
     }
 
     /// A set without any term.
-    pub fn plain(&self, explanation: &Explanation) -> Set {
+    pub(crate) fn plain(&self, explanation: &Explanation) -> Set {
         Set { merit: explanation.merit, held_out: explanation.held_out, ..self.set(explanation.clone(), Vec::new()) }
     }
 
@@ -239,7 +239,7 @@ impl Tools<'_, '_> {
     }
 
     /// A set that was fitted in another chamber, in this one.
-    pub fn refitted(&self, set: &Set) -> Option<Set> {
+    pub(crate) fn refitted(&self, set: &Set) -> Option<Set> {
         let fit = &set.explanation.fit;
         let mut assumed = fit.assumed.clone();
         let first = set.first_input();
@@ -251,7 +251,7 @@ impl Tools<'_, '_> {
         Some(self.followed(self.set(found, set.terms.clone())))
     }
 
-    pub fn with_listed(&self, set: &Set, proposal: &Proposal) -> Option<Set> {
+    pub(crate) fn with_listed(&self, set: &Set, proposal: &Proposal) -> Option<Set> {
         let begin = with(self.question, self.windings, &set.explanation.fit, proposal.member, proposal.values.clone())?;
         let mut members = set.explanation.members.clone();
         members.push(proposal.member);
@@ -261,7 +261,7 @@ impl Tools<'_, '_> {
     }
 
     /// With inner numbers that follow the fit.
-    pub fn followed(&self, mut best: Set) -> Set {
+    pub(crate) fn followed(&self, mut best: Set) -> Set {
         for _ in 0..POLISHED {
             let Some((next, share)) = self.polished(&best) else { break };
             if next.merit > best.merit {
@@ -309,7 +309,7 @@ impl Tools<'_, '_> {
     }
 
     /// Standard errors of the inner numbers, a list a term, cleared of everything that was fitted.
-    pub fn inner_errors(&self, set: &Set) -> Vec<Vec<f64>> {
+    pub(crate) fn inner_errors(&self, set: &Set) -> Vec<Vec<f64>> {
         let mut errors: Vec<Vec<f64>> = set.terms.iter().map(|t| vec![f64::NAN; t.inner.len()]).collect();
         let Ok(scorer) = self.question.chamber.scorer(&set.explanation.fit) else { return errors };
         let columns = self.inner_columns(set);
@@ -363,7 +363,7 @@ impl Tools<'_, '_> {
     }
 
     /// With the held-out records looked at, amplitudes and effects as they were fitted.
-    pub fn judged(&self, mut set: Set) -> Set {
+    pub(crate) fn judged(&self, mut set: Set) -> Set {
         if self.question.held_out.is_empty() || set.held_out.is_some() {
             return set;
         }
@@ -374,7 +374,7 @@ impl Tools<'_, '_> {
     }
 
     /// The next sets from one, best first; all of them were fitted. None beyond the set itself is worth more: empty.
-    pub fn onwards(&self, set: &Set) -> Vec<Set> {
+    pub(crate) fn onwards(&self, set: &Set) -> Vec<Set> {
         let fit = &set.explanation.fit;
         let chamber = self.question.chamber;
         let (Ok(scorer), Ok(regression)) = (chamber.scorer(fit), chamber.regression(fit)) else { return Vec::new() };
@@ -409,13 +409,13 @@ impl Tools<'_, '_> {
     }
 
     /// Whether one term in the place of all that is listed comes near what the listed effects are worth.
-    pub fn may_replace(&self, declared: Set, listed: f64) -> bool {
+    pub(crate) fn may_replace(&self, declared: Set, listed: f64) -> bool {
         let one = self.search(declared, 1, &|_| ());
         one.iter().any(|set| !set.terms.is_empty() && set.total() > listed - WITHIN_REACH)
     }
 
     /// Forward and back from a set, to so many terms; every set that was fitted and judged, best first.
-    pub fn search(&self, from: Set, most_terms: usize, progress: &(dyn Fn(f64) + Sync)) -> Vec<Set> {
+    pub(crate) fn search(&self, from: Set, most_terms: usize, progress: &(dyn Fn(f64) + Sync)) -> Vec<Set> {
         let mut best = self.judged(from);
         let mut all = vec![best.clone()];
         for stage in 0..most_terms {
@@ -456,7 +456,7 @@ impl Tools<'_, '_> {
     }
 
     /// The set without one of its members: listed ones first, then terms.
-    pub fn without(&self, set: &Set, place: usize) -> Option<Set> {
+    pub(crate) fn without(&self, set: &Set, place: usize) -> Option<Set> {
         let listed = set.explanation.members.len();
         let fit = &set.explanation.fit;
         let (begin, members, terms) = if place < listed {

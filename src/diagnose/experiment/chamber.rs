@@ -9,12 +9,12 @@ use crate::units::REFERENCE_TEMPERATURE_K;
 
 /// What the records show the chamber to be capable of.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Chamber {
-    pub coldest_k: f64,
-    pub warmest_k: f64,
-    pub rate_k_per_s: f64,
-    pub duration_s: f64,
-    pub interval_s: f64,
+pub(crate) struct Chamber {
+    pub(crate) coldest_k: f64,
+    pub(crate) warmest_k: f64,
+    pub(crate) rate_k_per_s: f64,
+    pub(crate) duration_s: f64,
+    pub(crate) interval_s: f64,
 }
 
 /// A profile begins with a soak of this length, or this share of its duration.
@@ -34,7 +34,7 @@ const SWINGS_S: [f64; 5] = [300.0, 450.0, 700.0, 1100.0, 1800.0];
 
 impl Chamber {
     /// None where the records hold no change of temperature.
-    pub fn of(records: &[&Record]) -> Option<Self> {
+    pub(crate) fn of(records: &[&Record]) -> Option<Self> {
         let temperatures = || records.iter().flat_map(|r| r.temperature_k().iter().copied());
         let duration_s = |r: &&Record| r.times_s()[r.rows() - 1] - r.times_s()[0];
         let rate = records.iter().flat_map(|r| slopes_k_per_s(r)).fold(0.0, f64::max);

@@ -7,8 +7,8 @@ use crate::record::Record;
 
 /// A candidate, fitted to the records at hand in their chamber.
 #[derive(Debug, Clone)]
-pub struct Rival {
-    pub name: String,
+pub(crate) struct Rival {
+    pub(crate) name: String,
     pub(super) fit: Fit,
     /// What the records say of its free numbers and of the film.
     pub(super) hold: Option<Hold>,
@@ -18,7 +18,7 @@ pub struct Rival {
 
 /// The candidates, and what is the same for all of them.
 #[derive(Debug, Clone)]
-pub struct Contest {
+pub(crate) struct Contest {
     pub(super) rivals: Vec<Rival>,
     /// What they are candidates to be added to.
     pub(super) without: Option<Rival>,
@@ -150,17 +150,17 @@ pub(in crate::diagnose) mod tests {
     use crate::pattern::classic::Classic;
     use crate::thermal::{Extent, Location, Material};
 
-    pub fn pattern() -> Pattern {
+    pub(crate) fn pattern() -> Pattern {
         Classic::Dip.pattern(8).unwrap()
     }
 
     /// By kind and values in SI, the first of all choices.
-    pub fn effect(kind: &str, values: &[f64]) -> DeclaredEffect {
+    pub(crate) fn effect(kind: &str, values: &[f64]) -> DeclaredEffect {
         let spec = effect::find(kind).unwrap();
         DeclaredEffect::new(spec, values.to_vec(), vec![0; spec.choices.len()]).unwrap()
     }
 
-    pub fn model(effects: Vec<DeclaredEffect>) -> CoilModel {
+    pub(crate) fn model(effects: Vec<DeclaredEffect>) -> CoilModel {
         let fibre = Fibre {
             refractive_index: 1.45,
             thermo_optic_per_k: 1.0e-5,
@@ -192,16 +192,16 @@ pub(in crate::diagnose) mod tests {
     }
 
     /// The white noise of a rate [rad/s].
-    pub const NOISE_RAD_PER_S: f64 = 1e-7;
+    pub(crate) const NOISE_RAD_PER_S: f64 = 1e-7;
 
     /// All of whose effects are fitted; no record holds them. The chamber is a usual one, its film 25 W/(m²K).
-    pub fn rival(name: &str, model: CoilModel) -> Rival {
+    pub(crate) fn rival(name: &str, model: CoilModel) -> Rival {
         let free = free_numbers(&super::tests::model(Vec::new()), &model);
         let fit = Fit::to_nothing(Assumption::new(model, pattern()), free, NOISE_RAD_PER_S);
         Rival { name: name.to_owned(), fit, hold: None, deviance: 0.0 }
     }
 
-    pub fn contest(rivals: Vec<Rival>) -> Contest {
+    pub(crate) fn contest(rivals: Vec<Rival>) -> Contest {
         let air = rivals.first().map(|r| r.fit.clone());
         Contest { rivals, without: None, air, noise_rad_per_s: NOISE_RAD_PER_S, variance: 1.0 }
     }

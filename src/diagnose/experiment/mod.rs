@@ -35,9 +35,9 @@ use crate::units::REFERENCE_TEMPERATURE_K;
 use chamber::profiles;
 use plan::{Difference, Plan, Refit};
 
-pub use chamber::Chamber;
-pub use contest::{Contest, Rival};
-pub use plan::Refusal;
+pub(crate) use chamber::Chamber;
+pub(crate) use contest::Contest;
+pub(crate) use plan::Refusal;
 
 #[cfg(test)]
 pub(super) use contest::tests as fixtures;
@@ -50,62 +50,62 @@ const EQUAL: f64 = 12.0;
 
 /// A profile, and how surely it tells the candidates apart.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Experiment {
-    pub profile: Profile,
+pub(crate) struct Experiment {
+    pub(crate) profile: Profile,
     /// The candidates' names, and the experiments of another kind that would isolate what they add.
-    pub rivals: Vec<(String, Vec<&'static str>)>,
-    pub separations: Vec<Separation>,
+    pub(crate) rivals: Vec<(String, Vec<&'static str>)>,
+    pub(crate) separations: Vec<Separation>,
     /// Profiles that it was chosen from.
-    pub tried: usize,
+    pub(crate) tried: usize,
 }
 
 /// Two candidates under a profile.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Separation {
-    pub first: usize,
-    pub second: usize,
+pub(crate) struct Separation {
+    pub(crate) first: usize,
+    pub(crate) second: usize,
     /// Root mean square of the difference of their predictions, the mean taken out, nothing fitted again.
-    pub rms_rad_per_s: f64,
+    pub(crate) rms_rad_per_s: f64,
     /// If the first is true and if the second is; one where the first is a special case of the second.
-    pub outcomes: Vec<Outcome>,
+    pub(crate) outcomes: Vec<Outcome>,
     /// Whether some profile was found that tells the two apart, be it not the one that was chosen.
-    pub possible: bool,
+    pub(crate) possible: bool,
 }
 
 /// What is expected if one candidate is true.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Outcome {
-    pub refusal: Refusal,
-    pub needed_alone: f64,
-    pub needed_with_records: f64,
+pub(crate) struct Outcome {
+    pub(crate) refusal: Refusal,
+    pub(crate) needed_alone: f64,
+    pub(crate) needed_with_records: f64,
     /// That what is found with the records exceeds what is needed.
-    pub chance: f64,
+    pub(crate) chance: f64,
     /// Repetitions of the profile after which the chance is at least [`SURE`]; None if more than [`MOST_RUNS`].
-    pub runs: Option<usize>,
+    pub(crate) runs: Option<usize>,
 }
 
 /// What can be said of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Promise {
+pub(crate) enum Promise {
     ToldApart,
     Perhaps,
     NotToldApart,
 }
 
 /// From this chance on candidates count as told apart, and below one less this as not.
-pub const SURE: f64 = 0.9;
-pub const MOST_RUNS: usize = 10;
+pub(crate) const SURE: f64 = 0.9;
+pub(crate) const MOST_RUNS: usize = 10;
 const MOST_ROWS: f64 = 1500.0;
 /// Profiles that are the best to first order and are judged in full.
 const JUDGED_IN_FULL: usize = 3;
 
 impl Separation {
     /// The less sure of the outcomes.
-    pub fn least(&self) -> Option<&Outcome> {
+    pub(crate) fn least(&self) -> Option<&Outcome> {
         self.outcomes.iter().min_by(|a, b| a.chance.total_cmp(&b.chance).then(a.margin().total_cmp(&b.margin())))
     }
 
-    pub fn promise(&self) -> Promise {
+    pub(crate) fn promise(&self) -> Promise {
         match self.least() {
             Some(least) if least.chance >= SURE => Promise::ToldApart,
             Some(least) if least.chance > 1.0 - SURE => Promise::Perhaps,
@@ -156,7 +156,7 @@ struct Judged {
 
 /// The profile that tells the candidates apart most surely; None where there is nothing to tell apart, and where no profile
 /// can be solved for all of them.
-pub fn design(contest: &Contest, chamber: &Chamber, seed: u64) -> Option<Experiment> {
+pub(crate) fn design(contest: &Contest, chamber: &Chamber, seed: u64) -> Option<Experiment> {
     if contest.rivals.len() < 2 {
         return None;
     }
@@ -212,6 +212,7 @@ pub fn design(contest: &Contest, chamber: &Chamber, seed: u64) -> Option<Experim
 
 #[cfg(test)]
 mod tests {
+    use super::contest::Rival;
     use super::contest::tests::{contest, effect, model, rival};
     use super::*;
 

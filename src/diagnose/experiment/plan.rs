@@ -28,34 +28,34 @@ pub(super) struct Plan<'a> {
 
 /// By how much χ² one candidate is expected to be refused if another one is true.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Refusal {
+pub(crate) struct Refusal {
     /// Places among the candidates.
-    pub truth: usize,
-    pub refused: usize,
+    pub(crate) truth: usize,
+    pub(crate) refused: usize,
     /// By the experiment alone, all of the refused candidate's parameters fitted to it.
-    pub chi_square_alone: f64,
+    pub(crate) chi_square_alone: f64,
     /// By the experiment and the records at hand, fitted together.
-    pub chi_square_with_records: f64,
+    pub(crate) chi_square_with_records: f64,
     /// The part that the records have said already.
-    pub chi_square_of_records: f64,
+    pub(crate) chi_square_of_records: f64,
     /// χ² that the candidates explain of the experiment, and of the records.
-    pub explained_alone: f64,
-    pub explained_of_records: f64,
+    pub(crate) explained_alone: f64,
+    pub(crate) explained_of_records: f64,
 }
 
 /// What is foreseen of one profile.
 pub(super) struct Foreseen {
-    pub refusals: Vec<Refusal>,
+    pub(crate) refusals: Vec<Refusal>,
     /// Each pair's.
-    pub differences: Vec<Difference>,
+    pub(crate) differences: Vec<Difference>,
 }
 
 /// Root mean square of the difference of two candidates' rates, the mean taken out, nothing fitted again.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Difference {
-    pub first: usize,
-    pub second: usize,
-    pub rms_rad_per_s: f64,
+    pub(crate) first: usize,
+    pub(crate) second: usize,
+    pub(crate) rms_rad_per_s: f64,
 }
 
 /// How many steps candidates are fitted again with.
@@ -82,14 +82,14 @@ struct Told {
 
 impl<'a> Plan<'a> {
     /// Readings every `step_s` over the whole profile.
-    pub fn new(contest: &'a Contest, profile: &Profile, start_k: f64, step_s: f64) -> Self {
+    pub(crate) fn new(contest: &'a Contest, profile: &Profile, start_k: f64, step_s: f64) -> Self {
         let rows = (profile.duration_s() / step_s) as usize;
         let times_s = (0..=rows).map(|i| step_s * i as f64).collect();
         Self { contest, air_k: profile.temperature(start_k), times_s }
     }
 
     /// Every candidate refused by every other one, and how far they are apart.
-    pub fn judge(&self, refit: Refit) -> Option<Foreseen> {
+    pub(crate) fn judge(&self, refit: Refit) -> Option<Foreseen> {
         let rivals = &self.contest.rivals;
         let air = self.contest.air.as_ref()?;
         let shown: Vec<Record> = rivals.iter().map(|r| self.shown(r, air)).collect::<Option<_>>()?;

@@ -11,12 +11,12 @@ use crate::chamber::{Effort, Fit};
 
 /// Something that may be there beside a fit of the declared model.
 #[derive(Debug, Clone, Copy)]
-pub struct Beside {
+pub(crate) struct Beside {
     /// None: wander that no gyro of this noise has.
-    pub candidate: Option<usize>,
+    pub(crate) candidate: Option<usize>,
     /// Of the log likelihood, and with what its parameters and its prior cost.
-    pub gain: f64,
-    pub merit: f64,
+    pub(crate) gain: f64,
+    pub(crate) merit: f64,
 }
 
 /// Candidates that are fitted where the score test promises that they are better.
@@ -27,7 +27,7 @@ const CONFIRMED: usize = 3;
 ///
 /// # Errors
 /// A model that cannot be solved for these records.
-pub fn beside(question: &Question, null: &Fit, wandering: &Fit) -> Outcome<Vec<Beside>> {
+pub(crate) fn beside(question: &Question, null: &Fit, wandering: &Fit) -> Outcome<Vec<Beside>> {
     let null = Explanation::new(question, &[], Vec::new(), null.clone());
     let wandering = Explanation::new(question, &[], vec![Member::Drift], wandering.clone());
     let merit = wandering.merit - null.merit;

@@ -7,7 +7,7 @@ use crate::effect::DeclaredEffect;
 
 /// One thing that a set assumes beside the declared model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Member {
+pub(crate) enum Member {
     /// An effect of the catalogue: its candidate.
     Effect(usize),
     /// The numbers of an effect that the model declares are wrong: its place in the model.
@@ -25,28 +25,28 @@ pub enum Member {
 }
 
 impl Member {
-    pub fn is_outside(self) -> bool {
+    pub(crate) fn is_outside(self) -> bool {
         matches!(self, Member::Drift | Member::Cycle)
     }
 }
 
 /// A set with its fit and what it is worth.
 #[derive(Debug, Clone)]
-pub struct Explanation {
+pub(crate) struct Explanation {
     /// In the order in which they joined.
-    pub members: Vec<Member>,
-    pub fit: Fit,
+    pub(crate) members: Vec<Member>,
+    pub(crate) fit: Fit,
     /// Log evidence of the fitted records, prior of the set included.
-    pub merit: f64,
+    pub(crate) merit: f64,
     /// … of the held-out ones; None where it was not computed or nothing was held out.
-    pub held_out: Option<f64>,
+    pub(crate) held_out: Option<f64>,
     /// What of both is gained in the readings alone, and says nothing of the coil.
-    pub in_readings: f64,
-    pub probability: f64,
+    pub(crate) in_readings: f64,
+    pub(crate) probability: f64,
 }
 
 impl Explanation {
-    pub fn new(question: &Question, windings: &[Winding], members: Vec<Member>, fit: Fit) -> Self {
+    pub(crate) fn new(question: &Question, windings: &[Winding], members: Vec<Member>, fit: Fit) -> Self {
         let prior: f64 = members
             .iter()
             .map(|m| match m {
@@ -75,22 +75,22 @@ impl Explanation {
     }
 
     /// The members in an order of their own.
-    pub fn key(&self) -> Vec<Member> {
+    pub(crate) fn key(&self) -> Vec<Member> {
         let mut key = self.members.clone();
         key.sort_unstable();
         key
     }
 
-    pub fn total(&self) -> f64 {
+    pub(crate) fn total(&self) -> f64 {
         self.merit + self.held_out.unwrap_or(0.0) - self.in_readings
     }
 
     /// Whether something is in it that no known effect explains: a member that says so, an estimate beyond what is physical.
-    pub fn is_outside(&self) -> bool {
+    pub(crate) fn is_outside(&self) -> bool {
         self.members.iter().any(|m| m.is_outside()) || self.is_beyond_physical()
     }
 
-    pub fn is_beyond_physical(&self) -> bool {
+    pub(crate) fn is_beyond_physical(&self) -> bool {
         self.fit.parameters.iter().zip(&self.fit.coordinates).any(|(p, &x)| {
             let Place::Effect { .. } = p.place else { return false };
             let at_bound = (p.scale == Scale::Logarithm && p.lower > f64::NEG_INFINITY && x - p.lower < 1e-3)
@@ -101,7 +101,7 @@ impl Explanation {
     }
 
     /// The effects that it adds to the declared model, each with its candidate.
-    pub fn effects(&self, question: &Question) -> Vec<(usize, DeclaredEffect)> {
+    pub(crate) fn effects(&self, question: &Question) -> Vec<(usize, DeclaredEffect)> {
         let declared = question.model.effects.len();
         let added = self.members.iter().filter_map(|m| match m {
             Member::Effect(candidate) => Some(*candidate),

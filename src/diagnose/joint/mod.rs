@@ -21,31 +21,31 @@ use crate::chamber::{Chamber, ChamberError, Fit};
 use crate::diagnose::candidate::Candidate;
 use crate::pattern::Pattern;
 
-pub use beside::beside;
-pub use explanation::{Explanation, Member};
+pub(crate) use beside::beside;
+pub(crate) use explanation::{Explanation, Member};
 pub(in crate::diagnose) use explanation::{fitted, with, without};
 pub(in crate::diagnose) use odds::EFFECT;
 pub(in crate::diagnose) use screen::{Proposal, proposals};
-pub use search::{again, promise, refit_without, search, settle_one};
-pub use winding::Winding;
+pub(crate) use search::{again, promise, refit_without, search, settle_one};
+pub(crate) use winding::Winding;
 
 /// What is asked of the search.
 #[derive(Debug, Clone)]
-pub struct Question<'a> {
-    pub chamber: &'a Chamber<'a>,
-    pub model: &'a crate::rate::CoilModel,
-    pub pattern: &'a Pattern,
-    pub candidates: &'a [Candidate],
+pub(crate) struct Question<'a> {
+    pub(crate) chamber: &'a Chamber<'a>,
+    pub(crate) model: &'a crate::rate::CoilModel,
+    pub(crate) pattern: &'a Pattern,
+    pub(crate) candidates: &'a [Candidate],
     /// Places of the records to fit, and of those that are held out.
-    pub fitted: Vec<usize>,
-    pub held_out: Vec<usize>,
+    pub(crate) fitted: Vec<usize>,
+    pub(crate) held_out: Vec<usize>,
     /// Members that a set may have.
-    pub depth: usize,
+    pub(crate) depth: usize,
 }
 
 impl Question<'_> {
     /// Log evidence of the held-out records with the coil's numbers as a fit has them; −∞ where one cannot be solved.
-    pub fn held_out_evidence(&self, fit: &Fit) -> f64 {
+    pub(crate) fn held_out_evidence(&self, fit: &Fit) -> f64 {
         let scores: Outcome<Vec<f64>> =
             self.held_out.iter().map(|&r| self.chamber.held_out(fit, r).map(|day| day.evidence)).collect();
         scores.map_or(f64::NEG_INFINITY, |s| s.iter().sum())
@@ -54,22 +54,22 @@ impl Question<'_> {
 
 /// What the search found.
 #[derive(Debug, Clone)]
-pub struct Found {
+pub(crate) struct Found {
     /// Best first; probabilities add up to one. The declared model is always among them.
-    pub explanations: Vec<Explanation>,
+    pub(crate) explanations: Vec<Explanation>,
     /// Of each candidate the gain in log likelihood that the score test promised, largest first, with the effect there.
-    pub promised: Vec<(usize, f64)>,
-    pub windings: Vec<Winding>,
+    pub(crate) promised: Vec<(usize, f64)>,
+    pub(crate) windings: Vec<Winding>,
 }
 
 impl Found {
     /// The declared model, with whatever belongs to the day.
-    pub fn declared(&self) -> Option<&Explanation> {
+    pub(crate) fn declared(&self) -> Option<&Explanation> {
         self.explanations.iter().find(|e| e.members.is_empty())
     }
 
     /// The fit of the likeliest set.
-    pub fn likeliest(&self) -> Option<&Fit> {
+    pub(crate) fn likeliest(&self) -> Option<&Fit> {
         self.explanations.first().map(|e| &e.fit)
     }
 }

@@ -5,9 +5,9 @@
 /// A natural logarithm of prior odds, with its reason.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::diagnose) struct Odds {
-    pub name: &'static str,
-    pub log: f64,
-    pub reason: &'static str,
+    pub(crate) name: &'static str,
+    pub(crate) log: f64,
+    pub(crate) reason: &'static str,
 }
 
 const fn odds(name: &'static str, log: f64, reason: &'static str) -> Odds {

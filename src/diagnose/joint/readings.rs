@@ -21,12 +21,12 @@ pub(super) struct Readings<'a> {
 }
 
 impl<'a> Readings<'a> {
-    pub fn new(question: &Question<'a>, declared: Fit) -> Self {
+    pub(super) fn new(question: &Question<'a>, declared: Fit) -> Self {
         Self { blind: question.chamber.without_rates(), declared }
     }
 
     /// Takes off what sets gain in the readings alone, with the coil's numbers as they were found.
-    pub fn take_off(&self, question: &Question, explanations: &mut [Explanation]) {
+    pub(super) fn take_off(&self, question: &Question, explanations: &mut [Explanation]) {
         let mut changing: Vec<&mut Explanation> =
             explanations.iter_mut().filter(|e| changes_readings(question, e)).collect();
         if changing.is_empty() {

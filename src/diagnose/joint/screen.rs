@@ -24,9 +24,9 @@ const LAYERS_TRIED: usize = 3;
 /// One more member, where its fit begins, and what the score test promises.
 #[derive(Debug, Clone)]
 pub(in crate::diagnose) struct Proposal {
-    pub member: Member,
-    pub values: Option<Vec<f64>>,
-    pub gain: f64,
+    pub(crate) member: Member,
+    pub(crate) values: Option<Vec<f64>>,
+    pub(crate) gain: f64,
 }
 
 /// The score test of every candidate from each of its starts; of what every layer has one for, the best layer's.

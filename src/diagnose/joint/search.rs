@@ -36,7 +36,7 @@ type Cache = BTreeMap<Vec<Member>, Explanation>;
 ///
 /// # Errors
 /// A declared model that cannot be solved for these records.
-pub fn search(question: &Question, null: Fit, progress: &(dyn Fn(f64) + Sync)) -> Outcome<Found> {
+pub(crate) fn search(question: &Question, null: Fit, progress: &(dyn Fn(f64) + Sync)) -> Outcome<Found> {
     progress(0.2);
     let mut windings: Vec<Winding> = Vec::new();
     let mut cache = Cache::new();
@@ -93,7 +93,7 @@ pub fn search(question: &Question, null: Fit, progress: &(dyn Fn(f64) + Sync)) -
 ///
 /// # Errors
 /// A declared model that cannot be solved for these records.
-pub fn again(question: &Question, found: Found) -> Outcome<Found> {
+pub(crate) fn again(question: &Question, found: Found) -> Outcome<Found> {
     let Found { explanations, promised, windings } = found;
     let mut explanations: Vec<Explanation> = explanations
         .into_par_iter()
@@ -256,7 +256,7 @@ fn refit_without_last(question: &Question, windings: &[Winding], next: &Explanat
 }
 
 /// The rest of a set, fitted again without one member.
-pub fn refit_without(question: &Question, from: &Explanation, place: usize) -> Option<Explanation> {
+pub(crate) fn refit_without(question: &Question, from: &Explanation, place: usize) -> Option<Explanation> {
     let mut members = from.members.clone();
     members.remove(place);
     let begin = without(question, from, place);
@@ -346,13 +346,13 @@ fn complete(question: &Question, windings: &[Winding], best: &Explanation, cache
 ///
 /// # Errors
 /// A model that cannot be solved for these records.
-pub fn promise(question: &Question, null: &Fit) -> Outcome<f64> {
+pub(crate) fn promise(question: &Question, null: &Fit) -> Outcome<f64> {
     let null = Explanation::new(question, &[], Vec::new(), null.clone());
     Ok(proposals(question, &null)?.iter().map(|p| p.gain).fold(0.0, f64::max))
 }
 
 /// The best fit of the only kind among the candidates, and mean squares of standardised innovations before and after.
-pub fn settle_one(question: &Question, base: &Fit) -> Option<(Explanation, (f64, f64))> {
+pub(crate) fn settle_one(question: &Question, base: &Fit) -> Option<Explanation> {
     let null = Explanation::new(question, &[], Vec::new(), base.clone());
     let begins: Vec<(usize, Vec<f64>)> = question
         .candidates
@@ -372,14 +372,5 @@ pub fn settle_one(question: &Question, base: &Fit) -> Option<(Explanation, (f64,
     });
     let fits: Vec<Explanation> = fits.collect();
     let best = fits.into_iter().max_by(|a, b| a.merit.total_cmp(&b.merit))?;
-    let best = calmed(question, &[], best);
-    let reduced = |fit: &Fit| {
-        let of = |&r: &usize| question.chamber.noise(fit, r).ok().map(|n| n.whiteness * n.whiteness);
-        let all: Vec<f64> = question.fitted.iter().filter_map(of).collect();
-        all.iter().sum::<f64>() / all.len().max(1) as f64
-    };
-    let after = reduced(&best.fit);
-    // In units of what the better model expects.
-    let less = 2.0 * (best.fit.log_likelihood - base.log_likelihood) / super::rates(question.chamber, base) as f64;
-    Some((best, (after + less, after)))
+    Some(calmed(question, &[], best))
 }

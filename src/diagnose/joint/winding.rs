@@ -11,16 +11,16 @@ use crate::rate::{LayerWeights, RateModel};
 
 /// A winding that is not the declared one.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Winding {
-    pub pattern: Pattern,
+pub(crate) struct Winding {
+    pub(crate) pattern: Pattern,
     /// A classic's name, where it is one.
-    pub classic: Option<&'static str>,
+    pub(crate) classic: Option<&'static str>,
     /// Connected the other way round than declared (or than the classic).
-    pub reversed: bool,
+    pub(crate) reversed: bool,
     /// The two layers that changed places, counted from 0 innermost.
-    pub exchanged: Option<(usize, usize)>,
+    pub(crate) exchanged: Option<(usize, usize)>,
     /// Rise of the log posterior in a short fit with it; until then what the score test promises.
-    pub promised: f64,
+    pub(crate) promised: f64,
 }
 
 /// Exchanges of two layers that are looked at more closely, if the score test promises so much of them.

@@ -12,20 +12,20 @@ use super::schema::{described, table};
 
 /// A number with its standard error; null where that is not known.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct EstimateJson {
-    pub value: f64,
-    pub standard_error: Option<f64>,
+pub(crate) struct EstimateJson {
+    pub(crate) value: f64,
+    pub(crate) standard_error: Option<f64>,
 }
 
 /// What is written into the `[boundary]` table of a model file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct BoundaryJson {
+pub(crate) struct BoundaryJson {
     /// Null where the model states the film or the records do not determine it.
-    pub surface_film_w_per_m2_k: Option<EstimateJson>,
-    pub offset_deg_per_h: Option<EstimateJson>,
+    pub(crate) surface_film_w_per_m2_k: Option<EstimateJson>,
+    pub(crate) offset_deg_per_h: Option<EstimateJson>,
     /// By its key in the model file, which ends in the unit.
-    pub chamber: BTreeMap<String, EstimateJson>,
-    pub records: usize,
+    pub(crate) chamber: BTreeMap<String, EstimateJson>,
+    pub(crate) records: usize,
 }
 
 impl EstimateJson {
@@ -36,7 +36,7 @@ impl EstimateJson {
 }
 
 impl BoundaryJson {
-    pub fn new(learned: &Learned) -> Self {
+    pub(crate) fn new(learned: &Learned) -> Self {
         let same: fn(f64) -> f64 = |v| v;
         Self {
             surface_film_w_per_m2_k: learned.film_w_per_m2_k.map(|e| EstimateJson::new(e, same)),
@@ -54,7 +54,7 @@ impl BoundaryJson {
     }
 
     /// For a reader of the command's answer.
-    pub fn words(&self) -> String {
+    pub(crate) fn words(&self) -> String {
         let stated = |e: &EstimateJson, digits: usize| match e.standard_error {
             Some(error) => format!("{:.digits$} ± {error:.digits$}", e.value),
             None => format!("{:.digits$}", e.value),

@@ -8,45 +8,45 @@ use crate::units::deg_per_h_from_rad_per_s;
 
 /// Of one model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct BuiltCoilsJson {
-    pub model: String,
-    pub layers: usize,
-    pub samples: u64,
-    pub seed: u64,
+pub(crate) struct BuiltCoilsJson {
+    pub(crate) model: String,
+    pub(crate) layers: usize,
+    pub(crate) samples: u64,
+    pub(crate) seed: u64,
     /// "guaranteed": over all profiles within the largest rate; "sampled": over the declared profiles.
-    pub measure: String,
-    pub limit_deg_per_h: Option<f64>,
-    pub patterns: Vec<BuiltPatternJson>,
+    pub(crate) measure: String,
+    pub(crate) limit_deg_per_h: Option<f64>,
+    pub(crate) patterns: Vec<BuiltPatternJson>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct BuiltPatternJson {
-    pub name: String,
-    pub segments: Vec<usize>,
-    pub nominal_deg_per_h: f64,
-    pub quantiles: Vec<QuantileJson>,
-    pub largest_deg_per_h: f64,
+pub(crate) struct BuiltPatternJson {
+    pub(crate) name: String,
+    pub(crate) segments: Vec<usize>,
+    pub(crate) nominal_deg_per_h: f64,
+    pub(crate) quantiles: Vec<QuantileJson>,
+    pub(crate) largest_deg_per_h: f64,
     /// The share of coils within the limit; null without a limit.
     #[serde(rename = "yield")]
-    pub yield_share: Option<f64>,
+    pub(crate) yield_share: Option<f64>,
     /// Share of coils, and the worst case that it exceeds.
-    pub exceeded: Vec<(f64, f64)>,
+    pub(crate) exceeded: Vec<(f64, f64)>,
 }
 
 /// A quantile with the interval that holds it with 95 %, whatever the distribution.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct QuantileJson {
-    pub share: f64,
-    pub value_deg_per_h: f64,
+pub(crate) struct QuantileJson {
+    pub(crate) share: f64,
+    pub(crate) value_deg_per_h: f64,
     /// Null where there are too few coils.
-    pub low_deg_per_h: Option<f64>,
-    pub high_deg_per_h: Option<f64>,
+    pub(crate) low_deg_per_h: Option<f64>,
+    pub(crate) high_deg_per_h: Option<f64>,
     /// Whether these are coils' own numbers; else they are off by at most a thousandth.
-    pub exact: bool,
+    pub(crate) exact: bool,
 }
 
 /// Which quantiles are stated.
-pub const SHARES: [f64; 4] = [0.5, 0.95, 0.99, 0.999];
+pub(crate) const SHARES: [f64; 4] = [0.5, 0.95, 0.99, 0.999];
 const CONFIDENCE: f64 = 0.95;
 
 /// Points of the curve a decade.
@@ -54,13 +54,13 @@ const POINTS_PER_DECADE: i32 = 8;
 
 /// One model's blocks as they come, in constant memory but for the worst cases of the worst three coils in a hundred.
 #[derive(Debug, Clone)]
-pub struct Blocks {
+pub(crate) struct Blocks {
     first: BlockJson,
     patterns: Vec<(BlockPatternJson, QuantileSketch)>,
 }
 
 impl Blocks {
-    pub fn of(mut first: BlockJson) -> Self {
+    pub(crate) fn of(mut first: BlockJson) -> Self {
         let patterns = std::mem::take(&mut first.patterns).into_iter().map(|mut pattern| {
             let sketch = sketch(&mut pattern);
             (pattern, sketch)
@@ -70,7 +70,7 @@ impl Blocks {
     }
 
     /// Takes the next block of the same model in.
-    pub fn add(&mut self, block: BlockJson) {
+    pub(crate) fn add(&mut self, block: BlockJson) {
         self.first.coils += block.coils;
         for ((all, sum), mut own) in self.patterns.iter_mut().zip(block.patterns) {
             sum.add(&sketch(&mut own));
@@ -78,7 +78,7 @@ impl Blocks {
         }
     }
 
-    pub fn finish(self) -> BuiltCoilsJson {
+    pub(crate) fn finish(self) -> BuiltCoilsJson {
         let BlockJson { model, layers, seed, coils, measure, limit_deg_per_h, .. } = self.first;
         let patterns = self.patterns.into_iter().map(|(pattern, sketch)| built(pattern, &sketch)).collect();
         BuiltCoilsJson { model, layers, samples: coils, seed, measure, limit_deg_per_h, patterns }

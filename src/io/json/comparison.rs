@@ -14,69 +14,69 @@ use super::metrics::GrossErrorJson;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CompareJson {
-    pub model: String,
-    pub pattern: String,
+    pub(crate) model: String,
+    pub(crate) pattern: String,
     /// "adequate" or "missing": whether every record is the model's prediction and noise.
-    pub verdict: String,
-    pub records: Vec<RecordComparisonJson>,
-    pub inputs: InputsJson,
+    pub(crate) verdict: String,
+    pub(crate) records: Vec<RecordComparisonJson>,
+    pub(crate) inputs: InputsJson,
 }
 
 /// One record beside its prediction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RecordComparisonJson {
-    pub file: String,
+pub(crate) struct RecordComparisonJson {
+    pub(crate) file: String,
     /// Where the layers' temperatures come from, if not from the record's own sensor.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub field: Option<String>,
-    pub rows: usize,
-    pub verdict: String,
-    pub rmse_deg_per_h: f64,
+    pub(crate) field: Option<String>,
+    pub(crate) rows: usize,
+    pub(crate) verdict: String,
+    pub(crate) rmse_deg_per_h: f64,
     /// Null where the record does not vary.
-    pub nrmse_fit_percent: Option<f64>,
-    pub r_squared: Option<f64>,
-    pub noise_floor_deg_per_h: f64,
-    pub noise_floor_standard_error_deg_per_h: f64,
-    pub noise_floor_method: String,
-    pub reduced_chi_square: f64,
+    pub(crate) nrmse_fit_percent: Option<f64>,
+    pub(crate) r_squared: Option<f64>,
+    pub(crate) noise_floor_deg_per_h: f64,
+    pub(crate) noise_floor_standard_error_deg_per_h: f64,
+    pub(crate) noise_floor_method: String,
+    pub(crate) reduced_chi_square: f64,
     /// What the uncertainty of the estimated boundary is expected to add to it.
-    pub boundary_chi_square: f64,
+    pub(crate) boundary_chi_square: f64,
     /// Against noise and boundary together.
-    pub whitened_chi_square: f64,
-    pub offset_deg_per_h: f64,
-    pub largest_error_deg_per_h: f64,
-    pub largest_error_time_s: f64,
-    pub autocorrelation: Vec<f64>,
-    pub autocorrelation_band_99: f64,
-    pub ljung_box: LjungBoxJson,
-    pub correlations: Vec<CorrelationJson>,
-    pub regimes: Vec<PartJson>,
-    pub temperature_bands: Vec<PartJson>,
-    pub rate_bands: Vec<PartJson>,
+    pub(crate) whitened_chi_square: f64,
+    pub(crate) offset_deg_per_h: f64,
+    pub(crate) largest_error_deg_per_h: f64,
+    pub(crate) largest_error_time_s: f64,
+    pub(crate) autocorrelation: Vec<f64>,
+    pub(crate) autocorrelation_band_99: f64,
+    pub(crate) ljung_box: LjungBoxJson,
+    pub(crate) correlations: Vec<CorrelationJson>,
+    pub(crate) regimes: Vec<PartJson>,
+    pub(crate) temperature_bands: Vec<PartJson>,
+    pub(crate) rate_bands: Vec<PartJson>,
     /// Where the model fails, in words.
-    pub findings: Vec<String>,
+    pub(crate) findings: Vec<String>,
     /// Null where the rates have no noise.
-    pub noise: Option<NoisePartsJson>,
-    pub estimated_film_w_per_m2_k: Option<f64>,
-    pub estimated_film_standard_error_w_per_m2_k: Option<f64>,
-    pub estimated_kinks_s: Vec<f64>,
+    pub(crate) noise: Option<NoisePartsJson>,
+    pub(crate) estimated_film_w_per_m2_k: Option<f64>,
+    pub(crate) estimated_film_standard_error_w_per_m2_k: Option<f64>,
+    pub(crate) estimated_kinks_s: Vec<f64>,
     /// Thermometers at layers, each beside the model's layer.
     #[serde(default)]
-    pub sensors: Vec<SensorJson>,
-    pub gross_errors: Vec<GrossErrorJson>,
-    pub gaps: usize,
+    pub(crate) sensors: Vec<SensorJson>,
+    pub(crate) gross_errors: Vec<GrossErrorJson>,
+    pub(crate) gaps: usize,
 }
 
 /// Reading less model of one thermometer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SensorJson {
-    pub column: String,
-    pub layer: usize,
-    pub rows: usize,
-    pub mean_difference_c: f64,
-    pub rms_difference_c: f64,
-    pub largest_difference_c: f64,
-    pub largest_difference_time_s: f64,
+pub(crate) struct SensorJson {
+    pub(crate) column: String,
+    pub(crate) layer: usize,
+    pub(crate) rows: usize,
+    pub(crate) mean_difference_c: f64,
+    pub(crate) rms_difference_c: f64,
+    pub(crate) largest_difference_c: f64,
+    pub(crate) largest_difference_time_s: f64,
 }
 
 impl SensorJson {
@@ -95,16 +95,16 @@ impl SensorJson {
 
 /// What a record's rate consists of beside the coil.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct NoisePartsJson {
+pub(crate) struct NoisePartsJson {
     /// Of one logged rate.
-    pub white_deg_per_h: f64,
+    pub(crate) white_deg_per_h: f64,
     /// Null where the record does not determine it.
-    pub white_standard_error_deg_per_h: Option<f64>,
-    pub wander_deg_per_h: f64,
+    pub(crate) white_standard_error_deg_per_h: Option<f64>,
+    pub(crate) wander_deg_per_h: f64,
     /// What the air did and the sensor could not see.
-    pub unresolved_air_deg_per_h: f64,
+    pub(crate) unresolved_air_deg_per_h: f64,
     /// What is beyond all that.
-    pub model_error_deg_per_h: f64,
+    pub(crate) model_error_deg_per_h: f64,
 }
 
 impl NoisePartsJson {
@@ -121,30 +121,30 @@ impl NoisePartsJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct LjungBoxJson {
-    pub statistic: f64,
-    pub lags: usize,
-    pub p_value: f64,
+pub(crate) struct LjungBoxJson {
+    pub(crate) statistic: f64,
+    pub(crate) lags: usize,
+    pub(crate) p_value: f64,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CorrelationJson {
-    pub with: String,
-    pub correlation: Option<f64>,
+pub(crate) struct CorrelationJson {
+    pub(crate) with: String,
+    pub(crate) correlation: Option<f64>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PartJson {
-    pub name: String,
-    pub share_of_squared_error: f64,
-    pub rmse_deg_per_h: f64,
-    pub rows: usize,
-    pub share_of_rows: f64,
-    pub chi_square_per_row: f64,
+pub(crate) struct PartJson {
+    pub(crate) name: String,
+    pub(crate) share_of_squared_error: f64,
+    pub(crate) rmse_deg_per_h: f64,
+    pub(crate) rows: usize,
+    pub(crate) share_of_rows: f64,
+    pub(crate) chi_square_per_row: f64,
 }
 
 /// How the noise floor is found; also said in reports.
-pub const NOISE_FLOOR_METHOD: &str =
+pub(crate) const NOISE_FLOOR_METHOD: &str =
     "what quadratics leave of 11 rows each, windows above the 98 % point of chi-square left out";
 
 fn verdict_word(verdict: Verdict) -> &'static str {
@@ -168,7 +168,7 @@ impl PartJson {
 }
 
 impl RecordComparisonJson {
-    pub fn new(file: &str, found: &Comparison, gross_errors: Vec<GrossErrorJson>, gaps: usize) -> Self {
+    pub(crate) fn new(file: &str, found: &Comparison, gross_errors: Vec<GrossErrorJson>, gaps: usize) -> Self {
         let parts = |parts: &[Part]| parts.iter().map(PartJson::new).collect();
         Self {
             file: file.to_owned(),
@@ -215,13 +215,13 @@ impl RecordComparisonJson {
 }
 
 impl CompareJson {
-    pub fn new(model: &str, pattern: &str, records: Vec<RecordComparisonJson>, inputs: InputsJson) -> Self {
+    pub(crate) fn new(model: &str, pattern: &str, records: Vec<RecordComparisonJson>, inputs: InputsJson) -> Self {
         let all = records.iter().all(|r| r.verdict == verdict_word(Verdict::Adequate));
         let verdict = verdict_word(if all { Verdict::Adequate } else { Verdict::Missing });
         Self { model: model.to_owned(), pattern: pattern.to_owned(), verdict: verdict.to_owned(), records, inputs }
     }
 
-    pub fn is_adequate(&self) -> bool {
+    pub(crate) fn is_adequate(&self) -> bool {
         self.verdict == verdict_word(Verdict::Adequate)
     }
 }

@@ -17,27 +17,27 @@ use super::boundary::BoundaryJson;
 use super::comparison::CompareJson;
 use super::experiment::ExperimentJson;
 use super::inputs::InputsJson;
-pub use super::noise::{NoiseJson, RemedyJson};
+pub(crate) use super::noise::NoiseJson;
 use super::proposals::ProposalJson;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DiagnosisJson {
-    pub model: String,
-    pub verdict: String,
-    pub effects: Vec<FindingJson>,
-    pub ladder: Vec<RungJson>,
-    pub candidates: Vec<ContenderJson>,
-    pub noise_floor_deg_per_h: f64,
+    pub(crate) model: String,
+    pub(crate) verdict: String,
+    pub(crate) effects: Vec<FindingJson>,
+    pub(crate) ladder: Vec<RungJson>,
+    pub(crate) candidates: Vec<ContenderJson>,
+    pub(crate) noise_floor_deg_per_h: f64,
     /// Null where no record was held out.
-    pub holdout_noise_floor_deg_per_h: Option<f64>,
+    pub(crate) holdout_noise_floor_deg_per_h: Option<f64>,
     /// What each step of the ladder bought, in words.
-    pub ladder_in_words: Vec<String>,
+    pub(crate) ladder_in_words: Vec<String>,
     /// Null unless the verdict is `unexplained`.
-    pub unexplained: Option<UnexplainedJson>,
-    pub suggested_experiment: Option<String>,
+    pub(crate) unexplained: Option<UnexplainedJson>,
+    pub(crate) suggested_experiment: Option<String>,
     /// The profile that would tell the candidates apart; null unless it was asked for and there is something to tell apart.
-    pub experiment: Option<ExperimentJson>,
-    pub cautions: Vec<String>,
+    pub(crate) experiment: Option<ExperimentJson>,
+    pub(crate) cautions: Vec<String>,
     /// Sets of explanations with their posterior probability, largest first.
     #[serde(default)]
     pub posterior: Vec<ShareJson>,
@@ -46,171 +46,171 @@ pub struct DiagnosisJson {
     pub refitted: Vec<RefittedJson>,
     /// Another winding, a coil connected the other way round, steps of the offset; null where none of these won.
     #[serde(default)]
-    pub hypothesis: Option<HypothesisJson>,
+    pub(crate) hypothesis: Option<HypothesisJson>,
     /// White noise, wander and unresolved air of each record, fitted ones first.
     #[serde(default)]
-    pub noise: Vec<NoiseJson>,
+    pub(crate) noise: Vec<NoiseJson>,
     /// Formulas for what no listed effect explains, best first.
     #[serde(default)]
-    pub proposals: Vec<ProposalJson>,
+    pub(crate) proposals: Vec<ProposalJson>,
     /// What the records showed of film, offset and chamber, with the accepted effects.
-    pub boundary: BoundaryJson,
-    pub inputs: InputsJson,
+    pub(crate) boundary: BoundaryJson,
+    pub(crate) inputs: InputsJson,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ShareJson {
-    pub effects: Vec<String>,
-    pub probability: f64,
+    pub(crate) effects: Vec<String>,
+    pub(crate) probability: f64,
     /// All effects of the model that the set makes of the declared one, the declared ones first.
     #[serde(default)]
-    pub members: Vec<MemberJson>,
+    pub(crate) members: Vec<MemberJson>,
     /// What the records say of the members' parameters.
     #[serde(default)]
-    pub estimates: Vec<EstimateJson>,
+    pub(crate) estimates: Vec<EstimateJson>,
     /// Of the estimates, or of their logarithms where that is what is normal.
     #[serde(default)]
-    pub correlation: Vec<Vec<f64>>,
+    pub(crate) correlation: Vec<Vec<f64>>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct MemberJson {
-    pub kind: String,
-    pub choices: BTreeMap<String, String>,
-    pub values: BTreeMap<String, f64>,
+pub(crate) struct MemberJson {
+    pub(crate) kind: String,
+    pub(crate) choices: BTreeMap<String, String>,
+    pub(crate) values: BTreeMap<String, f64>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct EstimateJson {
+pub(crate) struct EstimateJson {
     /// Place among the members, counted from 0.
-    pub member: usize,
-    pub parameter: String,
-    pub value: f64,
-    pub standard_error: f64,
-    pub unit: String,
+    pub(crate) member: usize,
+    pub(crate) parameter: String,
+    pub(crate) value: f64,
+    pub(crate) standard_error: f64,
+    pub(crate) unit: String,
     /// Whether the logarithm of the value is what is normal; its error is then that over the value.
-    pub logarithmic: bool,
+    pub(crate) logarithmic: bool,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RefittedJson {
-    pub kind: String,
-    pub parameter: String,
-    pub declared: f64,
-    pub value: f64,
-    pub standard_error: Option<f64>,
-    pub unit: String,
+    pub(crate) kind: String,
+    pub(crate) parameter: String,
+    pub(crate) declared: f64,
+    pub(crate) value: f64,
+    pub(crate) standard_error: Option<f64>,
+    pub(crate) unit: String,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct HypothesisJson {
+pub(crate) struct HypothesisJson {
     /// The classic that the coil seems to be wound as.
-    pub winding: Option<String>,
-    pub reversed: bool,
+    pub(crate) winding: Option<String>,
+    pub(crate) reversed: bool,
     /// Two layers that changed places, counted from 1 innermost.
-    pub exchanged_layers: Option<[usize; 2]>,
-    pub offset_steps: Vec<OffsetStepJson>,
+    pub(crate) exchanged_layers: Option<[usize; 2]>,
+    pub(crate) offset_steps: Vec<OffsetStepJson>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct OffsetStepJson {
-    pub record: String,
-    pub time_s: f64,
-    pub size_deg_per_h: f64,
+pub(crate) struct OffsetStepJson {
+    pub(crate) record: String,
+    pub(crate) time_s: f64,
+    pub(crate) size_deg_per_h: f64,
 }
 
 /// One row of a record: what the declared model and the one with the accepted effects leave.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct DiagnosisRow {
-    pub time_s: f64,
-    pub residual_declared_deg_per_h: f64,
-    pub residual_extended_deg_per_h: f64,
+pub(crate) struct DiagnosisRow {
+    pub(crate) time_s: f64,
+    pub(crate) residual_declared_deg_per_h: f64,
+    pub(crate) residual_extended_deg_per_h: f64,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct FindingJson {
-    pub kind: String,
-    pub parameters: BTreeMap<String, ParameterJson>,
+pub(crate) struct FindingJson {
+    pub(crate) kind: String,
+    pub(crate) parameters: BTreeMap<String, ParameterJson>,
     /// The words among which the effect lets one choose, such as `lead`.
-    pub choices: BTreeMap<String, String>,
+    pub(crate) choices: BTreeMap<String, String>,
     /// Kinds that explain the records equally well.
-    pub equivalents: Vec<String>,
-    pub equivalents_in_detail: Vec<EquivalentJson>,
+    pub(crate) equivalents: Vec<String>,
+    pub(crate) equivalents_in_detail: Vec<EquivalentJson>,
     /// By how much χ² rises without it, on fitted and on unseen data.
-    pub chi_square_less: f64,
-    pub confirmed_by: f64,
+    pub(crate) chi_square_less: f64,
+    pub(crate) confirmed_by: f64,
     /// What happens in the coil, and what to do about it; empty in documents of older versions.
     #[serde(default)]
-    pub happens: String,
+    pub(crate) happens: String,
     #[serde(default)]
-    pub remedy: String,
-    pub experiment: String,
+    pub(crate) remedy: String,
+    pub(crate) experiment: String,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ParameterJson {
-    pub value: f64,
+pub(crate) struct ParameterJson {
+    pub(crate) value: f64,
     /// Null where the records do not determine it, at a bound, or where it was held.
-    pub standard_error: Option<f64>,
-    pub unit: String,
-    pub fitted: bool,
-    pub at_bound: bool,
+    pub(crate) standard_error: Option<f64>,
+    pub(crate) unit: String,
+    pub(crate) fitted: bool,
+    pub(crate) at_bound: bool,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct EquivalentJson {
-    pub kind: String,
-    pub choices: BTreeMap<String, String>,
-    pub chi_square_more: f64,
+pub(crate) struct EquivalentJson {
+    pub(crate) kind: String,
+    pub(crate) choices: BTreeMap<String, String>,
+    pub(crate) chi_square_more: f64,
     /// Of the two predicted responses in these records.
-    pub correlation: f64,
+    pub(crate) correlation: f64,
     #[serde(default)]
-    pub happens: String,
+    pub(crate) happens: String,
     #[serde(default)]
-    pub remedy: String,
-    pub experiment: String,
+    pub(crate) remedy: String,
+    pub(crate) experiment: String,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RungJson {
-    pub effects: Vec<String>,
-    pub rmse_deg_per_h: f64,
-    pub holdout_rmse_deg_per_h: Option<f64>,
-    pub reduced_chi_square: f64,
-    pub holdout_reduced_chi_square: Option<f64>,
-    pub bic: f64,
+pub(crate) struct RungJson {
+    pub(crate) effects: Vec<String>,
+    pub(crate) rmse_deg_per_h: f64,
+    pub(crate) holdout_rmse_deg_per_h: Option<f64>,
+    pub(crate) reduced_chi_square: f64,
+    pub(crate) holdout_reduced_chi_square: Option<f64>,
+    pub(crate) bic: f64,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ContenderJson {
-    pub kind: String,
-    pub choices: BTreeMap<String, String>,
-    pub reduced_chi_square: f64,
-    pub bic: f64,
-    pub chi_square_less: f64,
+pub(crate) struct ContenderJson {
+    pub(crate) kind: String,
+    pub(crate) choices: BTreeMap<String, String>,
+    pub(crate) reduced_chi_square: f64,
+    pub(crate) bic: f64,
+    pub(crate) chi_square_less: f64,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct UnexplainedJson {
-    pub excess_deg_per_h: f64,
-    pub share_of_excess: f64,
-    pub correlations: Vec<CorrelationJson>,
-    pub plain: Vec<PlainJson>,
+pub(crate) struct UnexplainedJson {
+    pub(crate) excess_deg_per_h: f64,
+    pub(crate) share_of_excess: f64,
+    pub(crate) correlations: Vec<CorrelationJson>,
+    pub(crate) plain: Vec<PlainJson>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CorrelationJson {
-    pub with: String,
-    pub correlation: f64,
+pub(crate) struct CorrelationJson {
+    pub(crate) with: String,
+    pub(crate) correlation: f64,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PlainJson {
-    pub shape: String,
-    pub period_s: Option<f64>,
-    pub time_constant_s: Option<f64>,
-    pub rms_deg_per_h: f64,
-    pub chi_square_less: f64,
+pub(crate) struct PlainJson {
+    pub(crate) shape: String,
+    pub(crate) period_s: Option<f64>,
+    pub(crate) time_constant_s: Option<f64>,
+    pub(crate) rms_deg_per_h: f64,
+    pub(crate) chi_square_less: f64,
 }
 
 fn choices(effect: &DeclaredEffect) -> BTreeMap<String, String> {
@@ -220,7 +220,7 @@ fn choices(effect: &DeclaredEffect) -> BTreeMap<String, String> {
 
 impl DiagnosisJson {
     /// `holdout_noise_rad_per_s` is that of the records that were held out, if there are any.
-    pub fn new(
+    pub(crate) fn new(
         model: &str,
         diagnosis: &Diagnosis,
         holdout_noise_rad_per_s: Option<f64>,
@@ -259,13 +259,13 @@ impl DiagnosisJson {
     }
 
     /// A value as a multiple of the noise of the fitted records, or of those held out.
-    pub fn multiple_of_noise(&self, value_deg_per_h: f64, holdout: bool) -> f64 {
+    pub(crate) fn multiple_of_noise(&self, value_deg_per_h: f64, holdout: bool) -> f64 {
         let noise = self.holdout_noise_floor_deg_per_h.filter(|_| holdout).unwrap_or(self.noise_floor_deg_per_h);
         value_deg_per_h / noise.max(f64::MIN_POSITIVE)
     }
 
     /// What each rung adds to the one before.
-    pub fn steps(&self) -> Vec<Vec<&str>> {
+    pub(crate) fn steps(&self) -> Vec<Vec<&str>> {
         (0..self.ladder.len())
             .map(|i| {
                 let before: &[String] = if i > 0 { &self.ladder[i - 1].effects } else { &[] };
@@ -369,7 +369,7 @@ impl HypothesisJson {
 }
 
 impl FindingJson {
-    pub fn new(finding: &Finding) -> Self {
+    pub(crate) fn new(finding: &Finding) -> Self {
         Self {
             kind: finding.effect.kind(),
             parameters: finding.parameters.iter().map(|p| (p.key.clone(), ParameterJson::new(p))).collect(),
@@ -454,7 +454,6 @@ impl PlainJson {
     fn new(plain: &Plain) -> Self {
         let (shape, period_s, time_constant_s) = match plain.shape {
             Shape::Drift => ("drift", None, None),
-            Shape::Exponential { time_constant_s } => ("exponential", None, Some(time_constant_s)),
             Shape::Sinusoid { period_s } => ("sinusoid", Some(period_s), None),
         };
         Self {
@@ -470,11 +469,11 @@ impl PlainJson {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ExtendJson {
     /// The new model file.
-    pub written: String,
-    pub effect: FindingJson,
+    pub(crate) written: String,
+    pub(crate) effect: FindingJson,
     /// What the new model file states as `[boundary]`; null without a record to fit to.
-    pub boundary: Option<BoundaryJson>,
+    pub(crate) boundary: Option<BoundaryJson>,
     /// Every record given, as `compare` shows it.
-    pub before: CompareJson,
-    pub after: CompareJson,
+    pub(crate) before: CompareJson,
+    pub(crate) after: CompareJson,
 }

@@ -11,37 +11,37 @@ pub struct EffectsJson {
 
 #[derive(Debug, Serialize)]
 pub struct EffectJson {
-    pub kind: &'static str,
-    pub summary: &'static str,
-    pub equation: &'static str,
-    pub acts: &'static str,
-    pub parameters: Vec<ParameterJson>,
-    pub choices: Vec<ChoiceJson>,
-    pub source: &'static str,
-    pub signature: &'static str,
-    pub happens: &'static str,
-    pub remedy: &'static str,
-    pub experiment: &'static str,
+    pub(crate) kind: &'static str,
+    pub(crate) summary: &'static str,
+    pub(crate) equation: &'static str,
+    pub(crate) acts: &'static str,
+    pub(crate) parameters: Vec<ParameterJson>,
+    pub(crate) choices: Vec<ChoiceJson>,
+    pub(crate) source: &'static str,
+    pub(crate) signature: &'static str,
+    pub(crate) happens: &'static str,
+    pub(crate) remedy: &'static str,
+    pub(crate) experiment: &'static str,
 }
 
 /// Bounds, start and default in the parameter's own unit.
 #[derive(Debug, Serialize)]
-pub struct ParameterJson {
-    pub key: &'static str,
-    pub unit: &'static str,
-    pub meaning: &'static str,
-    pub lower: f64,
-    pub upper: f64,
-    pub start: f64,
+pub(crate) struct ParameterJson {
+    pub(crate) key: &'static str,
+    pub(crate) unit: &'static str,
+    pub(crate) meaning: &'static str,
+    pub(crate) lower: f64,
+    pub(crate) upper: f64,
+    pub(crate) start: f64,
     /// Null where a model file must state the parameter.
-    pub default: Option<f64>,
+    pub(crate) default: Option<f64>,
 }
 
 #[derive(Debug, Serialize)]
-pub struct ChoiceJson {
-    pub key: &'static str,
-    pub options: &'static [&'static str],
-    pub meaning: &'static str,
+pub(crate) struct ChoiceJson {
+    pub(crate) key: &'static str,
+    pub(crate) options: &'static [&'static str],
+    pub(crate) meaning: &'static str,
 }
 
 impl EffectJson {

@@ -7,58 +7,58 @@ use crate::units::{c_per_h_from_k_per_s, deg_per_h_from_rad_per_s, h_from_s, per
 
 /// A profile of the chamber's air, and how surely it tells the candidates apart.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ExperimentJson {
-    pub profile: String,
-    pub pieces: Vec<PieceJson>,
-    pub duration_s: f64,
+pub(crate) struct ExperimentJson {
+    pub(crate) profile: String,
+    pub(crate) pieces: Vec<PieceJson>,
+    pub(crate) duration_s: f64,
     /// How many profiles it was chosen from.
-    pub profiles_tried: usize,
-    pub separations: Vec<SeparationJson>,
-    pub statement: String,
+    pub(crate) profiles_tried: usize,
+    pub(crate) separations: Vec<SeparationJson>,
+    pub(crate) statement: String,
     /// What is to be expected of each pair, in words.
-    pub expectations: Vec<String>,
+    pub(crate) expectations: Vec<String>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PieceJson {
-    pub rate_c_per_h: f64,
-    pub duration_s: f64,
+pub(crate) struct PieceJson {
+    pub(crate) rate_c_per_h: f64,
+    pub(crate) duration_s: f64,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SeparationJson {
-    pub first: String,
-    pub second: String,
+pub(crate) struct SeparationJson {
+    pub(crate) first: String,
+    pub(crate) second: String,
     /// Root mean square of the difference of the two predictions as fitted to the records, their offsets taken out.
-    pub rms_deg_per_h: f64,
-    pub multiple_of_noise: f64,
+    pub(crate) rms_deg_per_h: f64,
+    pub(crate) multiple_of_noise: f64,
     /// By how much χ² one is expected to be refused if the other is true, after it is fitted again: to the experiment alone,
     /// and to the records at hand too; the less of the two directions.
-    pub expected_chi_square_alone: f64,
-    pub expected_chi_square_with_records: f64,
+    pub(crate) expected_chi_square_alone: f64,
+    pub(crate) expected_chi_square_with_records: f64,
     /// `yes`, `perhaps` or `no`.
-    pub told_apart: String,
+    pub(crate) told_apart: String,
     /// Whether a profile was found that tells the two apart, be it another one.
-    pub possible: bool,
+    pub(crate) possible: bool,
     /// Runs of the profile after which they are told apart; null if more than ten.
-    pub runs_needed: Option<usize>,
-    pub directions: Vec<DirectionJson>,
+    pub(crate) runs_needed: Option<usize>,
+    pub(crate) directions: Vec<DirectionJson>,
 }
 
 /// What is expected if one of two candidates is true.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct DirectionJson {
-    pub truth: String,
-    pub refused: String,
-    pub expected_chi_square_alone: f64,
+pub(crate) struct DirectionJson {
+    pub(crate) truth: String,
+    pub(crate) refused: String,
+    pub(crate) expected_chi_square_alone: f64,
     /// Of which the records have said `chi_square_of_records` already.
-    pub expected_chi_square_with_records: f64,
-    pub chi_square_of_records: f64,
+    pub(crate) expected_chi_square_with_records: f64,
+    pub(crate) chi_square_of_records: f64,
     /// From which on a diagnosis calls the two different.
-    pub needed_chi_square_alone: f64,
-    pub needed_chi_square_with_records: f64,
+    pub(crate) needed_chi_square_alone: f64,
+    pub(crate) needed_chi_square_with_records: f64,
     /// That what is found with the records is more than needed.
-    pub chance: f64,
+    pub(crate) chance: f64,
 }
 
 impl ExperimentJson {

@@ -7,42 +7,42 @@ use super::{PatternJson, WindabilityJson};
 /// The answer of `explore`.
 #[derive(Debug, Serialize)]
 pub struct ExploreJson {
-    pub page: String,
-    pub bytes: usize,
+    pub(crate) page: String,
+    pub(crate) bytes: usize,
 }
 
 /// Numbers of the model that the page's reader moves; null for what stays as it is, or is not in the model.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
-pub struct SettingsJson {
-    pub film_w_per_m2_k: Option<f64>,
-    pub diffusivity_m2_per_s: Option<f64>,
-    pub max_rate_c_per_h: Option<f64>,
-    pub spool_j_per_m2_k: Option<f64>,
+pub(crate) struct SettingsJson {
+    pub(crate) film_w_per_m2_k: Option<f64>,
+    pub(crate) diffusivity_m2_per_s: Option<f64>,
+    pub(crate) max_rate_c_per_h: Option<f64>,
+    pub(crate) spool_j_per_m2_k: Option<f64>,
 }
 
 /// What the page holds besides its own words.
 #[derive(Debug, Serialize)]
-pub struct ExplorerDataJson {
+pub(crate) struct ExplorerDataJson {
     /// The model file's name, without its folder.
-    pub file: String,
+    pub(crate) file: String,
     /// The model's source; where its pattern was a file, without it.
-    pub source: String,
+    pub(crate) source: String,
     /// Windings to begin with, the first of them shown.
-    pub patterns: Vec<NamedSegmentsJson>,
+    pub(crate) patterns: Vec<NamedSegmentsJson>,
 }
 
 #[derive(Debug, Clone, Serialize)]
-pub struct NamedSegmentsJson {
-    pub name: String,
-    pub title: String,
-    pub segments: Vec<usize>,
+pub(crate) struct NamedSegmentsJson {
+    pub(crate) name: String,
+    pub(crate) title: String,
+    pub(crate) segments: Vec<usize>,
 }
 
 /// A request; layers are counted from the innermost.
 #[derive(Debug, Deserialize)]
 #[serde(tag = "ask", rename_all = "snake_case")]
-pub enum AskJson {
+pub(crate) enum AskJson {
     /// The model, with other numbers where some are set.
     Open {
         file: String,
@@ -67,7 +67,7 @@ pub enum AskJson {
 /// What the page is answered; one line of JSON a request.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
-pub enum AnswerJson {
+pub(crate) enum AnswerJson {
     Open {
         model: String,
         layers: usize,
@@ -124,7 +124,7 @@ pub enum AnswerJson {
 }
 
 #[derive(Debug, Serialize)]
-pub struct ProfileJson {
-    pub name: String,
-    pub duration_s: f64,
+pub(crate) struct ProfileJson {
+    pub(crate) name: String,
+    pub(crate) duration_s: f64,
 }

@@ -8,40 +8,40 @@ use crate::stress::fibres::{FIBRES, FibreEntry};
 use crate::units::REFERENCE_TEMPERATURE_K;
 
 #[derive(Debug, Serialize)]
-pub struct FibresJson {
-    pub fibres: Vec<FibreJson>,
+pub(crate) struct FibresJson {
+    pub(crate) fibres: Vec<FibreJson>,
 }
 
 #[derive(Debug, Serialize)]
-pub struct FibreJson {
-    pub name: &'static str,
+pub(crate) struct FibreJson {
+    pub(crate) name: &'static str,
     /// "solid", "polarisation-maintaining", "thin" or "hollow-core".
-    pub kind: &'static str,
-    pub refractive_index: f64,
-    pub group_index: f64,
-    pub thermo_optic_per_k: f64,
-    pub wavelength_nm: f64,
-    pub glass_diameter_um: f64,
-    pub hole_diameter_um: f64,
-    pub coatings: Vec<CoatingJson>,
-    pub outer_diameter_um: f64,
+    pub(crate) kind: &'static str,
+    pub(crate) refractive_index: f64,
+    pub(crate) group_index: f64,
+    pub(crate) thermo_optic_per_k: f64,
+    pub(crate) wavelength_nm: f64,
+    pub(crate) glass_diameter_um: f64,
+    pub(crate) hole_diameter_um: f64,
+    pub(crate) coatings: Vec<CoatingJson>,
+    pub(crate) outer_diameter_um: f64,
     /// κ and expansion of the coated fibre by itself at 20 °C.
-    pub path_per_k: f64,
-    pub expansion_per_k: f64,
-    pub source: &'static str,
+    pub(crate) path_per_k: f64,
+    pub(crate) expansion_per_k: f64,
+    pub(crate) source: &'static str,
     /// False: not every number was read in an accessible source.
-    pub source_was_read: bool,
+    pub(crate) source_was_read: bool,
 }
 
 #[derive(Debug, Serialize)]
-pub struct CoatingJson {
-    pub material: &'static str,
-    pub outer_diameter_um: f64,
+pub(crate) struct CoatingJson {
+    pub(crate) material: &'static str,
+    pub(crate) outer_diameter_um: f64,
 }
 
 impl FibreJson {
     /// None where a material of it is in no library.
-    pub fn of(entry: &FibreEntry) -> Option<Self> {
+    pub(crate) fn of(entry: &FibreEntry) -> Option<Self> {
         let free = entry.made_of()?.free_fibre(&entry.optics(), REFERENCE_TEMPERATURE_K);
         let coatings = entry.coatings.iter();
         Some(Self {
@@ -66,7 +66,7 @@ impl FibreJson {
 }
 
 impl FibresJson {
-    pub fn all() -> Self {
+    pub(crate) fn all() -> Self {
         Self { fibres: FIBRES.iter().filter_map(FibreJson::of).collect() }
     }
 }

@@ -6,42 +6,42 @@ use super::{PatternJson, ProofJson};
 
 /// A field that was read.
 #[derive(Debug, Clone, Serialize)]
-pub struct FieldJson {
-    pub file: String,
+pub(crate) struct FieldJson {
+    pub(crate) file: String,
     /// Null for a pipe, which cannot be read twice.
-    pub sha256: Option<String>,
-    pub layers: usize,
-    pub rows: usize,
-    pub from_s: f64,
-    pub to_s: f64,
+    pub(crate) sha256: Option<String>,
+    pub(crate) layers: usize,
+    pub(crate) rows: usize,
+    pub(crate) from_s: f64,
+    pub(crate) to_s: f64,
     /// "given", or "straight between times" where only temperatures were.
-    pub rates: &'static str,
+    pub(crate) rates: &'static str,
 }
 
 /// The answer of `optimise --field`.
 #[derive(Debug, Clone, Serialize)]
-pub struct FieldSearchJson {
-    pub model: String,
-    pub fields: Vec<FieldJson>,
-    pub objective: String,
-    pub windability: String,
-    pub seed: u64,
-    pub best: PatternJson,
-    pub baselines: Vec<PatternJson>,
+pub(crate) struct FieldSearchJson {
+    pub(crate) model: String,
+    pub(crate) fields: Vec<FieldJson>,
+    pub(crate) objective: String,
+    pub(crate) windability: String,
+    pub(crate) seed: u64,
+    pub(crate) best: PatternJson,
+    pub(crate) baselines: Vec<PatternJson>,
     /// QUA's objective over the best pattern's; null where QUA does not fit the layer count.
-    pub improvement_over_qua: Option<f64>,
-    pub statement: String,
+    pub(crate) improvement_over_qua: Option<f64>,
+    pub(crate) statement: String,
     /// Nothing is proved under a field: its status is "none".
-    pub proof: ProofJson,
-    pub evaluations: u64,
+    pub(crate) proof: ProofJson,
+    pub(crate) evaluations: u64,
     /// On the screen only: files don't depend on the clock.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub evaluations_per_s: Option<f64>,
+    pub(crate) evaluations_per_s: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub seconds: Option<f64>,
-    pub rounds: u64,
+    pub(crate) seconds: Option<f64>,
+    pub(crate) rounds: u64,
     /// "no improvement", "rounds", "moves", "target", "clock" or "interrupted".
-    pub stopped_by: String,
+    pub(crate) stopped_by: String,
     /// False where the clock or a signal ended the search.
-    pub reproducible: bool,
+    pub(crate) reproducible: bool,
 }

@@ -3,104 +3,104 @@
 use serde::Serialize;
 
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct FleetJson {
+pub(crate) struct FleetJson {
     /// "metrics" or "diagnose".
-    pub kind: String,
+    pub(crate) kind: String,
     /// Those with a result.
-    pub gyros: usize,
+    pub(crate) gyros: usize,
     /// What a reader should know first.
-    pub sentences: Vec<String>,
+    pub(crate) sentences: Vec<String>,
     /// Numbers of the data sheets.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub measures: Vec<MeasureJson>,
+    pub(crate) measures: Vec<MeasureJson>,
     /// How the bias goes with temperature in all gyros; null where fewer than two share temperatures.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub thermal_curve: Option<ThermalCurveJson>,
+    pub(crate) thermal_curve: Option<ThermalCurveJson>,
     /// Verdict of each diagnosis, in the gyros' order.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub verdicts: Vec<VerdictJson>,
+    pub(crate) verdicts: Vec<VerdictJson>,
     /// Effects that were found in any gyro; what most have first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub effects: Vec<FleetEffectJson>,
+    pub(crate) effects: Vec<FleetEffectJson>,
 }
 
 /// One number over the fleet.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct MeasureJson {
-    pub key: String,
-    pub unit: String,
-    pub median: f64,
+pub(crate) struct MeasureJson {
+    pub(crate) key: String,
+    pub(crate) unit: String,
+    pub(crate) median: f64,
     /// From gyro to gyro, by the median absolute deviation, as a Gaussian's standard deviation; of positive numbers as a factor.
-    pub spread: f64,
-    pub spread_is_factor: bool,
+    pub(crate) spread: f64,
+    pub(crate) spread_is_factor: bool,
     /// For numbers with a sign: the share of their mean square that one number for the whole batch would take away.
-    pub common_share: Option<f64>,
-    pub values: Vec<GyroValueJson>,
+    pub(crate) common_share: Option<f64>,
+    pub(crate) values: Vec<GyroValueJson>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct GyroValueJson {
-    pub gyro: String,
-    pub value: f64,
+pub(crate) struct GyroValueJson {
+    pub(crate) gyro: String,
+    pub(crate) value: f64,
     /// Null for numbers that were not fitted.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub standard_error: Option<f64>,
+    pub(crate) standard_error: Option<f64>,
     /// Further from the others than chance explains: in one batch of twenty any gyro would be, in any measure.
-    pub single: bool,
+    pub(crate) single: bool,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ThermalCurveJson {
+pub(crate) struct ThermalCurveJson {
     /// Bias about each gyro's own mean.
-    pub points: Vec<ThermalPointJson>,
+    pub(crate) points: Vec<ThermalPointJson>,
     /// The share of the gyros' thermal mean square that the curve of the others takes away.
-    pub common_share: f64,
+    pub(crate) common_share: f64,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ThermalPointJson {
-    pub temperature_c: f64,
-    pub bias_deg_per_h: f64,
-    pub gyros: usize,
+pub(crate) struct ThermalPointJson {
+    pub(crate) temperature_c: f64,
+    pub(crate) bias_deg_per_h: f64,
+    pub(crate) gyros: usize,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct VerdictJson {
-    pub gyro: String,
-    pub verdict: String,
-    pub effects: Vec<String>,
-    pub noise_floor_deg_per_h: f64,
+pub(crate) struct VerdictJson {
+    pub(crate) gyro: String,
+    pub(crate) verdict: String,
+    pub(crate) effects: Vec<String>,
+    pub(crate) noise_floor_deg_per_h: f64,
 }
 
 /// An effect over the fleet.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct FleetEffectJson {
-    pub kind: String,
+pub(crate) struct FleetEffectJson {
+    pub(crate) kind: String,
     /// Gyros whose diagnosis found it.
-    pub found_in: Vec<String>,
+    pub(crate) found_in: Vec<String>,
     /// Gyros in which another effect was found that this one explains as well.
-    pub equivalent_in: Vec<String>,
+    pub(crate) equivalent_in: Vec<String>,
     /// Whether at least half of the gyros have it, found or as an equivalent.
-    pub common: bool,
-    pub parameters: Vec<FleetParameterJson>,
+    pub(crate) common: bool,
+    pub(crate) parameters: Vec<FleetParameterJson>,
 }
 
 /// A fitted parameter of an effect over the gyros that have it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct FleetParameterJson {
-    pub parameter: String,
-    pub unit: String,
+pub(crate) struct FleetParameterJson {
+    pub(crate) parameter: String,
+    pub(crate) unit: String,
     /// Weighted by the gyros' errors and their spread.
-    pub mean: f64,
-    pub standard_error: f64,
+    pub(crate) mean: f64,
+    pub(crate) standard_error: f64,
     /// From gyro to gyro beyond their errors, as a standard deviation.
-    pub spread: f64,
-    pub values: Vec<GyroValueJson>,
+    pub(crate) spread: f64,
+    pub(crate) values: Vec<GyroValueJson>,
 }
 
 impl FleetParameterJson {
     /// The mean to two digits of its error, and what the gyros spread beyond that.
-    pub fn in_words(&self) -> String {
+    pub(crate) fn in_words(&self) -> String {
         let decimals = |error: f64| {
             let exponent = if error > 0.0 && error.is_finite() { error.log10().floor() } else { -3.0 };
             (1.0 - exponent).clamp(0.0, 12.0) as usize
@@ -117,7 +117,7 @@ impl FleetParameterJson {
 }
 
 /// Four significant digits.
-pub fn four_digits(value: f64) -> String {
+pub(crate) fn four_digits(value: f64) -> String {
     let exponent = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
     if (-5.0..7.0).contains(&exponent) {
         format!("{value:.*}", (3.0 - exponent).clamp(0.0, 12.0) as usize)

@@ -11,25 +11,25 @@ use crate::io::files::sha256_hex;
 use crate::io::model::ModelFile;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct InputsJson {
-    pub program: String,
+pub(crate) struct InputsJson {
+    pub(crate) program: String,
     /// Null for documents that no model was asked about.
-    pub model_file: Option<String>,
-    pub model_sha256: Option<String>,
-    pub records: Vec<RecordInputJson>,
+    pub(crate) model_file: Option<String>,
+    pub(crate) model_sha256: Option<String>,
+    pub(crate) records: Vec<RecordInputJson>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RecordInputJson {
-    pub file: String,
+    pub(crate) file: String,
     /// Null for a pipe, which cannot be read twice.
-    pub sha256: Option<String>,
+    pub(crate) sha256: Option<String>,
     /// "compared", "measured", "fitted", "held out" or "temperatures".
-    pub role: String,
+    pub(crate) role: String,
 }
 
 impl InputsJson {
-    pub fn new(model: Option<&ModelFile>, records: Vec<RecordInputJson>) -> Self {
+    pub(crate) fn new(model: Option<&ModelFile>, records: Vec<RecordInputJson>) -> Self {
         Self {
             program: concat!("coilwright ", env!("CARGO_PKG_VERSION")).to_owned(),
             model_file: model.map(|m| m.path.display().to_string()),

@@ -16,93 +16,93 @@ use super::scale_factor::{PositionsJson, ScaleFactorJson};
 /// The measures under the keys that scripts read. Over several records: the mean bias and the worst of the others.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MetricsJson {
-    pub bias_deg_per_h: f64,
-    pub bias_stability_deg_per_h: Option<f64>,
-    pub bias_stability_average_s: f64,
+    pub(crate) bias_deg_per_h: f64,
+    pub(crate) bias_stability_deg_per_h: Option<f64>,
+    pub(crate) bias_stability_average_s: f64,
     /// The minimum of the Allan deviation.
-    pub bias_instability_deg_per_h: Option<f64>,
-    pub repeatability_deg_per_h: Option<f64>,
-    pub temperature_sensitivity_deg_per_h_per_c: Option<f64>,
-    pub angle_random_walk_deg_per_sqrt_h: Option<f64>,
-    pub peak_to_peak_deg_per_h: f64,
+    pub(crate) bias_instability_deg_per_h: Option<f64>,
+    pub(crate) repeatability_deg_per_h: Option<f64>,
+    pub(crate) temperature_sensitivity_deg_per_h_per_c: Option<f64>,
+    pub(crate) angle_random_walk_deg_per_sqrt_h: Option<f64>,
+    pub(crate) peak_to_peak_deg_per_h: f64,
     /// Of several records the largest.
-    pub drift_angle_deg: f64,
+    pub(crate) drift_angle_deg: f64,
     /// Of several records, for each kind the largest.
-    pub noise: Vec<NoiseJson>,
+    pub(crate) noise: Vec<NoiseJson>,
     /// Null where no rate table turned the gyro.
     #[serde(default)]
-    pub scale_factor: Option<ScaleFactorJson>,
+    pub(crate) scale_factor: Option<ScaleFactorJson>,
     /// Null where the attitude is not stated, or is the same in all records.
     #[serde(default)]
-    pub positions: Option<PositionsJson>,
-    pub records: Vec<RecordMetricsJson>,
-    pub inputs: InputsJson,
+    pub(crate) positions: Option<PositionsJson>,
+    pub(crate) records: Vec<RecordMetricsJson>,
+    pub(crate) inputs: InputsJson,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RecordMetricsJson {
-    pub file: String,
-    pub rows: usize,
-    pub duration_s: f64,
-    pub bias_deg_per_h: f64,
-    pub bias_stability_deg_per_h: Option<f64>,
-    pub bias_stability_average_s: f64,
-    pub bias_instability_deg_per_h: Option<f64>,
-    pub bias_instability_tau_s: Option<f64>,
-    pub temperature_sensitivity_deg_per_h_per_c: Option<f64>,
-    pub angle_random_walk_deg_per_sqrt_h: Option<f64>,
+pub(crate) struct RecordMetricsJson {
+    pub(crate) file: String,
+    pub(crate) rows: usize,
+    pub(crate) duration_s: f64,
+    pub(crate) bias_deg_per_h: f64,
+    pub(crate) bias_stability_deg_per_h: Option<f64>,
+    pub(crate) bias_stability_average_s: f64,
+    pub(crate) bias_instability_deg_per_h: Option<f64>,
+    pub(crate) bias_instability_tau_s: Option<f64>,
+    pub(crate) temperature_sensitivity_deg_per_h_per_c: Option<f64>,
+    pub(crate) angle_random_walk_deg_per_sqrt_h: Option<f64>,
     /// False: white noise may be absent, and the angle random walk is an upper bound.
-    pub angle_random_walk_has_slope: bool,
-    pub rate_random_walk_deg_per_h_per_sqrt_h: Option<f64>,
-    pub flicker_deg_per_h: Option<f64>,
-    pub quantisation_arcsec: Option<f64>,
-    pub peak_to_peak_deg_per_h: f64,
+    pub(crate) angle_random_walk_has_slope: bool,
+    pub(crate) rate_random_walk_deg_per_h_per_sqrt_h: Option<f64>,
+    pub(crate) flicker_deg_per_h: Option<f64>,
+    pub(crate) quantisation_arcsec: Option<f64>,
+    pub(crate) peak_to_peak_deg_per_h: f64,
     /// Of the means over `bias_stability_average_s`.
-    pub averaged_peak_to_peak_deg_per_h: f64,
+    pub(crate) averaged_peak_to_peak_deg_per_h: f64,
     /// The rate integrated over the record.
-    pub drift_angle_deg: f64,
+    pub(crate) drift_angle_deg: f64,
     /// Five kinds, each with an interval; all five hold together with 95 %. Empty where the record is too short.
-    pub noise: Vec<NoiseJson>,
+    pub(crate) noise: Vec<NoiseJson>,
     /// Null where no rate table turned the gyro. Bias, noise and drift are of the rate without the table's.
     #[serde(default)]
-    pub scale_factor: Option<ScaleFactorJson>,
+    pub(crate) scale_factor: Option<ScaleFactorJson>,
     /// About the sensitive axis; null where latitude and attitude are not stated.
     #[serde(default)]
-    pub earth_rate_deg_per_h: Option<f64>,
+    pub(crate) earth_rate_deg_per_h: Option<f64>,
     /// The bias (on a table: its offset) without the earth's rate.
     #[serde(default)]
-    pub bias_without_earth_deg_per_h: Option<f64>,
-    pub temperature_range_c: f64,
+    pub(crate) bias_without_earth_deg_per_h: Option<f64>,
+    pub(crate) temperature_range_c: f64,
     /// Root mean square of what follows the temperature, which was not taken for noise.
-    pub thermal_deg_per_h: Option<f64>,
+    pub(crate) thermal_deg_per_h: Option<f64>,
     /// What to keep in mind with these numbers.
-    pub cautions: Vec<String>,
-    pub temperature_points: Vec<TemperaturePointJson>,
+    pub(crate) cautions: Vec<String>,
+    pub(crate) temperature_points: Vec<TemperaturePointJson>,
     /// Rows of the stretch without a gap that the Allan deviation is of; 0: no stretch was long enough.
-    pub allan_rows: usize,
-    pub allan: Vec<AllanPointJson>,
+    pub(crate) allan_rows: usize,
+    pub(crate) allan: Vec<AllanPointJson>,
     /// The fitted noises that show, the steepest fall first.
-    pub allan_noises: Vec<AllanNoiseJson>,
+    pub(crate) allan_noises: Vec<AllanNoiseJson>,
     /// The first ten thousand of them.
-    pub gross_errors: Vec<GrossErrorJson>,
+    pub(crate) gross_errors: Vec<GrossErrorJson>,
     /// How many there are.
     #[serde(default)]
-    pub gross_errors_count: usize,
-    pub gaps: usize,
+    pub(crate) gross_errors_count: usize,
+    pub(crate) gaps: usize,
 }
 
 /// Values that stand alone, as a record passes by: counted all, listed as far as a document has use for them.
 #[derive(Debug, Clone, Default)]
-pub struct GrossErrors {
-    pub first: Vec<GrossErrorJson>,
-    pub count: usize,
+pub(crate) struct GrossErrors {
+    pub(crate) first: Vec<GrossErrorJson>,
+    pub(crate) count: usize,
 }
 
 /// More than this many are counted, not listed: a document and its page stay small however long the record is.
 const MOST_LISTED: usize = 10_000;
 
 impl GrossErrors {
-    pub fn push(&mut self, error: impl FnOnce() -> GrossErrorJson) {
+    pub(crate) fn push(&mut self, error: impl FnOnce() -> GrossErrorJson) {
         self.count += 1;
         if self.first.len() < MOST_LISTED {
             self.first.push(error());
@@ -111,52 +111,52 @@ impl GrossErrors {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct TemperaturePointJson {
-    pub temperature_c: f64,
-    pub bias_deg_per_h: f64,
-    pub rows: usize,
+pub(crate) struct TemperaturePointJson {
+    pub(crate) temperature_c: f64,
+    pub(crate) bias_deg_per_h: f64,
+    pub(crate) rows: usize,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct AllanPointJson {
-    pub tau_s: f64,
-    pub deviation_deg_per_h: f64,
-    pub standard_error_deg_per_h: f64,
+pub(crate) struct AllanPointJson {
+    pub(crate) tau_s: f64,
+    pub(crate) deviation_deg_per_h: f64,
+    pub(crate) standard_error_deg_per_h: f64,
 }
 
 /// One noise in the Allan deviation: a straight line in the picture of logarithms.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct AllanNoiseJson {
+pub(crate) struct AllanNoiseJson {
     /// "quantisation", "angle random walk", "bias instability", "rate random walk" or "rate ramp".
-    pub noise: String,
-    pub value: f64,
-    pub unit: String,
-    pub slope: f64,
-    pub deviation_at_1_s_deg_per_h: f64,
+    pub(crate) noise: String,
+    pub(crate) value: f64,
+    pub(crate) unit: String,
+    pub(crate) slope: f64,
+    pub(crate) deviation_at_1_s_deg_per_h: f64,
 }
 
 /// The strength of one noise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct NoiseJson {
+pub(crate) struct NoiseJson {
     /// "white", "flicker", "rate_random_walk", "quantisation" or "ramp".
-    pub kind: String,
-    pub value: f64,
-    pub low: f64,
-    pub high: f64,
-    pub unit: String,
+    pub(crate) kind: String,
+    pub(crate) value: f64,
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+    pub(crate) unit: String,
 }
 
 /// A value that stands alone.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct GrossErrorJson {
-    pub time_s: f64,
-    pub column: String,
+pub(crate) struct GrossErrorJson {
+    pub(crate) time_s: f64,
+    pub(crate) column: String,
     /// Whether it was left out of everything.
-    pub dropped: bool,
+    pub(crate) dropped: bool,
 }
 
 impl RecordMetricsJson {
-    pub fn new(file: &str, metrics: &Metrics, gross_errors: GrossErrors, gaps: usize) -> Self {
+    pub(crate) fn new(file: &str, metrics: &Metrics, gross_errors: GrossErrors, gaps: usize) -> Self {
         let allan = metrics.allan.as_ref();
         let noises = metrics.noises.as_ref();
         let of_noise = |show: fn(&NoiseStrengths) -> f64| noises.map(show);
@@ -221,7 +221,12 @@ impl RecordMetricsJson {
 
 impl RecordMetricsJson {
     /// With what is known of how the record was taken: the scale factor it was read by, and the earth's rate about the axis.
-    pub fn taken(mut self, metrics: &Metrics, raw_per_deg_per_h: Option<f64>, earth_rad_per_s: Option<f64>) -> Self {
+    pub(crate) fn taken(
+        mut self,
+        metrics: &Metrics,
+        raw_per_deg_per_h: Option<f64>,
+        earth_rad_per_s: Option<f64>,
+    ) -> Self {
         self.scale_factor = metrics.scale_factor.as_ref().map(|found| ScaleFactorJson::new(found, raw_per_deg_per_h));
         self.earth_rate_deg_per_h = earth_rad_per_s.map(deg_per_h_from_rad_per_s);
         self.bias_without_earth_deg_per_h =
@@ -351,7 +356,11 @@ fn lines(found: &NoiseStrengths) -> Vec<AllanNoiseJson> {
 }
 
 impl MetricsJson {
-    pub fn new(records: Vec<RecordMetricsJson>, repeatability_rad_per_s: Option<f64>, inputs: InputsJson) -> Self {
+    pub(crate) fn new(
+        records: Vec<RecordMetricsJson>,
+        repeatability_rad_per_s: Option<f64>,
+        inputs: InputsJson,
+    ) -> Self {
         let count = records.len().max(1) as f64;
         let worst =
             |show: fn(&RecordMetricsJson) -> Option<f64>| records.iter().filter_map(show).max_by(f64::total_cmp);

@@ -1,31 +1,31 @@
 //! JSON documents: mirror types of what commands answer, with the keys that scripts read.
 
-pub mod boundary;
-pub mod built_coils;
+pub(crate) mod boundary;
+pub(crate) mod built_coils;
 pub mod campaign;
-pub mod comparison;
+pub(crate) mod comparison;
 pub mod diagnosis;
 pub mod effects;
-pub mod experiment;
-pub mod explore;
-pub mod fibres;
-pub mod field;
-pub mod fleet;
+pub(crate) mod experiment;
+pub(crate) mod explore;
+pub(crate) mod fibres;
+pub(crate) mod field;
+pub(crate) mod fleet;
 pub mod further_schemas;
-pub mod improve;
+pub(crate) mod improve;
 pub mod inputs;
-pub mod metrics;
-pub mod noise;
-pub mod pareto;
-pub mod proposals;
-pub mod scale_factor;
+pub(crate) mod metrics;
+pub(crate) mod noise;
+pub(crate) mod pareto;
+pub(crate) mod proposals;
+pub(crate) mod scale_factor;
 pub mod schedule;
 pub mod schema;
 pub mod search;
-pub mod stress;
-pub mod temperatures;
-pub mod tolerance;
-pub mod trim;
+pub(crate) mod stress;
+pub(crate) mod temperatures;
+pub(crate) mod tolerance;
+pub(crate) mod trim;
 
 use serde::Serialize;
 
@@ -39,14 +39,14 @@ use crate::search::proof::Status;
 use crate::units::{deg_from_rad, deg_per_h_from_rad_per_s};
 
 /// Raised when a key changes its meaning or goes; new keys do not raise it.
-pub const SCHEMA_VERSION: u32 = 1;
+pub(crate) const SCHEMA_VERSION: u32 = 1;
 
 /// A document with its schema version in front.
 #[derive(Debug, Serialize)]
 pub struct Document<T: Serialize> {
-    pub schema_version: u32,
+    pub(crate) schema_version: u32,
     #[serde(flatten)]
-    pub body: T,
+    pub(crate) body: T,
 }
 
 impl<T: Serialize> Document<T> {
@@ -57,10 +57,10 @@ impl<T: Serialize> Document<T> {
 
 #[derive(Debug, Clone, Serialize)]
 pub struct WindabilityJson {
-    pub class: String,
-    pub reels: usize,
-    pub captive: usize,
-    pub max_climb: usize,
+    pub(crate) class: String,
+    pub(crate) reels: usize,
+    pub(crate) captive: usize,
+    pub(crate) max_climb: usize,
 }
 
 impl WindabilityJson {
@@ -77,36 +77,36 @@ impl WindabilityJson {
 
 /// A pattern with its worst case.
 #[derive(Debug, Clone, Serialize)]
-pub struct PatternJson {
-    pub name: String,
-    pub segments: Vec<usize>,
+pub(crate) struct PatternJson {
+    pub(crate) name: String,
+    pub(crate) segments: Vec<usize>,
     /// Whole turns more (or, below zero, fewer) than whole layers at either end of the fibre; absent without any.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub end_a_turns: Option<i32>,
+    pub(crate) end_a_turns: Option<i32>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub end_b_turns: Option<i32>,
-    pub worst_rate_deg_per_h: f64,
-    pub worst_phase_rad: f64,
-    pub worst_profile: String,
-    pub worst_time_s: f64,
+    pub(crate) end_b_turns: Option<i32>,
+    pub(crate) worst_rate_deg_per_h: f64,
+    pub(crate) worst_phase_rad: f64,
+    pub(crate) worst_profile: String,
+    pub(crate) worst_time_s: f64,
     /// Null where the model is nonlinear and no bound over all profiles exists.
-    pub guaranteed_worst_rate_deg_per_h: Option<f64>,
+    pub(crate) guaranteed_worst_rate_deg_per_h: Option<f64>,
     /// By how much the worst rate may differ from that of the continuum, whatever the grid; the guaranteed rate holds for the
     /// continuum, because it contains this margin. Null where nobody asked.
-    pub grid_margin_deg_per_h: Option<f64>,
+    pub(crate) grid_margin_deg_per_h: Option<f64>,
     /// The largest integral of the rate error over the profiles, up to any time, with its sign; null where nobody asked.
-    pub worst_pointing_error_deg: Option<f64>,
+    pub(crate) worst_pointing_error_deg: Option<f64>,
     /// Its largest size over all profiles of any length within the largest rate; null where there is no such bound.
-    pub guaranteed_pointing_error_deg: Option<f64>,
+    pub(crate) guaranteed_pointing_error_deg: Option<f64>,
     /// The 95 % quantile over built coils, where it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub p95_rate_deg_per_h: Option<f64>,
-    pub windability: WindabilityJson,
+    pub(crate) p95_rate_deg_per_h: Option<f64>,
+    pub(crate) windability: WindabilityJson,
 }
 
 impl PatternJson {
     /// `phase_rad` is the phase at the worst rate; the worst rate is shown as a size.
-    pub fn new(
+    pub(crate) fn new(
         name: &str,
         pattern: &Pattern,
         worst: &WorstCase,
@@ -132,14 +132,14 @@ impl PatternJson {
         }
     }
 
-    pub fn with_pointing(mut self, pointing: &PointingError) -> Self {
+    pub(crate) fn with_pointing(mut self, pointing: &PointingError) -> Self {
         self.worst_pointing_error_deg = Some(deg_from_rad(pointing.worst_rad));
         self.guaranteed_pointing_error_deg = pointing.guaranteed_rad.map(deg_from_rad);
         self
     }
 
     /// With what the grid may be off, which what is guaranteed must contain.
-    pub fn with_margin(mut self, grid_margin_rad_per_s: f64) -> Self {
+    pub(crate) fn with_margin(mut self, grid_margin_rad_per_s: f64) -> Self {
         let margin = deg_per_h_from_rad_per_s(grid_margin_rad_per_s);
         self.grid_margin_deg_per_h = Some(margin);
         self.guaranteed_worst_rate_deg_per_h = self.guaranteed_worst_rate_deg_per_h.map(|g| g + margin);
@@ -149,29 +149,29 @@ impl PatternJson {
 
 #[derive(Debug, Serialize)]
 pub struct EvaluateJson {
-    pub model: String,
-    pub patterns: Vec<PatternJson>,
+    pub(crate) model: String,
+    pub(crate) patterns: Vec<PatternJson>,
     /// Null for a half space.
-    pub other_boundary: Option<search::OtherBoundaryJson>,
+    pub(crate) other_boundary: Option<search::OtherBoundaryJson>,
     /// Formulas that the guaranteed rates leave out, which no pattern changes.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub guaranteed_beside: Vec<GuaranteedBesideJson>,
+    pub(crate) guaranteed_beside: Vec<GuaranteedBesideJson>,
     /// What the windings were evaluated under, where that is not the model's profiles.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub fields: Vec<field::FieldJson>,
+    pub(crate) fields: Vec<field::FieldJson>,
 }
 
 /// A formula that no guaranteed worst case holds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct GuaranteedBesideJson {
-    pub formula: String,
+pub(crate) struct GuaranteedBesideJson {
+    pub(crate) formula: String,
     /// By how much it can change the rate beside the guaranteed one; null where nothing bounds it.
-    pub at_most_deg_per_h: Option<f64>,
+    pub(crate) at_most_deg_per_h: Option<f64>,
 }
 
 impl GuaranteedBesideJson {
     /// Formulas with their largest sizes [rad/s].
-    pub fn all(left_out: &[(String, f64)]) -> Vec<Self> {
+    pub(crate) fn all(left_out: &[(String, f64)]) -> Vec<Self> {
         let one = |(formula, bound): &(String, f64)| Self {
             formula: formula.clone(),
             at_most_deg_per_h: bound.is_finite().then(|| deg_per_h_from_rad_per_s(*bound)),
@@ -179,7 +179,7 @@ impl GuaranteedBesideJson {
         left_out.iter().map(one).collect()
     }
 
-    pub fn in_words(&self) -> String {
+    pub(crate) fn in_words(&self) -> String {
         match self.at_most_deg_per_h {
             Some(bound) => format!(
                 "the guaranteed rates leave out the formula \"{}\", which adds at most {bound:.4} °/h whatever the winding",
@@ -195,22 +195,22 @@ impl GuaranteedBesideJson {
 
 /// What was proved about the best pattern.
 #[derive(Debug, Clone, Serialize)]
-pub struct ProofJson {
+pub(crate) struct ProofJson {
     /// "optimal", "gap" or "none".
-    pub status: String,
+    pub(crate) status: String,
     /// No pattern of the class has a smaller worst rate, in the continuum either; null where nothing was proved.
-    pub lower_bound_deg_per_h: Option<f64>,
+    pub(crate) lower_bound_deg_per_h: Option<f64>,
     /// By how much the grid may put any pattern's rate off the continuum's: "optimal" means that none is better by more.
     /// Null where nothing was proved.
-    pub grid_margin_deg_per_h: Option<f64>,
+    pub(crate) grid_margin_deg_per_h: Option<f64>,
 }
 
 impl ProofJson {
-    pub fn none() -> Self {
+    pub(crate) fn none() -> Self {
         Self::of(&Proof::NONE)
     }
 
-    pub fn of(proof: &Proof) -> Self {
+    pub(crate) fn of(proof: &Proof) -> Self {
         let where_proved = |rad_per_s: f64| (proof.status != Status::None).then(|| deg_per_h_from_rad_per_s(rad_per_s));
         Self {
             status: proof.status.to_string(),
@@ -223,29 +223,29 @@ impl ProofJson {
 /// The answer of `exact`.
 #[derive(Debug, Serialize)]
 pub struct ExactJson {
-    pub model: String,
-    pub windability: String,
+    pub(crate) model: String,
+    pub(crate) windability: String,
     /// What the proof is about.
-    pub objective: String,
-    pub best: PatternJson,
+    pub(crate) objective: String,
+    pub(crate) best: PatternJson,
     /// What the proof's lower bound is to be compared with.
-    pub best_objective_deg_per_h: f64,
-    pub proof: ProofJson,
+    pub(crate) best_objective_deg_per_h: f64,
+    pub(crate) proof: ProofJson,
     /// Nodes whose bound was computed; the same on every machine unless the clock ended the proof.
-    pub nodes: u64,
+    pub(crate) nodes: u64,
     /// Patterns judged on all samples.
-    pub judged: u64,
+    pub(crate) judged: u64,
     /// Samples that the last pass refuted by.
-    pub rows: usize,
-    pub seconds: f64,
+    pub(crate) rows: usize,
+    pub(crate) seconds: f64,
 }
 
 #[derive(Debug, Serialize)]
 pub struct FaultJson {
-    pub message: String,
+    pub(crate) message: String,
     /// Counted from 1; null for a fault of the file as a whole.
-    pub line: Option<usize>,
-    pub note: Option<String>,
+    pub(crate) line: Option<usize>,
+    pub(crate) note: Option<String>,
 }
 
 impl FaultJson {
@@ -281,43 +281,43 @@ pub struct PatternsJson {
 }
 
 #[derive(Debug, Serialize)]
-pub struct ViolationJson {
+pub(crate) struct ViolationJson {
     /// Counted from 1; null for the file as a whole.
-    pub row: Option<usize>,
-    pub field: String,
-    pub expected: String,
-    pub found: String,
-    pub remedy: String,
-    pub message: String,
+    pub(crate) row: Option<usize>,
+    pub(crate) field: String,
+    pub(crate) expected: String,
+    pub(crate) found: String,
+    pub(crate) remedy: String,
+    pub(crate) message: String,
 }
 
 #[derive(Debug, Serialize)]
 pub struct VerifyJson {
-    pub model: String,
-    pub schedule: String,
-    pub checks: usize,
-    pub rate_check: String,
+    pub(crate) model: String,
+    pub(crate) schedule: String,
+    pub(crate) checks: usize,
+    pub(crate) rate_check: String,
     /// The worst over all profiles and times, worked out again, and how closely the claim must agree with it.
-    pub independent_worst_rate_deg_per_h: Option<f64>,
-    pub rate_tolerance_deg_per_h: Option<f64>,
+    pub(crate) independent_worst_rate_deg_per_h: Option<f64>,
+    pub(crate) rate_tolerance_deg_per_h: Option<f64>,
     /// The same on a finer heat network; null in a half space, which has a closed form.
-    pub finer_worst_rate_deg_per_h: Option<f64>,
-    pub recomputed: Vec<&'static str>,
-    pub taken_as_given: Vec<&'static str>,
-    pub violations: Vec<ViolationJson>,
+    pub(crate) finer_worst_rate_deg_per_h: Option<f64>,
+    pub(crate) recomputed: Vec<&'static str>,
+    pub(crate) taken_as_given: Vec<&'static str>,
+    pub(crate) violations: Vec<ViolationJson>,
 }
 
 /// What a command wrote.
 #[derive(Debug, Serialize)]
-pub struct WrittenJson {
-    pub files: Vec<String>,
+pub(crate) struct WrittenJson {
+    pub(crate) files: Vec<String>,
 }
 
 /// A script for a shell.
 #[derive(Debug, Serialize)]
-pub struct CompletionsJson {
-    pub shell: String,
-    pub script: String,
+pub(crate) struct CompletionsJson {
+    pub(crate) shell: String,
+    pub(crate) script: String,
 }
 
 /// A JSON Schema with what it is of.

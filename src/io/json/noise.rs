@@ -7,26 +7,26 @@ use crate::diagnose::RecordNoise;
 use crate::units::deg_per_h_from_rad_per_s;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct NoiseJson {
-    pub record: String,
+pub(crate) struct NoiseJson {
+    pub(crate) record: String,
     /// Of one logged rate.
-    pub white_deg_per_h: f64,
-    pub white_standard_error_deg_per_h: f64,
-    pub wander_deg_per_h: f64,
+    pub(crate) white_deg_per_h: f64,
+    pub(crate) white_standard_error_deg_per_h: f64,
+    pub(crate) wander_deg_per_h: f64,
     /// What the air did and the sensor could not see.
-    pub unresolved_air_deg_per_h: f64,
+    pub(crate) unresolved_air_deg_per_h: f64,
     /// What the rate differs from the prediction beyond all that.
     #[serde(default)]
-    pub model_error_deg_per_h: f64,
+    pub(crate) model_error_deg_per_h: f64,
     /// What a change of the measurement would leave of the unresolved air, most helpful first.
     #[serde(default)]
-    pub remedies: Vec<RemedyJson>,
+    pub(crate) remedies: Vec<RemedyJson>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RemedyJson {
-    pub change: String,
-    pub unresolved_air_deg_per_h: f64,
+pub(crate) struct RemedyJson {
+    pub(crate) change: String,
+    pub(crate) unresolved_air_deg_per_h: f64,
 }
 
 impl NoiseJson {

@@ -9,36 +9,36 @@ use crate::text::sink::Cell;
 use super::PatternJson;
 
 #[derive(Debug, Serialize)]
-pub struct PointJson {
+pub(crate) struct PointJson {
     #[serde(flatten)]
-    pub pattern: PatternJson,
-    pub long_crossovers: usize,
+    pub(crate) pattern: PatternJson,
+    pub(crate) long_crossovers: usize,
     /// Whether its error is well below that of every point that is easier to wind.
-    pub knee: bool,
+    pub(crate) knee: bool,
     /// The pattern file, where one was written.
-    pub file: Option<String>,
+    pub(crate) file: Option<String>,
 }
 
 /// The answer of `pareto`.
 #[derive(Debug, Serialize)]
 pub struct ParetoJson {
-    pub model: String,
-    pub seed: u64,
+    pub(crate) model: String,
+    pub(crate) seed: u64,
     /// "best found": no point is proved to be the best of its kind.
-    pub status: &'static str,
+    pub(crate) status: &'static str,
     /// Knees first, each part smallest error first.
-    pub points: Vec<PointJson>,
+    pub(crate) points: Vec<PointJson>,
 }
 
 impl PointJson {
-    pub fn of(point: &Point, knee: bool, file: Option<String>) -> Self {
+    pub(crate) fn of(point: &Point, knee: bool, file: Option<String>) -> Self {
         let long_crossovers = point.windability.long_crossovers;
         Self { pattern: PatternJson::of(&point.judged), long_crossovers, knee, file }
     }
 }
 
 /// One row a point.
-pub fn front_csv(points: &[PointJson]) -> Vec<u8> {
+pub(crate) fn front_csv(points: &[PointJson]) -> Vec<u8> {
     let mut table = Table::with_header([
         "name",
         "worst_rate_deg_per_h",

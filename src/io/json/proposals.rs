@@ -11,67 +11,67 @@ use crate::units::deg_per_h_from_rad_per_s;
 
 /// One proposal; the formula's values are in °/h.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ProposalJson {
-    pub formula: String,
-    pub terms: Vec<TermJson>,
-    pub alternatives: Vec<AlternativeJson>,
+pub(crate) struct ProposalJson {
+    pub(crate) formula: String,
+    pub(crate) terms: Vec<TermJson>,
+    pub(crate) alternatives: Vec<AlternativeJson>,
     /// False: it only describes these records.
-    pub predicts: bool,
+    pub(crate) predicts: bool,
     /// Why it only describes; null where it predicts.
     #[serde(default)]
-    pub only_describes: Option<String>,
-    pub probability: f64,
-    pub rmse_deg_per_h: f64,
-    pub holdout_rmse_deg_per_h: Option<f64>,
+    pub(crate) only_describes: Option<String>,
+    pub(crate) probability: f64,
+    pub(crate) rmse_deg_per_h: f64,
+    pub(crate) holdout_rmse_deg_per_h: Option<f64>,
     /// What would tell it from its alternatives.
     #[serde(default)]
-    pub experiment: Option<String>,
+    pub(crate) experiment: Option<String>,
     /// What it means for the winding.
     #[serde(default)]
-    pub advice: String,
+    pub(crate) advice: String,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct TermJson {
+pub(crate) struct TermJson {
     /// As the formula of a custom effect.
-    pub text: String,
-    pub form: String,
-    pub variables: Vec<String>,
-    pub parameters: BTreeMap<String, TermParameterJson>,
-    pub reading: String,
+    pub(crate) text: String,
+    pub(crate) form: String,
+    pub(crate) variables: Vec<String>,
+    pub(crate) parameters: BTreeMap<String, TermParameterJson>,
+    pub(crate) reading: String,
     /// What is left of each record without the term, against its variable.
     #[serde(default)]
-    pub shown: Vec<ShownJson>,
+    pub(crate) shown: Vec<ShownJson>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct TermParameterJson {
-    pub value: f64,
-    pub standard_error: Option<f64>,
-    pub unit: String,
+pub(crate) struct TermParameterJson {
+    pub(crate) value: f64,
+    pub(crate) standard_error: Option<f64>,
+    pub(crate) unit: String,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct AlternativeJson {
-    pub formula: String,
-    pub probability: f64,
+pub(crate) struct AlternativeJson {
+    pub(crate) formula: String,
+    pub(crate) probability: f64,
 }
 
 /// Points of a picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ShownJson {
-    pub record: String,
-    pub variable: String,
-    pub x: Vec<f64>,
-    pub left_deg_per_h: Vec<f64>,
-    pub term_deg_per_h: Vec<f64>,
+pub(crate) struct ShownJson {
+    pub(crate) record: String,
+    pub(crate) variable: String,
+    pub(crate) x: Vec<f64>,
+    pub(crate) left_deg_per_h: Vec<f64>,
+    pub(crate) term_deg_per_h: Vec<f64>,
 }
 
 /// Points that a picture needs of a record.
 const SHOWN_POINTS: usize = 400;
 
 impl ProposalJson {
-    pub fn new(proposal: &Proposal) -> Self {
+    pub(crate) fn new(proposal: &Proposal) -> Self {
         Self {
             formula: proposal.formula.clone(),
             terms: proposal.terms.iter().map(TermJson::new).collect(),
@@ -138,9 +138,9 @@ fn short(value: f64) -> f64 {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ProposalExtendJson {
     /// The new model file.
-    pub written: String,
+    pub(crate) written: String,
     /// Listed effects, then the terms as custom effects.
-    pub effects: Vec<FindingJson>,
-    pub before: CompareJson,
-    pub after: CompareJson,
+    pub(crate) effects: Vec<FindingJson>,
+    pub(crate) before: CompareJson,
+    pub(crate) after: CompareJson,
 }

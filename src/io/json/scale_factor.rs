@@ -10,9 +10,9 @@ use crate::units::{
 
 /// A value with its standard error; null where the record determines it just so.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct EstimateJson {
-    pub value: f64,
-    pub standard_error: Option<f64>,
+pub(crate) struct EstimateJson {
+    pub(crate) value: f64,
+    pub(crate) standard_error: Option<f64>,
 }
 
 impl EstimateJson {
@@ -24,45 +24,45 @@ impl EstimateJson {
 
 /// Of one record on a rate table; of several the mean error, its deviation as repeatability, and the worst of the others.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ScaleFactorJson {
+pub(crate) struct ScaleFactorJson {
     /// By how much the gyro shows more than it turns.
-    pub error_ppm: EstimateJson,
+    pub(crate) error_ppm: EstimateJson,
     /// The temperature at which that is.
-    pub at_temperature_c: f64,
+    pub(crate) at_temperature_c: f64,
     /// Raw units that are one degree an hour, by this record; null where its rate is not raw.
-    pub raw_units_per_deg_per_h: Option<f64>,
+    pub(crate) raw_units_per_deg_per_h: Option<f64>,
     /// Null where the temperature did not change.
-    pub temperature_coefficient_ppm_per_k: Option<EstimateJson>,
+    pub(crate) temperature_coefficient_ppm_per_k: Option<EstimateJson>,
     /// Warming less cooling; null where it did not get both warmer and cooler.
-    pub hysteresis_ppm: Option<EstimateJson>,
+    pub(crate) hysteresis_ppm: Option<EstimateJson>,
     /// The largest residual over the largest rate.
-    pub nonlinearity_ppm: f64,
+    pub(crate) nonlinearity_ppm: f64,
     /// Turning forwards less turning backwards; null where the table turned one way.
-    pub asymmetry_ppm: Option<EstimateJson>,
+    pub(crate) asymmetry_ppm: Option<EstimateJson>,
     /// The deviation over runs, or over records; null where there is one.
-    pub repeatability_ppm: Option<f64>,
-    pub runs: usize,
+    pub(crate) repeatability_ppm: Option<f64>,
+    pub(crate) runs: usize,
     /// Earth's rate and drift together.
-    pub offset_deg_per_h: f64,
+    pub(crate) offset_deg_per_h: f64,
     /// The even stretches, in their order.
-    pub stretches: Vec<StretchJson>,
+    pub(crate) stretches: Vec<StretchJson>,
 }
 
 /// A stretch in which the table turned evenly.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct StretchJson {
-    pub table_rate_deg_per_s: f64,
+pub(crate) struct StretchJson {
+    pub(crate) table_rate_deg_per_s: f64,
     /// What the gyro showed beside it.
-    pub error_deg_per_h: f64,
+    pub(crate) error_deg_per_h: f64,
     /// What the fit leaves of that.
-    pub residual_deg_per_h: f64,
-    pub temperature_c: f64,
-    pub rows: usize,
+    pub(crate) residual_deg_per_h: f64,
+    pub(crate) temperature_c: f64,
+    pub(crate) rows: usize,
 }
 
 impl ScaleFactorJson {
     /// `raw_per_deg_per_h` is the scale factor that the record was read by.
-    pub fn new(found: &ScaleFactor, raw_per_deg_per_h: Option<f64>) -> Self {
+    pub(crate) fn new(found: &ScaleFactor, raw_per_deg_per_h: Option<f64>) -> Self {
         let stretches = found.stretches.iter().zip(&found.residual_rad_per_s);
         Self {
             error_ppm: EstimateJson::ppm(found.error),
@@ -88,7 +88,7 @@ impl ScaleFactorJson {
     }
 
     /// Of several records together; None of none.
-    pub fn of_all(all: &[&Self]) -> Option<Self> {
+    pub(crate) fn of_all(all: &[&Self]) -> Option<Self> {
         let [first, _, ..] = all else { return all.first().map(|one| (*one).clone()) };
         let count = all.len() as f64;
         let mean = all.iter().map(|s| s.error_ppm.value).sum::<f64>() / count;
@@ -117,14 +117,14 @@ impl ScaleFactorJson {
 
 /// What the offset's steps between attitudes show.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PositionsJson {
-    pub scale_error_ppm: EstimateJson,
+pub(crate) struct PositionsJson {
+    pub(crate) scale_error_ppm: EstimateJson,
     /// Of the gyro itself, without the earth's rate.
-    pub bias_deg_per_h: f64,
+    pub(crate) bias_deg_per_h: f64,
 }
 
 impl PositionsJson {
-    pub fn new(found: &Positions) -> Self {
+    pub(crate) fn new(found: &Positions) -> Self {
         Self {
             scale_error_ppm: EstimateJson::ppm(found.scale_error),
             bias_deg_per_h: deg_per_h_from_rad_per_s(found.bias_rad_per_s),

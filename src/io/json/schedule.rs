@@ -21,13 +21,13 @@ use super::SCHEMA_VERSION;
 use crate::io::table::rows_as_csv;
 
 /// Raised when a word of a machine program changes its meaning.
-pub const PROGRAM_VERSION: u32 = 1;
+pub(crate) const PROGRAM_VERSION: u32 = 1;
 
 /// Digits after the point: micrometres of fibre, a tenth of a micrometre of radius.
-pub const LENGTH_DECIMALS: i32 = 6;
-pub const MM_DECIMALS: i32 = 4;
-pub const TURNS_DECIMALS: i32 = 4;
-pub const RATE_DECIMALS: i32 = 6;
+pub(crate) const LENGTH_DECIMALS: i32 = 6;
+pub(crate) const MM_DECIMALS: i32 = 4;
+pub(crate) const TURNS_DECIMALS: i32 = 4;
+pub(crate) const RATE_DECIMALS: i32 = 6;
 
 /// What every form of a schedule says of a step; a table without one of these columns is no schedule.
 pub(in crate::io) const STEP_COLUMNS: [&str; 13] = [
@@ -49,17 +49,17 @@ pub(in crate::io) const STEP_COLUMNS: [&str; 13] = [
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ScheduleJson {
-    pub schema_version: u32,
+    pub(crate) schema_version: u32,
     /// "schedule", "traveller" or "machine program".
-    pub document: String,
-    pub program: String,
-    pub model: String,
+    pub(crate) document: String,
+    pub(crate) program: String,
+    pub(crate) model: String,
     pub model_sha256: String,
-    pub pattern: String,
+    pub(crate) pattern: String,
     /// Of the pattern's name and segments, so that neither changes alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub pattern_sha256: Option<String>,
-    pub segments: Vec<i64>,
+    pub(crate) pattern_sha256: Option<String>,
+    pub(crate) segments: Vec<i64>,
     /// Whole turns more (or, below zero, fewer) than whole layers at either end of the fibre; absent without any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub end_a_turns: Option<i32>,
@@ -67,22 +67,22 @@ pub struct ScheduleJson {
     pub end_b_turns: Option<i32>,
     pub windability: ClaimedWindability,
     pub worst_rate_deg_per_h: f64,
-    pub worst_profile: String,
+    pub(crate) worst_profile: String,
     pub worst_time_s: f64,
     /// The fibre in words.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub fibre: Option<String>,
-    pub length_m: f64,
+    pub(crate) fibre: Option<String>,
+    pub(crate) length_m: f64,
     /// The fibre's middle: arclength from end A, and the layer (counted from 1) in which it lies, the inner one of two.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub midpoint_m: Option<f64>,
+    pub(crate) midpoint_m: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub midpoint_layer: Option<i64>,
-    pub start_mark_m: f64,
+    pub(crate) midpoint_layer: Option<i64>,
+    pub(crate) start_mark_m: f64,
     pub expected_trim_m: f64,
-    pub reels: Vec<ReelJson>,
+    pub(crate) reels: Vec<ReelJson>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub production: Option<ProductionJson>,
+    pub(crate) production: Option<ProductionJson>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub steps: Vec<StepJson>,
 }
@@ -91,100 +91,100 @@ pub struct ScheduleJson {
 #[serde(deny_unknown_fields)]
 pub struct ClaimedWindability {
     pub class: String,
-    pub reels: i64,
-    pub captive: i64,
-    pub max_climb: i64,
+    pub(crate) reels: i64,
+    pub(crate) captive: i64,
+    pub(crate) max_climb: i64,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ReelJson {
-    pub name: String,
-    pub captive: bool,
-    pub prepared_before_step: i64,
-    pub taken_from: Option<String>,
-    pub from_m: f64,
-    pub to_m: f64,
+pub(crate) struct ReelJson {
+    pub(crate) name: String,
+    pub(crate) captive: bool,
+    pub(crate) prepared_before_step: i64,
+    pub(crate) taken_from: Option<String>,
+    pub(crate) from_m: f64,
+    pub(crate) to_m: f64,
     /// What to load: the fibre to be wound and the allowance.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub load_m: Option<f64>,
+    pub(crate) load_m: Option<f64>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ProductionJson {
-    pub part_number: String,
-    pub revision: String,
-    pub spool: String,
-    pub tension_n: f64,
-    pub tension_taper_percent_per_layer: f64,
-    pub tension_limit_percent: f64,
-    pub allowance_m: f64,
-    pub adhesive: String,
-    pub potting_every_layers: i64,
-    pub cure: String,
-    pub winding_speed_turns_per_min: f64,
+pub(crate) struct ProductionJson {
+    pub(crate) part_number: String,
+    pub(crate) revision: String,
+    pub(crate) spool: String,
+    pub(crate) tension_n: f64,
+    pub(crate) tension_taper_percent_per_layer: f64,
+    pub(crate) tension_limit_percent: f64,
+    pub(crate) allowance_m: f64,
+    pub(crate) adhesive: String,
+    pub(crate) potting_every_layers: i64,
+    pub(crate) cure: String,
+    pub(crate) winding_speed_turns_per_min: f64,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StepJson {
     pub step: i64,
-    pub layer: i64,
-    pub half: String,
+    pub(crate) layer: i64,
+    pub(crate) half: String,
     pub segment: i64,
-    pub supply_reel: String,
+    pub(crate) supply_reel: String,
     pub direction: String,
     pub turns: f64,
-    pub fibre_from_m: f64,
-    pub fibre_to_m: f64,
+    pub(crate) fibre_from_m: f64,
+    pub(crate) fibre_to_m: f64,
     pub length_m: f64,
     pub radius_mm: f64,
     pub climb: i64,
-    pub cumulative_m: f64,
+    pub(crate) cumulative_m: f64,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub crossover: Option<String>,
+    pub(crate) crossover: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub balance_m: Option<f64>,
+    pub(crate) balance_m: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub rotation: Option<String>,
+    pub(crate) rotation: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub axial_pitch_mm: Option<f64>,
+    pub(crate) axial_pitch_mm: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tension_n: Option<f64>,
+    pub(crate) tension_n: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tension_min_n: Option<f64>,
+    pub(crate) tension_min_n: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tension_max_n: Option<f64>,
+    pub(crate) tension_max_n: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub turns_per_min: Option<f64>,
+    pub(crate) turns_per_min: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub reel_change: Option<bool>,
+    pub(crate) reel_change: Option<bool>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub potting: Option<bool>,
+    pub(crate) potting: Option<bool>,
     /// Entered by hand.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub measured_length_m: Option<String>,
+    pub(crate) measured_length_m: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub checked_by: Option<String>,
+    pub(crate) checked_by: Option<String>,
 }
 
 /// To so many digits after the point, as the files have it.
-pub fn rounded(value: f64, decimals: i32) -> f64 {
+pub(crate) fn rounded(value: f64, decimals: i32) -> f64 {
     let scale = 10f64.powi(decimals);
     let result = (value * scale).round() / scale;
     // No "-0".
     if result == 0.0 { 0.0 } else { result }
 }
 
-pub fn direction_word(from: Flange) -> &'static str {
+pub(crate) fn direction_word(from: Flange) -> &'static str {
     match from {
         Flange::First => "first-to-second",
         Flange::Second => "second-to-first",
     }
 }
 
-pub fn flange_word(flange: Flange) -> &'static str {
+pub(crate) fn flange_word(flange: Flange) -> &'static str {
     match flange {
         Flange::First => "first",
         Flange::Second => "second",
@@ -264,11 +264,11 @@ impl ScheduleJson {
 /// The last columns of every row of a CSV.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(in crate::io) struct ClaimColumns {
-    pub model: String,
-    pub model_sha256: String,
-    pub pattern: String,
-    pub windability_class: String,
-    pub worst_rate_deg_per_h: f64,
+    pub(crate) model: String,
+    pub(crate) model_sha256: String,
+    pub(crate) pattern: String,
+    pub(crate) windability_class: String,
+    pub(crate) worst_rate_deg_per_h: f64,
 }
 
 impl StepJson {
@@ -321,7 +321,7 @@ fn fibre_words(fibre: &Fibre) -> String {
 }
 
 /// What the operator reads about the crossovers that a step completes: `second flange, from layer 3, 2 layers`.
-pub fn crossover_words(step: &Step) -> String {
+pub(crate) fn crossover_words(step: &Step) -> String {
     let begins = (step.start_gap_turns > 0.0).then(|| {
         let gap = rounded(step.start_gap_turns, TURNS_DECIMALS);
         format!("begin {gap} turns from the {} flange", flange_word(step.from_flange))
@@ -333,7 +333,7 @@ pub fn crossover_words(step: &Step) -> String {
     begins.into_iter().chain(crossovers).collect::<Vec<String>>().join("; ")
 }
 
-pub fn rotation_word(rotation: Rotation) -> &'static str {
+pub(crate) fn rotation_word(rotation: Rotation) -> &'static str {
     match rotation {
         Rotation::Clockwise => "cw",
         Rotation::Counterclockwise => "ccw",
@@ -341,7 +341,7 @@ pub fn rotation_word(rotation: Rotation) -> &'static str {
 }
 
 impl ProductionJson {
-    pub fn new(production: &Production) -> Self {
+    pub(crate) fn new(production: &Production) -> Self {
         Self {
             part_number: production.part_number.clone(),
             revision: production.revision.clone(),

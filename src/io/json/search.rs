@@ -18,7 +18,7 @@ use crate::units::{c_per_h_from_k_per_s, deg_per_h_from_rad_per_s, percent_from_
 
 impl PatternJson {
     /// Of a pattern that was judged by the reference.
-    pub fn of(judged: &Judged) -> Self {
+    pub(crate) fn of(judged: &Judged) -> Self {
         let Judged { name, pattern, worst, phase_rad, guaranteed_rad_per_s, .. } = judged;
         let body = Self {
             p95_rate_deg_per_h: judged.p95_rad_per_s.map(deg_per_h_from_rad_per_s),
@@ -38,67 +38,67 @@ impl PatternJson {
 /// The answer of `optimise`.
 #[derive(Debug, Clone, Serialize)]
 pub struct OptimiseJson {
-    pub model: String,
-    pub objective: String,
-    pub windability: String,
-    pub seed: u64,
-    pub best: PatternJson,
-    pub baselines: Vec<PatternJson>,
+    pub(crate) model: String,
+    pub(crate) objective: String,
+    pub(crate) windability: String,
+    pub(crate) seed: u64,
+    pub(crate) best: PatternJson,
+    pub(crate) baselines: Vec<PatternJson>,
     /// QUA's objective over the best pattern's; null where QUA does not fit the layer count.
-    pub improvement_over_qua: Option<f64>,
-    pub statement: String,
+    pub(crate) improvement_over_qua: Option<f64>,
+    pub(crate) statement: String,
     /// What to wind; null where the search was interrupted.
-    pub recommendation: Option<RecommendationJson>,
+    pub(crate) recommendation: Option<RecommendationJson>,
     /// The best pattern and QUA on profiles that were not searched; null where the search was interrupted.
-    pub validation: Option<ValidationJson>,
+    pub(crate) validation: Option<ValidationJson>,
     /// Null for a half space or an interrupted search.
-    pub other_boundary: Option<OtherBoundaryJson>,
+    pub(crate) other_boundary: Option<OtherBoundaryJson>,
     /// Null where the model is known.
-    pub uncertainty: Option<UncertaintyJson>,
+    pub(crate) uncertainty: Option<UncertaintyJson>,
     /// Of the recommended winding over the former one, or over QUA; null where the model is known.
-    pub predicted_gain: Option<GainJson>,
+    pub(crate) predicted_gain: Option<GainJson>,
     /// Null where the temperature has no grid or the search was interrupted.
-    pub grid_check: Option<GridCheckJson>,
+    pub(crate) grid_check: Option<GridCheckJson>,
     /// Null where no former pattern was stated.
-    pub compared_with: Option<FormerJson>,
-    pub proof: ProofJson,
+    pub(crate) compared_with: Option<FormerJson>,
+    pub(crate) proof: ProofJson,
     /// Null unless worst admissible profiles were to join the searched ones.
-    pub cutting_planes: Option<CutsJson>,
+    pub(crate) cutting_planes: Option<CutsJson>,
     /// Absent unless turns at the ends were to be chosen.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub ends: Option<EndsJson>,
-    pub evaluations: u64,
+    pub(crate) ends: Option<EndsJson>,
+    pub(crate) evaluations: u64,
     /// On the screen only: files don't depend on the clock.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub evaluations_per_s: Option<f64>,
+    pub(crate) evaluations_per_s: Option<f64>,
     /// On the screen only: the whole search, without reading the model.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub seconds: Option<f64>,
-    pub best_found: BestFoundJson,
-    pub rounds: u64,
+    pub(crate) seconds: Option<f64>,
+    pub(crate) best_found: BestFoundJson,
+    pub(crate) rounds: u64,
     /// "proved", "no improvement", "rounds", "moves", "target", "clock" or "interrupted".
-    pub stopped_by: String,
+    pub(crate) stopped_by: String,
     /// False where the clock or a signal ended the search: the same request may then end elsewhere.
-    pub reproducible: bool,
+    pub(crate) reproducible: bool,
 }
 
 /// The best with turns of its own at the ends of the fibre.
 #[derive(Debug, Clone, Serialize)]
-pub struct EndsJson {
+pub(crate) struct EndsJson {
     /// What might be chosen.
-    pub most_left_off_turns: u32,
-    pub shares_outermost_layer: bool,
+    pub(crate) most_left_off_turns: u32,
+    pub(crate) shares_outermost_layer: bool,
     /// Without `end_a_turns` and `end_b_turns` where none make it better.
-    pub best: PatternJson,
-    pub best_objective_deg_per_h: f64,
+    pub(crate) best: PatternJson,
+    pub(crate) best_objective_deg_per_h: f64,
     /// The same order of whole layers.
-    pub whole_layers: String,
-    pub whole_layers_objective_deg_per_h: f64,
-    pub statement: String,
+    pub(crate) whole_layers: String,
+    pub(crate) whole_layers_objective_deg_per_h: f64,
+    pub(crate) statement: String,
 }
 
 impl EndsJson {
-    pub fn of(ends: &WithEnds) -> Self {
+    pub(crate) fn of(ends: &WithEnds) -> Self {
         let WithEnds { choice, judged, whole, statement } = ends;
         Self {
             most_left_off_turns: choice.most_left_off,
@@ -114,22 +114,22 @@ impl EndsJson {
 
 /// What windings would cost with the boundary that the model has not.
 #[derive(Debug, Clone, Serialize)]
-pub struct OtherBoundaryJson {
-    pub boundary: String,
+pub(crate) struct OtherBoundaryJson {
+    pub(crate) boundary: String,
     /// The winding that would be best there.
-    pub best: Option<String>,
-    pub patterns: Vec<BoundaryCostJson>,
+    pub(crate) best: Option<String>,
+    pub(crate) patterns: Vec<BoundaryCostJson>,
 }
 
 #[derive(Debug, Clone, Serialize)]
-pub struct BoundaryCostJson {
-    pub name: String,
+pub(crate) struct BoundaryCostJson {
+    pub(crate) name: String,
     /// Guaranteed where the model has that, else over the profiles.
-    pub worst_rate_deg_per_h: f64,
+    pub(crate) worst_rate_deg_per_h: f64,
 }
 
 impl OtherBoundaryJson {
-    pub fn of(other: &OtherBoundary) -> Self {
+    pub(crate) fn of(other: &OtherBoundary) -> Self {
         let cost = |(name, rate): &(String, f64)| BoundaryCostJson {
             name: name.clone(),
             worst_rate_deg_per_h: deg_per_h_from_rad_per_s(*rate),
@@ -144,17 +144,17 @@ impl OtherBoundaryJson {
 
 /// What windings promise over the models that the records allow.
 #[derive(Debug, Clone, Serialize)]
-pub struct UncertaintyJson {
-    pub models: usize,
+pub(crate) struct UncertaintyJson {
+    pub(crate) models: usize,
     /// The best first.
-    pub patterns: Vec<ProspectJson>,
+    pub(crate) patterns: Vec<ProspectJson>,
 }
 
 #[derive(Debug, Clone, Serialize)]
-pub struct ProspectJson {
-    pub name: String,
-    pub expected_worst_rate_deg_per_h: f64,
-    pub p95_worst_rate_deg_per_h: f64,
+pub(crate) struct ProspectJson {
+    pub(crate) name: String,
+    pub(crate) expected_worst_rate_deg_per_h: f64,
+    pub(crate) p95_worst_rate_deg_per_h: f64,
 }
 
 impl UncertaintyJson {
@@ -170,21 +170,21 @@ impl UncertaintyJson {
 
 /// How many times smaller the recommended winding's error is than that of the winding that it replaces.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct GainJson {
-    pub value: f64,
+pub(crate) struct GainJson {
+    pub(crate) value: f64,
     /// 5 and 95 % of the models that the records allow lie below.
-    pub low: f64,
-    pub high: f64,
+    pub(crate) low: f64,
+    pub(crate) high: f64,
 }
 
 impl GainJson {
-    pub fn of(gain: &Gain) -> Self {
+    pub(crate) fn of(gain: &Gain) -> Self {
         let Gain { value, low, high } = *gain;
         Self { value, low, high }
     }
 
     /// In one sentence.
-    pub fn words(&self) -> String {
+    pub(crate) fn words(&self) -> String {
         format!(
             "predicted gain over the winding so far: {:.2} times less error (5 to 95 % of what the records allow: {:.2} to {:.2})",
             self.value, self.low, self.high
@@ -194,26 +194,26 @@ impl GainJson {
 
 /// Worst admissible profiles that joined the searched ones.
 #[derive(Debug, Clone, Serialize)]
-pub struct CutsJson {
+pub(crate) struct CutsJson {
     /// The best pattern's worst rate over all searched profiles, and over all admissible ones.
-    pub sampled_worst_rate_deg_per_h: f64,
-    pub admissible_worst_rate_deg_per_h: f64,
+    pub(crate) sampled_worst_rate_deg_per_h: f64,
+    pub(crate) admissible_worst_rate_deg_per_h: f64,
     /// False where many drawn profiles stand for all admissible ones.
-    pub guaranteed: bool,
-    pub agree: bool,
-    pub joined: Vec<JoinedProfileJson>,
+    pub(crate) guaranteed: bool,
+    pub(crate) agree: bool,
+    pub(crate) joined: Vec<JoinedProfileJson>,
 }
 
 #[derive(Debug, Clone, Serialize)]
-pub struct JoinedProfileJson {
-    pub name: String,
-    pub pieces: Vec<JoinedPieceJson>,
+pub(crate) struct JoinedProfileJson {
+    pub(crate) name: String,
+    pub(crate) pieces: Vec<JoinedPieceJson>,
 }
 
 #[derive(Debug, Clone, Serialize)]
-pub struct JoinedPieceJson {
-    pub rate_c_per_h: f64,
-    pub duration_s: f64,
+pub(crate) struct JoinedPieceJson {
+    pub(crate) rate_c_per_h: f64,
+    pub(crate) duration_s: f64,
 }
 
 impl CutsJson {
@@ -238,32 +238,32 @@ impl CutsJson {
 
 /// Rates on a grid twice as fine: the guaranteed ones where the search was for them, the worst ones otherwise.
 #[derive(Debug, Clone, Serialize)]
-pub struct GridCheckJson {
-    pub cells_per_layer: usize,
-    pub finer_cells_per_layer: usize,
+pub(crate) struct GridCheckJson {
+    pub(crate) cells_per_layer: usize,
+    pub(crate) finer_cells_per_layer: usize,
     /// The best pattern, then QUA.
-    pub patterns: Vec<GridCheckedJson>,
+    pub(crate) patterns: Vec<GridCheckedJson>,
     /// Null where the grid changes little.
-    pub caution: Option<String>,
+    pub(crate) caution: Option<String>,
 }
 
 #[derive(Debug, Clone, Serialize)]
-pub struct GridCheckedJson {
-    pub name: String,
+pub(crate) struct GridCheckedJson {
+    pub(crate) name: String,
     #[serde(flatten)]
-    pub rates: GridRatesJson,
-    pub change_percent: f64,
+    pub(crate) rates: GridRatesJson,
+    pub(crate) change_percent: f64,
 }
 
 #[derive(Debug, Clone, Serialize)]
 #[serde(untagged)]
-pub enum GridRatesJson {
+pub(crate) enum GridRatesJson {
     Worst { worst_rate_deg_per_h: f64, finer_worst_rate_deg_per_h: f64 },
     Guaranteed { guaranteed_worst_rate_deg_per_h: f64, finer_guaranteed_worst_rate_deg_per_h: f64 },
 }
 
 impl GridCheckJson {
-    pub fn of(check: &GridCheck) -> Self {
+    pub(crate) fn of(check: &GridCheck) -> Self {
         let patterns = check.patterns.iter().map(|checked| {
             let (rate, finer) =
                 (deg_per_h_from_rad_per_s(checked.rate_rad_per_s), deg_per_h_from_rad_per_s(checked.finer_rad_per_s));
@@ -289,42 +289,42 @@ impl GridCheckJson {
 
 /// When the best pattern was come upon.
 #[derive(Debug, Clone, Serialize)]
-pub struct BestFoundJson {
+pub(crate) struct BestFoundJson {
     /// "classic", "annealing", "shared" where a search for another objective found it, or "bounds" where the search by
     /// bounds at the end found better.
-    pub by: &'static str,
+    pub(crate) by: &'static str,
     /// Moves judged by then.
-    pub evaluations: u64,
+    pub(crate) evaluations: u64,
     /// On the screen only.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub seconds: Option<f64>,
+    pub(crate) seconds: Option<f64>,
 }
 
 /// A former pattern under the model of this search.
 #[derive(Debug, Clone, Serialize)]
-pub struct FormerJson {
+pub(crate) struct FormerJson {
     #[serde(flatten)]
-    pub pattern: PatternJson,
+    pub(crate) pattern: PatternJson,
     /// Whether the best pattern of this search is better by more than rounding.
-    pub best_changed: bool,
+    pub(crate) best_changed: bool,
     /// The former pattern's objective, and as a multiple of the best one's.
-    pub cost_deg_per_h: f64,
-    pub cost_factor: Option<f64>,
-    pub statement: String,
+    pub(crate) cost_deg_per_h: f64,
+    pub(crate) cost_factor: Option<f64>,
+    pub(crate) statement: String,
 }
 
 /// What to wind, in one sentence with its reasons.
 #[derive(Debug, Clone, Serialize)]
-pub struct RecommendationJson {
+pub(crate) struct RecommendationJson {
     /// Its name.
-    pub pattern: String,
-    pub segments: Vec<usize>,
-    pub sentence: String,
-    pub reasons: Vec<String>,
+    pub(crate) pattern: String,
+    pub(crate) segments: Vec<usize>,
+    pub(crate) sentence: String,
+    pub(crate) reasons: Vec<String>,
 }
 
 impl RecommendationJson {
-    pub fn of(recommendation: &Recommendation) -> Self {
+    pub(crate) fn of(recommendation: &Recommendation) -> Self {
         Self {
             pattern: recommendation.name.clone(),
             segments: recommendation.pattern.segments().to_vec(),
@@ -336,16 +336,16 @@ impl RecommendationJson {
 
 /// Worst rates on profiles that were not searched.
 #[derive(Debug, Clone, Serialize)]
-pub struct ValidationJson {
-    pub profiles: usize,
-    pub seed: u64,
-    pub best_worst_rate_deg_per_h: f64,
+pub(crate) struct ValidationJson {
+    pub(crate) profiles: usize,
+    pub(crate) seed: u64,
+    pub(crate) best_worst_rate_deg_per_h: f64,
     /// Null where QUA does not fit the layer count.
-    pub qua_worst_rate_deg_per_h: Option<f64>,
+    pub(crate) qua_worst_rate_deg_per_h: Option<f64>,
 }
 
 impl ValidationJson {
-    pub fn of(validation: &Validation) -> Self {
+    pub(crate) fn of(validation: &Validation) -> Self {
         Self {
             profiles: validation.profiles,
             seed: validation.seed,

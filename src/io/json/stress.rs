@@ -9,31 +9,31 @@ use crate::stress::material::Material;
 use crate::units::{celsius_from_kelvin, mpa_from_pa};
 
 #[derive(Debug, Serialize)]
-pub struct MaterialsJson {
-    pub materials: Vec<MaterialJson>,
+pub(crate) struct MaterialsJson {
+    pub(crate) materials: Vec<MaterialJson>,
 }
 
 #[derive(Debug, Serialize)]
-pub struct MaterialJson {
-    pub name: String,
+pub(crate) struct MaterialJson {
+    pub(crate) name: String,
     /// "glass", "coating", "adhesive" or "spool"; null for what a model file defines.
-    pub used_as: Option<&'static str>,
-    pub at: Vec<ElasticJson>,
-    pub source: &'static str,
+    pub(crate) used_as: Option<&'static str>,
+    pub(crate) at: Vec<ElasticJson>,
+    pub(crate) source: &'static str,
     /// False: the usual number of the field, of which no accessible source was read.
-    pub source_was_read: bool,
+    pub(crate) source_was_read: bool,
 }
 
 #[derive(Debug, Serialize)]
-pub struct ElasticJson {
-    pub temperature_c: f64,
-    pub youngs_modulus_mpa: f64,
-    pub poisson_ratio: f64,
-    pub expansion_per_k: f64,
+pub(crate) struct ElasticJson {
+    pub(crate) temperature_c: f64,
+    pub(crate) youngs_modulus_mpa: f64,
+    pub(crate) poisson_ratio: f64,
+    pub(crate) expansion_per_k: f64,
 }
 
 impl ElasticJson {
-    pub fn of(material: &Material, temperature_k: f64) -> Self {
+    pub(crate) fn of(material: &Material, temperature_k: f64) -> Self {
         let elastic = material.at(temperature_k);
         Self {
             temperature_c: celsius_from_kelvin(temperature_k),
@@ -45,7 +45,7 @@ impl ElasticJson {
 }
 
 impl MaterialJson {
-    pub fn of(entry: &Entry, temperatures_k: &[f64]) -> Self {
+    pub(crate) fn of(entry: &Entry, temperatures_k: &[f64]) -> Self {
         let material = entry.material();
         Self {
             name: entry.name.to_owned(),
@@ -59,77 +59,77 @@ impl MaterialJson {
 
 /// What a uniform change of temperature does to a coil, per kelvin.
 #[derive(Debug, Serialize)]
-pub struct StressJson {
-    pub model: String,
+pub(crate) struct StressJson {
+    pub(crate) model: String,
     /// Whether nothing depends on temperature, so that a guaranteed worst case exists.
-    pub is_linear: bool,
-    pub temperatures: Vec<StressAtJson>,
+    pub(crate) is_linear: bool,
+    pub(crate) temperatures: Vec<StressAtJson>,
 }
 
 #[derive(Debug, Serialize)]
-pub struct StressAtJson {
-    pub temperature_c: f64,
+pub(crate) struct StressAtJson {
+    pub(crate) temperature_c: f64,
     /// The coated fibre by itself, nothing holding it.
-    pub free_fibre: FreeFibreJson,
+    pub(crate) free_fibre: FreeFibreJson,
     /// κ of the coil, on average over the fibre.
-    pub path_per_k: f64,
+    pub(crate) path_per_k: f64,
     /// `strength` of the free effect `stress_gradient` that comes nearest; null where it says nothing of these layers.
-    pub stress_gradient_strength: Option<f64>,
+    pub(crate) stress_gradient_strength: Option<f64>,
     /// Innermost first.
-    pub layers: Vec<LayerStressJson>,
-    pub patterns: Vec<PatternStressJson>,
+    pub(crate) layers: Vec<LayerStressJson>,
+    pub(crate) patterns: Vec<PatternStressJson>,
 }
 
 #[derive(Debug, Serialize)]
-pub struct FreeFibreJson {
-    pub expansion_per_k: f64,
-    pub path_per_k: f64,
+pub(crate) struct FreeFibreJson {
+    pub(crate) expansion_per_k: f64,
+    pub(crate) path_per_k: f64,
 }
 
 #[derive(Debug, Serialize)]
-pub struct LayerStressJson {
+pub(crate) struct LayerStressJson {
     /// Counted from 1 innermost.
-    pub layer: usize,
-    pub hoop_strain_per_k: f64,
-    pub radial_strain_per_k: f64,
-    pub axial_strain_per_k: f64,
+    pub(crate) layer: usize,
+    pub(crate) hoop_strain_per_k: f64,
+    pub(crate) radial_strain_per_k: f64,
+    pub(crate) axial_strain_per_k: f64,
     /// Of the glass, across the fibre.
-    pub glass_transverse_strain_per_k: f64,
+    pub(crate) glass_transverse_strain_per_k: f64,
     /// κ_j.
-    pub path_per_k: f64,
+    pub(crate) path_per_k: f64,
 }
 
 #[derive(Debug, Serialize)]
-pub struct PatternStressJson {
-    pub name: String,
+pub(crate) struct PatternStressJson {
+    pub(crate) name: String,
     /// `mismatch` of the free effect `strain_mismatch` that makes the same error in a steady ramp.
-    pub equivalent_mismatch: f64,
+    pub(crate) equivalent_mismatch: f64,
     /// At the steepest rate of the profiles.
-    pub steady_ramp_deg_per_h: f64,
+    pub(crate) steady_ramp_deg_per_h: f64,
 }
 
 /// Pottings and spools by their effect on the worst case, best first.
 #[derive(Debug, Serialize)]
-pub struct PottingJson {
-    pub model: String,
-    pub choices: Vec<ChoiceJson>,
+pub(crate) struct PottingJson {
+    pub(crate) model: String,
+    pub(crate) choices: Vec<ChoiceJson>,
 }
 
 #[derive(Debug, Serialize)]
-pub struct ChoiceJson {
-    pub adhesive: String,
+pub(crate) struct ChoiceJson {
+    pub(crate) adhesive: String,
     /// Null for a pack that stands by itself.
-    pub spool: Option<String>,
+    pub(crate) spool: Option<String>,
     /// Whether it is what the model file states.
-    pub is_declared: bool,
+    pub(crate) is_declared: bool,
     /// The winding that is best with it.
-    pub best_pattern: String,
-    pub worst_rate_deg_per_h: f64,
-    pub worst_profile: String,
+    pub(crate) best_pattern: String,
+    pub(crate) worst_rate_deg_per_h: f64,
+    pub(crate) worst_profile: String,
     /// Null where stiffness or expansion depend on temperature.
-    pub guaranteed_worst_rate_deg_per_h: Option<f64>,
-    pub path_per_k: f64,
-    pub equivalent_mismatch: f64,
+    pub(crate) guaranteed_worst_rate_deg_per_h: Option<f64>,
+    pub(crate) path_per_k: f64,
+    pub(crate) equivalent_mismatch: f64,
 }
 
 /// The `[materials]` table of a model file.

@@ -9,18 +9,18 @@ use crate::units::{c_per_h_from_k_per_s, celsius_from_kelvin};
 /// One row a time, one column a layer, innermost first; moments are empty where nothing varies along the axis.
 #[derive(Debug, Serialize)]
 pub struct TemperaturesJson {
-    pub model: String,
+    pub(crate) model: String,
     /// The profile's or the record's name.
-    pub drive: String,
-    pub times_s: Vec<f64>,
-    pub ambient_c: Vec<f64>,
-    pub temperatures_c: Vec<Vec<f64>>,
-    pub rates_c_per_h: Vec<Vec<f64>>,
-    pub axial_moment_rates_c_per_h: Vec<Vec<f64>>,
+    pub(crate) drive: String,
+    pub(crate) times_s: Vec<f64>,
+    pub(crate) ambient_c: Vec<f64>,
+    pub(crate) temperatures_c: Vec<Vec<f64>>,
+    pub(crate) rates_c_per_h: Vec<Vec<f64>>,
+    pub(crate) axial_moment_rates_c_per_h: Vec<Vec<f64>>,
 }
 
 impl TemperaturesJson {
-    pub fn new(model: &str, drive: &str, history: &ThermalHistory) -> Self {
+    pub(crate) fn new(model: &str, drive: &str, history: &ThermalHistory) -> Self {
         let rows = |row: fn(&ThermalHistory, usize) -> &[f64], convert: fn(f64) -> f64| -> Vec<Vec<f64>> {
             (0..history.len()).map(|i| row(history, i).iter().map(|v| convert(*v)).collect()).collect()
         };
@@ -41,7 +41,7 @@ impl TemperaturesJson {
     }
 
     /// One line a time; layers are counted from the spool.
-    pub fn csv(&self) -> String {
+    pub(crate) fn csv(&self) -> String {
         let layers = self.temperatures_c.first().map_or(0, Vec::len);
         let mut header = vec!["time_s".to_owned(), "ambient_c".to_owned()];
         header.extend((1..=layers).map(|j| format!("layer_{j}_c")));

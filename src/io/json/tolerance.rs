@@ -7,37 +7,37 @@ use crate::units::deg_per_h_from_rad_per_s;
 
 #[derive(Debug, Serialize)]
 pub struct ToleranceJson {
-    pub model: String,
-    pub samples: usize,
-    pub seed: u64,
+    pub(crate) model: String,
+    pub(crate) samples: usize,
+    pub(crate) seed: u64,
     /// "guaranteed": over all profiles within the largest rate; "sampled": over the declared profiles.
-    pub measure: &'static str,
-    pub limit_deg_per_h: Option<f64>,
-    pub patterns: Vec<DistributionJson>,
+    pub(crate) measure: &'static str,
+    pub(crate) limit_deg_per_h: Option<f64>,
+    pub(crate) patterns: Vec<DistributionJson>,
 }
 
 #[derive(Debug, Serialize)]
-pub struct DistributionJson {
-    pub name: String,
-    pub nominal_deg_per_h: f64,
-    pub median_deg_per_h: f64,
-    pub p95_deg_per_h: f64,
-    pub p99_deg_per_h: f64,
+pub(crate) struct DistributionJson {
+    pub(crate) name: String,
+    pub(crate) nominal_deg_per_h: f64,
+    pub(crate) median_deg_per_h: f64,
+    pub(crate) p95_deg_per_h: f64,
+    pub(crate) p99_deg_per_h: f64,
     /// The share of coils within the limit; null without a limit.
     #[serde(rename = "yield")]
-    pub yield_share: Option<f64>,
+    pub(crate) yield_share: Option<f64>,
     /// Largest first.
-    pub variance_shares: Vec<ShareJson>,
+    pub(crate) variance_shares: Vec<ShareJson>,
 }
 
 #[derive(Debug, Serialize)]
-pub struct ShareJson {
-    pub spread: &'static str,
-    pub share: f64,
+pub(crate) struct ShareJson {
+    pub(crate) spread: &'static str,
+    pub(crate) share: f64,
 }
 
 impl ToleranceJson {
-    pub fn new(model: &str, spec: &ToleranceSpec, measure: Measure, patterns: Vec<DistributionJson>) -> Self {
+    pub(crate) fn new(model: &str, spec: &ToleranceSpec, measure: Measure, patterns: Vec<DistributionJson>) -> Self {
         Self {
             model: model.to_owned(),
             samples: spec.samples,
@@ -53,7 +53,7 @@ impl ToleranceJson {
 }
 
 impl DistributionJson {
-    pub fn new(name: &str, found: &Distribution) -> Self {
+    pub(crate) fn new(name: &str, found: &Distribution) -> Self {
         let shares = found.variance_shares.iter();
         Self {
             name: name.to_owned(),

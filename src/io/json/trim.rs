@@ -9,36 +9,36 @@ use crate::units::deg_per_h_from_rad_per_s;
 
 #[derive(Debug, Serialize)]
 pub struct TrimJson {
-    pub model: String,
-    pub pattern: String,
+    pub(crate) model: String,
+    pub(crate) pattern: String,
     /// Surplus fibre at end A; negative at end B.
-    pub asymmetric_length_m: EstimateJson,
+    pub(crate) asymmetric_length_m: EstimateJson,
     /// To be cut at `end`.
-    pub cut_m: f64,
+    pub(crate) cut_m: f64,
     /// "A" or "B".
-    pub end: &'static str,
+    pub(crate) end: &'static str,
     /// As many turns more on the outermost layer at the other end do the same.
-    pub turns_at_other_end: f64,
+    pub(crate) turns_at_other_end: f64,
     /// Whether the length is more than two standard errors.
-    pub is_significant: bool,
+    pub(crate) is_significant: bool,
     /// The largest rate error under the records' temperatures, as the coil is, and after the cut.
-    pub present_rate_deg_per_h: f64,
-    pub predicted_rate_deg_per_h: f64,
+    pub(crate) present_rate_deg_per_h: f64,
+    pub(crate) predicted_rate_deg_per_h: f64,
     /// The largest that one standard error of the cut adds.
-    pub predicted_rate_standard_error_deg_per_h: Option<f64>,
+    pub(crate) predicted_rate_standard_error_deg_per_h: Option<f64>,
     /// The fitted surplus, and what looks the same in these records.
-    pub effect: FindingJson,
-    pub inputs: InputsJson,
+    pub(crate) effect: FindingJson,
+    pub(crate) inputs: InputsJson,
 }
 
 #[derive(Debug, Serialize)]
-pub struct EstimateJson {
-    pub value: f64,
-    pub standard_error: Option<f64>,
+pub(crate) struct EstimateJson {
+    pub(crate) value: f64,
+    pub(crate) standard_error: Option<f64>,
 }
 
 impl TrimJson {
-    pub fn new(model: &str, pattern: &str, trim: &Trim, inputs: InputsJson) -> Self {
+    pub(crate) fn new(model: &str, pattern: &str, trim: &Trim, inputs: InputsJson) -> Self {
         Self {
             model: model.to_owned(),
             pattern: pattern.to_owned(),

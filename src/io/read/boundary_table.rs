@@ -6,7 +6,7 @@ use crate::units::rad_per_s_from_deg_per_h;
 use super::toml_reader::{Limits, TableReader, TomlReader};
 
 /// Key of a number's standard error.
-pub fn error_key(quantity: Quantity) -> &'static str {
+pub(crate) fn error_key(quantity: Quantity) -> &'static str {
     match quantity {
         Quantity::Film => "surface_film_standard_error_w_per_m2_k",
         _ => "standard_error",

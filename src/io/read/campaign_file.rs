@@ -11,9 +11,9 @@ use super::model_file::looks_like_a_record;
 use super::pattern_file::states_any;
 use super::toml_reader::{TableReader, TomlReader, parse};
 
-pub mod coils;
-pub mod fleet;
-pub mod grid;
+pub(crate) mod coils;
+pub(crate) mod fleet;
+pub(crate) mod grid;
 
 use coils::{Block, CoilStudy};
 use fleet::{Fleet, Gyro};
@@ -22,13 +22,13 @@ use grid::{Search, SearchGrid};
 /// A campaign file, understood.
 #[derive(Debug, Clone)]
 pub struct CampaignFile {
-    pub name: String,
-    pub kind: Kind,
+    pub(crate) name: String,
+    pub(crate) kind: Kind,
 }
 
 /// What its cells are.
 #[derive(Debug, Clone)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// Searches, the product of lists.
     Search(SearchGrid),
     /// Blocks of built coils.
@@ -40,12 +40,12 @@ pub enum Kind {
 }
 
 impl Kind {
-    pub const SEARCH: &'static str = KINDS[0];
-    pub const TOLERANCE: &'static str = KINDS[1];
-    pub const METRICS: &'static str = KINDS[2];
-    pub const DIAGNOSE: &'static str = KINDS[3];
+    pub(crate) const SEARCH: &'static str = KINDS[0];
+    pub(crate) const TOLERANCE: &'static str = KINDS[1];
+    pub(crate) const METRICS: &'static str = KINDS[2];
+    pub(crate) const DIAGNOSE: &'static str = KINDS[3];
 
-    pub fn key(&self) -> &'static str {
+    pub(crate) fn key(&self) -> &'static str {
         match self {
             Kind::Search(_) => Self::SEARCH,
             Kind::Tolerance(_) => Self::TOLERANCE,
@@ -61,11 +61,11 @@ pub struct Cell {
     /// What the result depends on, as [`ID_DIGITS`] hexadecimal digits: models and records as far as they matter, the settings, and
     /// the program's version. What has changed nothing here need not be computed again.
     pub id: String,
-    pub work: Work,
+    pub(crate) work: Work,
 }
 
 #[derive(Debug, Clone)]
-pub enum Work {
+pub(crate) enum Work {
     Search(Search),
     Tolerance(Block),
     Metrics(Gyro),
@@ -73,7 +73,7 @@ pub enum Work {
 }
 
 /// Digits of an identifier: among a million cells two agree with a probability below 1e-7.
-pub const ID_DIGITS: usize = 16;
+pub(crate) const ID_DIGITS: usize = 16;
 
 /// Reads and checks a campaign file; paths in it are relative to its folder.
 ///

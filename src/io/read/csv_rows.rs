@@ -24,7 +24,7 @@ const MOST_BYTES: usize = 1 << 16;
 
 /// What stands at one place of the text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Piece {
+pub(crate) enum Piece {
     /// A comment or an empty line.
     Aside,
     Row,
@@ -44,7 +44,7 @@ pub(super) struct PhysicalLine {
 }
 
 /// Goes through a text; what was read last is asked for by [`CsvRows::text`] and [`CsvRows::cells`].
-pub struct CsvRows<R> {
+pub(crate) struct CsvRows<R> {
     input: R,
     grammar: csv_core::Reader,
     separator: u8,
@@ -69,7 +69,7 @@ pub struct CsvRows<R> {
 
 #[allow(clippy::len_without_is_empty)]
 impl<R: BufRead> CsvRows<R> {
-    pub fn new(input: R) -> Self {
+    pub(crate) fn new(input: R) -> Self {
         Self {
             input,
             grammar: csv_core::Reader::new(),
@@ -98,7 +98,7 @@ impl<R: BufRead> CsvRows<R> {
     ///
     /// # Errors
     /// An input that fails.
-    pub fn header(&mut self, mut aside: impl FnMut(&str)) -> io::Result<Option<(Piece, Division)>> {
+    pub(crate) fn header(&mut self, mut aside: impl FnMut(&str)) -> io::Result<Option<(Piece, Division)>> {
         while let Some(first) = self.next_line()? {
             let line = String::from_utf8_lossy(&first.bytes);
             let line = line.trim_start_matches('\u{feff}');
@@ -118,7 +118,7 @@ impl<R: BufRead> CsvRows<R> {
     }
 
     /// Says what follows the header: of each column whether its cells may be words.
-    pub fn expect(&mut self, may_hold_words: impl Iterator<Item = bool>) {
+    pub(crate) fn expect(&mut self, may_hold_words: impl Iterator<Item = bool>) {
         self.may_hold_words = may_hold_words.collect();
     }
 
@@ -127,7 +127,7 @@ impl<R: BufRead> CsvRows<R> {
     /// # Errors
     /// An input that fails.
     #[allow(clippy::should_implement_trait, reason = "what it gives borrows from it and may fail")]
-    pub fn next(&mut self) -> io::Result<Option<Piece>> {
+    pub(crate) fn next(&mut self) -> io::Result<Option<Piece>> {
         self.begin_piece();
         let Some(first) = self.next_line()? else { return Ok(None) };
         let is_first = self.start == 0;
@@ -180,27 +180,27 @@ impl<R: BufRead> CsvRows<R> {
     }
 
     /// As it stands, without its line break.
-    pub fn text(&self) -> &str {
+    pub(crate) fn text(&self) -> &str {
         &self.text
     }
 
     /// The number of the line that it begins in, counted from 1.
-    pub fn line(&self) -> u64 {
+    pub(crate) fn line(&self) -> u64 {
         self.line
     }
 
     /// Rows are told by their numbers from here on, each being a line behind a header of one.
-    pub fn number_rows(&mut self) {
+    pub(crate) fn number_rows(&mut self) {
         self.numbers_rows = true;
     }
 
     /// Whether it is another program's table, of which it is known what holds words.
-    pub fn numbers_rows(&self) -> bool {
+    pub(crate) fn numbers_rows(&self) -> bool {
         self.numbers_rows
     }
 
     /// Where it stands, for a reader.
-    pub fn place(&self) -> String {
+    pub(crate) fn place(&self) -> String {
         match self.numbers_rows {
             true => format!("row {}", self.line - 1),
             false => format!("line {}", self.line),
@@ -208,23 +208,23 @@ impl<R: BufRead> CsvRows<R> {
     }
 
     /// Where it stands, in bytes from the text's beginning (of an input that is in memory).
-    pub fn span(&self) -> Range<usize> {
+    pub(crate) fn span(&self) -> Range<usize> {
         self.start..self.start + self.text.len()
     }
 
     /// How many cells the row has; 0 where it is none.
     #[allow(clippy::len_without_is_empty)] // Asked of rows only.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.count
     }
 
     /// The cells without their quotes, the spaces around them, and what keeps a spreadsheet from calculating them.
-    pub fn cells(&self) -> impl Iterator<Item = &str> + Clone {
+    pub(crate) fn cells(&self) -> impl Iterator<Item = &str> + Clone {
         self.bare_cells().map(|cell| Cell::read(cell.trim()))
     }
 
     /// As [`CsvRows::cells`] of a header: what is not seen around a name is left for whoever checks names.
-    pub fn names(&self) -> impl Iterator<Item = &str> + Clone {
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> + Clone {
         self.bare_cells().map(|cell| Cell::read(cell.trim_matches(|c: char| c.is_whitespace() && !is_unseen(c))))
     }
 
@@ -244,7 +244,7 @@ impl<R: BufRead> CsvRows<R> {
     }
 
     /// The place of a cell in the text; all of it where quotes hide the separators.
-    pub fn span_of_cell(&self, place: usize) -> Range<usize> {
+    pub(crate) fn span_of_cell(&self, place: usize) -> Range<usize> {
         let separator = char::from(self.separator);
         if self.text.contains('"') {
             return self.span();
@@ -255,7 +255,7 @@ impl<R: BufRead> CsvRows<R> {
     }
 
     /// Whether whoever feeds the input has sent nothing more so far.
-    pub fn waits(&mut self) -> bool
+    pub(crate) fn waits(&mut self) -> bool
     where
         R: Buffered,
     {
@@ -384,7 +384,7 @@ impl<R: BufRead> CsvRows<R> {
 }
 
 /// An input that knows whether it holds bytes that nobody has read.
-pub trait Buffered {
+pub(crate) trait Buffered {
     fn is_drained(&self) -> bool;
 }
 

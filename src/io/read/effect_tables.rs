@@ -112,7 +112,7 @@ fn read_channel(r: &mut TomlReader, table: &mut TableReader, name: &str) -> Opti
 }
 
 /// Why a further column cannot be called so; none if it can.
-pub fn channel_fault(name: &str) -> Option<String> {
+pub(crate) fn channel_fault(name: &str) -> Option<String> {
     if name.is_empty() {
         return Some("\"channel:\" lacks the column's name: write channel:NAME".to_owned());
     }

@@ -29,9 +29,9 @@ pub(super) enum Holds {
 /// A column that is read.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FieldColumn {
-    pub holds: Holds,
+    pub(crate) holds: Holds,
     /// Among the file's columns.
-    pub place: usize,
+    pub(crate) place: usize,
     conversion: Unit,
 }
 
@@ -65,7 +65,7 @@ fn temperature_unit(unit: &str) -> Option<Unit> {
 
 impl FieldColumn {
     /// None for a column that is no part of a field.
-    pub fn of(name: &str, place: usize) -> Option<Self> {
+    pub(crate) fn of(name: &str, place: usize) -> Option<Self> {
         let lower = name.trim().to_lowercase();
         let (bare, unit) = match lower.strip_suffix([')', ']']).and_then(|open| open.rsplit_once(['(', '['])) {
             Some((bare, unit)) => (bare.trim().replace(' ', "_"), unit.trim().to_owned()),
@@ -96,7 +96,7 @@ impl FieldColumn {
     }
 
     /// A number as it stands, in SI.
-    pub fn si(&self, value: f64) -> f64 {
+    pub(crate) fn si(&self, value: f64) -> f64 {
         match self.conversion {
             Unit::Number => value,
             Unit::Rate(to_si) => to_si(value),

@@ -37,7 +37,7 @@ const EXPECTED: &str = "expected time_s with layer_1_c, layer_2_c, … (one row 
 pub struct ReadField {
     pub field: GivenField,
     /// What was assumed or left out, in words.
-    pub remarks: Vec<String>,
+    pub(crate) remarks: Vec<String>,
 }
 
 /// Reads and checks a field.
@@ -54,7 +54,7 @@ pub fn read_field(path: &Path) -> Result<ReadField, Faults> {
 ///
 /// # Errors
 /// All faults of the text at once.
-pub fn parse_field(file: &str, name: &str, source: &str) -> Result<ReadField, Faults> {
+pub(crate) fn parse_field(file: &str, name: &str, source: &str) -> Result<ReadField, Faults> {
     let ended = |faults: Vec<Fault>| Faults { file: file.to_owned(), source: source.to_owned(), faults };
     let commented = commented(source);
     let table = Table::read(commented.as_deref().unwrap_or(source)).map_err(ended)?;

@@ -2,13 +2,13 @@
 
 /// What a number may be.
 #[derive(Debug, Clone, Copy)]
-pub struct Limits {
-    pub lower: f64,
-    pub upper: f64,
+pub(crate) struct Limits {
+    pub(crate) lower: f64,
+    pub(crate) upper: f64,
 }
 
 impl Limits {
-    pub const fn between(lower: f64, upper: f64) -> Self {
+    pub(crate) const fn between(lower: f64, upper: f64) -> Self {
         Self { lower, upper }
     }
 }

@@ -20,9 +20,9 @@ const LEAST_PATH_PER_K: f64 = 1e-9;
 
 /// Materials as stated, before the coil is known.
 pub(super) struct Stated {
-    pub materials: Materials,
+    pub(crate) materials: Materials,
     /// What the file itself defines.
-    pub own: Vec<Material>,
+    pub(crate) own: Vec<Material>,
     spool_span: Option<Range<usize>>,
     span: Option<Range<usize>>,
     surface_span: Option<Range<usize>>,

@@ -3,16 +3,16 @@
 //! A reader collects every fault of its file with the source line; a format that people write too is printed beside its
 //! reader, so that what is printed can be read.
 
-pub mod boundary_table;
+pub(crate) mod boundary_table;
 pub mod campaign_file;
-pub mod csv_rows;
-pub mod effect_tables;
+pub(crate) mod csv_rows;
+pub(crate) mod effect_tables;
 mod fibre_table;
 mod field_columns;
 pub mod field_file;
 mod kind_of_file;
 mod limits;
-pub mod materials_table;
+pub(crate) mod materials_table;
 pub mod model_file;
 mod nearest;
 pub mod pattern_file;
@@ -21,14 +21,14 @@ pub mod posterior;
 mod production_table;
 pub mod profile_file;
 mod profile_tables;
-pub mod proposal_file;
+pub(crate) mod proposal_file;
 pub mod record_columns;
 pub mod record_file;
-pub mod record_head;
+pub(crate) mod record_head;
 pub mod record_rows;
-pub mod run_reader;
+pub(crate) mod run_reader;
 pub mod schedule_reader;
 mod stamps;
 pub mod table_file;
 mod tolerance_table;
-pub mod toml_reader;
+pub(crate) mod toml_reader;

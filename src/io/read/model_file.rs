@@ -41,7 +41,7 @@ pub fn read_model(path: &Path) -> Result<ModelFile, Faults> {
 ///
 /// # Errors
 /// As [`read_model`].
-pub fn read_design(path: &Path) -> Result<ModelFile, Faults> {
+pub(crate) fn read_design(path: &Path) -> Result<ModelFile, Faults> {
     read_model(path).map(ModelFile::for_search)
 }
 

@@ -1,7 +1,7 @@
 //! What a misspelt word was meant to be.
 
 /// The word that a misspelling most likely stands for.
-pub fn nearest<'w>(found: &str, words: &[&'w str]) -> Option<&'w str> {
+pub(crate) fn nearest<'w>(found: &str, words: &[&'w str]) -> Option<&'w str> {
     // A name without its unit: `gain` for `gain_deg_per_h_per_unit`.
     let beginning = words.iter().find(|w| found.len() > 2 && w.strip_prefix(found).is_some_and(|r| r.starts_with('_')));
     if let Some(word) = beginning {

@@ -39,7 +39,7 @@ pub fn parse_profiles(file: &str, source: &str) -> Result<ProfileSpec, Faults> {
 }
 
 /// One listed profile and none sampled, with remarks in front.
-pub fn print_profile(profile: &Profile, remarks: &[TomlComment]) -> String {
+pub(crate) fn print_profile(profile: &Profile, remarks: &[TomlComment]) -> String {
     let mut document = DocumentMut::new();
     let mut table = Table::new();
     // The bound is that of this profile; rounding must not put a ramp above it.

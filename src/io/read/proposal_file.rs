@@ -7,7 +7,7 @@ use crate::io::json::proposals::TermJson;
 
 /// # Errors
 /// Text that is no diagnosis, in words with the line.
-pub fn parse_proposal(source: &str) -> Result<DiagnosisJson, String> {
+pub(crate) fn parse_proposal(source: &str) -> Result<DiagnosisJson, String> {
     serde_json::from_str(source)
         .map_err(|error| format!("line {}: cannot be understood as a diagnosis: {error}", error.line()))
 }
@@ -17,7 +17,7 @@ impl TermJson {
     ///
     /// # Errors
     /// A text that is no formula of these parameters, or one of layers that the coil lacks; in words.
-    pub fn declared(&self, layers: usize) -> Result<DeclaredEffect, String> {
+    pub(crate) fn declared(&self, layers: usize) -> Result<DeclaredEffect, String> {
         let (names, values): (Vec<String>, Vec<f64>) =
             self.parameters.iter().map(|(name, p)| (name.clone(), p.value)).unzip();
         let words = |error: String| format!("proposals: the term {:?}: {error}", self.text);
@@ -32,7 +32,7 @@ impl FindingJson {
     ///
     /// # Errors
     /// A kind, parameter or choice that is not known; in words.
-    pub fn declared(&self) -> Result<DeclaredEffect, String> {
+    pub(crate) fn declared(&self) -> Result<DeclaredEffect, String> {
         let value = |key: &str| self.parameters.get(key).map(|p| p.value);
         if let Some(channel) = self.kind.strip_prefix("channel:") {
             let parameter = effect::CHANNEL.parameters[0];

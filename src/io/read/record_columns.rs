@@ -40,9 +40,9 @@ pub(super) fn read_format(r: &mut TomlReader, table: &mut TableReader<'_>) -> Re
 
 /// One column of a record file.
 #[derive(Debug, Clone)]
-pub struct Column {
-    pub name: String,
-    pub quantity: Quantity,
+pub(crate) struct Column {
+    pub(crate) name: String,
+    pub(crate) quantity: Quantity,
     conversion: Conversion,
     scale: f64,
     decimal_comma: bool,
@@ -51,8 +51,8 @@ pub struct Column {
 }
 
 /// The compensated rate's column, and the one that says what happened to a row.
-pub const COMPENSATED: &str = "rate_compensated_deg_per_h";
-pub const FLAGS: &str = "flags";
+pub(crate) const COMPENSATED: &str = "rate_compensated_deg_per_h";
+pub(crate) const FLAGS: &str = "flags";
 
 impl Quantity {
     /// What can be measured at all, in SI and in words. Gross errors of a logger (-999, 9999999) are within; what is beyond is
@@ -148,7 +148,7 @@ impl Column {
     ///
     /// # Errors
     /// What was found instead, in words.
-    pub fn value(&self, field: &str) -> Result<f64, String> {
+    pub(crate) fn value(&self, field: &str) -> Result<f64, String> {
         let found = || match field.is_empty() {
             true => "nothing".to_owned(),
             false => format!("\"{}\"", field.chars().take(40).collect::<String>()),
@@ -176,7 +176,7 @@ impl Column {
     }
 
     /// What its cells must be, in words.
-    pub fn expected(&self) -> &'static str {
+    pub(crate) fn expected(&self) -> &'static str {
         match self.quantity {
             Quantity::Date => DATES,
             _ if self.conversion.is_stamp() => STAMPS,
@@ -185,21 +185,16 @@ impl Column {
     }
 
     /// Whether its cells are dates or times.
-    pub fn holds_stamps(&self) -> bool {
+    pub(crate) fn holds_stamps(&self) -> bool {
         self.conversion.is_stamp() || self.quantity == Quantity::Date
     }
 
-    /// Whether it must hold a number in every row.
-    pub fn is_needed(&self) -> bool {
-        matches!(self.quantity, Quantity::Date | Quantity::Time | Quantity::Temperature | Quantity::Rate)
-    }
-
-    pub fn is_temperature(&self) -> bool {
+    pub(crate) fn is_temperature(&self) -> bool {
         self.quantity.is_temperature()
     }
 
     /// Under which name a record keeps it as a further column, if it does.
-    pub fn channel(&self) -> Option<String> {
+    pub(crate) fn channel(&self) -> Option<String> {
         match self.quantity {
             Quantity::Channel => Some(self.name.clone()),
             Quantity::Sensor(place) => Some(place.channel()),
@@ -208,12 +203,12 @@ impl Column {
     }
 
     /// A value in SI as that column holds it.
-    pub fn in_channel(&self, value: f64) -> f64 {
+    pub(crate) fn in_channel(&self, value: f64) -> f64 {
         if self.is_temperature() { celsius_from_kelvin(value) } else { value }
     }
 
     /// The unit that was taken because nothing stated one.
-    pub fn assumed_unit(&self) -> Option<&'static str> {
+    pub(crate) fn assumed_unit(&self) -> Option<&'static str> {
         self.assumed
     }
 }
@@ -285,7 +280,7 @@ fn unbracketed(name: &str) -> (&str, Option<&str>) {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Division {
     pub separator: u8,
-    pub decimal_comma: bool,
+    pub(crate) decimal_comma: bool,
 }
 
 impl Division {
@@ -306,7 +301,7 @@ impl Division {
 ///
 /// # Errors
 /// Every fault of the header, as a message and a remedy.
-pub fn read_header(
+pub(crate) fn read_header(
     fields: &[&str],
     units: &[String],
     format: &RecordFormat,

@@ -29,7 +29,7 @@ pub struct ReadRecord {
     /// Rows that were skipped: a cell without a number, a stamp that repeats or jumps back.
     pub skipped_rows: usize,
     /// What was assumed or looks odd, in words.
-    pub remarks: Vec<String>,
+    pub(crate) remarks: Vec<String>,
 }
 
 /// Reads and checks a record.
@@ -44,7 +44,7 @@ pub fn read_record(path: &Path) -> Result<Record, Faults> {
 ///
 /// # Errors
 /// All faults of the file at once, with line and column.
-pub fn read_record_as(path: &Path, format: &RecordFormat) -> Result<ReadRecord, Faults> {
+pub(crate) fn read_record_as(path: &Path, format: &RecordFormat) -> Result<ReadRecord, Faults> {
     read_record_named(path, &path.display().to_string(), format)
 }
 
@@ -52,7 +52,7 @@ pub fn read_record_as(path: &Path, format: &RecordFormat) -> Result<ReadRecord, 
 ///
 /// # Errors
 /// All faults of the file at once, with line or row, and column.
-pub fn read_record_named(path: &Path, name: &str, format: &RecordFormat) -> Result<ReadRecord, Faults> {
+pub(crate) fn read_record_named(path: &Path, name: &str, format: &RecordFormat) -> Result<ReadRecord, Faults> {
     let Some(table) = Source::open_other(path)? else {
         return parse_record_as(name, &read_text_up_to(path, LARGEST_RECORD_BYTES)?, format);
     };

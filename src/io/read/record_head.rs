@@ -13,11 +13,11 @@ const MOST_LINES_ABOVE: usize = 200;
 
 /// Where the columns' names stand, and what stands around them.
 #[derive(Debug)]
-pub struct Head {
-    pub piece: Piece,
-    pub division: Division,
+pub(crate) struct Head {
+    pub(crate) piece: Piece,
+    pub(crate) division: Division,
     /// Of each column, as the row below the names states it; empty where there is no such row.
-    pub units: Vec<String>,
+    pub(crate) units: Vec<String>,
     /// Lines above the names that are neither comments nor empty.
     notes: usize,
     line: u64,
@@ -25,7 +25,7 @@ pub struct Head {
 
 impl Head {
     /// What was taken for what, in words.
-    pub fn remarks(&self) -> Vec<String> {
+    pub(crate) fn remarks(&self) -> Vec<String> {
         let mut said = Vec::new();
         let line = self.line;
         match self.notes {
@@ -74,7 +74,11 @@ impl<R: BufRead> CsvRows<R> {
     ///
     /// # Errors
     /// An input that fails.
-    pub fn record_head(&mut self, format: &RecordFormat, mut aside: impl FnMut(&str)) -> io::Result<Option<Head>> {
+    pub(crate) fn record_head(
+        &mut self,
+        format: &RecordFormat,
+        mut aside: impl FnMut(&str),
+    ) -> io::Result<Option<Head>> {
         if self.numbers_rows() {
             let found = self.header(aside)?;
             return Ok(found.map(|(piece, division)| Head { piece, division, units: Vec::new(), notes: 0, line: 1 }));
@@ -98,7 +102,7 @@ impl<R: BufRead> CsvRows<R> {
     ///
     /// # Errors
     /// An input that fails.
-    pub fn units_row(&mut self, head: &Head) -> io::Result<bool> {
+    pub(crate) fn units_row(&mut self, head: &Head) -> io::Result<bool> {
         Ok(!head.units.is_empty() && self.next()?.is_some())
     }
 

@@ -26,15 +26,15 @@ const CALENDAR_S: f64 = 1e8;
 /// Of a day, with what a clock's change and a leap second may add.
 const DAY_S: Range<f64> = 0.0..90_001.0;
 /// Rows of a stream that are handed on together.
-pub const CHUNK: usize = 65_536;
+pub(crate) const CHUNK: usize = 65_536;
 const MOST_FAULTS: usize = 50;
 
 /// What is wrong with a row, or with one of its cells.
 #[derive(Debug)]
 pub(super) struct CellFault {
-    pub message: String,
-    pub place: Option<usize>,
-    pub note: Option<&'static str>,
+    pub(crate) message: String,
+    pub(crate) place: Option<usize>,
+    pub(crate) note: Option<&'static str>,
 }
 
 /// What became of a row; its numbers are in [`Cells::numbers`].
@@ -255,7 +255,7 @@ pub(super) fn suspicions(times_s: &[f64], temperature_k: &[f64]) -> Vec<String> 
 }
 
 /// A stamp that contradicts what the model says of how rates are averaged; None where it does not.
-pub fn contradicts_mean(interval_s: f64, rate_mean_s: f64) -> Option<String> {
+pub(crate) fn contradicts_mean(interval_s: f64, rate_mean_s: f64) -> Option<String> {
     let is_odd = rate_mean_s > 0.0 && (rate_mean_s > 1.01 * interval_s || rate_mean_s < 0.5 * interval_s);
     is_odd.then(|| {
         format!(
@@ -267,9 +267,9 @@ pub fn contradicts_mean(interval_s: f64, rate_mean_s: f64) -> Option<String> {
 /// What a stream was, beside its rows.
 #[derive(Debug, Default)]
 pub struct StreamNoticed {
-    pub rows: usize,
+    pub(crate) rows: usize,
     pub skipped_rows: usize,
-    pub remarks: Vec<String>,
+    pub(crate) remarks: Vec<String>,
 }
 
 /// Reads a record row by row and hands them on in chunks, in memory that does not grow.
@@ -289,7 +289,7 @@ pub fn stream_rows(
 ///
 /// # Errors
 /// All faults of the input at once, with line or row, and column.
-pub fn stream_source(
+pub(crate) fn stream_source(
     name: &str,
     source: Source<'_>,
     format: &RecordFormat,

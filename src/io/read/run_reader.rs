@@ -14,103 +14,103 @@ use super::toml_reader::parse;
 
 /// The parts of `summary.json` that a report shows.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct RunSummary {
-    pub model: String,
-    pub objective: String,
-    pub windability: String,
-    pub seed: u64,
-    pub best: RunPattern,
-    pub baselines: Vec<RunPattern>,
-    pub improvement_over_qua: Option<f64>,
+pub(crate) struct RunSummary {
+    pub(crate) model: String,
+    pub(crate) objective: String,
+    pub(crate) windability: String,
+    pub(crate) seed: u64,
+    pub(crate) best: RunPattern,
+    pub(crate) baselines: Vec<RunPattern>,
+    pub(crate) improvement_over_qua: Option<f64>,
     #[serde(default)]
-    pub statement: String,
+    pub(crate) statement: String,
     #[serde(default)]
-    pub recommendation: Option<RunRecommendation>,
+    pub(crate) recommendation: Option<RunRecommendation>,
     #[serde(default)]
-    pub compared_with: Option<RunFormer>,
-    pub proof: RunProof,
-    pub evaluations: u64,
+    pub(crate) compared_with: Option<RunFormer>,
+    pub(crate) proof: RunProof,
+    pub(crate) evaluations: u64,
     #[serde(default)]
-    pub rounds: u64,
+    pub(crate) rounds: u64,
     #[serde(default)]
-    pub stopped_by: String,
+    pub(crate) stopped_by: String,
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct RunRecommendation {
-    pub sentence: String,
+pub(crate) struct RunRecommendation {
+    pub(crate) sentence: String,
     /// Empty where an older version wrote the summary.
     #[serde(default)]
-    pub pattern: String,
+    pub(crate) pattern: String,
     #[serde(default)]
-    pub segments: Vec<usize>,
+    pub(crate) segments: Vec<usize>,
     #[serde(default)]
-    pub reasons: Vec<String>,
+    pub(crate) reasons: Vec<String>,
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct RunFormer {
-    pub statement: String,
+pub(crate) struct RunFormer {
+    pub(crate) statement: String,
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct RunPattern {
-    pub name: String,
-    pub segments: Vec<usize>,
-    pub worst_rate_deg_per_h: f64,
-    pub worst_profile: String,
-    pub worst_time_s: f64,
-    pub guaranteed_worst_rate_deg_per_h: Option<f64>,
+pub(crate) struct RunPattern {
+    pub(crate) name: String,
+    pub(crate) segments: Vec<usize>,
+    pub(crate) worst_rate_deg_per_h: f64,
+    pub(crate) worst_profile: String,
+    pub(crate) worst_time_s: f64,
+    pub(crate) guaranteed_worst_rate_deg_per_h: Option<f64>,
     /// Of the coils as built, where the search was over them.
     #[serde(default)]
-    pub p95_rate_deg_per_h: Option<f64>,
-    pub windability: RunWindability,
+    pub(crate) p95_rate_deg_per_h: Option<f64>,
+    pub(crate) windability: RunWindability,
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct RunWindability {
-    pub class: String,
-    pub reels: usize,
-    pub captive: usize,
-    pub max_climb: usize,
+pub(crate) struct RunWindability {
+    pub(crate) class: String,
+    pub(crate) reels: usize,
+    pub(crate) captive: usize,
+    pub(crate) max_climb: usize,
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct RunProof {
-    pub status: String,
-    pub lower_bound_deg_per_h: Option<f64>,
+pub(crate) struct RunProof {
+    pub(crate) status: String,
+    pub(crate) lower_bound_deg_per_h: Option<f64>,
 }
 
 /// One row of `history.csv`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct HistoryRow {
-    pub evaluations: u64,
-    pub best_deg_per_h: f64,
+pub(crate) struct HistoryRow {
+    pub(crate) evaluations: u64,
+    pub(crate) best_deg_per_h: f64,
 }
 
 /// A search's folder, read.
 #[derive(Debug, Clone)]
-pub struct Run {
-    pub summary: RunSummary,
-    pub history: Vec<HistoryRow>,
-    pub run_toml: String,
-    pub file: ModelFile,
+pub(crate) struct Run {
+    pub(crate) summary: RunSummary,
+    pub(crate) history: Vec<HistoryRow>,
+    pub(crate) run_toml: String,
+    pub(crate) file: ModelFile,
     /// Where `pareto -o` wrote into the same folder.
-    pub front: Option<Vec<FrontPoint>>,
+    pub(crate) front: Option<Vec<FrontPoint>>,
 }
 
 /// A point of a searched front of error against winding effort.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct FrontPoint {
-    pub name: String,
-    pub worst_rate_deg_per_h: f64,
-    pub captive: usize,
-    pub max_climb: usize,
+pub(crate) struct FrontPoint {
+    pub(crate) name: String,
+    pub(crate) worst_rate_deg_per_h: f64,
+    pub(crate) captive: usize,
+    pub(crate) max_climb: usize,
 }
 
 /// # Errors
 /// A folder that is none of a search, or in which a file is missing or damaged.
-pub fn read_run(folder: &Path) -> Result<Run, Faults> {
+pub(crate) fn read_run(folder: &Path) -> Result<Run, Faults> {
     let summary_path = folder.join("summary.json");
     if !summary_path.is_file() {
         let message = "holds no summary.json: is it the folder that `coilwright optimise … -o DIR` wrote?";

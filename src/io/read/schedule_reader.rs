@@ -14,7 +14,7 @@ use crate::units::{fraction_from_percent, m_from_mm, rad_per_s_from_deg_per_h};
 use crate::verify::{Claim, ClaimedReel, Kind, Row, Shop, Violation};
 
 /// The element of a traveller's page that holds its data.
-pub const DATA_ELEMENT: &str = "<script type=\"application/json\" id=\"coilwright-data\">";
+pub(crate) const DATA_ELEMENT: &str = "<script type=\"application/json\" id=\"coilwright-data\">";
 
 /// Columns that hold whole numbers; the others with a unit in their name hold numbers, the rest words.
 const WHOLE: &[&str] = &["step", "layer", "segment", "climb"];

@@ -39,7 +39,7 @@ pub struct Source<'s> {
 
 impl<'s> Source<'s> {
     /// A text, whose rows are told by their lines.
-    pub fn text(reader: impl Read + 's) -> Self {
+    pub(crate) fn text(reader: impl Read + 's) -> Self {
         Self { reader: Box::new(reader), is_table: false, remarks: Vec::new() }
     }
 
@@ -80,7 +80,7 @@ impl<'s> Source<'s> {
     ///
     /// # Errors
     /// A table that cannot be read, or that this build does not read.
-    pub fn open_other(path: &Path) -> Result<Option<Source<'static>>, Faults> {
+    pub(crate) fn open_other(path: &Path) -> Result<Option<Source<'static>>, Faults> {
         let mut head = Vec::new();
         // What cannot be opened or is a pipe is said of when it is read as a text.
         let is_file = std::fs::metadata(path).is_ok_and(|found| found.is_file());
@@ -92,17 +92,17 @@ impl<'s> Source<'s> {
     }
 
     /// Whether its rows have numbers and no lines.
-    pub fn is_table(&self) -> bool {
+    pub(crate) fn is_table(&self) -> bool {
         self.is_table
     }
 
     /// What opening it noticed, in words.
-    pub fn remarks(&self) -> &[String] {
+    pub(crate) fn remarks(&self) -> &[String] {
         &self.remarks
     }
 
     /// The same with something between it and whoever reads.
-    pub fn map<R: Read + 's>(self, wrap: impl FnOnce(Box<dyn Read + 's>) -> R) -> Self {
+    pub(crate) fn map<R: Read + 's>(self, wrap: impl FnOnce(Box<dyn Read + 's>) -> R) -> Self {
         Self { reader: Box::new(wrap(self.reader)), ..self }
     }
 }

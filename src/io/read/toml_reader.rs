@@ -6,22 +6,20 @@ use std::ops::Range;
 
 use toml_edit::{Document, Item, TableLike, Value};
 
+pub(crate) use super::{limits::Limits, nearest::nearest};
 use crate::io::fault::{Fault, Faults};
 use crate::text;
 
-pub use super::limits::Limits;
-pub use super::nearest::nearest;
-
 /// The faults found so far in one document.
 #[derive(Debug)]
-pub struct TomlReader {
+pub(crate) struct TomlReader {
     file: String,
     source: String,
     faults: Vec<Fault>,
 }
 
 /// One table under a reader; `finish` reports what it did not expect.
-pub struct TableReader<'d> {
+pub(crate) struct TableReader<'d> {
     /// As in `winding.`; empty for the document itself.
     prefix: String,
     table: Option<&'d dyn TableLike>,
@@ -42,7 +40,7 @@ struct Missing {
 ///
 /// # Errors
 /// Text that is no TOML: one fault at the place where it stops being so.
-pub fn parse(file: &str, source: &str) -> Result<Document<String>, Faults> {
+pub(crate) fn parse(file: &str, source: &str) -> Result<Document<String>, Faults> {
     Document::parse(source.to_owned()).map_err(|error| {
         let message = error.message().lines().next().unwrap_or("not TOML").to_owned();
         Faults::one(file, source, Fault::new(message, error.span()))
@@ -50,11 +48,11 @@ pub fn parse(file: &str, source: &str) -> Result<Document<String>, Faults> {
 }
 
 impl TomlReader {
-    pub fn new(file: &str, source: &str) -> Self {
+    pub(crate) fn new(file: &str, source: &str) -> Self {
         Self { file: file.to_owned(), source: source.to_owned(), faults: Vec::new() }
     }
 
-    pub fn root<'d>(&self, document: &'d Document<String>) -> TableReader<'d> {
+    pub(crate) fn root<'d>(&self, document: &'d Document<String>) -> TableReader<'d> {
         TableReader {
             prefix: String::new(),
             table: Some(document.as_table()),
@@ -65,12 +63,12 @@ impl TomlReader {
         }
     }
 
-    pub fn fault(&mut self, fault: Fault) {
+    pub(crate) fn fault(&mut self, fault: Fault) {
         self.faults.push(fault);
     }
 
     /// To be compared before and after reading a part: whether that part has faults.
-    pub fn fault_count(&self) -> usize {
+    pub(crate) fn fault_count(&self) -> usize {
         self.faults.len()
     }
 
@@ -78,7 +76,7 @@ impl TomlReader {
     ///
     /// # Errors
     /// Any fault at all.
-    pub fn finish<T>(mut self, value: Option<T>) -> Result<T, Faults> {
+    pub(crate) fn finish<T>(mut self, value: Option<T>) -> Result<T, Faults> {
         match value {
             Some(value) if self.faults.is_empty() => Ok(value),
             _ => {
@@ -114,39 +112,39 @@ impl<'d> TableReader<'d> {
     }
 
     /// Nothing left to read.
-    pub fn gone() -> Self {
+    pub(crate) fn gone() -> Self {
         Self::absent(String::new())
     }
 
-    pub fn is_present(&self) -> bool {
+    pub(crate) fn is_present(&self) -> bool {
         self.table.is_some()
     }
 
-    pub fn span(&self) -> Option<Range<usize>> {
+    pub(crate) fn span(&self) -> Option<Range<usize>> {
         self.span.clone()
     }
 
     /// The place of a key's value, for faults found later.
-    pub fn span_of(&self, key: &str) -> Option<Range<usize>> {
+    pub(crate) fn span_of(&self, key: &str) -> Option<Range<usize>> {
         self.table?.get(key)?.span().or_else(|| self.span.clone())
     }
 
-    pub fn has(&self, key: &str) -> bool {
+    pub(crate) fn has(&self, key: &str) -> bool {
         self.table.is_some_and(|t| t.contains_key(key))
     }
 
     /// Whether an optional key stands here; it is then known, so that a misspelling of it is recognised.
-    pub fn states(&mut self, key: &'static str) -> bool {
+    pub(crate) fn states(&mut self, key: &'static str) -> bool {
         self.known.push(key);
         self.has(key)
     }
 
     /// What stands behind a key.
-    pub fn raw(&self, key: &str) -> Option<&'d Item> {
+    pub(crate) fn raw(&self, key: &str) -> Option<&'d Item> {
         self.table?.get(key)
     }
 
-    pub fn keys(&self) -> Vec<String> {
+    pub(crate) fn keys(&self) -> Vec<String> {
         self.table.map(|t| t.iter().map(|(k, _)| k.to_owned()).collect()).unwrap_or_default()
     }
 
@@ -165,14 +163,14 @@ impl<'d> TableReader<'d> {
     }
 
     /// Reports at the end that the first of `keys` is missing, unless an unknown key seems to be one of them misspelt.
-    pub fn note_missing_one_of(&mut self, keys: &[&'static str], expected: String) {
+    pub(crate) fn note_missing_one_of(&mut self, keys: &[&'static str], expected: String) {
         if self.table.is_some() {
             self.missing.push(Missing { keys: keys.to_vec(), expected });
         }
     }
 
     /// A number that may be absent.
-    pub fn number(&mut self, reader: &mut TomlReader, key: &'static str, limits: Limits) -> Option<f64> {
+    pub(crate) fn number(&mut self, reader: &mut TomlReader, key: &'static str, limits: Limits) -> Option<f64> {
         let item = self.item(key)?;
         let found = match item {
             Item::Value(Value::Float(v)) => *v.value(),
@@ -192,7 +190,7 @@ impl<'d> TableReader<'d> {
     }
 
     /// A number that must be there.
-    pub fn needed_number(&mut self, reader: &mut TomlReader, key: &'static str, limits: Limits) -> Option<f64> {
+    pub(crate) fn needed_number(&mut self, reader: &mut TomlReader, key: &'static str, limits: Limits) -> Option<f64> {
         if !self.has(key) {
             self.note_missing(key, format!("a number between {} and {}", limits.lower, limits.upper));
         }
@@ -200,7 +198,13 @@ impl<'d> TableReader<'d> {
     }
 
     /// An integer that may be absent.
-    pub fn integer(&mut self, reader: &mut TomlReader, key: &'static str, lower: i64, upper: i64) -> Option<i64> {
+    pub(crate) fn integer(
+        &mut self,
+        reader: &mut TomlReader,
+        key: &'static str,
+        lower: i64,
+        upper: i64,
+    ) -> Option<i64> {
         let item = self.item(key)?;
         let Item::Value(Value::Integer(value)) = item else {
             self.wrong_type(reader, key, "an integer", item);
@@ -215,7 +219,7 @@ impl<'d> TableReader<'d> {
         Some(found)
     }
 
-    pub fn needed_integer(
+    pub(crate) fn needed_integer(
         &mut self,
         reader: &mut TomlReader,
         key: &'static str,
@@ -229,7 +233,7 @@ impl<'d> TableReader<'d> {
     }
 
     /// A string that may be absent.
-    pub fn text(&mut self, reader: &mut TomlReader, key: &'static str) -> Option<&'d str> {
+    pub(crate) fn text(&mut self, reader: &mut TomlReader, key: &'static str) -> Option<&'d str> {
         let item = self.item(key)?;
         let Item::Value(Value::String(value)) = item else {
             self.wrong_type(reader, key, "a string", item);
@@ -239,7 +243,7 @@ impl<'d> TableReader<'d> {
     }
 
     /// A string under a key with a number in it.
-    pub fn numbered_text(&mut self, reader: &mut TomlReader, key: &str) -> Option<&'d str> {
+    pub(crate) fn numbered_text(&mut self, reader: &mut TomlReader, key: &str) -> Option<&'d str> {
         self.numbered.push(key.to_owned());
         let item = self.table?.get(key)?;
         let found = item.as_str();
@@ -250,13 +254,13 @@ impl<'d> TableReader<'d> {
     }
 
     /// A name that must be there: one that can be seen as it is, of a length that fits on a page.
-    pub fn needed_name(&mut self, reader: &mut TomlReader, key: &'static str) -> Option<&'d str> {
+    pub(crate) fn needed_name(&mut self, reader: &mut TomlReader, key: &'static str) -> Option<&'d str> {
         let name = self.needed_text(reader, key, "a name")?;
         self.without(reader, key, name, text::name_fault)
     }
 
     /// As [`TableReader::needed_name`], where the name may be absent or empty.
-    pub fn words(&mut self, reader: &mut TomlReader, key: &'static str) -> Option<&'d str> {
+    pub(crate) fn words(&mut self, reader: &mut TomlReader, key: &'static str) -> Option<&'d str> {
         let words = self.text(reader, key)?;
         self.without(reader, key, words, text::words_fault)
     }
@@ -273,7 +277,12 @@ impl<'d> TableReader<'d> {
         None
     }
 
-    pub fn needed_text(&mut self, reader: &mut TomlReader, key: &'static str, expected: &str) -> Option<&'d str> {
+    pub(crate) fn needed_text(
+        &mut self,
+        reader: &mut TomlReader,
+        key: &'static str,
+        expected: &str,
+    ) -> Option<&'d str> {
         if !self.has(key) {
             self.note_missing(key, expected.to_owned());
         }
@@ -281,7 +290,7 @@ impl<'d> TableReader<'d> {
     }
 
     /// The index of a string that must be one of a few words, where it is present.
-    pub fn word(&mut self, reader: &mut TomlReader, key: &'static str, words: &[&str]) -> Option<usize> {
+    pub(crate) fn word(&mut self, reader: &mut TomlReader, key: &'static str, words: &[&str]) -> Option<usize> {
         let found = self.text(reader, key)?;
         let index = words.iter().position(|w| *w == found);
         if index.is_none() {
@@ -295,7 +304,7 @@ impl<'d> TableReader<'d> {
         index
     }
 
-    pub fn needed_word(&mut self, reader: &mut TomlReader, key: &'static str, words: &[&str]) -> Option<usize> {
+    pub(crate) fn needed_word(&mut self, reader: &mut TomlReader, key: &'static str, words: &[&str]) -> Option<usize> {
         if !self.has(key) {
             self.note_missing(key, one_of(words));
         }
@@ -304,7 +313,7 @@ impl<'d> TableReader<'d> {
 
     /// An array of integers that must be there, each with its place.
     /// A non-empty array of strings, each with its place; a single string is no array.
-    pub fn needed_texts(
+    pub(crate) fn needed_texts(
         &mut self,
         reader: &mut TomlReader,
         key: &'static str,
@@ -335,7 +344,7 @@ impl<'d> TableReader<'d> {
         (texts.len() == array.len()).then_some(texts)
     }
 
-    pub fn needed_integers(
+    pub(crate) fn needed_integers(
         &mut self,
         reader: &mut TomlReader,
         key: &'static str,
@@ -365,7 +374,7 @@ impl<'d> TableReader<'d> {
     }
 
     /// Every entry of the table as a finite number; none if one is not. For tables whose keys the user chooses.
-    pub fn all_numbers(&mut self, reader: &mut TomlReader) -> Option<Vec<(String, f64)>> {
+    pub(crate) fn all_numbers(&mut self, reader: &mut TomlReader) -> Option<Vec<(String, f64)>> {
         let Some(table) = self.table else { return Some(Vec::new()) };
         let mut numbers = Vec::new();
         let mut clean = true;
@@ -387,7 +396,7 @@ impl<'d> TableReader<'d> {
     }
 
     /// A table below this one that may be absent.
-    pub fn table(&mut self, reader: &mut TomlReader, key: &'static str) -> TableReader<'d> {
+    pub(crate) fn table(&mut self, reader: &mut TomlReader, key: &'static str) -> TableReader<'d> {
         let prefix = format!("{}{key}.", self.prefix);
         let Some(item) = self.item(key) else { return TableReader::absent(prefix) };
         match item.as_table_like() {
@@ -409,7 +418,7 @@ impl<'d> TableReader<'d> {
         }
     }
 
-    pub fn needed_table(&mut self, reader: &mut TomlReader, key: &'static str) -> TableReader<'d> {
+    pub(crate) fn needed_table(&mut self, reader: &mut TomlReader, key: &'static str) -> TableReader<'d> {
         if !self.has(key) {
             self.note_missing(key, format!("a table [{}{key}]", self.prefix));
         }
@@ -417,7 +426,7 @@ impl<'d> TableReader<'d> {
     }
 
     /// The tables of an array, `[[key]]` or an array of inline tables; none if absent.
-    pub fn tables(&mut self, reader: &mut TomlReader, key: &'static str) -> Vec<TableReader<'d>> {
+    pub(crate) fn tables(&mut self, reader: &mut TomlReader, key: &'static str) -> Vec<TableReader<'d>> {
         let prefix = format!("{}{key}.", self.prefix);
         let Some(item) = self.item(key) else { return Vec::new() };
         let make = |table: &'d dyn TableLike, span: Option<Range<usize>>| TableReader {
@@ -451,7 +460,7 @@ impl<'d> TableReader<'d> {
     }
 
     /// Reports unknown keys, and missing ones that no unknown key seems to stand for.
-    pub fn finish(mut self, reader: &mut TomlReader) {
+    pub(crate) fn finish(mut self, reader: &mut TomlReader) {
         let Some(table) = self.table else { return };
         for (key, item) in table.iter() {
             if self.known.contains(&key) || self.numbered.iter().any(|numbered| numbered == key) {

@@ -11,7 +11,7 @@ use crate::units::deg_per_h_from_rad_per_s;
 ///
 /// # Errors
 /// A source that is no TOML.
-pub fn with_boundary(file: &str, source: &str, learned: &Learned) -> Result<String, Faults> {
+pub(crate) fn with_boundary(file: &str, source: &str, learned: &Learned) -> Result<String, Faults> {
     let mut document: DocumentMut = source
         .parse()
         .map_err(|e: toml_edit::TomlError| Faults::one(file, source, Fault::new(e.message(), e.span())))?;

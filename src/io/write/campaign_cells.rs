@@ -16,12 +16,12 @@ use super::checkpoint::CHECKPOINT_FILE;
 const FOLDER_DIGITS: usize = 2;
 
 /// The place of a cell's result under a campaign's folder.
-pub fn cell_path(folder: &Path, id: &str) -> PathBuf {
+pub(crate) fn cell_path(folder: &Path, id: &str) -> PathBuf {
     folder.join("cells").join(&id[..FOLDER_DIGITS.min(id.len())]).join(format!("{id}.json"))
 }
 
 /// A cell's result, if it is there, as it was written, and of this cell.
-pub fn read_cell<T: CellDocument>(folder: &Path, id: &str) -> Option<T> {
+pub(crate) fn read_cell<T: CellDocument>(folder: &Path, id: &str) -> Option<T> {
     let text = std::fs::read_to_string(cell_path(folder, id)).ok()?;
     let mut document: Map<String, Value> = serde_json::from_str(&text).ok()?;
     let stated = document.shift_remove(CHECKSUM)?;
@@ -39,7 +39,7 @@ fn sum(document: &Map<String, Value>) -> String {
 }
 
 /// Whether a cell's result is there.
-pub fn is_done(folder: &Path, cell: &Cell) -> bool {
+pub(crate) fn is_done(folder: &Path, cell: &Cell) -> bool {
     match &cell.work {
         Work::Search(_) => read_cell::<CellJson>(folder, &cell.id).is_some(),
         Work::Tolerance(_) => read_cell::<BlockJson>(folder, &cell.id).is_some(),
@@ -51,7 +51,7 @@ pub fn is_done(folder: &Path, cell: &Cell) -> bool {
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn write_cell<T: CellDocument>(folder: &Path, found: &T) -> Result<(), WriteError> {
+pub(crate) fn write_cell<T: CellDocument>(folder: &Path, found: &T) -> Result<(), WriteError> {
     let document = serde_json::to_value(found).expect("a cell's numbers can be written");
     let Value::Object(mut document) = document else { unreachable!("a cell's result has named fields") };
     document.insert(CHECKSUM.to_owned(), sum(&document).into());
@@ -62,19 +62,19 @@ pub fn write_cell<T: CellDocument>(folder: &Path, found: &T) -> Result<(), Write
 }
 
 /// Where the checkpoint of a cell stands while it is searched.
-pub fn state_folder(folder: &Path, id: &str) -> PathBuf {
+pub(crate) fn state_folder(folder: &Path, id: &str) -> PathBuf {
     folder.join("unfinished").join(id)
 }
 
 /// Takes the checkpoint of a cell away. One that stays behind does no harm.
-pub fn forget_state(folder: &Path, id: &str) {
+pub(crate) fn forget_state(folder: &Path, id: &str) {
     let own = state_folder(folder, id);
     let _ = std::fs::remove_file(own.join(CHECKPOINT_FILE));
     let _ = std::fs::remove_dir(&own);
 }
 
 /// Takes the folder of interrupted cells away once there is none.
-pub fn forget_unfinished(folder: &Path) {
+pub(crate) fn forget_unfinished(folder: &Path) {
     let _ = std::fs::remove_dir(folder.join("unfinished"));
 }
 
@@ -82,7 +82,7 @@ pub fn forget_unfinished(folder: &Path) {
 ///
 /// # Errors
 /// As said.
-pub fn check_kept<'a>(folder: &Path, read: impl IntoIterator<Item = &'a Path>) -> Result<(), WriteError> {
+pub(crate) fn check_kept<'a>(folder: &Path, read: impl IntoIterator<Item = &'a Path>) -> Result<(), WriteError> {
     let pictures = pictures_of_objectives();
     let kinds: Vec<&str> = OF_ALL.into_iter().chain(pictures.iter().map(String::as_str)).collect();
     check_read(folder, &kinds, read)
@@ -99,7 +99,7 @@ fn pictures_of_objectives() -> Vec<String> {
 ///
 /// # Errors
 /// Files that cannot be written.
-pub fn write_table(folder: &Path, table: &[u8], further: &[(String, String)]) -> Result<(), WriteError> {
+pub(crate) fn write_table(folder: &Path, table: &[u8], further: &[(String, String)]) -> Result<(), WriteError> {
     let mut files = Replacement::of(folder);
     files.add("summary.csv", table)?;
     for (name, text) in further {

@@ -6,7 +6,7 @@ use crate::io::table::Table;
 use crate::text::sink;
 
 /// The table of all cells, in the grid's order.
-pub fn searches(results: &[CellJson]) -> Vec<u8> {
+pub(crate) fn searches(results: &[CellJson]) -> Vec<u8> {
     let mut table = Table::with_header([
         "cell",
         "model",
@@ -58,7 +58,7 @@ fn number(value: Option<f64>) -> String {
 }
 
 /// One row a model and pattern.
-pub fn built_coils(models: &[BuiltCoilsJson]) -> Vec<u8> {
+pub(crate) fn built_coils(models: &[BuiltCoilsJson]) -> Vec<u8> {
     let mut header: Vec<String> =
         ["model", "layers", "pattern", "coils", "seed", "measure", "nominal_deg_per_h"].map(str::to_owned).to_vec();
     for share in SHARES {
@@ -92,7 +92,7 @@ pub fn built_coils(models: &[BuiltCoilsJson]) -> Vec<u8> {
 }
 
 /// One row a gyro.
-pub fn gyros(found: &[GyroJson]) -> Vec<u8> {
+pub(crate) fn gyros(found: &[GyroJson]) -> Vec<u8> {
     let is_diagnosis = found.iter().any(|gyro| gyro.diagnosis.is_some());
     let header: &[&str] = if is_diagnosis {
         &["gyro", "verdict", "effects", "noise_floor_deg_per_h", "records", "id", "failure"]

@@ -17,7 +17,7 @@ use crate::search::anneal::rounds::{Found, RoundRecord, State, Stop};
 use crate::search::cost::columns::Work;
 
 /// The name of a checkpoint in its run's folder.
-pub const CHECKPOINT_FILE: &str = "checkpoint.json";
+pub(crate) const CHECKPOINT_FILE: &str = "checkpoint.json";
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -122,7 +122,7 @@ pub fn write_checkpoint(folder: &Path, fingerprint: &str, state: &State) -> Resu
 ///
 /// # Errors
 /// A file that is no checkpoint, or one of another request.
-pub fn read_checkpoint(folder: &Path, fingerprint: &str) -> Result<Option<State>, Faults> {
+pub(crate) fn read_checkpoint(folder: &Path, fingerprint: &str) -> Result<Option<State>, Faults> {
     let path = folder.join(CHECKPOINT_FILE);
     if !path.exists() {
         return Ok(None);
@@ -160,13 +160,13 @@ pub fn parse_checkpoint(file: &str, text: &str, fingerprint: &str) -> Result<Sta
 }
 
 /// Where a checkpoint goes that cannot be gone on from.
-pub const BROKEN_FILE: &str = "checkpoint.broken.json";
+pub(crate) const BROKEN_FILE: &str = "checkpoint.broken.json";
 
 /// Keeps a checkpoint that is damaged or none aside, before another one takes its name; whether there was one.
 ///
 /// # Errors
 /// A file that cannot be renamed.
-pub fn set_broken_aside(folder: &Path) -> Result<bool, WriteError> {
+pub(crate) fn set_broken_aside(folder: &Path) -> Result<bool, WriteError> {
     let path = folder.join(CHECKPOINT_FILE);
     if !path.exists() {
         return Ok(false);

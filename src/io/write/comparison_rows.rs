@@ -8,15 +8,15 @@ use crate::units::{c_per_min_from_k_per_s, celsius_from_kelvin, deg_per_h_from_r
 
 /// One instant of a record beside its prediction; temperatures are those of the outermost layer in the model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ComparisonRow {
-    pub time_s: f64,
-    pub rate_deg_per_h: f64,
-    pub predicted_deg_per_h: f64,
-    pub residual_deg_per_h: f64,
-    pub temperature_c: f64,
-    pub temperature_rate_c_per_min: f64,
+pub(crate) struct ComparisonRow {
+    pub(crate) time_s: f64,
+    pub(crate) rate_deg_per_h: f64,
+    pub(crate) predicted_deg_per_h: f64,
+    pub(crate) residual_deg_per_h: f64,
+    pub(crate) temperature_c: f64,
+    pub(crate) temperature_rate_c_per_min: f64,
     /// As in [`crate::compare::regimes::Regime::key`].
-    pub regime: String,
+    pub(crate) regime: String,
 }
 
 /// Digits after the point: finer than any record's resolution.
@@ -27,7 +27,7 @@ fn rounded(value: f64) -> f64 {
 }
 
 /// The whole table.
-pub fn comparison_rows(record: &Record, found: &Comparison) -> Vec<ComparisonRow> {
+pub(crate) fn comparison_rows(record: &Record, found: &Comparison) -> Vec<ComparisonRow> {
     let pack = &found.prediction.pack;
     (0..record.rows())
         .map(|row| ComparisonRow {

@@ -24,25 +24,25 @@ use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s};
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct StreamSummary {
     pub rows: usize,
-    pub delay_rows: usize,
+    pub(crate) delay_rows: usize,
     pub malformed: usize,
     pub clock_back: usize,
-    pub gap: usize,
-    pub temperature_held: usize,
+    pub(crate) gap: usize,
+    pub(crate) temperature_held: usize,
     pub channel_held: usize,
-    pub rate_held: usize,
+    pub(crate) rate_held: usize,
     pub rate_rejected: usize,
     /// Standard deviations over the rows without a flag.
-    pub rate_deviation_deg_per_h: Option<f64>,
-    pub compensated_deviation_deg_per_h: Option<f64>,
+    pub(crate) rate_deviation_deg_per_h: Option<f64>,
+    pub(crate) compensated_deviation_deg_per_h: Option<f64>,
     /// What this start-up added to the bias; null where nobody asked.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub turn_on_offset_deg_per_h: Option<f64>,
+    pub(crate) turn_on_offset_deg_per_h: Option<f64>,
 }
 
 impl StreamSummary {
     /// Counts what happened to a row.
-    pub fn count(&mut self, flag: Flag) {
+    pub(crate) fn count(&mut self, flag: Flag) {
         *match flag {
             Flag::Malformed => &mut self.malformed,
             Flag::ClockBack => &mut self.clock_back,
@@ -131,7 +131,7 @@ pub fn compensate_lines(
 ///
 /// # Errors
 /// As [`compensate_lines`].
-pub fn compensate_lines_from_turn_on(
+pub(crate) fn compensate_lines_from_turn_on(
     compensator: &Compensator,
     format: &RecordFormat,
     name: &str,
@@ -360,31 +360,31 @@ impl<W: Write> Sink<W> {
 
 /// One method on a hold-out.
 #[derive(Debug, Clone, Serialize)]
-pub struct MethodJson {
-    pub method: &'static str,
+pub(crate) struct MethodJson {
+    pub(crate) method: &'static str,
     /// Null where the method cannot be used; `reason` then says why.
-    pub rms_deg_per_h: Option<f64>,
-    pub delay_rows: Option<usize>,
-    pub reason: Option<String>,
+    pub(crate) rms_deg_per_h: Option<f64>,
+    pub(crate) delay_rows: Option<usize>,
+    pub(crate) reason: Option<String>,
     /// What is left, measured as `metrics` measures it.
-    pub measures: Option<MeasuresJson>,
+    pub(crate) measures: Option<MeasuresJson>,
 }
 
 /// The measures of a rate, before or after.
 #[derive(Debug, Clone, Serialize)]
-pub struct MeasuresJson {
-    pub bias_deg_per_h: f64,
-    pub bias_stability_deg_per_h: Option<f64>,
-    pub bias_instability_deg_per_h: Option<f64>,
-    pub angle_random_walk_deg_per_sqrt_h: Option<f64>,
-    pub temperature_sensitivity_deg_per_h_per_c: Option<f64>,
-    pub peak_to_peak_deg_per_h: f64,
-    pub averaged_peak_to_peak_deg_per_h: f64,
-    pub drift_angle_deg: f64,
+pub(crate) struct MeasuresJson {
+    pub(crate) bias_deg_per_h: f64,
+    pub(crate) bias_stability_deg_per_h: Option<f64>,
+    pub(crate) bias_instability_deg_per_h: Option<f64>,
+    pub(crate) angle_random_walk_deg_per_sqrt_h: Option<f64>,
+    pub(crate) temperature_sensitivity_deg_per_h_per_c: Option<f64>,
+    pub(crate) peak_to_peak_deg_per_h: f64,
+    pub(crate) averaged_peak_to_peak_deg_per_h: f64,
+    pub(crate) drift_angle_deg: f64,
 }
 
 impl MeasuresJson {
-    pub fn new(metrics: &Metrics) -> Self {
+    pub(crate) fn new(metrics: &Metrics) -> Self {
         let all = RecordMetricsJson::new("", metrics, GrossErrors::default(), 0);
         Self {
             bias_deg_per_h: all.bias_deg_per_h,
@@ -399,7 +399,7 @@ impl MeasuresJson {
     }
 
     /// Name, unit and value of each.
-    pub fn all(&self) -> [(&'static str, &'static str, Option<f64>); 8] {
+    pub(crate) fn all(&self) -> [(&'static str, &'static str, Option<f64>); 8] {
         [
             ("bias", "°/h", Some(self.bias_deg_per_h)),
             ("bias stability, means over 10 s", "°/h", self.bias_stability_deg_per_h),
@@ -415,34 +415,34 @@ impl MeasuresJson {
 
 #[derive(Debug, Serialize)]
 pub struct CompensateJson {
-    pub model: String,
-    pub method: &'static str,
-    pub summary: Option<StreamSummary>,
-    pub noise_floor_deg_per_h: Option<f64>,
+    pub(crate) model: String,
+    pub(crate) method: &'static str,
+    pub(crate) summary: Option<StreamSummary>,
+    pub(crate) noise_floor_deg_per_h: Option<f64>,
     /// Of the record as it is, where all methods were asked for.
-    pub before: Option<MeasuresJson>,
+    pub(crate) before: Option<MeasuresJson>,
     /// All methods on the hold-out, where that was asked for.
-    pub methods: Vec<MethodJson>,
+    pub(crate) methods: Vec<MethodJson>,
     /// All methods on each fitted record, left out in turn, where there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub leave_one_out: Option<LeaveOneOutJson>,
-    pub lines: Vec<BiasLineJson>,
+    pub(crate) leave_one_out: Option<LeaveOneOutJson>,
+    pub(crate) lines: Vec<BiasLineJson>,
 }
 
 /// A straight piece of the bias over temperature.
 #[derive(Debug, Clone, Serialize)]
-pub struct BiasLineJson {
+pub(crate) struct BiasLineJson {
     /// Null: to the end.
-    pub until_c: Option<f64>,
+    pub(crate) until_c: Option<f64>,
     /// Where that end may lie, with 95 % confidence.
-    pub until_within_c: Option<[f64; 2]>,
-    pub at_20_c_deg_per_h: f64,
-    pub slope_deg_per_h_per_c: f64,
+    pub(crate) until_within_c: Option<[f64; 2]>,
+    pub(crate) at_20_c_deg_per_h: f64,
+    pub(crate) slope_deg_per_h_per_c: f64,
 }
 
 impl BiasLineJson {
     /// Empty for other compensators.
-    pub fn all(compensator: &Compensator) -> Vec<Self> {
+    pub(crate) fn all(compensator: &Compensator) -> Vec<Self> {
         let Compensator::Piecewise(piecewise) = compensator else { return Vec::new() };
         let json = |line: &crate::compensate::empirical::BiasLine| Self {
             until_c: Some(celsius_from_kelvin(line.until_k)).filter(|c| c.is_finite()),

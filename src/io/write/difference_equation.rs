@@ -11,44 +11,44 @@ use crate::units::deg_per_h_from_rad_per_s;
 /// The physical compensator as a difference equation: °C in, °/h out.
 #[derive(Debug, Serialize)]
 pub struct DifferenceEquation {
-    pub model: String,
-    pub equations: Vec<&'static str>,
-    pub interval_s: f64,
+    pub(crate) model: String,
+    pub(crate) equations: Vec<&'static str>,
+    pub(crate) interval_s: f64,
     /// The rate error that comes out belongs to the row so many rows ago.
-    pub delay_rows: usize,
-    pub offset_deg_per_h: f64,
+    pub(crate) delay_rows: usize,
+    pub(crate) offset_deg_per_h: f64,
     /// F, row by row.
-    pub transition: Vec<Vec<f64>>,
+    pub(crate) transition: Vec<Vec<f64>>,
     /// ω [°/h per °C].
-    pub rate: Vec<f64>,
+    pub(crate) rate: Vec<f64>,
     /// h.
-    pub reading: Vec<f64>,
+    pub(crate) reading: Vec<f64>,
     /// States that are temperatures, counted from the first reading; all start at 0.
-    pub level_states: Vec<usize>,
+    pub(crate) level_states: Vec<usize>,
     /// 1: one difference equation, whose gains are the only ones.
-    pub most_hypotheses: usize,
-    pub break_probability: f64,
-    pub least_log_weight: f64,
+    pub(crate) most_hypotheses: usize,
+    pub(crate) break_probability: f64,
+    pub(crate) least_log_weight: f64,
     /// After so many rows without a reading the next one begins anew.
-    pub forgotten_rows: usize,
+    pub(crate) forgotten_rows: usize,
     /// By rows since the last break; the last ones are for long ago.
-    pub gains: Vec<GainsJson>,
+    pub(crate) gains: Vec<GainsJson>,
     /// What is added to the rate error by the model's formulas [°/h], with the values of their parameters in their place.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub formulas: Vec<String>,
+    pub(crate) formulas: Vec<String>,
     #[serde(skip)]
     formulas_in_c: Option<FormulasInC>,
 }
 
 /// Gains of one age.
 #[derive(Debug, Serialize)]
-pub struct GainsJson {
+pub(crate) struct GainsJson {
     /// k.
-    pub gain: Vec<f64>,
+    pub(crate) gain: Vec<f64>,
     /// κ [°/h per °C].
-    pub chain_gain: Vec<f64>,
+    pub(crate) chain_gain: Vec<f64>,
     /// f [°C²].
-    pub variance: f64,
+    pub(crate) variance: f64,
 }
 
 impl GainsJson {

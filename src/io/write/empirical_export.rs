@@ -13,20 +13,20 @@ use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s};
 /// An empirical compensator: °C in, °/h out.
 #[derive(Debug, Serialize)]
 pub struct EmpiricalExport {
-    pub model: String,
+    pub(crate) model: String,
     /// "piecewise", "regression" or "learned".
     pub method: &'static str,
-    pub equations: Vec<&'static str>,
-    pub interval_s: f64,
+    pub(crate) equations: Vec<&'static str>,
+    pub(crate) interval_s: f64,
     /// The rate error that comes out belongs to the row so many rows ago.
     pub delay_rows: usize,
     #[serde(flatten)]
-    pub coefficients: Coefficients,
+    pub(crate) coefficients: Coefficients,
 }
 
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
-pub enum Coefficients {
+pub(crate) enum Coefficients {
     Piecewise {
         lines: Vec<LineJson>,
     },
@@ -49,11 +49,11 @@ pub enum Coefficients {
 
 /// One straight piece.
 #[derive(Debug, Serialize)]
-pub struct LineJson {
+pub(crate) struct LineJson {
     /// Null for the last.
-    pub until_c: Option<f64>,
-    pub at_20_c_deg_per_h: f64,
-    pub slope_deg_per_h_per_c: f64,
+    pub(crate) until_c: Option<f64>,
+    pub(crate) at_20_c_deg_per_h: f64,
+    pub(crate) slope_deg_per_h_per_c: f64,
 }
 
 const PIECEWISE: [&str; 1] =

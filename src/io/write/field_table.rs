@@ -3,7 +3,7 @@
 use crate::thermal::ThermalHistory;
 
 /// One line a time, both sides of a kink under one; layers are counted from the spool.
-pub fn field_table(field: &ThermalHistory) -> String {
+pub(crate) fn field_table(field: &ThermalHistory) -> String {
     let has_moments = !field.axial_moment_k_per_s.is_empty();
     let kinds: &[(&str, &str)] = &[("layer", "k"), ("layer", "k_per_s"), ("moment", "k"), ("moment", "k_per_s")];
     let kinds = if has_moments { kinds } else { &kinds[..2] };

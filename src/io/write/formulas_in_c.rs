@@ -11,7 +11,7 @@ use crate::effect::custom::OfLayer;
 #[derive(Debug)]
 pub(super) struct FormulasInC {
     /// With numbers in the place of parameters.
-    pub stated: Vec<String>,
+    pub(crate) stated: Vec<String>,
     expressions: Vec<String>,
     memories: usize,
     columns: usize,
@@ -31,7 +31,7 @@ fn rows(of: &DMatrix<f64>) -> Vec<String> {
 }
 
 impl FormulasInC {
-    pub fn new(formulas: &Formulas, work: &AtWork, rate_mean_s: f64) -> Self {
+    pub(crate) fn new(formulas: &Formulas, work: &AtWork, rate_mean_s: f64) -> Self {
         let (mut stated, mut expressions, mut memories) = (Vec::new(), Vec::new(), 0);
         let layers = work.shares().len();
         for effect in formulas.effects() {
@@ -93,7 +93,7 @@ impl FormulasInC {
     }
 
     /// The header with the formulas before its last line.
-    pub fn added_to(&self, header: &str) -> String {
+    pub(crate) fn added_to(&self, header: &str) -> String {
         let sum = self.expressions.iter().map(|e| format!("  sum += {e};")).collect::<Vec<_>>().join("\n");
         let block = filled(
             BLOCK,

@@ -6,7 +6,7 @@ use super::compensation_file::MeasuresJson;
 
 /// Each record in turn, compensated by what was fitted to the others.
 #[derive(Debug, Serialize)]
-pub struct LeaveOneOutJson {
+pub(crate) struct LeaveOneOutJson {
     /// What is left of all records where only the mean rate of the others is taken off.
     pub by_offset_rms_deg_per_h: f64,
     pub records: Vec<LeftOutRecordJson>,
@@ -15,7 +15,7 @@ pub struct LeaveOneOutJson {
 
 /// A record as it is.
 #[derive(Debug, Serialize)]
-pub struct LeftOutRecordJson {
+pub(crate) struct LeftOutRecordJson {
     pub file: String,
     pub before: MeasuresJson,
     pub by_offset_rms_deg_per_h: f64,
@@ -23,7 +23,7 @@ pub struct LeftOutRecordJson {
 
 /// One method on all records.
 #[derive(Debug, Serialize)]
-pub struct LeftOutMethodJson {
+pub(crate) struct LeftOutMethodJson {
     pub method: &'static str,
     /// Of all records, by what was fitted to all of them; null where the method cannot be used.
     pub fitted_rms_deg_per_h: Option<f64>,
@@ -38,7 +38,7 @@ pub struct LeftOutMethodJson {
 
 /// One method on one record, fitted to the others.
 #[derive(Debug, Serialize)]
-pub struct LeftOutJson {
+pub(crate) struct LeftOutJson {
     pub file: String,
     pub rms_deg_per_h: Option<f64>,
     /// About its own mean: without what its start-up added to the bias.

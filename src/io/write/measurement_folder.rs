@@ -23,26 +23,26 @@ pub const COMPARISON_FILE: &str = "comparison.json";
 pub const DIAGNOSIS_FILE: &str = "diagnosis.json";
 pub const METRICS_FILE: &str = "metrics.json";
 /// The model with the listed effects and the proposed terms.
-pub const PROPOSED_FILE: &str = "proposed.toml";
+pub(crate) const PROPOSED_FILE: &str = "proposed.toml";
 /// A copy of the model file that was asked about.
-pub const MODEL_FILE: &str = "model.toml";
+pub(crate) const MODEL_FILE: &str = "model.toml";
 
 const LARGEST_TABLE_BYTES: u64 = 2 * 1024 * 1024 * 1024;
 
 /// Everything that a folder holds.
 #[derive(Debug, Clone, Default)]
-pub struct Measurements {
+pub(crate) struct Measurements {
     /// With one table a record.
-    pub comparison: Option<(CompareJson, Vec<Vec<ComparisonRow>>)>,
+    pub(crate) comparison: Option<(CompareJson, Vec<Vec<ComparisonRow>>)>,
     /// With one table a record, where effects were found.
-    pub diagnosis: Option<(DiagnosisJson, Vec<Vec<DiagnosisRow>>)>,
-    pub metrics: Option<MetricsJson>,
+    pub(crate) diagnosis: Option<(DiagnosisJson, Vec<Vec<DiagnosisRow>>)>,
+    pub(crate) metrics: Option<MetricsJson>,
     /// The text of the model file.
-    pub model_source: Option<String>,
+    pub(crate) model_source: Option<String>,
 }
 
 /// Whether a folder holds measurements rather than a search.
-pub fn holds_measurements(folder: &Path) -> bool {
+pub(crate) fn holds_measurements(folder: &Path) -> bool {
     [COMPARISON_FILE, DIAGNOSIS_FILE, METRICS_FILE].iter().any(|name| folder.join(name).is_file())
 }
 
@@ -85,7 +85,7 @@ pub fn check_kept<'a>(
 
 /// # Errors
 /// Files that are missing, damaged or of another program.
-pub fn read_measurements(folder: &Path) -> Result<Measurements, Faults> {
+pub(crate) fn read_measurements(folder: &Path) -> Result<Measurements, Faults> {
     let comparison = match read_document::<CompareJson>(folder, COMPARISON_FILE, "comparison")? {
         None => None,
         Some(document) => {
@@ -116,12 +116,12 @@ pub fn read_measurements(folder: &Path) -> Result<Measurements, Faults> {
 }
 
 /// The name of the `number`-th record's table, counted from 1.
-pub fn table_name(number: usize) -> String {
+pub(crate) fn table_name(number: usize) -> String {
     format!("record-{number}.csv")
 }
 
 /// The name of the `number`-th record's table of a diagnosis, counted from 1.
-pub fn before_and_after_name(number: usize) -> String {
+pub(crate) fn before_and_after_name(number: usize) -> String {
     format!("before-after-{number}.csv")
 }
 
@@ -152,7 +152,7 @@ const OF_ALL: [&str; 2] = [MODEL_FILE, "report.html"];
 
 /// The files of one command on their way into a folder that it may share with the others about the same model.
 #[derive(Debug)]
-pub struct MeasurementFiles<'a> {
+pub(crate) struct MeasurementFiles<'a> {
     folder: &'a Path,
     files: Replacement<'a>,
     model_source: Option<&'a str>,
@@ -163,7 +163,7 @@ impl<'a> MeasurementFiles<'a> {
     ///
     /// # Errors
     /// A folder that cannot be written.
-    pub fn new(folder: &'a Path, model: Option<&'a ModelFile>) -> Result<Self, WriteError> {
+    pub(crate) fn new(folder: &'a Path, model: Option<&'a ModelFile>) -> Result<Self, WriteError> {
         let mut files = Replacement::of(folder);
         let model_source = model.map(|m| m.source.as_str());
         if let Some(source) = model_source {
@@ -174,13 +174,13 @@ impl<'a> MeasurementFiles<'a> {
 
     /// # Errors
     /// A file that cannot be written.
-    pub fn add(&mut self, name: &str, contents: &[u8]) -> Result<(), WriteError> {
+    pub(crate) fn add(&mut self, name: &str, contents: &[u8]) -> Result<(), WriteError> {
         self.files.add(name, contents)
     }
 
     /// # Errors
     /// A file that cannot be written.
-    pub fn document<T: Serialize>(&mut self, name: &str, document: &T) -> Result<(), WriteError> {
+    pub(crate) fn document<T: Serialize>(&mut self, name: &str, document: &T) -> Result<(), WriteError> {
         // A number that is not finite becomes null, which is no error.
         let json = serde_json::to_string_pretty(&Document::new(document)).expect("keys are texts");
         self.add(name, (json + "\n").as_bytes())
@@ -190,7 +190,7 @@ impl<'a> MeasurementFiles<'a> {
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn table<T: Serialize>(&mut self, name: &str, rows: &[T]) -> Result<(), WriteError> {
+    pub(crate) fn table<T: Serialize>(&mut self, name: &str, rows: &[T]) -> Result<(), WriteError> {
         self.add(name, &rows_as_csv(rows).expect("rows are flat and a buffer in memory takes every one"))
     }
 
@@ -198,7 +198,7 @@ impl<'a> MeasurementFiles<'a> {
     ///
     /// # Errors
     /// A file that cannot be written, removed or renamed.
-    pub fn commit(self, document: &str) -> Result<(), WriteError> {
+    pub(crate) fn commit(self, document: &str) -> Result<(), WriteError> {
         let former = std::fs::read_to_string(self.folder.join(MODEL_FILE)).ok();
         let is_other = self.model_source.zip(former.as_deref()).is_some_and(|(new, old)| new != old);
         let replaced = KINDS.iter().filter(|kinds| is_other || kinds[0] == document).copied().flatten();
@@ -212,7 +212,7 @@ impl<'a> MeasurementFiles<'a> {
 ///
 /// # Errors
 /// A file that cannot be removed.
-pub fn clear(folder: &Path) -> Result<(), WriteError> {
+pub(crate) fn clear(folder: &Path) -> Result<(), WriteError> {
     let kinds: Vec<&str> = KINDS.iter().copied().flatten().chain(&OF_ALL).copied().collect();
     remove_kinds(folder, &kinds)
 }
@@ -221,7 +221,7 @@ pub fn clear(folder: &Path) -> Result<(), WriteError> {
 ///
 /// # Errors
 /// A folder that cannot be written.
-pub fn write_table<T: Serialize>(folder: &Path, name: &str, rows: &[T]) -> Result<(), WriteError> {
+pub(crate) fn write_table<T: Serialize>(folder: &Path, name: &str, rows: &[T]) -> Result<(), WriteError> {
     let table = rows_as_csv(rows).expect("rows are flat and a buffer in memory takes every one");
     write_atomically(&folder.join(name), &table)
 }

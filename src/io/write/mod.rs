@@ -2,24 +2,24 @@
 //!
 //! What only this program writes and reads again (a checkpoint, the parts of a front, the cells of a campaign) is read here too.
 
-pub mod boundary_edit;
-pub mod campaign_cells;
-pub mod campaign_tables;
+pub(crate) mod boundary_edit;
+pub(crate) mod campaign_cells;
+pub(crate) mod campaign_tables;
 pub mod checkpoint;
-pub mod comparison_rows;
+pub(crate) mod comparison_rows;
 pub mod compensation_file;
 pub mod difference_equation;
 pub mod empirical_export;
-pub mod field_table;
+pub(crate) mod field_table;
 mod formulas_in_c;
 pub(crate) mod leave_one_out;
 pub mod machine_program;
 pub mod measurement_folder;
 pub mod model_edit;
 pub mod model_template;
-pub mod model_tuning;
+pub(crate) mod model_tuning;
 pub mod pareto_parts;
 pub mod run_directory;
-pub mod sample_table;
+pub(crate) mod sample_table;
 pub mod traveller;
 pub mod workflow;

@@ -10,16 +10,21 @@ use crate::text::sink::TomlComment;
 
 /// A remark written behind a parameter's value, such as its standard error.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Remark {
-    pub key: String,
-    pub text: TomlComment,
+pub(crate) struct Remark {
+    pub(crate) key: String,
+    pub(crate) text: TomlComment,
 }
 
 /// The source with the effect declared: appended, or with its values renewed where it is declared already.
 ///
 /// # Errors
 /// A source that is no TOML or whose `effect` is no array of tables.
-pub fn with_effect(file: &str, source: &str, effect: &DeclaredEffect, remarks: &[Remark]) -> Result<String, Faults> {
+pub(crate) fn with_effect(
+    file: &str,
+    source: &str,
+    effect: &DeclaredEffect,
+    remarks: &[Remark],
+) -> Result<String, Faults> {
     let mut document: DocumentMut = source
         .parse()
         .map_err(|e: toml_edit::TomlError| Faults::one(file, source, Fault::new(e.message(), e.span())))?;
@@ -55,7 +60,7 @@ pub fn with_effect(file: &str, source: &str, effect: &DeclaredEffect, remarks: &
 ///
 /// # Errors
 /// A source that is no TOML or whose `sensor` or `winding` is no table.
-pub fn with_sensor_and_pattern(
+pub(crate) fn with_sensor_and_pattern(
     file: &str,
     source: &str,
     location: Option<&str>,

@@ -13,7 +13,7 @@ use crate::thermal::{Extent, Material};
 use crate::units::c_per_h_from_k_per_s;
 
 /// The numbers as the model has them; none where it lacks what they are of.
-pub fn settings(file: &ModelFile) -> SettingsJson {
+pub(crate) fn settings(file: &ModelFile) -> SettingsJson {
     let of = |address: Address| {
         let effect = file.model.effects.iter().find(|e| e.is_at(address))?;
         Some(address.spec.parameters[address.parameter].unit.from_si(effect.values()[address.parameter]))
@@ -27,7 +27,7 @@ pub fn settings(file: &ModelFile) -> SettingsJson {
 }
 
 /// Whether heat can pass through a film or into a spool: a half space has neither.
-pub fn has_surfaces(file: &ModelFile) -> bool {
+pub(crate) fn has_surfaces(file: &ModelFile) -> bool {
     file.model.heat_path().is_ok_and(|path| path.extent == Extent::Pack)
 }
 
@@ -35,7 +35,7 @@ pub fn has_surfaces(file: &ModelFile) -> bool {
 ///
 /// # Errors
 /// A source that cannot be edited, numbers that no effect takes.
-pub fn tuned(file: &ModelFile, set: &SettingsJson) -> Result<String, Faults> {
+pub(crate) fn tuned(file: &ModelFile, set: &SettingsJson) -> Result<String, Faults> {
     let path = file.path.display().to_string();
     let mut source = file.source.clone();
     for (address, stated) in [(FILM, set.film_w_per_m2_k), (SPOOL, set.spool_j_per_m2_k)] {
@@ -127,7 +127,7 @@ fn scale_ramps(document: &mut DocumentMut, factor: f64) {
 ///
 /// # Errors
 /// A source that is no TOML.
-pub fn without_pattern(file: &str, source: &str) -> Result<String, Faults> {
+pub(crate) fn without_pattern(file: &str, source: &str) -> Result<String, Faults> {
     let mut document: DocumentMut = source
         .parse()
         .map_err(|e: toml_edit::TomlError| Faults::one(file, source, Fault::new(e.message(), e.span())))?;

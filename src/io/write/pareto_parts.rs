@@ -13,11 +13,11 @@ use crate::text::sink::Cell;
 
 /// What all parts of one front have in common and what a part must agree with to be kept.
 #[derive(Debug, Clone)]
-pub struct Front<'a> {
-    pub folder: &'a Path,
-    pub file: &'a ModelFile,
-    pub seed: u64,
-    pub rounds: u64,
+pub(crate) struct Front<'a> {
+    pub(crate) folder: &'a Path,
+    pub(crate) file: &'a ModelFile,
+    pub(crate) seed: u64,
+    pub(crate) rounds: u64,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -40,7 +40,7 @@ impl PartJson {
 
 /// What an earlier front left in the folder: its pictures, the pattern files that its table lists, and the table, last: it must
 /// not go before what it lists.
-pub fn files_of_front(folder: &Path) -> Vec<String> {
+pub(crate) fn files_of_front(folder: &Path) -> Vec<String> {
     let mut names = ["pareto.svg", "pareto-p95.svg"].map(str::to_owned).to_vec();
     if let Ok(mut reader) = csv::Reader::from_path(folder.join("pareto.csv")) {
         let column = reader.headers().ok().and_then(|header| header.iter().position(|name| name == "file"));
@@ -65,7 +65,7 @@ pub fn check_kept<'a>(folder: &Path, read: impl IntoIterator<Item = &'a Path>) -
 
 impl Front<'_> {
     /// The patterns of a part that has been searched; none if it has not, or for another request.
-    pub fn read_part(&self, number: usize, part: &str) -> Option<Vec<Pattern>> {
+    pub(crate) fn read_part(&self, number: usize, part: &str) -> Option<Vec<Pattern>> {
         let text = std::fs::read_to_string(self.path(number)).ok()?;
         let read: PartJson = serde_json::from_str(&text).ok()?;
         let layers = self.file.model.coil.layers();
@@ -79,7 +79,7 @@ impl Front<'_> {
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn write_part(&self, number: usize, part: &str, found: &[Pattern]) -> Result<(), WriteError> {
+    pub(crate) fn write_part(&self, number: usize, part: &str, found: &[Pattern]) -> Result<(), WriteError> {
         let found = found.iter().map(|p| p.segments().to_vec()).collect();
         let (fingerprint, part) = (self.fingerprint(part), part.to_owned());
         let mut document = PartJson { fingerprint, checksum: String::new(), part, found };
@@ -92,7 +92,7 @@ impl Front<'_> {
     ///
     /// # Errors
     /// A file that cannot be removed.
-    pub fn keep_parts(&self, count: usize) -> Result<(), WriteError> {
+    pub(crate) fn keep_parts(&self, count: usize) -> Result<(), WriteError> {
         let parts = self.folder.join("parts");
         remove_numbered(&parts, count)?;
         clear_left_behind(&parts).map_err(|source| WriteError::Folder { path: parts, source })

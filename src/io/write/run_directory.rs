@@ -69,7 +69,7 @@ impl Request<'_> {
     }
 
     /// The text of `run.toml`.
-    pub fn run_toml(&self) -> String {
+    pub(crate) fn run_toml(&self) -> String {
         let mut document = toml_edit::DocumentMut::new();
         document["program"] = toml_edit::value(concat!("coilwright ", env!("CARGO_PKG_VERSION")));
         document["command"] = toml_edit::value("optimise");
@@ -87,7 +87,7 @@ impl Request<'_> {
 impl Request<'_> {
     /// What differs between the request of the run that a folder holds and this one: each option with its old and its new value.
     /// Empty where the folder does not say.
-    pub fn differences(&self, folder: &Path) -> Vec<String> {
+    pub(crate) fn differences(&self, folder: &Path) -> Vec<String> {
         let read = |name: &str| std::fs::read_to_string(folder.join(name)).ok();
         let old = read("run.toml").and_then(|text| text.parse::<toml_edit::DocumentMut>().ok());
         let Some(old) = old.as_ref().and_then(|document| document["search"].as_table()) else { return Vec::new() };
@@ -121,7 +121,7 @@ pub fn write_request(folder: &Path, request: &Request) -> Result<(), WriteError>
 }
 
 /// What a search may leave, over profiles or over fields; the summary first: while it is there, the rest is of its run.
-pub const KINDS: [&str; 11] = [
+pub(crate) const KINDS: [&str; 11] = [
     "summary.json",
     "best.toml",
     "baselines.csv",
@@ -151,7 +151,7 @@ pub fn check_kept<'a>(folder: &Path, read: impl IntoIterator<Item = &'a Path>) -
 ///
 /// # Errors
 /// A file that cannot be removed.
-pub fn clear(folder: &Path) -> Result<(), WriteError> {
+pub(crate) fn clear(folder: &Path) -> Result<(), WriteError> {
     remove_kinds(folder, &KINDS)
 }
 
@@ -159,7 +159,12 @@ pub fn clear(folder: &Path) -> Result<(), WriteError> {
 ///
 /// # Errors
 /// Files that cannot be written.
-pub fn write_results(folder: &Path, answer: &OptimiseJson, best: &Judged, state: &State) -> Result<(), WriteError> {
+pub(crate) fn write_results(
+    folder: &Path,
+    answer: &OptimiseJson,
+    best: &Judged,
+    state: &State,
+) -> Result<(), WriteError> {
     let named = NamedPattern { name: best.name.clone(), pattern: best.pattern.clone() };
     let mut comments = vec![
         format!("coil: {}", answer.model),

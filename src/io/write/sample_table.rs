@@ -6,7 +6,7 @@ use crate::units::deg_per_h_from_rad_per_s;
 /// One sample a line: the constant and a coefficient a layer [°/h], so that Ω = constant + Σ_j a_j (2 P(j) − 1 − N).
 ///
 /// `None` where Ω is not of that form: lengths that differ, halves that respond differently, axial moments.
-pub fn print_samples(rows: &[Row], lengths_m: &[f64]) -> Option<String> {
+pub(crate) fn print_samples(rows: &[Row], lengths_m: &[f64]) -> Option<String> {
     let length_m = lengths_m[0];
     let is_zero = |values: &[f64]| values.iter().all(|v| *v == 0.0);
     let linear = lengths_m.iter().all(|l| *l == length_m);

@@ -38,10 +38,10 @@ const SETTLED: f64 = 2e-3;
 /// Where the likelihood was looked at.
 #[derive(Debug, Clone)]
 pub(super) struct Point {
-    pub variances: [f64; COMPONENTS],
+    pub(crate) variances: [f64; COMPONENTS],
     /// Of the columns, by group.
     group_variances: Vec<f64>,
-    pub minus_two_log_likelihood: f64,
+    pub(crate) minus_two_log_likelihood: f64,
 }
 
 #[derive(Debug, Clone)]

@@ -51,9 +51,9 @@ pub struct NoiseStrengths {
     pub white: Interval,
     pub flicker: Interval,
     pub random_walk: Interval,
-    pub ramp: Interval,
+    pub(crate) ramp: Interval,
     /// Root mean square of what the further columns explain, in units of y.
-    pub explained: f64,
+    pub(crate) explained: f64,
 }
 
 /// χ² with one degree of freedom at 0.95^(1/5).

@@ -34,15 +34,15 @@ pub enum Degree {
 
 /// Least and largest value.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Interval {
-    pub low: f64,
-    pub high: f64,
+pub(crate) struct Interval {
+    pub(crate) low: f64,
+    pub(crate) high: f64,
 }
 
 impl Interval {
-    pub const EVERYTHING: Self = Self { low: f64::NEG_INFINITY, high: f64::INFINITY };
+    pub(crate) const EVERYTHING: Self = Self { low: f64::NEG_INFINITY, high: f64::INFINITY };
 
-    pub fn at(value: f64) -> Self {
+    pub(crate) fn at(value: f64) -> Self {
         Self { low: value, high: value }
     }
 
@@ -62,14 +62,14 @@ impl Interval {
     }
 
     /// The largest size.
-    pub fn size(self) -> f64 {
+    pub(crate) fn size(self) -> f64 {
         self.low.abs().max(self.high.abs())
     }
 }
 
 impl Expression {
     /// Why it has no value where all its variables have one, the memory being as it was before; None where it has.
-    pub fn fault(&self, values: &[f64], time_s: f64, memory: &Memory) -> Option<EvaluationError> {
+    pub(crate) fn fault(&self, values: &[f64], time_s: f64, memory: &Memory) -> Option<EvaluationError> {
         let mut memory = memory.clone();
         self.checked(&self.root, values, &mut memory.at(time_s, self.memories)).err()
     }
@@ -126,20 +126,20 @@ impl Expression {
     }
 
     /// How it depends on the variables (by place) that `which` picks.
-    pub fn degree(&self, which: &dyn Fn(usize) -> bool) -> Degree {
+    pub(crate) fn degree(&self, which: &dyn Fn(usize) -> bool) -> Degree {
         degree(&self.root, which)
     }
 
     /// Whether a variable (by place) stands by itself as the time constant or half width of what remembers, and never
     /// elsewhere: it is then no sum's sign but a size.
-    pub fn is_size(&self, variable: usize) -> bool {
+    pub(crate) fn is_size(&self, variable: usize) -> bool {
         let (mut as_size, mut elsewhere) = (0, 0);
         count(&self.root, variable, &mut as_size, &mut elsewhere);
         as_size > 0 && elsewhere == 0
     }
 
     /// Within which bounds it stays while its variables stay within theirs.
-    pub fn range(&self, variables: &[Interval]) -> Interval {
+    pub(crate) fn range(&self, variables: &[Interval]) -> Interval {
         range(&self.root, variables)
     }
 }

@@ -18,7 +18,7 @@ pub(super) enum Keeper {
 }
 
 impl Keeper {
-    pub fn named(function: &str) -> Option<Self> {
+    pub(crate) fn named(function: &str) -> Option<Self> {
         match function {
             "lag" => Some(Keeper::Lag),
             "play" => Some(Keeper::Play),
@@ -26,7 +26,7 @@ impl Keeper {
         }
     }
 
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Keeper::Lag => "lag",
             Keeper::Play => "play",
@@ -66,7 +66,7 @@ pub struct Memory {
 
 impl Memory {
     /// play(x, h) of an effect that remembers nothing else.
-    pub fn play(&mut self, time_s: f64, x: f64, half_width: f64) -> f64 {
+    pub(crate) fn play(&mut self, time_s: f64, x: f64, half_width: f64) -> f64 {
         self.at(time_s, 1).remember(Keeper::Play, 0, x, half_width)
     }
 

@@ -5,18 +5,18 @@ use super::{Expression, Node, Operator};
 impl Expression {
     /// `variable` names each variable's value; a call that remembers becomes `lag_NAME(m, SLOT, x, size)` or
     /// `play_NAME(…)`, where `m` is where the memory is.
-    pub fn in_c(&self, prefix: &str, variable: &dyn Fn(usize) -> String) -> String {
+    pub(crate) fn in_c(&self, prefix: &str, variable: &dyn Fn(usize) -> String) -> String {
         printed(&self.root, prefix, variable)
     }
 
     /// The formula as it was written, with numbers in the place of names that have a value.
-    pub fn with_values(&self, value: &dyn Fn(&str) -> Option<f64>) -> String {
+    pub(crate) fn with_values(&self, value: &dyn Fn(&str) -> Option<f64>) -> String {
         let shown = |v: f64| if v < 0.0 { format!("({v:?})") } else { format!("{v:?}") };
         self.with_names(&|name| value(name).map(shown))
     }
 
     /// The same with texts in the place of names.
-    pub fn with_names(&self, value: &dyn Fn(&str) -> Option<String>) -> String {
+    pub(crate) fn with_names(&self, value: &dyn Fn(&str) -> Option<String>) -> String {
         let mut text = String::with_capacity(self.source.len());
         let mut name = String::new();
         for c in self.source.chars().chain([' ']) {
@@ -38,7 +38,7 @@ impl Expression {
     }
 
     /// Calls that remember.
-    pub fn memories(&self) -> usize {
+    pub(crate) fn memories(&self) -> usize {
         self.memories
     }
 }

@@ -12,7 +12,7 @@ use crate::io::json::explore::ExplorerDataJson;
 use crate::text::sink::{JsonText, Markup};
 
 /// The library as a WebAssembly module, compressed: `explorer/build` makes it.
-pub const MODULE: &[u8] = include_bytes!("model.wasm.gz");
+pub(crate) const MODULE: &[u8] = include_bytes!("model.wasm.gz");
 
 const SCRIPT: &str = include_str!("page.js");
 const STYLE: &str = include_str!("style.css");
@@ -32,7 +32,7 @@ fn policy() -> String {
 ///
 /// # Errors
 /// None that data with finite numbers could cause.
-pub fn explorer_page(model: &str, data: &ExplorerDataJson) -> Result<String, serde_json::Error> {
+pub(crate) fn explorer_page(model: &str, data: &ExplorerDataJson) -> Result<String, serde_json::Error> {
     let json = JsonText::embedded(&serde_json::to_string(data)?).into_string();
     let number = |id: &str, title: &str, value: &str, unit: &str| {
         html! { div { dt { (title) } dd { span id=(id) { (value) } @if !unit.is_empty() { " " small { (unit) } } } } }

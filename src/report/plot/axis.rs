@@ -28,17 +28,17 @@ impl Axis {
         Self { label: label.into(), scale: Scale::Linear, include: Vec::new() }
     }
 
-    pub fn log(label: impl Into<String>) -> Self {
+    pub(crate) fn log(label: impl Into<String>) -> Self {
         Self { label: label.into(), scale: Scale::Log, include: Vec::new() }
     }
 
     /// Of counts.
-    pub fn whole(label: impl Into<String>) -> Self {
+    pub(crate) fn whole(label: impl Into<String>) -> Self {
         Self { label: label.into(), scale: Scale::Whole, include: Vec::new() }
     }
 
     /// Logarithmic, of the sizes of values that may have either sign; `floor` is positive.
-    pub fn sizes(label: impl Into<String>, floor: f64) -> Self {
+    pub(crate) fn sizes(label: impl Into<String>, floor: f64) -> Self {
         Self { label: label.into(), scale: Scale::Size { floor }, include: Vec::new() }
     }
 
@@ -91,19 +91,19 @@ impl Axis {
 /// A labelled or unlabelled place on a ruler.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Tick {
-    pub position: f64,
+    pub(crate) position: f64,
     /// Empty for a minor tick.
-    pub label: String,
+    pub(crate) label: String,
 }
 
 /// An axis with its ends and ticks found.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Ruler {
-    pub low: f64,
-    pub high: f64,
-    pub ticks: Vec<Tick>,
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+    pub(crate) ticks: Vec<Tick>,
     /// Behind the axis label: the power of ten that the tick labels leave out.
-    pub suffix: String,
+    pub(crate) suffix: String,
 }
 
 impl Ruler {

@@ -74,17 +74,17 @@ impl Series {
         Self::of(name, Shape::Dashed, points)
     }
 
-    pub fn points(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+    pub(crate) fn points(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
         Self::of(name, Shape::Points, points)
     }
 
     /// Each value holds until the next one's x.
-    pub fn step(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+    pub(crate) fn step(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
         Self::of(name, Shape::Step, points)
     }
 
     /// Columns of a histogram: `edges` has one entry more than `heights`.
-    pub fn histogram(name: impl Into<String>, edges: &[f64], heights: &[f64]) -> Self {
+    pub(crate) fn histogram(name: impl Into<String>, edges: &[f64], heights: &[f64]) -> Self {
         let mut points: Vec<(f64, f64)> = edges.iter().copied().zip(heights.iter().copied()).collect();
         if let Some(&edge) = edges.get(points.len()) {
             points.push((edge, 0.0));
@@ -93,26 +93,26 @@ impl Series {
     }
 
     /// Lying bars, one value for each of the chart's [`Chart::categories`].
-    pub fn bars(name: impl Into<String>, values: &[f64]) -> Self {
+    pub(crate) fn bars(name: impl Into<String>, values: &[f64]) -> Self {
         let points = values.iter().enumerate().map(|(i, v)| (*v, i as f64)).collect();
         Self::of(name, Shape::Bars, points)
     }
 
     /// Rectangles of one size around their middles, (x, y, value): blue below zero, red above, the paler the smaller.
-    pub fn cells(name: impl Into<String>, size: (f64, f64), cells: &[(f64, f64, f64)]) -> Self {
+    pub(crate) fn cells(name: impl Into<String>, size: (f64, f64), cells: &[(f64, f64, f64)]) -> Self {
         let points = cells.iter().map(|c| (c.0, c.1)).collect();
         let values = cells.iter().map(|c| c.2).collect();
         Self { values, cell: size, ..Self::of(name, Shape::Cells, points) }
     }
 
     /// Draws a bar of one standard error up and down through each point.
-    pub fn with_errors(mut self, errors: Vec<f64>) -> Self {
+    pub(crate) fn with_errors(mut self, errors: Vec<f64>) -> Self {
         self.errors = errors;
         self
     }
 
     /// The strongest tint of cells stands for no less than this.
-    pub fn at_least(mut self, value: f64) -> Self {
+    pub(crate) fn at_least(mut self, value: f64) -> Self {
         self.least = value;
         self
     }
@@ -123,7 +123,7 @@ impl Series {
     }
 
     /// Writes a word next to each point.
-    pub fn labelled(mut self, labels: Vec<String>) -> Self {
+    pub(crate) fn labelled(mut self, labels: Vec<String>) -> Self {
         self.labels = labels;
         self
     }
@@ -156,7 +156,7 @@ impl Mark {
     }
 
     /// At one y.
-    pub fn horizontal(label: impl Into<String>, y: f64) -> Self {
+    pub(crate) fn horizontal(label: impl Into<String>, y: f64) -> Self {
         Self { label: label.into(), along: Along::Y, value: y }
     }
 }
@@ -179,7 +179,7 @@ impl Band {
     }
 
     /// Between two y, over the whole width.
-    pub fn horizontal(label: impl Into<String>, from: f64, to: f64) -> Self {
+    pub(crate) fn horizontal(label: impl Into<String>, from: f64, to: f64) -> Self {
         Self { label: label.into(), along: Along::Y, from, to, hue: None }
     }
 
@@ -253,7 +253,7 @@ impl Chart {
     }
 
     /// Names along the vertical axis, from the top, for [`Series::bars`]; the height follows their number.
-    pub fn categories(mut self, names: impl IntoIterator<Item = impl Into<String>>) -> Self {
+    pub(crate) fn categories(mut self, names: impl IntoIterator<Item = impl Into<String>>) -> Self {
         self.categories = names.into_iter().map(Into::into).collect();
         self
     }
@@ -271,7 +271,7 @@ impl Chart {
 
     /// The same with its data beside it, from which a page's script shows values under the pointer and draws it again, zoomed, on
     /// another scale, or as differences.
-    pub fn svg_to_read(&self) -> String {
+    pub(crate) fn svg_to_read(&self) -> String {
         draw::svg(self, true)
     }
 }

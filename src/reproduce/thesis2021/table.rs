@@ -10,15 +10,15 @@ use crate::units::{
 
 /// What the simulated record shows.
 pub(super) struct Found<'f> {
-    pub measured: &'f Metrics,
-    pub left: &'f Metrics,
-    pub lines: &'f PiecewiseBias,
-    pub crossings_c: [f64; 2],
-    pub walk: f64,
-    pub walk_by_fit: f64,
-    pub shifts: [f64; 2],
+    pub(crate) measured: &'f Metrics,
+    pub(crate) left: &'f Metrics,
+    pub(crate) lines: &'f PiecewiseBias,
+    pub(crate) crossings_c: [f64; 2],
+    pub(crate) walk: f64,
+    pub(crate) walk_by_fit: f64,
+    pub(crate) shifts: [f64; 2],
     /// Of a rate of one degree an hour, with its standard error.
-    pub estimate: (f64, f64),
+    pub(crate) estimate: (f64, f64),
 }
 
 /// Each number of the chapter beside the computed one.

@@ -14,9 +14,9 @@ pub(super) fn uniform(random: &mut ChaCha8Rng) -> f64 {
 /// What the winding shop puts up with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    pub class: WindabilityClass,
+    pub(crate) class: WindabilityClass,
     /// No crossover may climb more layers.
-    pub most_climb: Option<usize>,
+    pub(crate) most_climb: Option<usize>,
 }
 
 impl From<WindabilityClass> for Limits {
@@ -26,7 +26,7 @@ impl From<WindabilityClass> for Limits {
 }
 
 impl Limits {
-    pub fn admits(self, segments: &[usize]) -> bool {
+    pub(crate) fn admits(self, segments: &[usize]) -> bool {
         let in_class = match self.class {
             WindabilityClass::Standard => signs_of_segments(segments).is_some(),
             WindabilityClass::Captive(most) => most_captive(segments) <= most,
@@ -59,7 +59,7 @@ pub(super) fn most_captive(segments: &[usize]) -> usize {
 
 /// A pattern within the limits drawn at random; `captive:K` starts from a standard one, and where climbs are limited a
 /// random walk starts from the cylindrical winding, which climbs least.
-pub fn draw(limits: impl Into<Limits>, layers: usize, random: &mut ChaCha8Rng) -> Vec<usize> {
+pub(crate) fn draw(limits: impl Into<Limits>, layers: usize, random: &mut ChaCha8Rng) -> Vec<usize> {
     let limits: Limits = limits.into();
     if limits.most_climb.is_some() {
         let mut segments: Vec<usize> = (1..=layers).collect();
@@ -91,7 +91,7 @@ pub(super) fn pick(random: &mut ChaCha8Rng, count: usize) -> usize {
 const STEPS_A_LAYER: usize = 32;
 
 /// One end or two of a standard pattern; three swaps to one insertion elsewhere. `None` if it would leave the limits.
-pub fn neighbour(limits: Limits, segments: &[usize], random: &mut ChaCha8Rng) -> Option<Vec<usize>> {
+pub(crate) fn neighbour(limits: Limits, segments: &[usize], random: &mut ChaCha8Rng) -> Option<Vec<usize>> {
     let layers = segments.len();
     let is_within = |candidate: &Vec<usize>| limits.admits(candidate);
     if limits.class == WindabilityClass::Standard {

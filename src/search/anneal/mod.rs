@@ -1,7 +1,7 @@
 //! The annealer: one restart, rounds of restarts, and the steps that stay within what the winding shop puts up with.
 
-pub mod limits;
-pub mod quantile;
+pub(crate) mod limits;
+pub(crate) mod quantile;
 pub mod restart;
 pub mod rounds;
 pub mod sample_cost;

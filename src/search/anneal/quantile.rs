@@ -25,26 +25,26 @@ use crate::search::cost::{Cost, InFull, Pace, Position, Proposal};
 const COILS_THAT_TELL: usize = 40;
 
 /// Moves of a restart for a layer count.
-pub fn default_moves_per_restart(layers: usize) -> u64 {
+pub(crate) fn default_moves_per_restart(layers: usize) -> u64 {
     ((layers as u64).pow(2) * 16).max(1000)
 }
 
 /// The quantile of the worst case over sampled coils, within limits.
 #[derive(Debug, Clone)]
-pub struct QuantileCost {
+pub(crate) struct QuantileCost {
     coils: SampledCoils,
     limits: Limits,
 }
 
 impl QuantileCost {
-    pub fn new(coils: SampledCoils, limits: impl Into<Limits>) -> Self {
+    pub(crate) fn new(coils: SampledCoils, limits: impl Into<Limits>) -> Self {
         Self { coils, limits: limits.into() }
     }
 }
 
 /// A pattern, the worst case of every coil with it, and the pattern proposed last.
 #[derive(Debug, Clone)]
-pub struct QuantilePosition {
+pub(crate) struct QuantilePosition {
     segments: Vec<usize>,
     candidate: Vec<usize>,
     worst: QuantileWorst,

@@ -24,7 +24,7 @@ use crate::search::cost::{Cost, Position, Proposal};
 pub struct Cooling {
     pub hot: f64,
     pub cold: f64,
-    pub moves: u64,
+    pub(crate) moves: u64,
 }
 
 impl Cooling {
@@ -43,12 +43,12 @@ pub fn generator(seed: u64, stream: u64) -> ChaCha8Rng {
 /// Everything that a restart needs to go on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Restart {
-    pub index: u64,
-    pub moves: u64,
-    pub segments: Vec<usize>,
-    pub best_segments: Vec<usize>,
+    pub(crate) index: u64,
+    pub(crate) moves: u64,
+    pub(crate) segments: Vec<usize>,
+    pub(crate) best_segments: Vec<usize>,
     pub best_cost: f64,
-    pub random: ChaCha8Rng,
+    pub(crate) random: ChaCha8Rng,
     pub work: Work,
 }
 

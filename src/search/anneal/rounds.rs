@@ -40,8 +40,8 @@ pub fn default_moves_per_restart(layers: usize) -> u64 {
     ((layers as u64).pow(2) * 128).min(1_000_000)
 }
 
-pub const DEFAULT_RESTARTS_PER_ROUND: usize = 8;
-pub const DEFAULT_PATIENCE: u64 = 6;
+pub(crate) const DEFAULT_RESTARTS_PER_ROUND: usize = 8;
+pub(crate) const DEFAULT_PATIENCE: u64 = 6;
 
 /// Why a search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,7 +58,7 @@ impl Stop {
     const ALL: [Stop; 5] = [Stop::Rounds, Stop::Moves, Stop::Patience, Stop::Target, Stop::Proved];
 
     /// As written in results.
-    pub fn key(self) -> &'static str {
+    pub(crate) fn key(self) -> &'static str {
         match self {
             Stop::Rounds => "rounds",
             Stop::Moves => "moves",
@@ -68,7 +68,7 @@ impl Stop {
         }
     }
 
-    pub fn from_key(key: &str) -> Option<Self> {
+    pub(crate) fn from_key(key: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|stop| stop.key() == key)
     }
 }
@@ -83,31 +83,31 @@ pub struct Found {
 
 /// The state after a round.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RoundRecord {
-    pub round: u64,
-    pub evaluations: u64,
-    pub best_cost: f64,
-    pub working_samples: usize,
+pub(crate) struct RoundRecord {
+    pub(crate) round: u64,
+    pub(crate) evaluations: u64,
+    pub(crate) best_cost: f64,
+    pub(crate) working_samples: usize,
 }
 
 /// The part of a search that changes: save it between slices, and the search goes on from it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct State {
     pub round: u64,
-    pub restarts: Vec<Restart>,
+    pub(crate) restarts: Vec<Restart>,
     /// Best first, no two alike, at most [`MOST_FOUND`].
     pub found: Vec<Found>,
     pub rounds_without_improvement: u64,
     /// Indices of the samples that the restarts run on, those that bind most first.
-    pub working: Vec<usize>,
+    pub(crate) working: Vec<usize>,
     pub work: Work,
-    pub history: Vec<RoundRecord>,
-    pub stop: Option<Stop>,
+    pub(crate) history: Vec<RoundRecord>,
+    pub(crate) stop: Option<Stop>,
 }
 
 impl State {
     /// Ends the search for a reason from outside: what is best was proved, or what is good enough was found, elsewhere.
-    pub fn conclude(&mut self, stop: Stop) {
+    pub(crate) fn conclude(&mut self, stop: Stop) {
         for restart in std::mem::take(&mut self.restarts) {
             self.work += restart.work;
         }
@@ -129,7 +129,7 @@ impl State {
     }
 
     /// The first round after which the best was known; none if it was given.
-    pub fn first_with_best(&self) -> Option<&RoundRecord> {
+    pub(crate) fn first_with_best(&self) -> Option<&RoundRecord> {
         let best_cost = self.found.first()?.cost;
         self.history.iter().find(|record| record.best_cost <= best_cost)
     }
@@ -167,7 +167,7 @@ impl State {
 }
 
 /// Patterns kept for the final judgement by the reference.
-pub const MOST_FOUND: usize = 24;
+pub(crate) const MOST_FOUND: usize = 24;
 
 /// A search under way, whatever it makes small.
 #[derive(Debug)]
@@ -229,7 +229,7 @@ impl<C: Cost> Optimisation<C> {
 
     /// Goes on from a saved state; everything else must be as it was when it was saved. `None` for a state that no
     /// search for this cost can have been in.
-    pub fn resume(cost: C, plan: Plan, state: State) -> Option<Self> {
+    pub(crate) fn resume(cost: C, plan: Plan, state: State) -> Option<Self> {
         let is_pattern = |segments: &Vec<usize>| {
             segments.len() == cost.layers() && Pattern::new(segments.clone()).is_ok() && cost.admits(segments)
         };

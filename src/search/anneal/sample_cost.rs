@@ -32,7 +32,7 @@ impl SampleCost {
     /// Where the class is `standard` but the error is not linear in its signs, lets the rounds run on what it is near a
     /// pattern, where it is linear. What they find is refined and judged as it is.
     #[must_use]
-    pub fn frozen_at(mut self, weights: &LayerWeights) -> Self {
+    pub(crate) fn frozen_at(mut self, weights: &LayerWeights) -> Self {
         let layout = self.space.matrix().layout;
         let is_curved = !layout.halves_alike || layout.axial;
         if self.space.class() == WindabilityClass::Standard && is_curved {

@@ -64,17 +64,17 @@ impl Space {
         &self.matrix
     }
 
-    pub fn layers(&self) -> usize {
+    pub(crate) fn layers(&self) -> usize {
         self.matrix.layers()
     }
 
     /// The columns that a walk's coefficients and changes refer to.
-    pub fn columns(&self) -> &Columns {
+    pub(crate) fn columns(&self) -> &Columns {
         self.signs.as_ref().unwrap_or(&self.matrix.columns)
     }
 
     /// Whether the class admits P(j).
-    pub fn admits(&self, segments: &[usize]) -> bool {
+    pub(crate) fn admits(&self, segments: &[usize]) -> bool {
         Limits::from(self.class).admits(segments)
     }
 
@@ -84,7 +84,7 @@ impl Space {
     }
 
     /// A position at a pattern of the class.
-    pub fn walk(&self, segments: Vec<usize>) -> Walk {
+    pub(crate) fn walk(&self, segments: Vec<usize>) -> Walk {
         let mut walk = Walk {
             high: match self.class {
                 WindabilityClass::Standard => signs_of_segments(&segments).unwrap_or_default(),
@@ -112,7 +112,7 @@ fn invert(segments: &[usize]) -> Vec<usize> {
 
 /// A pattern, its coefficients, and the proposal made last.
 #[derive(Debug, Clone)]
-pub struct Walk {
+pub(crate) struct Walk {
     segments: Vec<usize>,
     layers_by_segment: Vec<usize>,
     /// The ends, for the class `standard`; otherwise empty.
@@ -125,20 +125,12 @@ pub struct Walk {
 
 impl Walk {
     /// P(j), innermost layer first.
-    pub fn segments(&self) -> Vec<usize> {
+    pub(crate) fn segments(&self) -> Vec<usize> {
         if self.high.is_empty() { self.segments.clone() } else { segments_of_signs(&self.high) }
     }
 
-    pub fn coefficients(&self) -> &[f64] {
+    pub(crate) fn coefficients(&self) -> &[f64] {
         &self.coefficients
-    }
-
-    /// Computes the coefficients again, so that rounding of many changes is gone.
-    pub fn refresh(&mut self, space: &Space) {
-        self.segments = self.segments();
-        self.layers_by_segment = invert(&self.segments);
-        self.candidate.clone_from(&self.segments);
-        self.coefficients = self.recomputed_coefficients(space);
     }
 
     fn recomputed_coefficients(&self, space: &Space) -> Vec<f64> {
@@ -165,7 +157,7 @@ impl Walk {
     }
 
     /// Draws a move; its changes of the coefficients, or `None` if it would leave the class.
-    pub fn propose(&mut self, space: &Space, random: &mut ChaCha8Rng) -> Option<&[Change]> {
+    pub(crate) fn propose(&mut self, space: &Space, random: &mut ChaCha8Rng) -> Option<&[Change]> {
         let layers = space.layers();
         self.changes.clear();
         if space.class == WindabilityClass::Standard {
@@ -270,7 +262,7 @@ impl Walk {
     }
 
     /// Goes where the last proposal leads.
-    pub fn accept(&mut self, space: &Space) {
+    pub(crate) fn accept(&mut self, space: &Space) {
         for change in &self.changes {
             self.coefficients[change.column] += change.by;
         }
@@ -291,7 +283,7 @@ impl Walk {
     }
 
     /// Forgets the last proposal.
-    pub fn refuse(&mut self, space: &Space) {
+    pub(crate) fn refuse(&mut self, space: &Space) {
         if space.class != WindabilityClass::Standard {
             self.candidate.copy_from_slice(&self.segments);
         }

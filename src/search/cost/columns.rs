@@ -16,7 +16,7 @@
 //! for k changed columns, which is bound by cache bandwidth.
 
 /// Samples judged at once; values, changed columns and the result of a block fit the first-level cache.
-pub const BLOCK: usize = 64;
+pub(crate) const BLOCK: usize = 64;
 
 /// How the values of all samples make one cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -81,7 +81,7 @@ impl Norm {
     }
 
     /// The cost of given values.
-    pub fn of(self, values: &[f64]) -> f64 {
+    pub(crate) fn of(self, values: &[f64]) -> f64 {
         let total = match self {
             Norm::Largest => values.iter().map(|v| v.abs()).fold(0.0, f64::max),
             Norm::RootMeanSquare => values.iter().map(|v| v * v).sum(),
@@ -108,7 +108,7 @@ impl Columns {
     ///
     /// # Panics
     /// Columns of unequal length are a bug of the caller.
-    pub fn new(constant: &[f64], columns: &[Vec<f64>]) -> Self {
+    pub(crate) fn new(constant: &[f64], columns: &[Vec<f64>]) -> Self {
         let samples = constant.len();
         let padded = samples.next_multiple_of(BLOCK).max(BLOCK);
         let pad = |column: &[f64]| {
@@ -120,7 +120,7 @@ impl Columns {
         Self { samples, padded, constant: pad(constant), data: columns.iter().flat_map(|c| pad(c)).collect() }
     }
 
-    pub fn samples(&self) -> usize {
+    pub(crate) fn samples(&self) -> usize {
         self.samples
     }
 
@@ -139,7 +139,7 @@ impl Columns {
     }
 
     /// The same map with the samples in another order, or fewer of them.
-    pub fn select(&self, samples: &[usize]) -> Self {
+    pub(crate) fn select(&self, samples: &[usize]) -> Self {
         let pick = |column: &[f64]| samples.iter().map(|&s| column[s]).collect::<Vec<f64>>();
         let columns: Vec<Vec<f64>> = (0..self.count()).map(|k| pick(self.column(k))).collect();
         Self::new(&pick(self.constant()), &columns)
@@ -190,24 +190,24 @@ impl std::ops::AddAssign for Work {
 
 /// A change of one coefficient.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Change {
-    pub column: usize,
-    pub by: f64,
+pub(crate) struct Change {
+    pub(crate) column: usize,
+    pub(crate) by: f64,
 }
 
 /// The values of all samples for the present coefficients, and room for a proposal.
 #[derive(Debug, Clone)]
-pub struct Values {
+pub(crate) struct Values {
     norm: Norm,
     values: Vec<f64>,
     proposed: Vec<f64>,
     cost: f64,
     proposed_cost: f64,
-    pub work: Work,
+    pub(crate) work: Work,
 }
 
 impl Values {
-    pub fn new(columns: &Columns, coefficients: &[f64], norm: Norm) -> Self {
+    pub(crate) fn new(columns: &Columns, coefficients: &[f64], norm: Norm) -> Self {
         let values = columns.padded_values(coefficients);
         let proposed = values.clone();
         let mut state = Self { norm, values, proposed, cost: 0.0, proposed_cost: 0.0, work: Work::default() };
@@ -215,31 +215,20 @@ impl Values {
         state
     }
 
-    /// Starts again from given coefficients: rounding of many small changes is gone.
-    pub fn reset(&mut self, columns: &Columns, coefficients: &[f64]) {
-        self.values = columns.padded_values(coefficients);
-        self.cost = self.recomputed_cost(columns);
-    }
-
     fn recomputed_cost(&self, columns: &Columns) -> f64 {
         let total = self.values.chunks_exact(BLOCK).fold(0.0, |total, block| self.norm.gather(total, block));
         self.norm.finish(total, columns.samples)
     }
 
-    pub fn cost(&self) -> f64 {
+    pub(crate) fn cost(&self) -> f64 {
         self.cost
-    }
-
-    /// Padding included.
-    pub fn values(&self) -> &[f64] {
-        &self.values
     }
 
     /// The cost after changes, or `None` as soon as it is known to be above `limit`.
     ///
     /// The answer is kept: [`Values::accept`] makes it the present state.
     #[inline]
-    pub fn propose(&mut self, columns: &Columns, changes: &[Change], limit: f64) -> Option<f64> {
+    pub(crate) fn propose(&mut self, columns: &Columns, changes: &[Change], limit: f64) -> Option<f64> {
         self.work.moves += 1;
         let total_limit = self.norm.total_limit(limit, columns.samples);
         let mut total = 0.0;
@@ -279,7 +268,7 @@ impl Values {
     }
 
     /// Makes the last proposal, which must have passed, the present state.
-    pub fn accept(&mut self) {
+    pub(crate) fn accept(&mut self) {
         self.work.accepted += 1;
         std::mem::swap(&mut self.values, &mut self.proposed);
         self.cost = self.proposed_cost;

@@ -11,15 +11,15 @@ use statrs::distribution::{ContinuousCDF, Normal};
 /// One coil's standard normal deviates.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Deviates {
-    pub turns: Vec<f64>,
+    pub(crate) turns: Vec<f64>,
     /// In the order of [`super::tolerance::Spread::ALL`]; the first is not used.
-    pub others: [f64; OTHERS],
+    pub(crate) others: [f64; OTHERS],
     /// Of each layer, even between 0 and 1; empty where nothing asks for it, as the next.
-    pub lost: Vec<f64>,
-    pub pitches: Vec<f64>,
-    pub flanges: [f64; 2],
+    pub(crate) lost: Vec<f64>,
+    pub(crate) pitches: Vec<f64>,
+    pub(crate) flanges: [f64; 2],
     /// Even between −1 and 1.
-    pub trim: f64,
+    pub(crate) trim: f64,
 }
 
 /// Deviates beside those of the turns.
@@ -34,7 +34,7 @@ const WORDS_PER_DEVIATE: u128 = 2;
 
 impl Deviates {
     /// Of those coils, counted from 0. What is further stands in a stream of its own, so that the others are the same without it.
-    pub fn of(seed: u64, layers: usize, coils: Range<u64>, is_further: bool) -> Vec<Self> {
+    pub(crate) fn of(seed: u64, layers: usize, coils: Range<u64>, is_further: bool) -> Vec<Self> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let normal = Normal::standard();
         let words_per_coil = (layers + OTHERS) as u128 * WORDS_PER_DEVIATE;

@@ -35,7 +35,7 @@ use crate::thermal::{Drive, Extent, HeatPath, Instant, Solver, StepResponse, The
 use crate::units::REFERENCE_TEMPERATURE_K;
 
 /// Of the change from the model's grid to the finer one: what that leaves of the continuum's is a fraction of it (tests).
-pub const SAFETY: f64 = 2.0;
+pub(crate) const SAFETY: f64 = 2.0;
 
 /// The finer grid has so many times as many cells a layer, and elements of a higher order with them.
 const FINER: usize = 2;

@@ -73,11 +73,11 @@ struct HeatAlone {
 
 /// What a guaranteed worst case is made of, for any pattern.
 #[derive(Debug, Clone)]
-pub struct BoundParts {
+pub(crate) struct BoundParts {
     /// G(0+), and then what it changes by from one time of the grid to the next.
-    pub changes: Vec<WeightResponse>,
+    pub(crate) changes: Vec<WeightResponse>,
     /// g at the same times; empty where nothing heats the bore.
-    pub heat: Vec<WeightResponse>,
+    pub(crate) heat: Vec<WeightResponse>,
 }
 
 /// The guaranteed worst case of one pattern.
@@ -223,7 +223,7 @@ impl UnitStep {
     ///
     /// # Errors
     /// Effects that leave a layer no turns.
-    pub fn parts(&self, model: &CoilModel, stride: usize) -> Result<BoundParts, SearchError> {
+    pub(crate) fn parts(&self, model: &CoilModel, stride: usize) -> Result<BoundParts, SearchError> {
         let rate_model = any_rate_model(model)?;
         let limit = self.times_s.len();
         let rows: Vec<usize> = (0..limit).step_by(stride).chain([limit]).collect();

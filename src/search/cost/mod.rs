@@ -12,7 +12,7 @@ pub mod pointing;
 pub mod sampled_coils;
 pub mod samples;
 pub mod signs;
-pub mod tolerance;
+pub(crate) mod tolerance;
 pub mod worst_case;
 
 use rand_chacha::ChaCha8Rng;
@@ -23,12 +23,12 @@ use columns::Work;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pace {
     /// Moves between two points at which a restart can be stopped, saved and taken up again.
-    pub slice_moves: u64,
+    pub(crate) slice_moves: u64,
     /// The temperature is renewed after so many moves.
-    pub moves_per_temperature: u64,
+    pub(crate) moves_per_temperature: u64,
     /// Random patterns, and moves from each, that show how large a typical move is.
-    pub probed_patterns: usize,
-    pub probed_moves: usize,
+    pub(crate) probed_patterns: usize,
+    pub(crate) probed_moves: usize,
 }
 
 /// What came of a proposed move.
@@ -45,11 +45,11 @@ pub enum Proposal {
 /// A pattern judged on all samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InFull {
-    pub cost: f64,
+    pub(crate) cost: f64,
     /// The pattern, or its mirror image where both cost the same and that comes first.
-    pub segments: Vec<usize>,
+    pub(crate) segments: Vec<usize>,
     /// Samples that should join the working set.
-    pub joining: Vec<usize>,
+    pub(crate) joining: Vec<usize>,
 }
 
 /// A cost over the patterns of a class.

@@ -26,7 +26,7 @@ pub enum Objective {
 }
 
 /// One hour: the unit of time by which a pointing error counts as a rate.
-pub const POINTING_S: f64 = SECONDS_PER_HOUR;
+pub(crate) const POINTING_S: f64 = SECONDS_PER_HOUR;
 
 impl Objective {
     pub const ALL: [Objective; 6] = [
@@ -57,7 +57,7 @@ impl Objective {
     }
 
     /// In words.
-    pub fn title(self) -> &'static str {
+    pub(crate) fn title(self) -> &'static str {
         match self {
             Objective::WorstRate => "worst rate error",
             Objective::WorstPhase => "worst phase error",
@@ -69,7 +69,7 @@ impl Objective {
     }
 
     /// Of its value as it is shown.
-    pub fn unit(self) -> &'static str {
+    pub(crate) fn unit(self) -> &'static str {
         if self == Objective::Pointing { "°" } else { "°/h" }
     }
 
@@ -83,7 +83,7 @@ impl Objective {
     }
 
     /// Moves of a restart for a layer count.
-    pub fn default_moves_per_restart(self, layers: usize) -> u64 {
+    pub(crate) fn default_moves_per_restart(self, layers: usize) -> u64 {
         match self {
             Objective::P95 => crate::search::anneal::quantile::default_moves_per_restart(layers),
             _ => crate::search::anneal::rounds::default_moves_per_restart(layers),
@@ -112,7 +112,7 @@ impl Objective {
 }
 
 /// √(mean Ω²) over all profiles' time, by the reference.
-pub fn rms_rad_per_s(rate_model: &RateModel, solved: &SolvedProfiles) -> f64 {
+pub(crate) fn rms_rad_per_s(rate_model: &RateModel, solved: &SolvedProfiles) -> f64 {
     let series = solved.profiles().iter().flat_map(|p| rate_model.series_rad_per_s(&p.history));
     series.zip(time_shares(solved)).map(|(rate, share)| share * rate * rate).sum::<f64>().sqrt()
 }

@@ -250,7 +250,7 @@ impl PointingResponses {
 ///
 /// # Errors
 /// Effects that leave a layer no turns.
-pub fn pointing_samples(model: &CoilModel, solved: &SolvedProfiles) -> Result<SampleMatrix, SearchError> {
+pub(crate) fn pointing_samples(model: &CoilModel, solved: &SolvedProfiles) -> Result<SampleMatrix, SearchError> {
     let responses = PointingResponses::new(model)?;
     let of_all: Vec<WeightResponse> =
         solved.profiles().par_iter().flat_map_iter(|profile| responses.of_profile(profile)).collect();

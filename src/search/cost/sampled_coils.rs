@@ -34,7 +34,7 @@ use crate::thermal::{Drive, Instant, solve};
 use crate::units::REFERENCE_TEMPERATURE_K;
 
 /// The quantile that is made small.
-pub const SHARE: f64 = 0.95;
+pub(crate) const SHARE: f64 = 0.95;
 
 /// Every so many-th time of a unit step's grid is compiled: neighbours are then 9 % apart, and the quantile falls short by
 /// at most 0.04 % (all 128 standard patterns of eight layers under a film, a test allows 0.2 %).
@@ -243,7 +243,7 @@ impl SampledCoils {
     ///
     /// # Errors
     /// As [`crate::search::cost::tolerance::study`].
-    pub fn new(coils: &Coils, probes: &[Pattern]) -> Result<Self, ToleranceError> {
+    pub(crate) fn new(coils: &Coils, probes: &[Pattern]) -> Result<Self, ToleranceError> {
         let layers = coils.model().coil.layers();
         let coils = match coils.measure() {
             Measure::Guaranteed => {
@@ -268,7 +268,11 @@ impl SampledCoils {
     ///
     /// # Errors
     /// Models that cannot be solved.
-    pub fn of_models(models: &[CoilModel], profiles: &ProfileSpec, probes: &[Pattern]) -> Result<Self, ToleranceError> {
+    pub(crate) fn of_models(
+        models: &[CoilModel],
+        profiles: &ProfileSpec,
+        probes: &[Pattern],
+    ) -> Result<Self, ToleranceError> {
         let compile = |model: &CoilModel| -> Result<SampledCoil, ToleranceError> {
             match UnitStep::new(model, profiles.max_rate_k_per_s) {
                 Ok(step) => SampledCoil::guaranteed(model, &step, STRIDE),
@@ -296,38 +300,29 @@ impl SampledCoils {
     ///
     /// # Errors
     /// Models that cannot be solved.
-    pub fn declared(model: &CoilModel, profiles: &ProfileSpec, probes: &[Pattern]) -> Result<Self, SearchError> {
+    pub(crate) fn declared(model: &CoilModel, profiles: &ProfileSpec, probes: &[Pattern]) -> Result<Self, SearchError> {
         let instants = binding_instants(model, profiles, probes)?;
         let coils = vec![SampledCoil::sampled(model, profiles, &instants)?];
         Ok(Self { layers: model.coil.layers(), share: SHARE, coils })
     }
 
-    pub fn layers(&self) -> usize {
+    pub(crate) fn layers(&self) -> usize {
         self.layers
     }
 
     /// Coils.
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.coils.len()
     }
 
     /// Some of the coils.
-    pub fn select(&self, coils: &[usize]) -> Self {
+    pub(crate) fn select(&self, coils: &[usize]) -> Self {
         Self { coils: coils.iter().map(|&i| self.coils[i].clone()).collect(), ..*self }
     }
 
     /// The coils in the order of their worst cases with a pattern, largest first.
-    pub fn by_worst(&self, segments: &[usize]) -> Vec<usize> {
+    pub(crate) fn by_worst(&self, segments: &[usize]) -> Vec<usize> {
         QuantileWorst::new(self, segments).order
-    }
-
-    /// Numbers held for all coils together.
-    pub fn samples(&self) -> usize {
-        let rows = |build: &SampledCoil| match &build.worst {
-            Worst::Largest(part) | Worst::Variation(part) => part.rows,
-            Worst::Heated(changes, heat) => changes.rows + heat.rows,
-        };
-        self.coils.iter().map(rows).sum()
     }
 
     /// The quantile of the worst cases with a pattern P(j), innermost layer first.
@@ -404,7 +399,7 @@ fn binding_instants(
 
 /// The worst case of every coil with the present pattern, and room for a proposal.
 #[derive(Debug, Clone)]
-pub struct QuantileWorst {
+pub(crate) struct QuantileWorst {
     worst: Vec<f64>,
     proposed: Vec<f64>,
     /// Coils with the largest worst cases first: they are the ones that refuse a move.
@@ -413,11 +408,11 @@ pub struct QuantileWorst {
     proposed_cost: f64,
     scratch: Scratch,
     /// Coils judged since the last reading.
-    pub judged: u64,
+    pub(crate) judged: u64,
 }
 
 impl QuantileWorst {
-    pub fn new(coils: &SampledCoils, segments: &[usize]) -> Self {
+    pub(crate) fn new(coils: &SampledCoils, segments: &[usize]) -> Self {
         let mut scratch = Scratch::default();
         let pattern = Arrangement::new(segments);
         let worst: Vec<f64> = coils.coils.iter().map(|build| build.worst(&pattern, &mut scratch)).collect();
@@ -435,12 +430,12 @@ impl QuantileWorst {
         state
     }
 
-    pub fn cost(&self) -> f64 {
+    pub(crate) fn cost(&self) -> f64 {
         self.cost
     }
 
     /// The quantile with another pattern, or `None` as soon as so many coils are above `limit` that it must be too.
-    pub fn propose(&mut self, coils: &SampledCoils, segments: &[usize], limit: f64) -> Option<f64> {
+    pub(crate) fn propose(&mut self, coils: &SampledCoils, segments: &[usize], limit: f64) -> Option<f64> {
         let pattern = Arrangement::new(segments);
         let count = coils.coils.len();
         let mut left = count - (coils.share * (count - 1) as f64).floor() as usize;
@@ -460,7 +455,7 @@ impl QuantileWorst {
     }
 
     /// Makes the last proposal, which must have passed, the present state.
-    pub fn accept(&mut self) {
+    pub(crate) fn accept(&mut self) {
         std::mem::swap(&mut self.worst, &mut self.proposed);
         self.cost = self.proposed_cost;
         self.sort();

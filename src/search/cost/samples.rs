@@ -22,9 +22,9 @@ use crate::thermal::Instant;
 /// Which column belongs to which layer and half.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
-    pub layers: usize,
+    pub(crate) layers: usize,
     /// Both halves of the fibre respond alike: their weights share a column.
-    pub halves_alike: bool,
+    pub(crate) halves_alike: bool,
     pub axial: bool,
 }
 
@@ -50,8 +50,8 @@ impl Layout {
 /// Where a sample comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Origin {
-    pub profile: usize,
-    pub instant: Instant,
+    pub(crate) profile: usize,
+    pub(crate) instant: Instant,
 }
 
 /// The compiled objective: columns over samples, and the lengths that turn a pattern into weights.
@@ -67,7 +67,7 @@ impl SampleMatrix {
     ///
     /// # Errors
     /// Effects that leave a layer no turns.
-    pub fn new(model: &CoilModel, responses: &[WeightResponse]) -> Result<Self, RateError> {
+    pub(crate) fn new(model: &CoilModel, responses: &[WeightResponse]) -> Result<Self, RateError> {
         let lengths_m = model.wound_coil()?.layer_lengths_m().to_vec();
         let layers = lengths_m.len();
         let layout = Layout {
@@ -118,7 +118,7 @@ impl SampleMatrix {
 
     /// From an array of sensitivities to 2 P(j) − 1 − N, row-major, one row a sample: layers of one metre whose halves
     /// respond alike. Read once, in place; `constant` may be empty.
-    pub fn of_sensitivities(layers: usize, sensitivities: &[f64], constant: &[f64]) -> Self {
+    pub(crate) fn of_sensitivities(layers: usize, sensitivities: &[f64], constant: &[f64]) -> Self {
         let samples = sensitivities.len() / layers;
         let zero = vec![0.0; if constant.is_empty() { samples } else { 0 }];
         let constant = if constant.is_empty() { &zero } else { constant };
@@ -134,7 +134,7 @@ impl SampleMatrix {
     }
 
     /// The same matrix with further samples behind the others.
-    pub fn extended(&self, responses: &[WeightResponse]) -> Self {
+    pub(crate) fn extended(&self, responses: &[WeightResponse]) -> Self {
         let layout = self.layout;
         let longer = |column: &[f64], of: &dyn Fn(&WeightResponse) -> f64| {
             column.iter().copied().chain(responses.iter().map(of)).collect::<Vec<f64>>()
@@ -159,7 +159,7 @@ impl SampleMatrix {
     /// ```text
     /// A w^A + B w^B + X x ≈ S (w^A + w^B) + { D (w^A − w^B) + X x } at the given weights,   S = (A + B)/2,  D = (A − B)/2
     /// ```
-    pub fn frozen_at(&self, weights: &LayerWeights) -> Self {
+    pub(crate) fn frozen_at(&self, weights: &LayerWeights) -> Self {
         let Layout { layers, axial, .. } = self.layout;
         let column = |k: usize| self.columns.column(k);
         let mut constant = self.columns.constant().to_vec();
@@ -182,7 +182,7 @@ impl SampleMatrix {
     }
 
     /// The same matrix with the samples of another behind its own.
-    pub fn joined(&self, other: &Self) -> Self {
+    pub(crate) fn joined(&self, other: &Self) -> Self {
         let both = |a: &[f64], b: &[f64]| [a, b].concat();
         let columns: Vec<Vec<f64>> =
             (0..self.columns.count()).map(|k| both(self.columns.column(k), other.columns.column(k))).collect();
@@ -191,7 +191,7 @@ impl SampleMatrix {
     }
 
     /// New samples, each a sum of this matrix's times weights.
-    pub fn combined(&self, weights: &[Vec<(usize, f64)>]) -> Self {
+    pub(crate) fn combined(&self, weights: &[Vec<(usize, f64)>]) -> Self {
         let sums = |column: &[f64]| -> Vec<f64> {
             weights.iter().map(|weights| weights.iter().map(|&(s, y)| y * column[s]).sum()).collect()
         };
@@ -205,7 +205,7 @@ impl SampleMatrix {
     /// ```text
     /// ‖D x + c‖ = ‖R (x, 1)‖,   [D c] = Q R
     /// ```
-    pub fn of_same_mean_square(&self) -> Self {
+    pub(crate) fn of_same_mean_square(&self) -> Self {
         let (samples, count) = (self.samples(), self.columns.count());
         if samples <= count + 1 {
             return self.clone();
@@ -222,7 +222,7 @@ impl SampleMatrix {
     }
 
     /// The same matrix with every sample multiplied by its own factor.
-    pub fn scaled(&self, factors: &[f64]) -> Self {
+    pub(crate) fn scaled(&self, factors: &[f64]) -> Self {
         let scale = |column: &[f64]| column.iter().zip(factors).map(|(v, f)| v * f).collect::<Vec<f64>>();
         let columns: Vec<Vec<f64>> = (0..self.columns.count()).map(|k| scale(self.columns.column(k))).collect();
         let columns = Columns::new(&scale(self.columns.constant()), &columns);
@@ -243,12 +243,12 @@ impl SampleMatrix {
     }
 
     /// Whether each segment's place along the fibre is the same for every pattern.
-    pub fn equal_lengths(&self) -> bool {
+    pub(crate) fn equal_lengths(&self) -> bool {
         self.lengths_m.iter().all(|l| *l == self.lengths_m[0])
     }
 
     /// The coefficients of a pattern, from the reference's own weights.
-    pub fn coefficients(&self, weights: &LayerWeights) -> Vec<f64> {
+    pub(crate) fn coefficients(&self, weights: &LayerWeights) -> Vec<f64> {
         let mut coefficients = vec![0.0; self.layout.columns()];
         for layer in 0..self.layers() {
             coefficients[self.layout.column_a(layer)] += weights.half_a_m2[layer];
@@ -284,7 +284,7 @@ fn is_finite(response: &WeightResponse) -> bool {
 }
 
 /// A rate model with a pattern that does not matter, to ask for responses.
-pub fn any_rate_model(model: &CoilModel) -> Result<RateModel, SearchError> {
+pub(crate) fn any_rate_model(model: &CoilModel) -> Result<RateModel, SearchError> {
     let pattern = Classic::Zyl.pattern(model.coil.layers()).expect("every even layer count has a cylindrical winding");
     let rate_model = RateModel::new(model, &pattern, &[])?;
     rate_model.check_searchable()?;
@@ -300,7 +300,7 @@ pub(in crate::search) mod tests {
     use crate::thermal::{DEFAULT_CELLS_PER_LAYER, Extent, Location, Material};
 
     /// A tactical coil with any effects at their start values.
-    pub fn model(layers: usize, layer_length: LayerLength, effects: &[&str]) -> CoilModel {
+    pub(crate) fn model(layers: usize, layer_length: LayerLength, effects: &[&str]) -> CoilModel {
         let fibre = Fibre {
             refractive_index: 1.45,
             thermo_optic_per_k: 1.0e-5,
@@ -333,7 +333,7 @@ pub(in crate::search) mod tests {
         }
     }
 
-    pub fn profiles() -> Vec<Profile> {
+    pub(crate) fn profiles() -> Vec<Profile> {
         let up = Piece { rate_k_per_s: 0.003, duration_s: 40.0 };
         let down = Piece { rate_k_per_s: -0.002, duration_s: 60.0 };
         vec![Profile::new("up", vec![up, down]).unwrap(), Profile::new("down", vec![down, up, down]).unwrap()]

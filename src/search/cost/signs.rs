@@ -62,7 +62,7 @@ pub fn segments_of_signs(high: &[bool]) -> Vec<usize> {
 }
 
 /// The ends that make a pattern, or `None` for a pattern that is not of the class `standard`.
-pub fn signs_of_segments(segments: &[usize]) -> Option<Vec<bool>> {
+pub(crate) fn signs_of_segments(segments: &[usize]) -> Option<Vec<bool>> {
     let (mut low, mut high) = (segments[0], segments[0]);
     segments[1..]
         .iter()
@@ -81,7 +81,7 @@ pub fn signs_of_segments(segments: &[usize]) -> Option<Vec<bool>> {
 }
 
 /// ±1 for true and false.
-pub fn sign_value(high: bool) -> f64 {
+pub(crate) fn sign_value(high: bool) -> f64 {
     if high { 1.0 } else { -1.0 }
 }
 

@@ -46,35 +46,35 @@ use built::built;
 /// Spreads of what is built, as standard deviations; zero: exact.
 /// What winding and trimming leave, beside the spreads of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct AsBuilt {
+pub(crate) struct AsBuilt {
     /// Whole turns that a layer loses on average, each layer for itself.
-    pub lost_turns_mean: f64,
+    pub(crate) lost_turns_mean: f64,
     /// Relative, of each layer's own radial pitch. Only lengths follow it; what heat flows through keeps the mean pitch.
-    pub layer_pitch_sd: f64,
+    pub(crate) layer_pitch_sd: f64,
     /// Relative, of the film at each heated flange for itself.
-    pub flange_film_sd: f64,
+    pub(crate) flange_film_sd: f64,
     /// The largest asymmetric length that trimming leaves; every one up to it is as likely.
-    pub trim_residue_m: f64,
+    pub(crate) trim_residue_m: f64,
 }
 
 #[derive(Clone, PartialEq)]
 pub struct ToleranceSpec {
     /// Turns, independent from layer to layer.
-    pub turns_per_layer_sd: f64,
+    pub(crate) turns_per_layer_sd: f64,
     /// Relative.
-    pub radial_pitch_sd: f64,
-    pub midpoint_offset_sd_m: f64,
+    pub(crate) radial_pitch_sd: f64,
+    pub(crate) midpoint_offset_sd_m: f64,
     /// Relative.
-    pub diffusivity_sd: f64,
+    pub(crate) diffusivity_sd: f64,
     /// Relative; acts on `surface_film`.
-    pub film_sd: f64,
+    pub(crate) film_sd: f64,
     /// Absolute, of `strain_mismatch`.
-    pub mismatch_sd: f64,
-    pub as_built: AsBuilt,
-    pub samples: usize,
-    pub seed: u64,
+    pub(crate) mismatch_sd: f64,
+    pub(crate) as_built: AsBuilt,
+    pub(crate) samples: usize,
+    pub(crate) seed: u64,
     /// A coil whose worst case is larger is scrap.
-    pub limit_rad_per_s: Option<f64>,
+    pub(crate) limit_rad_per_s: Option<f64>,
 }
 
 /// Without what winding leaves as before there was any: cells of campaigns are told by it.
@@ -100,7 +100,7 @@ impl std::fmt::Debug for ToleranceSpec {
 
 /// What may spread, in the order of the shares.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Spread {
+pub(crate) enum Spread {
     Turns,
     RadialPitch,
     MidpointOffset,
@@ -133,7 +133,7 @@ pub enum ToleranceError {
 
 /// Whose worst case was drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Measure {
+pub(crate) enum Measure {
     Guaranteed,
     /// Over the declared profiles: the model has no guaranteed worst case.
     Sampled,
@@ -141,38 +141,38 @@ pub enum Measure {
 
 /// The distribution of a pattern's worst case.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Distribution {
+pub(crate) struct Distribution {
     /// As declared, without spreads.
-    pub nominal_rad_per_s: f64,
+    pub(crate) nominal_rad_per_s: f64,
     /// Ascending.
-    pub worst_rad_per_s: Vec<f64>,
+    pub(crate) worst_rad_per_s: Vec<f64>,
     /// The share of coils within the limit, if there is one.
-    pub yield_share: Option<f64>,
+    pub(crate) yield_share: Option<f64>,
     /// Shares of the variance, largest first; only spreads that are above zero.
-    pub variance_shares: Vec<(Spread, f64)>,
+    pub(crate) variance_shares: Vec<(Spread, f64)>,
 }
 
 impl Distribution {
     /// The value that a share of the coils does not exceed, between the order statistics.
-    pub fn quantile_rad_per_s(&self, share: f64) -> f64 {
+    pub(crate) fn quantile_rad_per_s(&self, share: f64) -> f64 {
         quantile(&self.worst_rad_per_s, share)
     }
 
-    pub fn median_rad_per_s(&self) -> f64 {
+    pub(crate) fn median_rad_per_s(&self) -> f64 {
         self.quantile_rad_per_s(0.5)
     }
 
-    pub fn p95_rad_per_s(&self) -> f64 {
+    pub(crate) fn p95_rad_per_s(&self) -> f64 {
         self.quantile_rad_per_s(crate::search::cost::sampled_coils::SHARE)
     }
 
-    pub fn p99_rad_per_s(&self) -> f64 {
+    pub(crate) fn p99_rad_per_s(&self) -> f64 {
         self.quantile_rad_per_s(0.99)
     }
 }
 
 impl Spread {
-    pub const ALL: [Spread; 10] = [
+    pub(crate) const ALL: [Spread; 10] = [
         Spread::Turns,
         Spread::RadialPitch,
         Spread::MidpointOffset,
@@ -186,7 +186,7 @@ impl Spread {
     ];
 
     /// The key of its standard deviation in a model file.
-    pub fn key(self) -> &'static str {
+    pub(crate) fn key(self) -> &'static str {
         match self {
             Spread::Turns => "turns_per_layer_sd",
             Spread::RadialPitch => "radial_pitch_percent_sd",
@@ -229,7 +229,7 @@ impl ToleranceSpec {
 }
 
 /// The coils of a study, drawn once: every pattern is judged on the same ones.
-pub struct Coils<'a> {
+pub(crate) struct Coils<'a> {
     model: &'a CoilModel,
     spec: &'a ToleranceSpec,
     active: Vec<Spread>,
@@ -240,7 +240,7 @@ pub struct Coils<'a> {
 impl<'a> Coils<'a> {
     /// # Errors
     /// As [`Self::among`].
-    pub fn new(
+    pub(crate) fn new(
         model: &'a CoilModel,
         profiles: &'a ProfileSpec,
         spec: &'a ToleranceSpec,
@@ -252,7 +252,7 @@ impl<'a> Coils<'a> {
     ///
     /// # Errors
     /// No spread at all, a film's spread without a film, models that cannot be solved.
-    pub fn among(
+    pub(crate) fn among(
         model: &'a CoilModel,
         profiles: &'a ProfileSpec,
         spec: &'a ToleranceSpec,
@@ -276,20 +276,20 @@ impl<'a> Coils<'a> {
     }
 
     /// As declared.
-    pub fn model(&self) -> &CoilModel {
+    pub(crate) fn model(&self) -> &CoilModel {
         self.model
     }
 
-    pub fn profiles(&self) -> &ProfileSpec {
+    pub(crate) fn profiles(&self) -> &ProfileSpec {
         self.judge.profiles
     }
 
-    pub fn measure(&self) -> Measure {
+    pub(crate) fn measure(&self) -> Measure {
         self.judge.measure
     }
 
     /// The models of all coils, in their order.
-    pub fn built(&self) -> impl IndexedParallelIterator<Item = Result<CoilModel, SearchError>> {
+    pub(crate) fn built(&self) -> impl IndexedParallelIterator<Item = Result<CoilModel, SearchError>> {
         self.deviates.par_iter().map(|coil| built(self.model, self.spec, &self.active, coil))
     }
 
@@ -297,7 +297,7 @@ impl<'a> Coils<'a> {
     ///
     /// # Errors
     /// A pattern of another layer count.
-    pub fn nominal_rad_per_s(&self, patterns: &[Pattern]) -> Result<Vec<f64>, SearchError> {
+    pub(crate) fn nominal_rad_per_s(&self, patterns: &[Pattern]) -> Result<Vec<f64>, SearchError> {
         self.judge.worst(self.model, None, patterns)
     }
 
@@ -308,7 +308,7 @@ impl<'a> Coils<'a> {
     ///
     /// # Errors
     /// A pattern of another layer count.
-    pub fn worst_rad_per_s(&self, patterns: &[Pattern]) -> Result<Vec<Vec<f64>>, SearchError> {
+    pub(crate) fn worst_rad_per_s(&self, patterns: &[Pattern]) -> Result<Vec<Vec<f64>>, SearchError> {
         self.worst(&self.active, patterns)
     }
 
@@ -326,7 +326,7 @@ impl<'a> Coils<'a> {
     ///
     /// # Errors
     /// A pattern of another layer count.
-    pub fn p95_rad_per_s(&self, patterns: &[Pattern]) -> Result<Vec<f64>, SearchError> {
+    pub(crate) fn p95_rad_per_s(&self, patterns: &[Pattern]) -> Result<Vec<f64>, SearchError> {
         Ok(self.p95_and_yield(patterns)?.into_iter().map(|(p95, _)| p95).collect())
     }
 
@@ -334,7 +334,7 @@ impl<'a> Coils<'a> {
     ///
     /// # Errors
     /// A pattern of another layer count.
-    pub fn p95_and_yield(&self, patterns: &[Pattern]) -> Result<Vec<(f64, Option<f64>)>, SearchError> {
+    pub(crate) fn p95_and_yield(&self, patterns: &[Pattern]) -> Result<Vec<(f64, Option<f64>)>, SearchError> {
         let worst = self.worst(&self.active, patterns)?;
         let of = |p: usize| {
             let mut ascending: Vec<f64> = worst.iter().map(|coil| coil[p]).collect();
@@ -350,7 +350,7 @@ impl<'a> Coils<'a> {
 ///
 /// # Errors
 /// No spread at all, a film's spread without a film, models that cannot be solved.
-pub fn study(
+pub(crate) fn study(
     model: &CoilModel,
     profiles: &ProfileSpec,
     spec: &ToleranceSpec,
@@ -385,7 +385,7 @@ pub fn study(
 }
 
 /// Whether the worst cases of [`study`] are guaranteed ones.
-pub fn measure(model: &CoilModel, max_rate_k_per_s: f64) -> Result<Measure, ToleranceError> {
+pub(crate) fn measure(model: &CoilModel, max_rate_k_per_s: f64) -> Result<Measure, ToleranceError> {
     match UnitStep::new(model, max_rate_k_per_s) {
         Ok(_) => Ok(Measure::Guaranteed),
         Err(GuaranteedError::Effect { .. }) => Ok(Measure::Sampled),

@@ -48,12 +48,12 @@ pub struct SolvedProfiles {
 
 #[derive(Debug)]
 pub struct SolvedProfile {
-    pub profile: Profile,
+    pub(crate) profile: Profile,
     pub field: Field,
     /// One list of instants a piece, from just after its start to just before its end.
-    pub pieces: Vec<Vec<Instant>>,
+    pub(crate) pieces: Vec<Vec<Instant>>,
     /// The field at all of them, in order.
-    pub history: ThermalHistory,
+    pub(crate) history: ThermalHistory,
     /// What came before the first of them, where something remembers it; empty elsewhere.
     lead: ThermalHistory,
 }
@@ -64,7 +64,7 @@ pub struct WorstCase {
     /// With its sign.
     pub rate_rad_per_s: f64,
     pub profile: String,
-    pub profile_index: usize,
+    pub(crate) profile_index: usize,
     pub time_s: f64,
 }
 
@@ -127,7 +127,7 @@ impl SolvedProfiles {
     ///
     /// # Errors
     /// A heat path that cannot be solved.
-    pub fn after_the_ends(model: &CoilModel, profiles: &[Profile]) -> Result<Option<Self>, SearchError> {
+    pub(crate) fn after_the_ends(model: &CoilModel, profiles: &[Profile]) -> Result<Option<Self>, SearchError> {
         let (path, remembers) = (model.heat_path()?, model.remembers());
         let (settling_s, solver) = (settling_s(&path)?, Solver::new(&path)?);
         let soaked: Vec<SolvedProfile> = profiles
@@ -239,7 +239,7 @@ impl SolvedProfile {
     }
 
     /// The rate error at every sample.
-    pub fn series_rad_per_s(&self, rate_model: &RateModel) -> Vec<f64> {
+    pub(crate) fn series_rad_per_s(&self, rate_model: &RateModel) -> Vec<f64> {
         rate_model.series_after(&self.history, &mut self.past(rate_model))
     }
 

@@ -13,7 +13,12 @@ use rayon::prelude::*;
 use super::permutation_tree::{Node, PermutationTree, Places};
 
 /// Patterns whose bounds stay below the limit, most promising first, at most `width`.
-pub fn promising(orders: &PermutationTree, limit_rad_per_s: f64, mirrored: bool, width: usize) -> Vec<Vec<usize>> {
+pub(crate) fn promising(
+    orders: &PermutationTree,
+    limit_rad_per_s: f64,
+    mirrored: bool,
+    width: usize,
+) -> Vec<Vec<usize>> {
     let limit = limit_rad_per_s as f32;
     let mut kept = vec![(0.0, orders.root())];
     for _ in 0..orders.layers() {

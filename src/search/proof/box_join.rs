@@ -23,7 +23,7 @@ const LEAF_BITS: u32 = 3;
 
 /// 2^b points in a balanced tree of boxes.
 #[derive(Debug)]
-pub struct Tree {
+pub(crate) struct Tree {
     bits: u32,
     /// Coordinates of a point, padded.
     width: usize,
@@ -39,7 +39,7 @@ impl Tree {
     /// The corners of a cube: Σ ±column over all choices of signs, added to `start`.
     ///
     /// Point number `i` has +column k where bit k of `i` is set.
-    pub fn of_corners(start: &[f64], columns: &[Vec<f64>]) -> Self {
+    pub(crate) fn of_corners(start: &[f64], columns: &[Vec<f64>]) -> Self {
         let bits = columns.len() as u32;
         let width = start.len().next_multiple_of(LANES);
         let mut first: Vec<f64> = start.to_vec();
@@ -158,14 +158,14 @@ fn split_at_median(part: &mut [u32], width: usize, given: &[f32]) {
 
 /// Where a sum must lie, coordinate by coordinate.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Target {
+pub(crate) struct Target {
     low: Vec<f32>,
     high: Vec<f32>,
 }
 
 impl Target {
     /// Coordinates that pad the trees are free.
-    pub fn new(bounds: impl Iterator<Item = (f64, f64)>) -> Self {
+    pub(crate) fn new(bounds: impl Iterator<Item = (f64, f64)>) -> Self {
         let (mut low, mut high): (Vec<f32>, Vec<f32>) = bounds.map(|(l, h)| (l as f32, h as f32)).unzip();
         let width = low.len().next_multiple_of(LANES);
         low.resize(width, f32::NEG_INFINITY);
@@ -176,14 +176,14 @@ impl Target {
 
 /// Two trees of equal width, to be matched.
 #[derive(Debug)]
-pub struct Matching<'a> {
-    pub left: &'a Tree,
-    pub right: &'a Tree,
+pub(crate) struct Matching<'a> {
+    pub(crate) left: &'a Tree,
+    pub(crate) right: &'a Tree,
 }
 
 /// A pair of nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct NodePair {
+pub(crate) struct NodePair {
     left: usize,
     right: usize,
 }
@@ -194,7 +194,7 @@ impl Matching<'_> {
     }
 
     /// Pairs that together hold every match: the work to share out. Counts the pairs looked at.
-    pub fn shares(&self, target: &Target, at_least: usize, nodes: &mut u64) -> Vec<NodePair> {
+    pub(crate) fn shares(&self, target: &Target, at_least: usize, nodes: &mut u64) -> Vec<NodePair> {
         let mut pairs = vec![NodePair { left: 1, right: 1 }];
         loop {
             *nodes += pairs.len() as u64;
@@ -227,7 +227,7 @@ impl Matching<'_> {
 
     /// Visits every match below a pair as the numbers of its points; `visit` answers whether to go on.
     /// Returns false if it was stopped. Counts the pairs looked at.
-    pub fn search(
+    pub(crate) fn search(
         &self,
         pair: NodePair,
         target: &Target,
@@ -278,7 +278,7 @@ impl Matching<'_> {
 
 /// What a search asks its caller about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Step {
+pub(crate) enum Step {
     /// A candidate.
     Match { left: u32, right: u32 },
     /// Nothing found for a while.

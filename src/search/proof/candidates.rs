@@ -19,14 +19,14 @@ use crate::search::cost::worst_case::{SearchError, WorstCase};
 
 /// A pattern and its cost by the reference, refined in time where it is a worst rate.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Candidate {
-    pub rate_rad_per_s: f64,
-    pub segments: Vec<usize>,
+pub(crate) struct Candidate {
+    pub(crate) rate_rad_per_s: f64,
+    pub(crate) segments: Vec<usize>,
 }
 
 impl Candidate {
     /// The smaller rate; of equals the pattern that comes first, so that the answer does not depend on threads.
-    pub fn better(self, other: Self) -> Self {
+    pub(crate) fn better(self, other: Self) -> Self {
         let before = (other.rate_rad_per_s, &other.segments) < (self.rate_rad_per_s, &self.segments);
         if before { other } else { self }
     }
@@ -34,7 +34,7 @@ impl Candidate {
 
 /// What shows that a pattern is not below the limit although no sample so far does; it becomes a sample.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Witness {
+pub(crate) enum Witness {
     /// A time of a profile.
     Instant { profile: usize, time_s: f64 },
     /// The pattern's own norm: the sample in which it shows.
@@ -43,7 +43,7 @@ pub enum Witness {
 
 /// What was found out about a pattern.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Finding {
+pub(crate) enum Finding {
     /// Its worst rate is not below the limit, as a sample shows.
     Refuted {
         sample: usize,
@@ -82,7 +82,7 @@ impl Largest {
 
 /// Every sample of the solved profiles, or the samples that a norm has been asked for, and the reference behind them.
 #[derive(Debug)]
-pub struct Judge<'a> {
+pub(crate) struct Judge<'a> {
     task: Task<'a>,
     coil: Coil,
     of: Largest,
@@ -99,7 +99,7 @@ pub struct Judge<'a> {
 impl<'a> Judge<'a> {
     /// # Errors
     /// Effects that leave a layer no turns; rates that are not finite.
-    pub fn new(task: &Task<'a>) -> Result<Self, SearchError> {
+    pub(crate) fn new(task: &Task<'a>) -> Result<Self, SearchError> {
         let of = Largest::new(task)?;
         let (matrix, profile_of) = match &of {
             Largest::Course(course) => course.samples(task)?,
@@ -118,16 +118,16 @@ impl<'a> Judge<'a> {
     }
 
     /// Every sample of the profiles in order, then those that were added.
-    pub fn matrix(&self) -> &SampleMatrix {
+    pub(crate) fn matrix(&self) -> &SampleMatrix {
         &self.matrix
     }
 
-    pub fn lengths_m(&self) -> &[f64] {
+    pub(crate) fn lengths_m(&self) -> &[f64] {
         self.matrix.lengths_m()
     }
 
     /// A pattern's mirror image has the same rate at every instant but for the sign.
-    pub fn is_mirror_symmetric(&self) -> bool {
+    pub(crate) fn is_mirror_symmetric(&self) -> bool {
         let layout = self.matrix.layout;
         layout.halves_alike && !layout.axial && self.matrix.columns.constant().iter().all(|c| *c == 0.0)
     }
@@ -136,7 +136,7 @@ impl<'a> Judge<'a> {
     ///
     /// # Errors
     /// A pattern of another layer count.
-    pub fn candidate_and_witness(&self, pattern: &Pattern) -> Result<(Candidate, Witness), SearchError> {
+    pub(crate) fn candidate_and_witness(&self, pattern: &Pattern) -> Result<(Candidate, Witness), SearchError> {
         let Task { model, solved, goal, .. } = self.task;
         let segments = pattern.segments().to_vec();
         let of_time = |worst: WorstCase| {
@@ -164,7 +164,7 @@ impl<'a> Judge<'a> {
     }
 
     /// The largest size over the samples, or the norm of all of them.
-    pub fn sampled_worst_rad_per_s(&self, segments: &[usize]) -> f64 {
+    pub(crate) fn sampled_worst_rad_per_s(&self, segments: &[usize]) -> f64 {
         let coefficients = self.coefficients_of(segments);
         match &self.of {
             Largest::Norm(support) => support.value(&coefficients),
@@ -173,7 +173,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Makes samples of what refuted patterns; false if none of them is new.
-    pub fn add_witnesses(&mut self, witnesses: &[Witness]) -> bool {
+    pub(crate) fn add_witnesses(&mut self, witnesses: &[Witness]) -> bool {
         let (mut responses, mut attaining) = (Vec::new(), Vec::new());
         for witness in witnesses {
             if self.witnesses.iter().any(|known| self.is_same(known, witness)) {
@@ -217,7 +217,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Whether a pattern's worst rate is below a limit: first by the samples, then by the reference.
-    pub fn judge(&self, segments: &[usize], limit_rad_per_s: f64) -> Finding {
+    pub(crate) fn judge(&self, segments: &[usize], limit_rad_per_s: f64) -> Finding {
         let pattern = Pattern::new(segments.to_vec()).expect("a search makes permutations only");
         let coefficients = self.coefficients(&pattern);
         let columns = &self.ordered.columns;
@@ -288,7 +288,7 @@ impl<'a> Judge<'a> {
     }
 
     /// The samples at which given patterns are worst, the most frequent first, no two next to each other.
-    pub fn binding_samples(&mut self, patterns: &[Vec<usize>], most: usize) -> Vec<usize> {
+    pub(crate) fn binding_samples(&mut self, patterns: &[Vec<usize>], most: usize) -> Vec<usize> {
         if matches!(self.of, Largest::Norm(_)) {
             // Each pattern's own sample: of the first and then of every so many-th.
             let stride = patterns.len().div_ceil(most).max(1);
@@ -328,7 +328,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Tries these samples first from now on, and the others in the order that they have.
-    pub fn try_first(&mut self, samples: &[usize]) {
+    pub(crate) fn try_first(&mut self, samples: &[usize]) {
         let mut is_first = vec![false; self.matrix.samples()];
         for &s in samples {
             is_first[s] = true;

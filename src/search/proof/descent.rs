@@ -34,7 +34,13 @@ struct Search<'a, 'w> {
 }
 
 /// Judges every pattern that may stay under the limit.
-pub fn search(orders: &PermutationTree, judge: &Judge, limit_rad_per_s: f64, mirrored: bool, watch: &Watch) -> Outcome {
+pub(crate) fn search(
+    orders: &PermutationTree,
+    judge: &Judge,
+    limit_rad_per_s: f64,
+    mirrored: bool,
+    watch: &Watch,
+) -> Outcome {
     let mut outcome = Outcome::default();
     let mut shares = vec![orders.root()];
     let mut places = Places::default();

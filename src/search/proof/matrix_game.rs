@@ -19,14 +19,14 @@ const TINY: f64 = 1e-12;
 
 /// Both players' weights, and what the row player can count on.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Solution {
-    pub rows: Vec<f64>,
-    pub columns: Vec<f64>,
-    pub value: f64,
+pub(crate) struct Solution {
+    pub(crate) rows: Vec<f64>,
+    pub(crate) columns: Vec<f64>,
+    pub(crate) value: f64,
 }
 
 /// Solves a game given column by column; there must be a row and a column.
-pub fn solve(columns: &[Vec<f64>]) -> Solution {
+pub(crate) fn solve(columns: &[Vec<f64>]) -> Solution {
     let (m, n) = (columns[0].len(), columns.len());
     let smallest = columns.iter().flatten().copied().fold(f64::INFINITY, f64::min);
     let largest = columns.iter().flatten().copied().fold(f64::NEG_INFINITY, f64::max);

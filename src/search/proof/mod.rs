@@ -26,20 +26,20 @@
 //! its own, and the rms rate and the guaranteed worst rate, which are largest values of samples too ([`support`]). Leaves
 //! out the quantile over built coils.
 
-pub mod beam;
-pub mod box_join;
-pub mod candidates;
+pub(crate) mod beam;
+pub(crate) mod box_join;
+pub(crate) mod candidates;
 mod course;
-pub mod descent;
-pub mod matrix_game;
-pub mod permutation_tree;
-pub mod rows;
+pub(crate) mod descent;
+pub(crate) mod matrix_game;
+pub(crate) mod permutation_tree;
+pub(crate) mod rows;
 mod sampling;
-pub mod sign_search;
-pub mod simd_bounds;
+pub(crate) mod sign_search;
+pub(crate) mod simd_bounds;
 mod starts;
-pub mod support;
-pub mod surrogates;
+pub(crate) mod support;
+pub(crate) mod surrogates;
 #[cfg(test)]
 mod tests;
 
@@ -88,7 +88,7 @@ pub struct Progress {
     /// No pattern is below this.
     pub lower_bound_rad_per_s: f64,
     /// The limit of the present pass over the best worst rate.
-    pub pass: f64,
+    pub(crate) pass: f64,
     /// How much of the present pass is done, from 0 to 1.
     pub share_done: f64,
 }
@@ -117,22 +117,22 @@ impl std::fmt::Display for Status {
 /// The best pattern known and what is known about all others.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Certificate {
-    pub pattern: Pattern,
+    pub(crate) pattern: Pattern,
     /// Its worst rate, refined in time.
     pub best_rad_per_s: f64,
     /// No pattern of the class has a smaller worst rate.
-    pub lower_bound_rad_per_s: f64,
+    pub(crate) lower_bound_rad_per_s: f64,
     pub status: Status,
     /// Nodes whose bound was computed.
     pub nodes: u64,
     /// Patterns judged on all samples.
     pub judged: u64,
     /// Samples that the last pass refuted by.
-    pub rows: Vec<Row>,
+    pub(crate) rows: Vec<Row>,
 }
 
 /// Told from time to time; answers whether to go on.
-pub type Watcher<'a> = &'a (dyn Fn(Progress) -> ControlFlow<()> + Sync);
+pub(crate) type Watcher<'a> = &'a (dyn Fn(Progress) -> ControlFlow<()> + Sync);
 
 /// Limits of the passes over the best known rate.
 const LIMITS: [f64; 11] = [0.25, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.998, 1.0];
@@ -189,7 +189,7 @@ impl Passes {
 }
 
 /// Two rates closer than this count as equal.
-pub const RELATIVE_TOLERANCE: f64 = 1e-9;
+pub(crate) const RELATIVE_TOLERANCE: f64 = 1e-9;
 
 /// Proves which pattern is best, beginning with the best of given patterns.
 ///
@@ -279,21 +279,21 @@ fn begin<'a>(task: &Task<'a>, starts: &[Pattern], good_enough_rad_per_s: f64) ->
 
 /// What a short search by bounds made of its starts.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Improvement {
+pub(crate) struct Improvement {
     /// At worst the best start.
-    pub pattern: Pattern,
+    pub(crate) pattern: Pattern,
     /// No pattern of the class is better.
-    pub is_optimal: bool,
+    pub(crate) is_optimal: bool,
 }
 
 /// How much a short search by bounds may do.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Effort {
-    pub most_nodes: u64,
+pub(crate) struct Effort {
+    pub(crate) most_nodes: u64,
     /// Nodes of a level that a last look ahead keeps ([`beam`]); zero for none.
-    pub beam_width: usize,
+    pub(crate) beam_width: usize,
     /// A worst rate at which it ends, proved or not; zero for none.
-    pub good_enough_rad_per_s: f64,
+    pub(crate) good_enough_rad_per_s: f64,
 }
 
 /// The best pattern that a short search by bounds comes upon: what an annealer needs to end on the very best of many
@@ -301,7 +301,7 @@ pub struct Effort {
 ///
 /// # Errors
 /// As [`prove`].
-pub fn improve(task: &Task, starts: &[Pattern], effort: Effort) -> Result<Improvement, SearchError> {
+pub(crate) fn improve(task: &Task, starts: &[Pattern], effort: Effort) -> Result<Improvement, SearchError> {
     let Effort { most_nodes, beam_width, good_enough_rad_per_s } = effort;
     let Begun { mut judge, mut best, mut proof } = begin(task, starts, good_enough_rad_per_s)?;
     let stop = AtomicBool::new(false);
@@ -332,18 +332,18 @@ pub fn improve(task: &Task, starts: &[Pattern], effort: Effort) -> Result<Improv
 
 /// What a pass, or a piece of one, found.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Outcome {
+pub(crate) struct Outcome {
     /// Everything below the limit was judged.
-    pub complete: bool,
+    pub(crate) complete: bool,
     /// Too many patterns could not be refuted by the samples.
-    pub overflowed: bool,
-    pub nodes: u64,
-    pub judged: u64,
-    pub best: Option<Candidate>,
+    pub(crate) overflowed: bool,
+    pub(crate) nodes: u64,
+    pub(crate) judged: u64,
+    pub(crate) best: Option<Candidate>,
     /// Samples that refuted what was judged.
-    pub refuting: Vec<usize>,
+    pub(crate) refuting: Vec<usize>,
     /// Instants between samples that refuted what no sample did.
-    pub between: Vec<Witness>,
+    pub(crate) between: Vec<Witness>,
 }
 
 impl Default for Outcome {
@@ -362,7 +362,7 @@ impl Default for Outcome {
 
 impl Outcome {
     /// Adds what the next piece found.
-    pub fn absorb(&mut self, other: Self) {
+    pub(crate) fn absorb(&mut self, other: Self) {
         self.complete &= other.complete;
         self.overflowed |= other.overflowed;
         self.nodes += other.nodes;
@@ -377,32 +377,32 @@ impl Outcome {
 }
 
 /// The caller's wish to stop, seen by every piece of work.
-pub struct Watch<'a> {
+pub(crate) struct Watch<'a> {
     stop: &'a AtomicBool,
     watcher: Watcher<'a>,
     at: Progress,
     /// The pass ends incomplete beyond so many.
-    pub most_nodes: u64,
+    pub(crate) most_nodes: u64,
     /// The pass ends with a rate that is good enough; zero for none.
-    pub good_enough_rad_per_s: f64,
+    pub(crate) good_enough_rad_per_s: f64,
     /// A piece of work gives up where too much is left to be judged in full, so that samples can be added.
-    pub may_overflow: bool,
+    pub(crate) may_overflow: bool,
 }
 
 impl Watch<'_> {
     /// Asks whether to go on, without news.
-    pub fn pause(&self) -> ControlFlow<()> {
+    pub(crate) fn pause(&self) -> ControlFlow<()> {
         self.report(self.at.share_done)
     }
 
-    pub fn report(&self, share_done: f64) -> ControlFlow<()> {
+    pub(crate) fn report(&self, share_done: f64) -> ControlFlow<()> {
         if (self.watcher)(Progress { share_done, ..self.at }).is_break() {
             self.stop.store(true, Ordering::Relaxed);
         }
         if self.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    pub fn is_stopped(&self) -> bool {
+    pub(crate) fn is_stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
 }

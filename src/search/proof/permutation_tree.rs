@@ -34,12 +34,12 @@ use super::simd_bounds::{Block, Bound, LANES, Level, Shape};
 use crate::pattern::windability::WindabilityClass;
 
 /// More layers than this do not fit the set of open places.
-pub const MOST_LAYERS: usize = 64;
+pub(crate) const MOST_LAYERS: usize = 64;
 
 /// A problem: lengths, class, and bounds by level. Lengths are in units of the innermost layer's, so that with equal
 /// lengths every place is an exact small integer.
 #[derive(Debug, Clone)]
-pub struct PermutationTree {
+pub(crate) struct PermutationTree {
     layers: usize,
     lengths_m: Vec<f64>,
     lengths: Vec<f32>,
@@ -57,16 +57,16 @@ pub struct PermutationTree {
 
 /// The outer layers' places.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Node {
+pub(crate) struct Node {
     /// Place of each layer that has one, outermost layer first.
-    pub places: Vec<u8>,
+    pub(crate) places: Vec<u8>,
     /// Bit p is set while place p is open.
-    pub open: u64,
+    pub(crate) open: u64,
 }
 
 /// Places of a node as a bound needs them, shared by all rows; kept between nodes for its room.
 #[derive(Debug, Default)]
-pub struct Places {
+pub(crate) struct Places {
     /// W at the places of F, outermost layer first, then the open places' in ascending order.
     pub(super) placed: Vec<f32>,
     pub(super) open: Vec<f32>,
@@ -80,12 +80,12 @@ pub struct Places {
 }
 
 impl Node {
-    pub fn open_count(&self) -> usize {
+    pub(crate) fn open_count(&self) -> usize {
         self.open.count_ones() as usize
     }
 
     /// Takes back the layer placed last.
-    pub fn take_back(&mut self) {
+    pub(crate) fn take_back(&mut self) {
         if let Some(place) = self.places.pop() {
             self.open |= 1 << place;
         }
@@ -95,7 +95,12 @@ impl Node {
 impl PermutationTree {
     /// No bounds yet. `has_difference` where the halves respond differently in any row that will be given;
     /// `axial_sign` where any has an axial term.
-    pub fn new(lengths_m: &[f64], class: WindabilityClass, has_difference: bool, axial_sign: Option<f32>) -> Self {
+    pub(crate) fn new(
+        lengths_m: &[f64],
+        class: WindabilityClass,
+        has_difference: bool,
+        axial_sign: Option<f32>,
+    ) -> Self {
         let layers = lengths_m.len();
         let lengths: Vec<f64> = lengths_m.iter().map(|l| l / lengths_m[0]).collect();
         let half_deviation = |open| 0.5 * deviations_m(&lengths, open).iter().map(|d| d.abs()).sum::<f64>() as f32;
@@ -120,7 +125,7 @@ impl PermutationTree {
     }
 
     /// Σ_s (row)_s ≥ limit refutes a node with so many open layers from now on; tried after what is there already.
-    pub fn add_bound(&mut self, open: usize, row: &Row) {
+    pub(crate) fn add_bound(&mut self, open: usize, row: &Row) {
         let shape = Shape {
             lengths_m: &self.lengths_m,
             has_difference: self.has_difference,
@@ -130,31 +135,26 @@ impl PermutationTree {
         self.levels[open].push(&Bound::new(row, open, &shape));
     }
 
-    /// Bounds of a level.
-    pub fn bounds(&self, open: usize) -> usize {
-        self.levels[open].count()
-    }
-
     /// Keeps only the given bounds of a level, in the given order.
-    pub fn keep_bounds(&mut self, open: usize, kept: &[usize]) {
+    pub(crate) fn keep_bounds(&mut self, open: usize, kept: &[usize]) {
         self.levels[open] = self.levels[open].select(kept);
     }
 
-    pub fn root(&self) -> Node {
+    pub(crate) fn root(&self) -> Node {
         Node { places: Vec::new(), open: if self.layers == 64 { u64::MAX } else { (1 << self.layers) - 1 } }
     }
 
-    pub fn layers(&self) -> usize {
+    pub(crate) fn layers(&self) -> usize {
         self.layers
     }
 
     /// Whether layers wound at these places, and no others, leave few enough captive runs.
-    pub fn admits(&self, wound: u64) -> bool {
+    pub(crate) fn admits(&self, wound: u64) -> bool {
         (wound & !(wound << 1)).count_ones() <= self.most_intervals
     }
 
     /// P(j), innermost layer first.
-    pub fn segments(node: &Node) -> Vec<usize> {
+    pub(crate) fn segments(node: &Node) -> Vec<usize> {
         node.places.iter().rev().map(|&p| usize::from(p) + 1).collect()
     }
 
@@ -168,7 +168,7 @@ impl PermutationTree {
         if place.is_multiple_of(2) { -sign } else { sign }
     }
 
-    pub fn set_places(&self, node: &Node, found: &mut Places) {
+    pub(crate) fn set_places(&self, node: &Node, found: &mut Places) {
         let placed_count = node.places.len();
         let open_count = self.layers - placed_count;
         let mean = self.mean[open_count];
@@ -277,28 +277,28 @@ impl PermutationTree {
     }
 
     /// Whether a pattern below the node may stay under the limit. What is not a number refutes nothing.
-    pub fn may_stay_under(&self, node: &Node, limit: f32, places: &mut Places) -> bool {
+    pub(crate) fn may_stay_under(&self, node: &Node, limit: f32, places: &mut Places) -> bool {
         self.set_places(node, places);
         let blocks = self.levels[node.open_count()].blocks();
         blocks.iter().all(|block| self.excess(block, places, limit).iter().all(|e| !(*e >= 0.0)))
     }
 
     /// By how much the largest bound below the node exceeds the limit; minus infinity where there is no bound.
-    pub fn largest_excess(&self, node: &Node, limit: f32, places: &mut Places) -> f32 {
+    pub(crate) fn largest_excess(&self, node: &Node, limit: f32, places: &mut Places) -> f32 {
         self.set_places(node, places);
         let blocks = self.levels[node.open_count()].blocks().iter();
         blocks.flat_map(|block| self.excess(block, places, limit)).fold(f32::NEG_INFINITY, f32::max)
     }
 
     /// The first bound of the level that refutes a node whose places are set.
-    pub fn refuting_bound(&self, node: &Node, limit: f32, places: &Places) -> Option<usize> {
+    pub(crate) fn refuting_bound(&self, node: &Node, limit: f32, places: &Places) -> Option<usize> {
         self.levels[node.open_count()].blocks().iter().enumerate().find_map(|(b, block)| {
             self.excess(block, places, limit).iter().position(|e| *e >= 0.0).map(|lane| b * LANES + lane)
         })
     }
 
     /// Puts the next layer on a place if that is open, the class admits it, and no mirror image stands for it.
-    pub fn place(&self, node: &mut Node, place: usize, mirrored: bool) -> bool {
+    pub(crate) fn place(&self, node: &mut Node, place: usize, mirrored: bool) -> bool {
         let is_mirror_image = mirrored && node.places.is_empty() && place >= self.layers / 2;
         if is_mirror_image || node.open >> place & 1 == 0 || !self.admits(node.open & !(1 << place)) {
             return false;

@@ -17,23 +17,23 @@ use crate::search::cost::samples::SampleMatrix;
 
 /// One sample's coefficients, one entry a layer, innermost first.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row {
-    pub constant: f64,
-    pub mean: Vec<f64>,
-    pub difference: Vec<f64>,
-    pub axial: Vec<f64>,
+pub(crate) struct Row {
+    pub(crate) constant: f64,
+    pub(crate) mean: Vec<f64>,
+    pub(crate) difference: Vec<f64>,
+    pub(crate) axial: Vec<f64>,
 }
 
 /// An interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Range {
-    pub low: f64,
-    pub high: f64,
+pub(crate) struct Range {
+    pub(crate) low: f64,
+    pub(crate) high: f64,
 }
 
 impl Row {
     /// A sample of a matrix.
-    pub fn of(matrix: &SampleMatrix, sample: usize) -> Self {
+    pub(crate) fn of(matrix: &SampleMatrix, sample: usize) -> Self {
         let (layout, columns) = (matrix.layout, &matrix.columns);
         let layers = 0..layout.layers;
         let a = |j: usize| columns.column(layout.column_a(j))[sample];
@@ -49,7 +49,7 @@ impl Row {
     }
 
     /// Σ of rows times weights.
-    pub fn blend<'a>(parts: impl Iterator<Item = (&'a Self, f64)> + Clone, layers: usize) -> Self {
+    pub(crate) fn blend<'a>(parts: impl Iterator<Item = (&'a Self, f64)> + Clone, layers: usize) -> Self {
         let sum = |of: fn(&Self) -> &[f64]| {
             (0..layers).map(|j| parts.clone().map(|(row, y)| y * of(row)[j]).sum()).collect::<Vec<f64>>()
         };
@@ -63,7 +63,7 @@ impl Row {
 
     /// The same row with S shifted by a constant, which changes no pattern's value because Σ w_j = 0: zero in the mean
     /// over the `open` innermost layers, or over all if none is open.
-    pub fn shifted(&self, open: usize) -> Self {
+    pub(crate) fn shifted(&self, open: usize) -> Self {
         let count = if open == 0 { self.mean.len() } else { open };
         let shift = self.mean[..count].iter().sum::<f64>() / count as f64;
         Self { mean: self.mean.iter().map(|s| s - shift).collect(), ..self.clone() }
@@ -71,7 +71,7 @@ impl Row {
 
     /// For each kind of term (mean, and where asked for difference and axial) the factor of each layer's place, with
     /// lengths along the fibre in units of the innermost layer's.
-    pub fn factors(&self, lengths_m: &[f64], has_difference: bool, has_axial: bool) -> Vec<Vec<f64>> {
+    pub(crate) fn factors(&self, lengths_m: &[f64], has_difference: bool, has_axial: bool) -> Vec<Vec<f64>> {
         let unit_m = lengths_m[0];
         let times = |of: &[f64]| of.iter().zip(lengths_m).map(|(v, l)| v * l * unit_m).collect::<Vec<f64>>();
         let mut terms = vec![times(&self.mean)];
@@ -85,7 +85,7 @@ impl Row {
     }
 
     /// No term of the row can be larger than this; rounding is judged against it.
-    pub fn scale(&self, lengths_m: &[f64]) -> f64 {
+    pub(crate) fn scale(&self, lengths_m: &[f64]) -> f64 {
         let length_m: f64 = lengths_m.iter().sum();
         let layers = self.mean.iter().zip(&self.difference).zip(&self.axial).zip(lengths_m);
         let sum: f64 = layers.map(|(((s, d), x), l)| l * length_m * (s.abs() + d.abs()) + 2.0 * l * l * x.abs()).sum();
@@ -96,7 +96,7 @@ impl Row {
     ///
     /// u_j is −l_j |2 z̄_j − L| but for the one segment that may straddle the middle. It is taken at the places of
     /// equally long segments; the lengths' deviations from their mean move any place by less than their sum.
-    pub fn curved_range(&self, lengths_m: &[f64]) -> Range {
+    pub(crate) fn curved_range(&self, lengths_m: &[f64]) -> Range {
         let layers = lengths_m.len();
         let axial: f64 = self.axial.iter().zip(lengths_m).map(|(x, l)| 2.0 * l * l * x.abs()).sum();
         let mut factors: Vec<f64> = self.difference.iter().zip(lengths_m).map(|(d, l)| d * l).collect();
@@ -113,7 +113,7 @@ impl Row {
 }
 
 /// How far Σ D_j u_j may be from its value with the `open` innermost layers as long as their mean; `factors` are D_j l_j.
-pub fn curved_slack(factors: &[f64], lengths_m: &[f64], open: usize) -> f64 {
+pub(crate) fn curved_slack(factors: &[f64], lengths_m: &[f64], open: usize) -> f64 {
     let deviation_m: f64 = deviations_m(lengths_m, open).iter().map(|d| d.abs()).sum();
     let equal = lengths_m.iter().all(|l| *l == lengths_m[0]);
     let straddle = factors.iter().zip(lengths_m).map(|(f, l)| f.abs() * l).fold(0.0, f64::max);
@@ -123,7 +123,7 @@ pub fn curved_slack(factors: &[f64], lengths_m: &[f64], open: usize) -> f64 {
 }
 
 /// The lengths of the innermost layers less their mean.
-pub fn deviations_m(lengths_m: &[f64], open: usize) -> Vec<f64> {
+pub(crate) fn deviations_m(lengths_m: &[f64], open: usize) -> Vec<f64> {
     let mean_m = lengths_m[..open].iter().sum::<f64>() / open.max(1) as f64;
     lengths_m[..open].iter().map(|l| l - mean_m).collect()
 }

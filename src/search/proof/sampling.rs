@@ -48,7 +48,7 @@ enum Engine {
 
 /// A search over chosen samples.
 #[derive(Debug)]
-pub struct Proof {
+pub(crate) struct Proof {
     class: WindabilityClass,
     mirrored: bool,
     samples: Vec<usize>,
@@ -59,7 +59,7 @@ pub struct Proof {
 
 impl Proof {
     /// Learning ends with a rate that is good enough; zero for none.
-    pub fn new(
+    pub(crate) fn new(
         class: WindabilityClass,
         judge: &mut Judge,
         starts: &[Pattern],
@@ -88,7 +88,13 @@ impl Proof {
 
     /// Looks for a better pattern where the bounds promise one, for as long as that comes of it; `width` nodes of a level
     /// are kept.
-    pub fn look_ahead(&mut self, judge: &mut Judge, best: &mut Candidate, width: usize, good_enough_rad_per_s: f64) {
+    pub(crate) fn look_ahead(
+        &mut self,
+        judge: &mut Judge,
+        best: &mut Candidate,
+        width: usize,
+        good_enough_rad_per_s: f64,
+    ) {
         while best.rate_rad_per_s > good_enough_rad_per_s {
             let Engine::PermutationTree(directions) = &self.engine else { break };
             let limit_rad_per_s = best.rate_rad_per_s * (1.0 - RELATIVE_TOLERANCE);
@@ -136,7 +142,7 @@ impl Proof {
     }
 
     /// Makes use of a better rate than the engine was made for.
-    pub fn renew(&mut self, judge: &mut Judge, best: &mut Candidate, good_enough_rad_per_s: f64) {
+    pub(crate) fn renew(&mut self, judge: &mut Judge, best: &mut Candidate, good_enough_rad_per_s: f64) {
         let open = self.make_engine(judge, best.rate_rad_per_s);
         self.follow(judge, best, open, good_enough_rad_per_s);
     }
@@ -149,12 +155,18 @@ impl Proof {
     }
 
     /// Samples in use.
-    pub fn rows(&self, judge: &Judge) -> Vec<Row> {
+    pub(crate) fn rows(&self, judge: &Judge) -> Vec<Row> {
         self.used.iter().map(|&s| Row::of(judge.matrix(), s)).collect()
     }
 
     /// Judges every pattern whose worst rate may be below the limit.
-    pub fn pass(&mut self, judge: &mut Judge, limit_rad_per_s: f64, best_rad_per_s: f64, watch: &mut Watch) -> Outcome {
+    pub(crate) fn pass(
+        &mut self,
+        judge: &mut Judge,
+        limit_rad_per_s: f64,
+        best_rad_per_s: f64,
+        watch: &mut Watch,
+    ) -> Outcome {
         let mut whole = Outcome::default();
         loop {
             let outcome = match &self.engine {

@@ -25,7 +25,7 @@ const SHARES: usize = 256;
 
 /// A choice of samples, made ready.
 #[derive(Debug)]
-pub struct SignSearch {
+pub(crate) struct SignSearch {
     rows: Vec<PreparedRow>,
     left: Tree,
     right: Tree,
@@ -47,7 +47,7 @@ struct PreparedRow {
 }
 
 impl SignSearch {
-    pub fn new(rows: &[Row], lengths_m: &[f64], mirrored: bool) -> Self {
+    pub(crate) fn new(rows: &[Row], lengths_m: &[f64], mirrored: bool) -> Self {
         let signs = lengths_m.len() - 1;
         let rows: Vec<PreparedRow> = rows
             .iter()
@@ -72,7 +72,7 @@ impl SignSearch {
     }
 
     /// Every choice of signs that may stay under the limit is judged.
-    pub fn search(&self, judge: &Judge, limit_rad_per_s: f64, watch: &Watch) -> Outcome {
+    pub(crate) fn search(&self, judge: &Judge, limit_rad_per_s: f64, watch: &Watch) -> Outcome {
         let choices = 1u64 << self.outer_signs.len();
         let mut outcome = Outcome::default();
         for choice in 0..choices {

@@ -3,23 +3,23 @@
 use super::rows::{Row, curved_slack, deviations_m};
 
 /// Bounds judged at once.
-pub const LANES: usize = 8;
+pub(crate) const LANES: usize = 8;
 
 /// Relative error of one operation in single precision.
 const UNIT_ROUNDING: f64 = 6e-8;
 
 /// What all bounds of a problem have in common.
 #[derive(Debug, Clone, Copy)]
-pub struct Shape<'a> {
-    pub lengths_m: &'a [f64],
-    pub has_difference: bool,
-    pub has_axial: bool,
-    pub equal: bool,
+pub(crate) struct Shape<'a> {
+    pub(crate) lengths_m: &'a [f64],
+    pub(crate) has_difference: bool,
+    pub(crate) has_axial: bool,
+    pub(crate) equal: bool,
 }
 
 /// A row, or a blend of rows, made ready for nodes with a given number of open layers.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Bound {
+pub(crate) struct Bound {
     constant: f64,
     /// For each kind of term (mean, difference, axial): the factor of each layer's place.
     terms: Vec<Vec<f64>>,
@@ -30,7 +30,7 @@ pub struct Bound {
 }
 
 impl Bound {
-    pub fn new(row: &Row, open: usize, shape: &Shape) -> Self {
+    pub(crate) fn new(row: &Row, open: usize, shape: &Shape) -> Self {
         let lengths_m = shape.lengths_m;
         let row = row.shifted(open);
         let terms = row.factors(lengths_m, shape.has_difference, shape.has_axial);
@@ -71,11 +71,11 @@ fn pairs_slack(row: &Row, lengths_m: &[f64], deviations_m: &[f64]) -> f64 {
 
 /// Eight bounds, lane by lane.
 #[derive(Debug, Clone)]
-pub struct Block {
-    pub constant: [f32; LANES],
-    pub terms: Vec<Vec<[f32; LANES]>>,
-    pub sorted: Vec<Vec<[f32; LANES]>>,
-    pub slack: [f32; LANES],
+pub(crate) struct Block {
+    pub(crate) constant: [f32; LANES],
+    pub(crate) terms: Vec<Vec<[f32; LANES]>>,
+    pub(crate) sorted: Vec<Vec<[f32; LANES]>>,
+    pub(crate) slack: [f32; LANES],
 }
 
 impl Block {
@@ -104,21 +104,17 @@ impl Block {
 
 /// All bounds of a level, in the order in which they are tried.
 #[derive(Debug, Clone, Default)]
-pub struct Level {
+pub(crate) struct Level {
     bounds: Vec<Bound>,
     blocks: Vec<Block>,
 }
 
 impl Level {
-    pub fn count(&self) -> usize {
-        self.bounds.len()
-    }
-
-    pub fn blocks(&self) -> &[Block] {
+    pub(crate) fn blocks(&self) -> &[Block] {
         &self.blocks
     }
 
-    pub fn push(&mut self, bound: &Bound) {
+    pub(crate) fn push(&mut self, bound: &Bound) {
         let lane = self.bounds.len() % LANES;
         if lane == 0 {
             self.blocks.push(Block::like(bound));
@@ -128,7 +124,7 @@ impl Level {
     }
 
     /// Only the given bounds, in the given order.
-    pub fn select(&self, kept: &[usize]) -> Self {
+    pub(crate) fn select(&self, kept: &[usize]) -> Self {
         let mut selected = Self::default();
         for &k in kept {
             selected.push(&self.bounds[k]);

@@ -27,7 +27,7 @@ use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
 
 /// The samples of a norm, and how they make it.
 #[derive(Debug)]
-pub struct Support {
+pub(crate) struct Support {
     matrix: SampleMatrix,
     kind: Kind,
 }
@@ -53,7 +53,7 @@ impl Support {
     ///
     /// # Errors
     /// Effects that leave a layer no turns; rates that are not finite.
-    pub fn of_rms(model: &CoilModel, solved: &SolvedProfiles) -> Result<Self, SearchError> {
+    pub(crate) fn of_rms(model: &CoilModel, solved: &SolvedProfiles) -> Result<Self, SearchError> {
         let matrix = Objective::RootMeanSquare.of_profiles(model, solved)?;
         Ok(Self { matrix, kind: Kind::RootMeanSquare })
     }
@@ -62,7 +62,7 @@ impl Support {
     ///
     /// # Errors
     /// Effects that leave a layer no turns.
-    pub fn of_guaranteed(model: &CoilModel, step: &UnitStep) -> Result<Self, SearchError> {
+    pub(crate) fn of_guaranteed(model: &CoilModel, step: &UnitStep) -> Result<Self, SearchError> {
         let parts = step.parts(model, 1)?;
         let (changes, heated) = (parts.changes.len(), !parts.heat.is_empty());
         let responses: Vec<WeightResponse> = parts.changes.into_iter().chain(parts.heat).collect();
@@ -70,12 +70,12 @@ impl Support {
         Ok(Self { matrix, kind: Kind::Guaranteed { changes, heated } })
     }
 
-    pub fn matrix(&self) -> &SampleMatrix {
+    pub(crate) fn matrix(&self) -> &SampleMatrix {
         &self.matrix
     }
 
     /// The norm for given coefficients.
-    pub fn value(&self, coefficients: &[f64]) -> f64 {
+    pub(crate) fn value(&self, coefficients: &[f64]) -> f64 {
         let values = self.matrix.columns.values(coefficients);
         match self.kind {
             Kind::RootMeanSquare => Norm::RootMeanSquare.of(&values),
@@ -84,7 +84,7 @@ impl Support {
     }
 
     /// Samples to begin with.
-    pub fn first_samples(&self) -> SampleMatrix {
+    pub(crate) fn first_samples(&self) -> SampleMatrix {
         let weights: Vec<Weights> = match self.kind {
             Kind::RootMeanSquare => {
                 // Σ y² = 1/S with a single entry.
@@ -101,7 +101,7 @@ impl Support {
     }
 
     /// One sample for each choice of coefficients: that in which its norm shows.
-    pub fn attaining(&self, coefficients: &[Vec<f64>]) -> SampleMatrix {
+    pub(crate) fn attaining(&self, coefficients: &[Vec<f64>]) -> SampleMatrix {
         let weights: Vec<Weights> = coefficients.iter().map(|c| self.attaining_weights(c)).collect();
         self.matrix.combined(&weights)
     }

@@ -42,19 +42,19 @@ const JOINING: usize = 3;
 
 /// What came of learning.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Lesson {
+pub(crate) struct Lesson {
     /// Rows that bounds are made of.
-    pub used: Vec<usize>,
+    pub(crate) used: Vec<usize>,
     /// Patterns that no row refutes, P(j) innermost layer first.
-    pub open: Vec<Vec<usize>>,
+    pub(crate) open: Vec<Vec<usize>>,
 }
 
 /// Signed weights of rows; their sizes add up to one.
-pub type Weights = Vec<(usize, f64)>;
+pub(crate) type Weights = Vec<(usize, f64)>;
 
 /// Finds blends for nodes.
 #[derive(Debug)]
-pub struct Surrogates<'a> {
+pub(crate) struct Surrogates<'a> {
     rows: &'a [Row],
     /// For each kind of term and layer: the factors of all rows.
     factors: Vec<Vec<Vec<f64>>>,
@@ -73,7 +73,7 @@ enum Verdict {
 }
 
 impl<'a> Surrogates<'a> {
-    pub fn new(rows: &'a [Row], lengths_m: &[f64], has_difference: bool, has_axial: bool) -> Self {
+    pub(crate) fn new(rows: &'a [Row], lengths_m: &[f64], has_difference: bool, has_axial: bool) -> Self {
         let layers = lengths_m.len();
         let of_rows: Vec<Vec<Vec<f64>>> =
             rows.iter().map(|row| row.shifted(layers).factors(lengths_m, has_difference, has_axial)).collect();
@@ -85,12 +85,12 @@ impl<'a> Surrogates<'a> {
     }
 
     /// The row that a choice of weights makes.
-    pub fn row(&self, weights: &Weights) -> Row {
+    pub(crate) fn row(&self, weights: &Weights) -> Row {
         Row::blend(weights.iter().map(|&(s, y)| (&self.rows[s], y)), self.layers)
     }
 
     /// Gives every level of a search the bounds that refute most.
-    pub fn teach(&self, orders: &mut PermutationTree, limit_rad_per_s: f64, mirrored: bool) -> Lesson {
+    pub(crate) fn teach(&self, orders: &mut PermutationTree, limit_rad_per_s: f64, mirrored: bool) -> Lesson {
         let breadth = (BREADTH_TIMES_LAYERS_SQUARED / self.layers.pow(2)).clamp(1, MOST_BREADTH);
         let mut used = vec![false; self.rows.len()];
         let mut places = Places::default();

@@ -92,7 +92,7 @@ impl Part<'_> {
 }
 
 /// Which cells are missing, in a line.
-pub fn missing_words(answer: &CampaignJson) -> String {
+pub(crate) fn missing_words(answer: &CampaignJson) -> String {
     let shown: Vec<&str> = answer.missing.iter().take(MOST_SHOWN).map(String::as_str).collect();
     let further = answer.missing.len() - shown.len();
     let further = if further > 0 { format!(" and {further} more") } else { String::new() };

@@ -20,7 +20,7 @@ pub(super) fn estimated_s(block: &Block) -> f64 {
 }
 
 /// The worst cases of one block's coils. What a model itself does not permit is a result as well: the block's failure.
-pub fn judge_block(id: &str, block: &Block) -> BlockJson {
+pub(crate) fn judge_block(id: &str, block: &Block) -> BlockJson {
     match judged(block) {
         Ok((measure, patterns)) => BlockJson { measure, patterns, ..nothing(id, block) },
         Err(failure) => BlockJson { failure: Some(failure), ..nothing(id, block) },

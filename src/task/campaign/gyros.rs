@@ -29,7 +29,7 @@ fn nothing(id: &str, kind: &str, gyro: &Gyro) -> GyroJson {
 ///
 /// # Errors
 /// A record that cannot be opened.
-pub fn measure_gyro(id: &str, gyro: &Gyro, observer: &dyn Observer) -> Result<GyroJson, TaskError> {
+pub(crate) fn measure_gyro(id: &str, gyro: &Gyro, observer: &dyn Observer) -> Result<GyroJson, TaskError> {
     let settings = Settings { average_s: gyro.settings.average_s, gross_errors: GrossErrors::Keep, attitude: None };
     let mut measured = Vec::with_capacity(gyro.records.len());
     for file in &gyro.records {
@@ -68,7 +68,7 @@ mod diagnosed {
     ///
     /// # Errors
     /// A record that cannot be opened; a gyro without a model.
-    pub fn diagnose_gyro(id: &str, gyro: &Gyro, observer: &dyn Observer) -> Result<GyroJson, TaskError> {
+    pub(crate) fn diagnose_gyro(id: &str, gyro: &Gyro, observer: &dyn Observer) -> Result<GyroJson, TaskError> {
         let Some(file) = &gyro.file else { return Err(TaskError::PatternMissing) };
         for file in gyro.records.iter().chain(&gyro.holdout) {
             Source::open(&file.path)?;
@@ -99,4 +99,4 @@ mod diagnosed {
     }
 }
 #[cfg(feature = "report")]
-pub use diagnosed::diagnose_gyro;
+pub(crate) use diagnosed::diagnose_gyro;

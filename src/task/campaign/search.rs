@@ -54,7 +54,7 @@ fn plan(grid: &SearchGrid, cell: &Search) -> Plan {
 /// Searches one cell; `saved` is where an interrupted search of it was. None if the observer ended it.
 ///
 /// What a model itself does not permit is a result as well: the cell's failure.
-pub fn search_cell(
+pub(crate) fn search_cell(
     grid: &SearchGrid,
     id: &str,
     cell: &Search,

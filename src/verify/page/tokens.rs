@@ -5,10 +5,10 @@ use std::ops::Range;
 /// One piece of a page as its file has it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Piece<'h> {
-    pub raw: &'h str,
-    pub kind: Kind,
+    pub(crate) raw: &'h str,
+    pub(crate) kind: Kind,
     /// Where it begins in the file.
-    pub offset: usize,
+    pub(crate) offset: usize,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -17,27 +17,27 @@ use super::{ARRAY_OF_STRINGS, Cell, Kind, Work, id_of, model_address, model_text
 
 /// Coils to draw of each model, in blocks.
 #[derive(Debug, Clone)]
-pub struct CoilStudy {
-    pub models: Vec<PathBuf>,
+pub(crate) struct CoilStudy {
+    pub(crate) models: Vec<PathBuf>,
     /// Windings' names or pattern files beside the campaign file; empty for the model's own. QUA always joins where it fits.
-    pub patterns: Vec<String>,
+    pub(crate) patterns: Vec<String>,
     base: PathBuf,
     /// None for the model's own.
-    pub samples: Option<u64>,
-    pub seed: Option<u64>,
-    pub limit_rad_per_s: Option<f64>,
-    pub coils_per_cell: u64,
+    pub(crate) samples: Option<u64>,
+    pub(crate) seed: Option<u64>,
+    pub(crate) limit_rad_per_s: Option<f64>,
+    pub(crate) coils_per_cell: u64,
 }
 
 /// Some of the coils of one model, judged with each pattern.
 #[derive(Debug, Clone)]
-pub struct Block {
-    pub file: Arc<ModelFile>,
-    pub patterns: Arc<[NamedPattern]>,
+pub(crate) struct Block {
+    pub(crate) file: Arc<ModelFile>,
+    pub(crate) patterns: Arc<[NamedPattern]>,
     /// How much is built apart; its number of samples is that of the whole study.
-    pub spec: Arc<ToleranceSpec>,
+    pub(crate) spec: Arc<ToleranceSpec>,
     /// Counted from 0.
-    pub coils: Range<u64>,
+    pub(crate) coils: Range<u64>,
 }
 
 /// A block of the 998 m coil takes about 20 s of one thread.

@@ -16,30 +16,30 @@ use super::{ARRAY_OF_STRINGS, Cell, Kind, Work, id_of, model_text};
 
 /// Gyros with their records, and how those are read.
 #[derive(Debug, Clone)]
-pub struct Fleet {
+pub(crate) struct Fleet {
     gyros: Vec<Stated>,
     settings: Arc<FleetSettings>,
 }
 
 /// What holds for every gyro of a fleet.
 #[derive(Debug, Clone)]
-pub struct FleetSettings {
+pub(crate) struct FleetSettings {
     /// Averaging time of the bias stability.
-    pub average_s: f64,
+    pub(crate) average_s: f64,
     /// As `--columns` says it.
-    pub columns: Option<String>,
-    pub skips_bad_rows: bool,
+    pub(crate) columns: Option<String>,
+    pub(crate) skips_bad_rows: bool,
     /// Forms and variables that formulas may be made of, as `--terms` says it; none for all.
-    pub terms: Option<Vec<String>>,
+    pub(crate) terms: Option<Vec<String>>,
 }
 
 /// A file as the campaign file names it, so that a result is the same wherever the campaign stands, and where it is.
 #[derive(Debug, Clone)]
-pub struct StatedFile {
-    pub stated: String,
-    pub path: PathBuf,
+pub(crate) struct StatedFile {
+    pub(crate) stated: String,
+    pub(crate) path: PathBuf,
     /// None for what cannot be read twice.
-    pub sha256: Option<String>,
+    pub(crate) sha256: Option<String>,
 }
 
 #[derive(Debug, Clone)]
@@ -52,15 +52,15 @@ struct Stated {
 
 /// One gyro of a fleet.
 #[derive(Debug, Clone)]
-pub struct Gyro {
-    pub name: String,
+pub(crate) struct Gyro {
+    pub(crate) name: String,
     /// None where no model is asked about.
-    pub file: Option<Arc<ModelFile>>,
-    pub records: Vec<StatedFile>,
+    pub(crate) file: Option<Arc<ModelFile>>,
+    pub(crate) records: Vec<StatedFile>,
     /// Only judged by.
-    pub holdout: Vec<StatedFile>,
-    pub format: RecordFormat,
-    pub settings: Arc<FleetSettings>,
+    pub(crate) holdout: Vec<StatedFile>,
+    pub(crate) format: RecordFormat,
+    pub(crate) settings: Arc<FleetSettings>,
 }
 
 /// As `metrics` does it.

@@ -16,24 +16,24 @@ use super::{ARRAY_OF_STRINGS, Cell, Kind, Work, id_of, model_address, model_text
 
 /// A grid of searches.
 #[derive(Debug, Clone)]
-pub struct SearchGrid {
-    pub models: Vec<PathBuf>,
+pub(crate) struct SearchGrid {
+    pub(crate) models: Vec<PathBuf>,
     /// Layer counts that stand in for the models' own; empty: as the models say.
-    pub layers: Vec<usize>,
-    pub classes: Vec<WindabilityClass>,
-    pub objectives: Vec<Objective>,
-    pub seeds: Vec<u64>,
-    pub rounds: Option<u64>,
-    pub moves_per_restart: Option<u64>,
+    pub(crate) layers: Vec<usize>,
+    pub(crate) classes: Vec<WindabilityClass>,
+    pub(crate) objectives: Vec<Objective>,
+    pub(crate) seeds: Vec<u64>,
+    pub(crate) rounds: Option<u64>,
+    pub(crate) moves_per_restart: Option<u64>,
 }
 
 /// One search of a grid.
 #[derive(Debug, Clone)]
-pub struct Search {
-    pub file: Arc<ModelFile>,
-    pub class: WindabilityClass,
-    pub objective: Objective,
-    pub seed: u64,
+pub(crate) struct Search {
+    pub(crate) file: Arc<ModelFile>,
+    pub(crate) class: WindabilityClass,
+    pub(crate) objective: Objective,
+    pub(crate) seed: u64,
 }
 
 /// What the file says of a grid.

@@ -11,30 +11,30 @@ const MOST_NAMED: usize = 8;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Shape {
     /// The names of what it stands in, outermost first, and its own.
-    pub path: Vec<String>,
-    pub dims: Vec<u64>,
+    pub(crate) path: Vec<String>,
+    pub(crate) dims: Vec<u64>,
     /// Of its columns, where the file has them.
-    pub names: Vec<String>,
+    pub(crate) names: Vec<String>,
 }
 
 /// One column of the table.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Placed {
-    pub name: String,
+    pub(crate) name: String,
     /// Which variable,
-    pub variable: usize,
+    pub(crate) variable: usize,
     /// which of its dimensions the rows are,
-    pub axis: usize,
+    pub(crate) axis: usize,
     /// and which place in the other one.
-    pub index: u64,
+    pub(crate) index: u64,
 }
 
 #[derive(Debug)]
 pub(super) struct Layout {
-    pub rows: u64,
-    pub columns: Vec<Placed>,
+    pub(crate) rows: u64,
+    pub(crate) columns: Vec<Placed>,
     /// What is in none of the columns, in words.
-    pub remarks: Vec<String>,
+    pub(crate) remarks: Vec<String>,
 }
 
 impl Shape {
