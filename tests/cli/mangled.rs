@@ -308,8 +308,8 @@ pub(super) fn fault(ran: &Ran, given: &str, out: &Path) -> Option<String> {
     if ![Some(0), Some(1), Some(2)].contains(&ran.code) {
         return Some(format!("ended with {:?}", ran.code));
     }
-    // A stream's rows are passed on as they stand, and a tab moves a terminal's cursor as a space does.
-    if ran.said.contains(|c| is_unseen(c) && c != '\n' && c != '\t') {
+    // A stream's rows are passed on as they stand, white space about a number too: what only moves a terminal's cursor on.
+    if ran.said.contains(|c| is_unseen(c) && !['\n', '\t', '\u{85}', '\u{2028}', '\u{2029}'].contains(&c)) {
         return Some("a control character on the terminal".to_owned());
     }
     if ran.code == Some(2) && !ran.said.contains("error") {
