@@ -245,7 +245,13 @@ fn all_methods(
     let holdout = arguments.record.as_ref().map(|path| Measurement::read(path, format)).transpose()?;
     let found = try_all(request, holdout.as_ref(), &Watching::quiet(screen))?;
     if let Some(path) = &arguments.output {
-        write_atomically(path, compensation_chart(&found.times_s, &found.curves).svg().as_bytes())?;
+        let title = match found.document.before {
+            Some(_) => "Rate before and after compensation",
+            None => {
+                "Rate of each record, one behind the other, before and after compensation by what was fitted to the others"
+            }
+        };
+        write_atomically(path, compensation_chart(title, &found.times_s, &found.curves).svg().as_bytes())?;
         screen.note(&format!("wrote {}", path.display()));
     }
     let body = found.document;

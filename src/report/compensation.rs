@@ -7,12 +7,14 @@ use crate::units::{deg_per_h_from_rad_per_s, h_from_s};
 const MOST_POINTS: usize = 1500;
 
 /// One curve a method, in means, so that they can be told apart.
-pub(crate) fn compensation_chart(times_s: &[f64], curves: &[(&str, Vec<f64>)]) -> Chart {
+pub(crate) fn compensation_chart(title: &str, times_s: &[f64], curves: &[(&str, Vec<f64>)]) -> Chart {
     let rows = times_s.len().div_ceil(MOST_POINTS).max(1);
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    let chart = Chart::new("Rate before and after compensation").size(860, 460).x(Axis::linear("time [h]")).y(
-        Axis::linear(if rows > 1 { format!("rate, means over {rows} rows [°/h]") } else { "rate [°/h]".to_owned() }),
-    );
+    let chart = Chart::new(title).size(860, 460).x(Axis::linear("time [h]")).y(Axis::linear(if rows > 1 {
+        format!("rate, means over {rows} rows [°/h]")
+    } else {
+        "rate [°/h]".to_owned()
+    }));
     curves.iter().fold(chart, |chart, (name, rates)| {
         let points = times_s
             .chunks(rows)
