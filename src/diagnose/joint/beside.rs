@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::explanation::{fitted, with};
 use super::odds::{CERTAIN, EFFECT};
-use super::readings::Readings;
+use super::readings::take_off;
 use super::screen::{Proposal, proposals};
 use super::{Explanation, Member, Outcome, Question};
 use crate::chamber::{Effort, Fit};
@@ -56,7 +56,7 @@ pub(crate) fn beside(question: &Question, null: &Fit, wandering: &Fit) -> Outcom
         fitted(question, &[], vec![member], &begin, &null.fit, Effort::QUICK)
     });
     let mut fits: Vec<Explanation> = fits.collect();
-    Readings::new(question, null.fit.clone()).take_off(question, &mut fits);
+    take_off(question, &null.fit, &mut fits);
     let found = fits.into_iter().map(|there| {
         let candidate = match there.members[..] {
             [Member::Effect(place)] => Some(place),

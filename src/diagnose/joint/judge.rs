@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::explanation::{fitted, without};
 use super::odds::{CERTAIN, WINDOW};
-use super::readings::Readings;
+use super::readings::take_off;
 use super::{Explanation, Question, Winding};
 use crate::chamber::Effort;
 
@@ -60,7 +60,7 @@ pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mu
         }
     });
     if let Some(declared) = explanations.iter().find(|e| e.members.is_empty()).map(|e| e.fit.clone()) {
-        Readings::new(question, declared).take_off(question, explanations);
+        take_off(question, &declared, explanations);
     }
     order(explanations);
     let top = explanations.first().map_or(0.0, Explanation::total);
