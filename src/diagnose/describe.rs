@@ -280,7 +280,9 @@ pub(super) fn unexplained(
     let number = |q: Quantity| likeliest.fit.number(q, record);
     let gain = 2.0 * (likeliest.fit.log_likelihood - fit.log_likelihood);
     let plain = likeliest.members.iter().filter_map(|m| match m {
-        Member::Drift => Some((Shape::Drift, number(Quantity::DriftSize), 2)),
+        Member::Drift => {
+            Some((Shape::Drift { time_constant_s: number(Quantity::DriftTime) }, number(Quantity::DriftSize), 2))
+        }
         Member::Cycle => {
             Some((Shape::Sinusoid { period_s: number(Quantity::CyclePeriod) }, number(Quantity::CycleSize), 2))
         }

@@ -3,8 +3,13 @@
 /// A shape in time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Shape {
-    Drift,
-    Sinusoid { period_s: f64 },
+    /// Slow wander, and the time after which it has forgotten itself.
+    Drift {
+        time_constant_s: f64,
+    },
+    Sinusoid {
+        period_s: f64,
+    },
 }
 
 /// A shape that goes along with what is left over.

@@ -36,4 +36,8 @@ impl Effect for BiasGradientRate {
     fn outside_rate_rad_per_s(&self, state: &PackState) -> f64 {
         self.gain_rad_per_k * state.gradient_rate_k_per_s()
     }
+
+    fn is_beside_coil(&self) -> bool {
+        true
+    }
 }

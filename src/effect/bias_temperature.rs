@@ -56,4 +56,8 @@ impl Effect for BiasTemperature {
         let above_k = state.mean_temperature_k - REFERENCE_TEMPERATURE_K;
         (self.linear_rad_per_s_k + self.quadratic_rad_per_s_k2 * above_k) * above_k
     }
+
+    fn is_beside_coil(&self) -> bool {
+        true
+    }
 }

@@ -48,4 +48,8 @@ impl Effect for ChannelBias {
         let value = self.column.and_then(|c| state.channels.get(c)).copied().unwrap_or(0.0);
         self.gain_rad_per_s_per_unit * value
     }
+
+    fn is_beside_coil(&self) -> bool {
+        true
+    }
 }

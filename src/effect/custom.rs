@@ -297,6 +297,11 @@ impl Effect for CustomBias {
         rad_per_s_from_deg_per_h(formula.expression.evaluate_after(&values, state.time_s, memory))
     }
 
+    /// Layers' temperatures are the pack's, whichever fibre lies there.
+    fn is_beside_coil(&self) -> bool {
+        self.formula.is_some() && self.degree_in_thermal_rate() == Degree::Not
+    }
+
     fn remembers(&self) -> bool {
         self.formula.as_ref().is_some_and(|f| f.expression.remembers())
     }

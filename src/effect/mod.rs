@@ -180,6 +180,11 @@ pub trait Effect: std::fmt::Debug + Send + Sync {
         self.outside_rate_rad_per_s(state)
     }
 
+    /// Whether there is such a rate, and it is the same with every winding.
+    fn is_beside_coil(&self) -> bool {
+        false
+    }
+
     /// Whether the rate depends on states that came before.
     fn remembers(&self) -> bool {
         false

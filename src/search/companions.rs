@@ -54,7 +54,12 @@ impl<'a> Evaluator<'a> {
         }
         let is_wider = !matches!(class, WindabilityClass::Standard | WindabilityClass::Captive(0 | 1));
         if is_wider {
-            shared.extend(self.under(Objective::WorstRate).short(WindabilityClass::Captive(1), plan, goes_on)?);
+            // With one captive run the least is often found sooner than with any, and it is one of any.
+            let own = Some(self.objective)
+                .filter(|o| !matches!(o, Objective::WorstRate | Objective::P95 | Objective::WorstPhase));
+            for objective in [Some(Objective::WorstRate), own].into_iter().flatten() {
+                shared.extend(self.under(objective).short(WindabilityClass::Captive(1), plan, goes_on)?);
+            }
         }
         let mut seen = std::collections::BTreeSet::new();
         shared.retain(|pattern| seen.insert(pattern.segments().to_vec()));

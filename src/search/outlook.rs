@@ -89,6 +89,41 @@ impl Evaluator<'_> {
         )))
     }
 
+    /// What the coil's own part of the error is, where effects add a rate that no winding changes: the search makes use of
+    /// both, and whoever compensates that rate is left with the coil's part.
+    pub(super) fn beside_coil_reason(
+        &self,
+        recommended: &Weighed,
+        qua: Option<&Weighed>,
+    ) -> Result<Option<String>, JudgeError> {
+        let (beside, of_coil): (Vec<DeclaredEffect>, Vec<DeclaredEffect>) =
+            self.model.effects.iter().cloned().partition(|e| e.bind(&self.model.coil, &[]).is_beside_coil());
+        if beside.is_empty() {
+            return Ok(None);
+        }
+        let coil_alone = CoilModel { effects: of_coil, ..self.model.clone() };
+        let own_rad_per_s = |weighed: &Weighed| -> Result<f64, SearchError> {
+            Ok(self.solved.worst_case(&coil_alone, &weighed.judged.pattern)?.rate_rad_per_s.abs())
+        };
+        let shown = deg_per_h_from_rad_per_s;
+        let kinds: Vec<String> = beside.iter().map(|e| e.kind()).collect();
+        let kinds = kinds.join(", ");
+        let own = own_rad_per_s(recommended)?;
+        let mut words = format!(
+            "no winding changes the rate that {kinds} adds: without it {} has {:.4} °/h on the searched profiles",
+            recommended.judged.name,
+            shown(own)
+        );
+        if let Some(qua) = qua.filter(|qua| qua.judged.pattern != recommended.judged.pattern) {
+            let other = own_rad_per_s(qua)?;
+            words += &format!(", qua {:.4}", shown(other));
+            if own > (1.0 + TIE) * other {
+                words += &format!("; whoever compensates {kinds} should search with a model without it");
+            }
+        }
+        Ok(Some(words))
+    }
+
     /// What the candidates, and what a short search for it finds, would cost with the other boundary.
     pub(super) fn other_boundary(
         &self,

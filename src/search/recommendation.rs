@@ -282,6 +282,7 @@ impl Evaluator<'_> {
         }
         reasons.extend(self.captive_reason(context.class, recommended)?);
         reasons.extend(self.spread_reason(recommended)?);
+        reasons.extend(self.beside_coil_reason(recommended, named(Classic::Qua.key()))?);
         reasons.extend(boundary.and_then(|b| b.sentence(&recommended.judged.name)));
         if context.proof.status != Status::Optimal && !recommended.is_classic {
             reasons.push(match context.proof.status {

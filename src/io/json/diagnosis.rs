@@ -453,7 +453,7 @@ impl UnexplainedJson {
 impl PlainJson {
     fn new(plain: &Plain) -> Self {
         let (shape, period_s, time_constant_s) = match plain.shape {
-            Shape::Drift => ("drift", None, None),
+            Shape::Drift { time_constant_s } => ("drift", None, Some(time_constant_s)),
             Shape::Sinusoid { period_s } => ("sinusoid", Some(period_s), None),
         };
         Self {

@@ -6,6 +6,7 @@ use crate::search::anneal::rounds::Rules;
 use crate::search::cost::samples::tests::{model, profiles};
 use crate::search::cost::signs::segments_of_signs;
 use crate::search::cost::tolerance::AsBuilt;
+use crate::units::deg_per_h_from_rad_per_s;
 
 fn request<'a>(
     model: &'a CoilModel,
@@ -164,6 +165,29 @@ fn what_is_recommended_is_nowhere_far_behind_the_best_classic_on_profiles_that_n
             assert!(mine <= 1.1 * classic, "{layers} {seed}: {mine} {classic}");
         }
     }
+}
+
+#[test]
+fn a_recommendation_tells_the_coil_s_own_part_from_a_rate_that_no_winding_changes() {
+    let (profiles, tolerance) = (spec(1), spread());
+    let reason = |effects: &[&str]| {
+        let model = model(8, LayerLength::Actual, effects);
+        let request = Request { tolerance: None, ..request(&model, &profiles, &tolerance, Objective::WorstRate) };
+        let recommended = run(&request, &mut Unobserved).unwrap().unwrap().recommendation.unwrap();
+        let said = recommended.reasons.into_iter().find(|r| r.starts_with("no winding changes"));
+        (said, recommended.pattern, recommended.name)
+    };
+    assert_eq!(reason(&["surface_film", "strain_mismatch", "heating_cooling_asymmetry"]).0, None);
+    let (said, pattern, name) = reason(&["surface_film", "bias_temperature_rate"]);
+    // The coil with its film alone, by itself.
+    let alone = model(8, LayerLength::Actual, &["surface_film"]);
+    let solved = SolvedProfiles::new(&alone, &profiles.profiles()).unwrap();
+    let own = deg_per_h_from_rad_per_s(solved.worst_case(&alone, &pattern).unwrap().rate_rad_per_s.abs());
+    let said = said.expect("a bias over the rate of temperature is the same with every winding");
+    let start = format!(
+        "no winding changes the rate that bias_temperature_rate adds: without it {name} has {own:.4} °/h on the searched profiles"
+    );
+    assert!(said.starts_with(&start), "{said}\n{start}");
 }
 
 /// Keeps the state behind every slice, as checkpoints do.
