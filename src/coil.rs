@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+/// Why numbers make no coil.
 /// The fibre's optical properties.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fibre {
@@ -13,6 +14,7 @@ pub struct Fibre {
     pub thermo_optic_per_k: f64,
     /// α, in n·α; 0 gives the paper's Eq. (4).
     pub thermal_expansion_per_k: f64,
+    /// Of the light in vacuum.
     pub wavelength_m: f64,
     /// Over the coating.
     pub outer_diameter_m: f64,
@@ -52,12 +54,19 @@ pub(crate) enum SagnacDiameter {
 /// What is needed to build a [`Coil`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoilSpec {
+    /// The fibre that is wound.
     pub fibre: Fibre,
+    /// Layers, an even number.
     pub layers: usize,
+    /// Turns of a layer; None where a half space is modelled, which has no height.
     pub turns_per_layer: Option<f64>,
+    /// From the coil's axis to the inner face of the innermost layer.
     pub bore_radius_m: f64,
+    /// From one layer's middle to the next.
     pub radial_pitch_m: f64,
+    /// From one turn's middle to the next along the axis.
     pub axial_pitch_m: f64,
+    /// Whether each layer is as long as its radius makes it or all are alike.
     pub layer_length: LayerLength,
     /// The fibre's length; with `Equal` it may stand in for the turns.
     pub length_m: Option<f64>,
@@ -84,6 +93,7 @@ pub struct Coil {
 const LENGTH_AGREEMENT: f64 = 0.02;
 
 #[derive(Debug, Error, Clone, PartialEq)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum CoilError {
     #[error(
         "winding.layers must be an even number of at least 2, found {found}: both halves of the fibre need the same number of layers"
@@ -238,6 +248,7 @@ impl Coil {
         coil
     }
 
+    /// The fibre that is wound.
     pub fn fibre(&self) -> &Fibre {
         &self.fibre
     }
@@ -247,6 +258,7 @@ impl Coil {
         self.turns.len()
     }
 
+    /// Whether each layer is as long as its radius makes it or all are alike.
     pub fn layer_length(&self) -> LayerLength {
         self.layer_length
     }
@@ -285,10 +297,12 @@ impl Coil {
         self.bore_radius_m + self.layers() as f64 * self.radial_pitch_m
     }
 
+    /// From one layer's middle to the next.
     pub fn radial_pitch_m(&self) -> f64 {
         self.radial_pitch_m
     }
 
+    /// From one turn's middle to the next along the axis.
     pub fn axial_pitch_m(&self) -> f64 {
         self.axial_pitch_m
     }

@@ -7,10 +7,13 @@ use thiserror::Error;
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::units::k_per_s_from_c_per_h;
 
+/// Why ramps make no profile.
 /// A ramp (or, at rate zero, a soak) of one duration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Piece {
+    /// Slope of the temperature; 0 for a soak.
     pub rate_k_per_s: f64,
+    /// How long it lasts; above 0.
     pub duration_s: f64,
 }
 
@@ -22,6 +25,7 @@ pub struct Profile {
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum ProfileError {
     #[error("a ramp profile needs at least one piece")]
     Empty,
@@ -51,18 +55,22 @@ impl Profile {
         Ok(Self { name: name.into(), pieces })
     }
 
+    /// As it is shown.
     pub fn name(&self) -> &str {
         &self.name
     }
 
+    /// In their order in time.
     pub fn pieces(&self) -> &[Piece] {
         &self.pieces
     }
 
+    /// Of all pieces together.
     pub fn duration_s(&self) -> f64 {
         self.pieces.iter().map(|p| p.duration_s).sum()
     }
 
+    /// The largest size of any piece's slope.
     pub fn max_rate_k_per_s(&self) -> f64 {
         self.pieces.iter().map(|p| p.rate_k_per_s.abs()).fold(0.0, f64::max)
     }
@@ -90,8 +98,11 @@ pub struct ProfileSpec {
     pub count: usize,
     /// Ramps in each of them.
     pub segments: usize,
+    /// Of each of them.
     pub duration_s: f64,
+    /// Of their random slopes.
     pub seed: u64,
+    /// Those stated piece by piece, behind the drawn ones.
     pub listed: Vec<Profile>,
 }
 

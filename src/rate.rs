@@ -41,13 +41,17 @@ pub use builder::CoilModelBuilder;
 pub(crate) use laid::Laid;
 pub use past::Past;
 
+/// Why a model has no rate error for a pattern.
 /// A coil, how it is heated, and which physics is taken into account; everything but the pattern.
 #[derive(Debug, Clone)]
 pub struct CoilModel {
+    /// As it is shown.
     pub name: String,
     /// As declared, before effects change it.
     pub coil: Coil,
+    /// Where the pack ends inwards.
     pub extent: Extent,
+    /// Of the pack, effective.
     pub material: Material,
     /// Where the sensor is, and so what a profile or a record is the temperature of.
     pub location: Location,
@@ -55,10 +59,12 @@ pub struct CoilModel {
     pub rate_mean_s: f64,
     /// Finite-volume cells across a layer of the pack: 1 or an even number.
     pub cells_per_layer: usize,
+    /// In the model file's order.
     pub effects: Vec<DeclaredEffect>,
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum RateError {
     #[error("the pattern has {pattern} layers and the coil {coil}: use a pattern of the coil's layer count")]
     Layers { pattern: usize, coil: usize },
@@ -194,7 +200,9 @@ impl LayerWeights {
 /// One entry a layer, innermost first; `axial_rad_per_s_m2` is empty where nothing varies along the axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WeightResponse {
+    /// Of the half from end A.
     pub half_a_rad_per_s_m2: Vec<f64>,
+    /// Of the half from end B.
     pub half_b_rad_per_s_m2: Vec<f64>,
     pub(crate) axial_rad_per_s_m2: Vec<f64>,
     /// Lead and everything outside the coil.
@@ -260,6 +268,7 @@ impl RateModel {
         &self.coil
     }
 
+    /// Of every layer, by half.
     pub fn weights(&self) -> &LayerWeights {
         &self.weights
     }

@@ -6,10 +6,13 @@ use crate::numeric::piecewise::trailing_means;
 use crate::numeric::statistics::{gross_errors, robust_deviation};
 use crate::units::rad_per_s_from_deg_per_h;
 
+/// Why columns make no record.
 /// A further column of a record, by its name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
+    /// The column's title.
     pub name: String,
+    /// One value a row, in the file's own unit.
     pub values: Vec<f64>,
 }
 
@@ -67,6 +70,7 @@ pub struct Record {
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum RecordError {
     #[error("a record needs at least {needed} rows, found {found}")]
     TooShort { needed: usize, found: usize },
@@ -163,14 +167,17 @@ impl Record {
         if found == expected { Ok(()) } else { Err(RecordError::Shape { column: column.to_owned(), expected, found }) }
     }
 
+    /// As it is shown; a file's stem.
     pub fn name(&self) -> &str {
         &self.name
     }
 
+    /// How many there are.
     pub fn rows(&self) -> usize {
         self.times_s.len()
     }
 
+    /// Increasing; one entry a row.
     pub fn times_s(&self) -> &[f64] {
         &self.times_s
     }
@@ -185,10 +192,12 @@ impl Record {
         &self.rate_rad_per_s
     }
 
+    /// Of a second thermometer at the bore; None without one.
     pub fn inner_k(&self) -> Option<&[f64]> {
         self.inner_k.as_deref()
     }
 
+    /// Of the air outside the film; None without a thermometer there.
     pub fn ambient_k(&self) -> Option<&[f64]> {
         self.ambient_k.as_deref()
     }
@@ -209,6 +218,7 @@ impl Record {
         self.channels.iter().map(mean).collect()
     }
 
+    /// Further columns, in the file's order.
     pub fn channels(&self) -> &[Channel] {
         &self.channels
     }

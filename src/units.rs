@@ -18,10 +18,12 @@ const NANO: f64 = 1e-9;
 /// The temperature at which the temperature-dependent effects are zero: 20 °C, in kelvin.
 pub const REFERENCE_TEMPERATURE_K: f64 = ZERO_CELSIUS_K + 20.0;
 
+/// Converts °/h to rad/s.
 pub fn rad_per_s_from_deg_per_h(rate_deg_per_h: f64) -> f64 {
     rate_deg_per_h / DEGREES_PER_RADIAN / SECONDS_PER_HOUR
 }
 
+/// Converts rad/s to °/h.
 pub fn deg_per_h_from_rad_per_s(rate_rad_per_s: f64) -> f64 {
     rate_rad_per_s * DEGREES_PER_RADIAN * SECONDS_PER_HOUR
 }
@@ -36,6 +38,7 @@ pub fn deg_per_h_from_rad_per_s(rate_rad_per_s: f64) -> f64 {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 pub struct RotationRate {
+    /// As it is held.
     pub rad_per_s: f64,
 }
 
@@ -46,10 +49,12 @@ impl std::fmt::Display for RotationRate {
     }
 }
 
+/// Converts °/s to rad/s.
 pub fn rad_per_s_from_deg_per_s(rate_deg_per_s: f64) -> f64 {
     rate_deg_per_s / DEGREES_PER_RADIAN
 }
 
+/// Converts rad/s to °/s.
 pub fn deg_per_s_from_rad_per_s(rate_rad_per_s: f64) -> f64 {
     rate_rad_per_s * DEGREES_PER_RADIAN
 }
@@ -77,14 +82,17 @@ pub(crate) fn arcsec_from_rad(angle_rad: f64) -> f64 {
     angle_rad * DEGREES_PER_RADIAN * SECONDS_PER_HOUR
 }
 
+/// Converts °C to K.
 pub fn kelvin_from_celsius(temperature_c: f64) -> f64 {
     temperature_c + ZERO_CELSIUS_K
 }
 
+/// Converts K to °C.
 pub fn celsius_from_kelvin(temperature_k: f64) -> f64 {
     temperature_k - ZERO_CELSIUS_K
 }
 
+/// Converts a ramp from °C/h to K/s.
 pub fn k_per_s_from_c_per_h(ramp_c_per_h: f64) -> f64 {
     ramp_c_per_h / SECONDS_PER_HOUR
 }
@@ -93,6 +101,7 @@ pub(crate) fn c_per_h_from_k_per_s(ramp_k_per_s: f64) -> f64 {
     ramp_k_per_s * SECONDS_PER_HOUR
 }
 
+/// Converts a ramp from °C/min to K/s.
 pub fn k_per_s_from_c_per_min(ramp_c_per_min: f64) -> f64 {
     ramp_c_per_min / SECONDS_PER_MINUTE
 }
@@ -105,10 +114,12 @@ pub(crate) fn h_from_s(duration_s: f64) -> f64 {
     duration_s / SECONDS_PER_HOUR
 }
 
+/// Converts s to min.
 pub fn min_from_s(duration_s: f64) -> f64 {
     duration_s / SECONDS_PER_MINUTE
 }
 
+/// Converts min to s.
 pub fn s_from_min(duration_min: f64) -> f64 {
     duration_min * SECONDS_PER_MINUTE
 }
@@ -175,6 +186,7 @@ pub(crate) fn mpa_from_pa(stress_pa: f64) -> f64 {
     stress_pa * MICRO
 }
 
+/// Converts a fraction to %.
 pub fn percent_from_fraction(fraction: f64) -> f64 {
     fraction * 100.0
 }
@@ -202,23 +214,41 @@ pub enum Unit {
     One,
     /// The number of a layer, counted from 1 innermost.
     Layer,
+    /// 1/K.
     PerKelvin,
+    /// s.
     Second,
+    /// m.
     Metre,
+    /// mm.
     Millimetre,
+    /// °C.
     Celsius,
+    /// K, of a difference.
     Kelvin,
+    /// W/m².
     WattPerSquareMetre,
+    /// W/(m² K).
     WattPerSquareMetreKelvin,
+    /// W/(m K).
     WattPerMetreKelvin,
+    /// J/(m² K).
     JoulePerSquareMetreKelvin,
+    /// °/h.
     DegPerHour,
+    /// (°/h)/K.
     DegPerHourPerKelvin,
+    /// (°/h)/K².
     DegPerHourPerSquareKelvin,
+    /// (°/h)/(K/s).
     DegPerHourSecondPerKelvin,
+    /// °/h for each unit of a further column.
     DegPerHourPerUnit,
+    /// °C/h.
     CelsiusPerHour,
+    /// ppm.
     PartsPerMillion,
+    /// ppm/K.
     PartsPerMillionPerKelvin,
 }
 

@@ -51,6 +51,7 @@ pub(crate) const VARIABLES: [&str; 10] =
 /// The model's own thermal rate error.
 pub(crate) const THERMAL_RATE: &str = "thermal_rate";
 
+/// Why a formula makes no effect.
 /// A variable of one layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum OfLayer {
@@ -94,6 +95,7 @@ pub struct Formula {
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum FormulaError {
     #[error(transparent)]
     Expression(#[from] ExpressionError),

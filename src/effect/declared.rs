@@ -10,6 +10,7 @@ use crate::coil::Coil;
 use crate::stress::Materials;
 use crate::units::Unit;
 
+/// Why a declaration makes no effect.
 /// An effect with its parameters, as a model declares it.
 #[derive(Debug, Clone)]
 pub struct DeclaredEffect {
@@ -31,6 +32,7 @@ pub struct DeclaredParameter {
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum EffectError {
     #[error("{kind} takes {expected} parameters, found {found}")]
     Count { kind: &'static str, expected: usize, found: usize },

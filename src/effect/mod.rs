@@ -206,7 +206,9 @@ pub trait Effect: std::fmt::Debug + Send + Sync {
 pub struct FibrePlace {
     /// Index 0 is the innermost.
     pub layer: usize,
+    /// Which half of the fibre.
     pub half: Half,
+    /// Of the layer there.
     pub temperature_k: f64,
 }
 
@@ -217,14 +219,21 @@ pub struct FibrePlace {
 /// `channels` in the order of [`Binding::channels`].
 #[derive(Debug, Clone, Copy)]
 pub struct PackState<'a> {
+    /// From the drive's zero.
     pub time_s: f64,
+    /// Of each layer.
     pub temperatures_k: &'a [f64],
+    /// dT/dt of each layer.
     pub rates_k_per_s: &'a [f64],
+    /// ∫ Ṫ ζ dζ of each layer, as in [`crate::thermal::ThermalHistory`].
     pub axial_moments_k_per_s: &'a [f64],
     /// Over the fibre's length.
     pub mean_temperature_k: f64,
+    /// dT/dt over the fibre's length.
     pub mean_rate_k_per_s: f64,
+    /// Of the air outside the film.
     pub ambient_k: f64,
+    /// Its rate of change.
     pub ambient_rate_k_per_s: f64,
     /// A record's further columns.
     pub channels: &'a [f64],
@@ -311,11 +320,15 @@ pub enum Nature {
 pub struct ParameterSpec {
     /// The key in the model file; ends in the unit.
     pub key: &'static str,
+    /// In which the model file states it.
     pub unit: Unit,
+    /// In words, for people.
     pub meaning: &'static str,
     /// Bounds, start of a fit and default, all in `unit`.
     pub lower: f64,
+    /// The upper bound.
     pub upper: f64,
+    /// Where a fit begins.
     pub start: f64,
     /// Where a model file need not state it.
     pub(crate) default: Option<f64>,
@@ -324,8 +337,11 @@ pub struct ParameterSpec {
 /// A parameter that is one of a few words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ChoiceSpec {
+    /// The key in the model file.
     pub key: &'static str,
+    /// What may stand there.
     pub options: &'static [&'static str],
+    /// In words, for people.
     pub meaning: &'static str,
 }
 
@@ -339,11 +355,16 @@ pub struct EffectSpec {
     pub kind: &'static str,
     /// One line: what it adds.
     pub summary: &'static str,
+    /// What it adds, as a formula.
     pub equation: &'static str,
     pub(crate) acts: Acts,
+    /// Mechanism, regularity, factor on a declared number, or the user's formula.
     pub nature: Nature,
+    /// What it takes; in the model file's order.
     pub parameters: &'static [ParameterSpec],
+    /// What is chosen from words.
     pub choices: &'static [ChoiceSpec],
+    /// Publication and equation.
     pub source: &'static str,
     /// What it looks like in a record.
     pub signature: &'static str,

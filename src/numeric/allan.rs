@@ -22,7 +22,9 @@
 /// One point of the Allan deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AllanPoint {
+    /// Averaging time.
     pub tau_s: f64,
+    /// σ(τ), in the units of y.
     pub deviation: f64,
     /// How many pairs of means it was estimated from.
     pub pairs: usize,

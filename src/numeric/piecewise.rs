@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+/// Why knots and values make no function.
 /// Continuous, piecewise linear, constant before its first and after its last knot.
 ///
 /// # Shapes
@@ -13,6 +14,7 @@ pub struct PiecewiseLinear {
 }
 
 #[derive(Debug, Error, Clone, Copy, PartialEq)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum PiecewiseError {
     #[error(
         "a piecewise-linear function needs at least one knot and a value at each, found {knots} knots and {values} values"
@@ -40,10 +42,12 @@ impl PiecewiseLinear {
         Ok(Self { knots, values })
     }
 
+    /// The same everywhere.
     pub fn constant(value: f64) -> Self {
         Self { knots: vec![0.0], values: vec![value] }
     }
 
+    /// Where straight pieces meet; increasing.
     pub fn knots(&self) -> &[f64] {
         &self.knots
     }
@@ -61,6 +65,7 @@ impl PiecewiseLinear {
         self.knots.partition_point(|&k| k <= x).checked_sub(1)
     }
 
+    /// Constant before the first knot and behind the last.
     pub fn value(&self, x: f64) -> f64 {
         match self.piece(x) {
             None => self.values[0],

@@ -8,6 +8,7 @@ use thiserror::Error;
 
 use super::{EndTurns, Half, Pattern};
 
+/// Why a classic winding does not exist for a layer count.
 /// A winding that has a name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Classic {
@@ -28,6 +29,7 @@ pub enum Classic {
 }
 
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum ClassicError {
     #[error(
         "winding.layers must be a multiple of {multiple} for {article} {name}, found {found}: use {nearby}",
@@ -52,6 +54,7 @@ impl std::fmt::Display for Nearby {
 }
 
 impl Classic {
+    /// All of them, simplest first.
     pub const ALL: [Classic; 7] =
         [Classic::Zyl, Classic::Sym, Classic::SymText, Classic::Dip, Classic::Qua, Classic::Oct, Classic::Hex];
 
@@ -68,6 +71,7 @@ impl Classic {
         }
     }
 
+    /// In words.
     pub fn title(self) -> &'static str {
         match self {
             Classic::Zyl => "cylindrical winding",

@@ -12,7 +12,9 @@ use super::{Half, Pattern, PatternError};
 /// Whole turns more (above zero) or fewer (below) than whole layers at the fibre's ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 pub struct EndTurns {
+    /// At the fibre's end A.
     pub a: i32,
+    /// At the fibre's end B.
     pub b: i32,
 }
 
@@ -67,6 +69,7 @@ impl Pattern {
         Ok(Self { end_turns, ..self })
     }
 
+    /// Both 0 where the ends are whole layers.
     pub fn end_turns(&self) -> EndTurns {
         self.end_turns
     }

@@ -8,6 +8,7 @@ use thiserror::Error;
 
 pub use ends::{EndTurns, WoundPiece};
 
+/// Why numbers make no pattern.
 /// A permutation layer → segment, innermost layer first.
 ///
 /// Segments are numbered 1 … N in the order of arclength from end A; half A is 1 … N/2. Layers are indexed from
@@ -34,7 +35,9 @@ impl std::fmt::Debug for Pattern {
 /// A half of the fibre, by arclength: A is z < L/2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Half {
+    /// From end A to the middle.
     A,
+    /// From the middle to end B.
     B,
 }
 
@@ -57,6 +60,7 @@ impl std::fmt::Display for Half {
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum PatternError {
     #[error("a pattern needs an even number of at least 2 segments, found {found}")]
     Count { found: usize },

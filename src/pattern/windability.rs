@@ -44,6 +44,7 @@ pub struct WindingStep {
     pub climb: usize,
     /// Layers that this step's segment is joined to and that are wound already, and how far away: at its low and high end.
     pub joined_low: Option<usize>,
+    /// As `joined_low`, at the high end.
     pub joined_high: Option<usize>,
 }
 
@@ -72,6 +73,7 @@ pub enum WindabilityClass {
 }
 
 impl WindabilityClass {
+    /// Whether the winding shop can wind it.
     pub fn admits(self, pattern: &Pattern) -> bool {
         match self {
             WindabilityClass::Standard => WindingGraph::new(pattern).windability().captive == 0,
@@ -108,6 +110,7 @@ impl Windability {
 }
 
 impl WindingGraph {
+    /// One node a segment; an edge where a segment is wound upon another.
     pub fn new(pattern: &Pattern) -> Self {
         let pieces = pattern.pieces();
         let mut graph = UnGraph::with_capacity(pieces.len(), pieces.len() - 1);
@@ -173,6 +176,7 @@ impl WindingGraph {
         steps
     }
 
+    /// The cheapest way to wind it.
     pub fn windability(&self) -> Windability {
         let steps = self.steps();
         let climbs = || self.graph.edge_references().map(|e| e.weight().climb);

@@ -82,6 +82,7 @@ pub struct Entry {
 }
 
 impl Entry {
+    /// As the stress of a pack needs it.
     pub fn material(&self) -> Material {
         Material {
             name: self.name.to_owned(),

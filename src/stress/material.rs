@@ -112,6 +112,7 @@ impl Elastic {
 pub(crate) const MOST_POISSON_RATIO: f64 = 0.49995;
 
 impl Material {
+    /// Of the same modulus, ratio and expansion at every temperature.
     pub fn constant(name: &str, youngs_modulus_pa: f64, poisson_ratio: f64, expansion_per_k: f64) -> Self {
         Self {
             name: name.to_owned(),

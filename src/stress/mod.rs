@@ -39,27 +39,35 @@ use ring::{Annulus, LayeredRing, Strain};
 /// A fibre from its glass outwards.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoatedFibre {
+    /// Core and cladding.
     pub glass: Material,
+    /// To the first coating.
     pub glass_radius_m: f64,
     /// 0 where light runs in the glass; else the radius of the hole that the glass surrounds as a tube.
     pub hole_radius_m: f64,
     /// Each with its outer radius, from within outwards; the last is the fibre's surface.
     pub coatings: Vec<(Material, f64)>,
+    /// Elasto-optic coefficient, mean of both polarisations.
     pub p11: f64,
+    /// Elasto-optic coefficient, mean of both polarisations.
     pub p12: f64,
 }
 
 /// The spool that the pack is bonded to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spool {
+    /// Of the spool.
     pub material: Material,
+    /// Of its wall.
     pub thickness_m: f64,
 }
 
 /// What a coil is made of.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Materials {
+    /// What is wound.
     pub fibre: CoatedFibre,
+    /// Between the turns.
     pub adhesive: Material,
     /// None for a free-standing pack.
     pub spool: Option<Spool>,
@@ -125,8 +133,10 @@ pub struct FreeFibre {
 /// What a layer does for a change of all temperatures: strains, and the change of optical path per metre of fibre.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LayerChange {
+    /// Of the fibre there.
     pub strain: Strain,
     pub(crate) glass_transverse: f64,
+    /// Change of optical path per metre of fibre.
     pub path: f64,
 }
 
@@ -150,6 +160,7 @@ pub struct PackStress {
 }
 
 impl PackStress {
+    /// For a coil wound from these materials.
     pub fn new(materials: &Materials, coil: &Coil) -> Self {
         let is_constant = materials.is_constant();
         let nodes = if is_constant { 1 } else { ((HOTTEST_K - COLDEST_K) / CELL_STEP_K) as usize + 1 };

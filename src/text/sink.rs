@@ -16,10 +16,12 @@ use super::{is_unseen, visible};
 macro_rules! shown_as_it_is {
     ($($sink:ident),*) => {$(
         impl $sink {
+            /// As it may be written.
             pub fn as_str(&self) -> &str {
                 &self.0
             }
 
+            /// As it may be written.
             pub fn into_string(self) -> String {
                 self.0
             }
@@ -38,6 +40,7 @@ macro_rules! shown_as_it_is {
 pub struct Line(String);
 
 impl Line {
+    /// Control characters and what does not show become visible escapes.
     pub fn of(text: impl std::fmt::Display) -> Self {
         Self(visible(&text.to_string(), &[]))
     }
@@ -95,6 +98,7 @@ fn escaped_json(json: &str, hidden: impl Fn(char) -> bool) -> String {
 pub struct TomlComment(String);
 
 impl TomlComment {
+    /// Every line a comment of its own.
     pub fn of(text: impl std::fmt::Display) -> Self {
         Self(visible(&text.to_string(), &[]))
     }
@@ -105,6 +109,7 @@ impl TomlComment {
 pub struct CComment(String);
 
 impl CComment {
+    /// In which no comment can end or begin.
     pub fn of(text: &str) -> Self {
         let mut out = String::with_capacity(text.len());
         for c in text.chars() {
@@ -180,6 +185,7 @@ impl AsRef<[u8]> for Cell {
 pub struct ShellWord(String);
 
 impl ShellWord {
+    /// Quoted where a shell would read more than the text.
     pub fn of(text: &str) -> Self {
         if text.contains(is_unseen) {
             // Between $' and ' a byte may be written as three octal digits.
@@ -196,6 +202,7 @@ impl ShellWord {
 pub struct Markup(String);
 
 impl Markup {
+    /// In which no tag or entity can begin.
     pub fn of(quoted: &str) -> Self {
         Self(visible(quoted, &['\n', '\t']))
     }

@@ -3,7 +3,9 @@
 /// From which side a time is approached: rates jump where the drive's rate does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
+    /// What holds until then.
     Before,
+    /// What holds from then on.
     After,
 }
 
@@ -15,10 +17,12 @@ pub struct Instant {
 }
 
 impl Instant {
+    /// At a time, as what holds from then on.
     pub fn after(time_s: f64) -> Self {
         Self { time_s, side: Side::After }
     }
 
+    /// At a time, as what held until then.
     pub fn before(time_s: f64) -> Self {
         Self { time_s, side: Side::Before }
     }
@@ -30,20 +34,27 @@ impl Instant {
 /// Row-major, one row a time, `layers` columns, innermost layer first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ThermalHistory {
+    /// Columns of a row.
     pub layers: usize,
+    /// One entry a row; both sides of a kink share a time.
     pub times_s: Vec<f64>,
+    /// One row a time.
     pub temperature_k: Vec<f64>,
+    /// dT/dt, as `temperature_k`.
     pub rate_k_per_s: Vec<f64>,
     /// ∫ Ṫ ζ dζ over −½ ≤ ζ ≤ ½, ζ the axial coordinate over the height, growing away from the first flange; empty
     /// where nothing varies along the axis.
     pub axial_moment_k_per_s: Vec<f64>,
     /// ∫ T ζ dζ; empty where nothing varies along the axis.
     pub axial_moment_k: Vec<f64>,
+    /// Of the air outside the film; one entry a row.
     pub ambient_k: Vec<f64>,
+    /// Its rate of change.
     pub ambient_rate_k_per_s: Vec<f64>,
 }
 
 impl ThermalHistory {
+    /// Without a row.
     pub fn with_capacity(layers: usize, times: usize) -> Self {
         Self {
             layers,
@@ -57,6 +68,7 @@ impl ThermalHistory {
         }
     }
 
+    /// Rows.
     pub fn len(&self) -> usize {
         self.times_s.len()
     }
@@ -86,18 +98,22 @@ impl ThermalHistory {
         self.ambient_rate_k_per_s.push(other.ambient_rate_k_per_s[row]);
     }
 
+    /// Whether there is no row.
     pub fn is_empty(&self) -> bool {
         self.times_s.is_empty()
     }
 
+    /// Of each layer in one row.
     pub fn temperatures_k(&self, row: usize) -> &[f64] {
         &self.temperature_k[row * self.layers..(row + 1) * self.layers]
     }
 
+    /// dT/dt of each layer in one row.
     pub fn rates_k_per_s(&self, row: usize) -> &[f64] {
         &self.rate_k_per_s[row * self.layers..(row + 1) * self.layers]
     }
 
+    /// ∫ Ṫ ζ dζ of each layer in one row; empty where nothing varies along the axis.
     pub fn axial_moments_k_per_s(&self, row: usize) -> &[f64] {
         if self.axial_moment_k_per_s.is_empty() {
             &[]

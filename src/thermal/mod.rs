@@ -37,6 +37,7 @@ pub use path::{
 };
 use stepped::SteppedField;
 
+/// Why a heat path cannot be solved.
 /// What drives the field: temperatures against time, the pack being in a steady state before the first knot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drive {
@@ -47,6 +48,7 @@ pub struct Drive {
 }
 
 impl Drive {
+    /// One temperature, at the place that [`Location`] says.
     pub fn boundary(boundary_k: PiecewiseLinear) -> Self {
         Self { boundary_k, ambient_k: None }
     }
@@ -70,6 +72,7 @@ impl Drive {
 
 /// A part of the heat path that not every pack can have.
 #[derive(Debug, Error, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum HeatPart {
     #[error("a film or an ambient sensor")]
     AmbientSensor,
@@ -100,6 +103,7 @@ pub enum HeatPart {
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum ThermalError {
     #[error(
         "{part} needs a pack that ends somewhere: set thermal.model = \"pack\", or add the effect that ends the pack"
@@ -138,7 +142,9 @@ pub enum ThermalError {
 /// The response of every layer's rate to a unit step of the boundary's rate at t = 0.
 #[derive(Debug, Clone)]
 pub enum StepResponse {
+    /// In closed form.
     HalfSpace(half_space::HalfSpace),
+    /// By its modes.
     Pack(Box<Pack>),
 }
 
@@ -184,8 +190,11 @@ impl StepResponse {
 /// The temperature field under one drive.
 #[derive(Debug, Clone)]
 pub enum Field {
+    /// In closed form.
     HalfSpace(HalfSpaceField),
+    /// By its modes.
     Pack(Box<PackField>),
+    /// The modes with what a conductivity that depends on temperature adds.
     Stepped(Box<SteppedField>),
 }
 

@@ -8,10 +8,14 @@ use crate::numeric::piecewise::PiecewiseLinear;
 pub enum Material {
     /// Only K = k/ρc is known; effects that exchange heat with something else need both.
     Diffusivity {
+        /// K = k/ρc.
         m2_per_s: f64,
     },
+    /// Both are known.
     Conductivity {
+        /// k.
         w_per_m_k: f64,
+        /// ρc.
         heat_capacity_j_per_m3_k: f64,
     },
 }
@@ -64,6 +68,7 @@ pub enum Location {
 pub struct Spool {
     /// Per bore area.
     pub heat_capacity_j_per_m2_k: f64,
+    /// Between the spool and the pack.
     pub contact_w_per_m2_k: f64,
     /// From the spool to the ambient.
     pub mount_w_per_m2_k: f64,
@@ -72,7 +77,9 @@ pub struct Spool {
 /// The spool's metal, where it conducts along the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpoolWall {
+    /// k of the metal.
     pub conductivity_w_per_m_k: f64,
+    /// Of the wall, radially.
     pub thickness_m: f64,
 }
 
@@ -81,9 +88,13 @@ pub struct SpoolWall {
 /// All per area of the pack's face.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpoolFlange {
+    /// Which of the two.
     pub flange: Flange,
+    /// Of the flange.
     pub heat_capacity_j_per_m2_k: f64,
+    /// Between the flange and the pack.
     pub contact_w_per_m2_k: f64,
+    /// Between the flange and the ambient.
     pub film_w_per_m2_k: f64,
 }
 
@@ -94,6 +105,7 @@ pub struct SpoolFlange {
 pub struct Housing {
     /// Counted from 0 at the coil outwards; some may be missing.
     pub place: usize,
+    /// Of the housing.
     pub heat_capacity_j_per_m2_k: f64,
     /// Across the gap inside it.
     pub gap_w_per_m2_k: f64,
@@ -102,11 +114,15 @@ pub struct Housing {
 /// A start that is not steady: by how much parts are warmer than the drive, and a ramp that ends there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Start {
+    /// The pack, evenly.
     pub pack_above_k: f64,
+    /// The spool, where there is one.
     pub spool_above_k: f64,
+    /// All housings.
     pub housing_above_k: f64,
     /// Rate of the drive before the start, for how long.
     pub rate_k_per_s: f64,
+    /// Duration of that ramp; above 0.
     pub lasted_s: f64,
 }
 
@@ -136,23 +152,31 @@ pub struct BoreHeat {
 /// Which flange: layer 1 starts at the first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Flange {
+    /// At ζ = −½.
     First,
+    /// At ζ = +½.
     Second,
 }
 
 /// A flange that exchanges heat with the ambient.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlangeFilm {
+    /// Which of the two faces.
     pub flange: Flange,
+    /// Between that face and the ambient.
     pub film_w_per_m2_k: f64,
 }
 
 /// The pack's dimensions as far as heat is concerned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PackShape {
+    /// How many there are.
     pub layers: usize,
+    /// From the coil's axis to the pack's inner face.
     pub bore_radius_m: f64,
+    /// From one layer's middle to the next.
     pub radial_pitch_m: f64,
+    /// Along the axis.
     pub height_m: f64,
 }
 
@@ -170,21 +194,29 @@ impl PackShape {
 /// Everything that the heat flows through, from the drive to the bore.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeatPath {
+    /// Where its layers are.
     pub shape: PackShape,
+    /// Where the pack ends inwards.
     pub extent: Extent,
+    /// Of the pack, effective.
     pub material: Material,
+    /// Where the driving temperature is.
     pub location: Location,
     /// At the outer surface; only used where the drive is the ambient.
     pub film_w_per_m2_k: Option<f64>,
+    /// At the bore.
     pub spool: Option<Spool>,
     /// None: the spool is one lump at every place of the axis.
     pub spool_wall: Option<SpoolWall>,
+    /// At most one of each.
     pub spool_flanges: Vec<SpoolFlange>,
     /// Between the coil and the air, from the coil outwards.
     pub housings: Vec<Housing>,
     /// None: steady before the drive's first knot.
     pub start: Option<Start>,
+    /// None: the bore is adiabatic or behind a spool.
     pub bore_heat: Option<BoreHeat>,
+    /// None: both faces are adiabatic or behind flanges.
     pub flange: Option<FlangeFilm>,
     /// Of the other flange, where that exchanges heat too.
     pub opposite_flange: Option<FlangeFilm>,
@@ -208,6 +240,7 @@ pub struct LayerGap {
 pub const DEFAULT_CELLS_PER_LAYER: usize = 1;
 
 impl HeatPath {
+    /// Without anything around the pack.
     pub fn new(shape: PackShape, extent: Extent, material: Material, location: Location) -> Self {
         Self {
             shape,

@@ -39,17 +39,24 @@ use likelihood::{Likelihood, Point};
 /// A strength and the interval in which it lies; `low` is 0 where the noise may be absent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interval {
+    /// The most likely strength.
     pub value: f64,
+    /// Its lower end.
     pub low: f64,
+    /// Its upper end.
     pub high: f64,
 }
 
 /// In the units of y and seconds, as in [`crate::numeric::allan`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseStrengths {
+    /// Q.
     pub quantisation: Interval,
+    /// N.
     pub white: Interval,
+    /// B.
     pub flicker: Interval,
+    /// K.
     pub random_walk: Interval,
     pub(crate) ramp: Interval,
     /// Root mean square of what the further columns explain, in units of y.
