@@ -24,6 +24,7 @@ use crate::rate::{CoilModel, Past, RateError, RateModel};
 use crate::record::{Record, RecordError};
 use crate::thermal::{GivenField, ThermalError, ThermalHistory};
 
+/// Why a record cannot be predicted.
 /// A model's prediction of one record.
 ///
 /// # Shapes
@@ -32,6 +33,7 @@ use crate::thermal::{GivenField, ThermalError, ThermalHistory};
 pub struct Prediction {
     /// With the offset.
     pub rate_rad_per_s: Vec<f64>,
+    /// The record's bias, as estimated; contained in the rates.
     pub offset_rad_per_s: f64,
     /// What the readings leave open contributes [(rad/s)²].
     pub boundary_variance_rad2_per_s2: Vec<f64>,
@@ -81,6 +83,7 @@ struct Course {
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum PredictError {
     #[error("the course of the air needs at least {needed} readings of temperature, found {found}")]
     TooFew { needed: usize, found: usize },

@@ -44,16 +44,21 @@ use verdict::{Finding, Verdict};
 /// Everything that was found out about one record and one model.
 #[derive(Debug, Clone)]
 pub struct Comparison {
+    /// Rows that were compared.
     pub rows: usize,
     pub(crate) offset_rad_per_s: f64,
     pub(crate) noise_rad_per_s: f64,
     pub(crate) noise_standard_error_rad_per_s: f64,
+    /// Root mean square of the residual, the offset taken out.
     pub rmse_rad_per_s: f64,
     pub(crate) nrmse_fit_percent: f64,
     /// None where the record does not vary.
     pub(crate) r_squared: Option<f64>,
+    /// Σ r²/σ² over the degrees of freedom, σ the record's noise alone; 1 where the prediction is exact.
     pub reduced_chi_square: f64,
+    /// What of it the uncertainty of the estimated boundary makes.
     pub boundary_chi_square: f64,
+    /// The residual against noise and boundary together; 1 where the model is complete.
     pub whitened_chi_square: f64,
     pub(crate) largest: LargestError,
     /// At lags 0, 1, …, of the residual in units of its expected deviation.
@@ -61,12 +66,15 @@ pub struct Comparison {
     pub(crate) autocorrelation_band: f64,
     pub(crate) ljung_box: LjungBox,
     pub(crate) correlations: Vec<Correlation>,
+    /// The record by what the drive does; see [`Regime`].
     pub regimes: Vec<Part>,
     /// One entry a row.
     pub(crate) regime_of_row: Vec<Regime>,
     pub(crate) temperature_bands: Vec<Part>,
     pub(crate) rate_bands: Vec<Part>,
+    /// Where the error lies, what matters most first.
     pub findings: Vec<Finding>,
+    /// Whether the model is adequate for the record.
     pub verdict: Verdict,
     /// One entry a row.
     pub prediction: Prediction,
@@ -90,15 +98,19 @@ pub(crate) struct LargestError {
 /// What the residual may go along with.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Quantity {
+    /// T of the pack's mean.
     Temperature,
+    /// dT/dt of the pack's mean.
     TemperatureRate,
     /// Outermost less innermost layer.
     Gradient,
+    /// Its rate of change.
     GradientRate,
     /// The model's own prediction: a scale error.
     Prediction,
     /// The prediction where it gets warmer less where it gets cooler.
     PredictionByDirection,
+    /// A further column of the record, by its name.
     Channel(String),
 }
 

@@ -22,12 +22,18 @@ const STILL: f64 = 0.05;
 const BEND_SHARE: f64 = 0.1;
 const TEMPERATURE_BANDS: usize = 6;
 
+/// What the drive does at a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Regime {
+    /// The first part of the record.
     WarmUp,
+    /// Behind a change of the drive's slope, until the pack has settled.
     Transient,
+    /// The outermost layer gets warmer.
     HeatingRamp,
+    /// The outermost layer gets cooler.
     CoolingRamp,
+    /// The outermost layer hardly changes.
     Soak,
 }
 
@@ -53,6 +59,7 @@ pub struct Part {
     pub(crate) name: String,
     pub(crate) rows: usize,
     pub(crate) share_of_rows: f64,
+    /// Of the whole record's Σ r²; from 0 to 1.
     pub share_of_squared_error: f64,
     pub(crate) rmse_rad_per_s: f64,
     /// Σ r²/(σ² + var) over the part, divided by its rows: 1 where the model is complete.

@@ -7,9 +7,12 @@ use super::regimes::{Part, Regime};
 use super::{Comparison, Quantity};
 use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
 
+/// Whether a model is adequate for a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
+    /// What is left is the record's noise.
     Adequate,
+    /// The model lacks something.
     Missing,
 }
 
@@ -18,46 +21,76 @@ pub enum Verdict {
 pub enum Finding {
     /// The whole χ² is too large.
     Excess {
+        /// Reduced χ² against noise and boundary.
         whitened_chi_square: f64,
     },
+    /// The error gathers where the drive does one thing.
     Regime {
+        /// What the drive does there.
         regime: Regime,
+        /// Of the squared error; from 0 to 1.
         share: f64,
+        /// Of the record's rows; from 0 to 1.
         share_of_rows: f64,
+        /// How long a change of ramp counts as recent.
         transient_s: f64,
     },
+    /// The error gathers at some temperatures.
     TemperatureBand {
+        /// From and to, in words.
         band: String,
+        /// Of the squared error; from 0 to 1.
         share: f64,
+        /// Of the record's rows; from 0 to 1.
         share_of_rows: f64,
     },
+    /// The error gathers at some rates of temperature.
     RateBand {
+        /// From and to, in words.
         band: String,
+        /// Of the squared error; from 0 to 1.
         share: f64,
+        /// Of the record's rows; from 0 to 1.
         share_of_rows: f64,
     },
+    /// The residual follows a quantity.
     Follows {
+        /// Which one.
         quantity: Quantity,
+        /// From −1 to 1.
         correlation: f64,
     },
     /// Readings and rates together want something else.
     Wanted {
+        /// Of log likelihood, with an effect that the model lacks.
         gain: f64,
     },
+    /// The rate wanders more than a gyro of this noise does.
     Wanders,
+    /// Neighbouring residuals hang together.
     Coloured {
+        /// Autocorrelation at lag 1.
         lag_one: f64,
+        /// Within which white noise stays in 99 of 100 records.
         band: f64,
     },
+    /// The residual is the record's noise.
     NothingStandsOut {
+        /// Against the noise alone.
         reduced_chi_square: f64,
     },
+    /// A part of χ² is what the estimated boundary leaves open.
     Boundary {
+        /// Against the noise alone.
         reduced_chi_square: f64,
+        /// The part of it that the boundary makes.
         boundary_chi_square: f64,
     },
+    /// The largest single error.
     Largest {
+        /// With its sign.
         residual_rad_per_s: f64,
+        /// Its row's time.
         time_s: f64,
     },
 }

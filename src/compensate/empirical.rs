@@ -39,6 +39,7 @@ pub struct BiasLine {
 /// Bias over temperature, in up to three straight lines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PiecewiseBias {
+    /// Its straight pieces, in order of temperature.
     pub lines: Vec<BiasLine>,
 }
 

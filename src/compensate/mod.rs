@@ -31,18 +31,25 @@ use learned::Learned;
 use physical::{MOST_DELAY_ROWS, Physical};
 use stream::{Compensated, Reading, Stream};
 
+/// Why nothing can be compensated.
 /// Ways to compensate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
+    /// The coil's own model, driven by the thermometers.
     Physical,
+    /// Straight lines over temperature.
     Piecewise,
+    /// A regression on temperature and its rates.
     Regression,
+    /// A ridge regression on lagged temperatures.
     Learned,
 }
 
 impl Method {
+    /// All of them, in the order in which they are shown.
     pub const ALL: [Method; 4] = [Method::Physical, Method::Piecewise, Method::Regression, Method::Learned];
 
+    /// As in files and on the command line.
     pub fn key(self) -> &'static str {
         match self {
             Method::Physical => "physical",
@@ -56,13 +63,18 @@ impl Method {
 /// A compensator, ready for any record of the same gyro.
 #[derive(Debug, Clone)]
 pub enum Compensator {
+    /// See [`Method::Physical`].
     Physical(Box<Physical>),
+    /// See [`Method::Piecewise`].
     Piecewise(PiecewiseBias),
+    /// See [`Method::Regression`].
     Regression(Regression),
+    /// See [`Method::Learned`].
     Learned(Learned),
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum CompensateError {
     #[error(
         "no difference equation holds {}: leave {} out of the model, or compensate with piecewise or regression",
@@ -217,6 +229,7 @@ impl Compensator {
         Ok(Compensator::Physical(Box::new(physical)))
     }
 
+    /// Which of the methods it is.
     pub fn method(&self) -> Method {
         match self {
             Compensator::Physical(_) => Method::Physical,

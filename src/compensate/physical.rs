@@ -80,6 +80,7 @@ pub struct Physical {
     /// At least 1; with 1 it is one difference equation without breaks.
     pub hypotheses: usize,
     pub(crate) delay_s: f64,
+    /// Bias of the record that it was tuned on.
     pub offset_rad_per_s: f64,
 }
 
@@ -96,6 +97,7 @@ struct Part {
 /// A conductivity that was taken at one temperature.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Linearised {
+    /// The temperature at which it was taken.
     pub at_k: f64,
     /// The largest relative difference of the conductivity over the fitted record.
     pub conductivity_error: f64,
@@ -314,6 +316,7 @@ impl Physical {
         self.channel_bias_rad_per_s(self.channel_names().map(value))
     }
 
+    /// None where the conductivity does not depend on temperature.
     pub fn linearised(&self) -> Option<Linearised> {
         self.linearised
     }

@@ -16,13 +16,17 @@ use crate::numeric::statistics::{median, median_in_place};
 /// What one row holds; None is a drop-out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
+    /// Its stamp, from any zero.
     pub time_s: f64,
+    /// Of the thermometer that drives the model.
     pub temperature_k: Option<f64>,
+    /// Of the thermometer at the bore, where the model reads one.
     pub inner_k: Option<f64>,
     /// What the model's further columns add to the rate error; 0 where it reads none.
     pub channel_rad_per_s: Option<f64>,
     /// What formulas read of the further columns.
     pub columns: Columns,
+    /// As measured.
     pub rate_rad_per_s: Option<f64>,
 }
 
@@ -31,15 +35,22 @@ pub struct Reading {
 pub enum Flag {
     /// The row could not be read; it is passed on as it is.
     Malformed,
+    /// Its stamp is not behind the one before it.
     ClockBack,
+    /// Rows are missing before it.
     Gap,
+    /// The temperature was missing or implausible: the last good one stood in.
     TemperatureHeld,
+    /// A further column was missing: its last good value stood in.
     ChannelHeld,
+    /// The rate was missing: the last good one stood in.
     RateHeld,
+    /// The rate is a gross error: the last good one stood in.
     RateRejected,
 }
 
 impl Flag {
+    /// As in files.
     pub fn word(self) -> &'static str {
         match self {
             Flag::Malformed => "malformed",
@@ -56,9 +67,11 @@ impl Flag {
 /// A row on its way out, with what it was tagged with on its way in.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Compensated<T> {
+    /// What the row was tagged with.
     pub tag: T,
     /// None where nothing is known yet: a malformed row, or a drop-out before the first good row.
     pub rate_rad_per_s: Option<f64>,
+    /// What happened to it; empty for a good row.
     pub flags: Vec<Flag>,
 }
 
@@ -132,6 +145,7 @@ pub struct Stream<'c, T> {
 }
 
 impl<'c, T> Stream<'c, T> {
+    /// Before the first row.
     pub fn new(compensator: &'c Compensator) -> Self {
         Self {
             compensator,

@@ -15,6 +15,7 @@
 
 mod answer;
 mod candidate;
+mod caution;
 mod describe;
 pub(crate) mod discover;
 pub(crate) mod experiment;
@@ -39,6 +40,7 @@ use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::units::Unit;
 
+pub use caution::{Caution, Refusal};
 use experiment::Contest;
 use joint::Question;
 pub(crate) use plain::{Plain, Shape};
@@ -46,10 +48,13 @@ pub(crate) use standing::{Standing, standing};
 pub use terms::Terms;
 pub(crate) use together::{declared_with, extend_together};
 
+/// Why records cannot be diagnosed.
 /// What is asked.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
+    /// As declared.
     pub model: &'a CoilModel,
+    /// The winding that was measured.
     pub pattern: &'a Pattern,
     /// Fitted to.
     pub records: &'a [Record],
@@ -75,8 +80,10 @@ pub enum Verdict {
 /// A fitted parameter; value and error in SI.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FittedParameter {
+    /// As in the model file; ends in the unit.
     pub key: String,
     pub(crate) unit: Unit,
+    /// In the unit.
     pub value: f64,
     /// With the residuals' autocorrelation; None at a bound or where the records do not determine it.
     pub standard_error: Option<f64>,
@@ -88,6 +95,7 @@ pub struct FittedParameter {
 /// Another effect that would do in the place of an accepted one.
 #[derive(Debug, Clone)]
 pub struct Equivalent {
+    /// With its fitted parameters.
     pub effect: DeclaredEffect,
     /// By how much χ² is larger with it, over all records, hold-out included.
     pub(crate) chi_square_more: f64,
@@ -100,8 +108,11 @@ pub struct Equivalent {
 /// An accepted effect.
 #[derive(Debug, Clone)]
 pub struct Finding {
+    /// With its fitted parameters.
     pub effect: DeclaredEffect,
+    /// As fitted, or as declared where they are fixed.
     pub parameters: Vec<FittedParameter>,
+    /// Other effects that would do in its place.
     pub equivalents: Vec<Equivalent>,
     /// By how much χ² rises without it.
     pub(crate) chi_square_less: f64,
@@ -134,6 +145,7 @@ impl Finding {
 pub struct Rung {
     pub(crate) effects: Vec<String>,
     pub(crate) rmse_rad_per_s: f64,
+    /// None without a record that was held out.
     pub holdout_rmse_rad_per_s: Option<f64>,
     pub(crate) reduced_chi_square: f64,
     /// Of the records that were held out, nothing being fitted to them but their offsets.
@@ -164,53 +176,21 @@ pub(crate) struct Unexplained {
     pub(crate) plain: Vec<Plain>,
 }
 
-/// Something that a reader of the answer should know.
-#[derive(Debug, Clone, PartialEq, Error)]
-pub enum Caution {
-    #[error("{record}: {rows} rows were left out because of gross errors")]
-    Outliers { record: String, rows: usize },
-    #[error("{record}: column {channel} lacks values and was not considered")]
-    ChannelIncomplete { record: String, channel: String },
-    #[error(
-        "{record}: the declared coil predicts its rate no better than a constant does: does the model file belong to this coil?"
-    )]
-    WrongCoil { record: String },
-    #[error("the winding {winding} explains the records without any effect: is the declared pattern the coil's?")]
-    OtherWinding { winding: &'static str },
-    #[error("no hold-out record: effects were confirmed on blocks in time that they were not fitted to")]
-    NoHoldout,
-    #[error(
-        "the records to fit show nothing that the model lacks, the hold-out does: what is said was fitted to the hold-out and confirmed on the records to fit"
-    )]
-    FittedToHoldout,
-    #[error("{kind} was not accepted: {reason}")]
-    Refused { kind: String, reason: Refusal },
-}
-
-/// Why an effect that fits was refused.
-#[derive(Debug, Clone, Copy, PartialEq, Error)]
-pub enum Refusal {
-    #[error("it does not explain data that it was not fitted to")]
-    Unconfirmed,
-    #[error("it is too small to matter beside the model's own accuracy")]
-    Small,
-    #[error("the factor is within 2 % of one")]
-    FactorNearOne,
-    #[error("what is left over, or a plain function of time, is larger than what it explains")]
-    Outdone,
-}
-
 /// The whole answer.
 #[derive(Debug, Clone)]
 pub struct Diagnosis {
+    /// Whether the declared model is adequate, and if not, whether that is explained.
     pub verdict: Verdict,
+    /// Those accepted.
     pub effects: Vec<Finding>,
+    /// From the declared model to the accepted one.
     pub ladder: Vec<Rung>,
     pub(crate) candidates: Vec<Contender>,
     /// Over all records that were fitted.
     pub(crate) noise_floor_rad_per_s: f64,
     pub(crate) unexplained: Option<Unexplained>,
     pub(crate) suggested_experiment: Option<String>,
+    /// What a reader should know besides.
     pub cautions: Vec<Caution>,
     /// The declared model with the accepted effects.
     pub(crate) extended: CoilModel,
@@ -278,6 +258,7 @@ pub(crate) struct RecordNoise {
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum DiagnoseError {
     #[error("a diagnosis needs at least one record")]
     NoRecord,

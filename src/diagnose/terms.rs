@@ -3,10 +3,12 @@
 /// Whether and among which terms an unlisted effect is sought.
 #[derive(Debug, Clone, Copy, Default)]
 pub enum Terms<'a> {
+    /// Of every form and variable that there is.
     #[default]
     All,
     /// Of these forms and variables only.
     Among(&'a [String]),
+    /// Nothing but the listed effects.
     None,
 }
 

@@ -174,6 +174,7 @@ impl Schedule {
         &self.pattern
     }
 
+    /// In winding order.
     pub fn steps(&self) -> &[Step] {
         &self.steps
     }

@@ -27,7 +27,9 @@ use crate::pattern::classic::Classic;
 /// Layers that a caller's array or function may have.
 pub(crate) const MOST_LAYERS: usize = 400;
 
+/// Why a caller's cost cannot be searched.
 #[derive(Debug, Error, Clone, PartialEq)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum CustomError {
     #[error("layers must be even and from 2 to {MOST_LAYERS}, found {found}")]
     Layers { found: usize },
@@ -99,7 +101,9 @@ pub struct CustomAnswer {
     pub found: Vec<Found>,
     /// Moves judged.
     pub evaluations: u64,
+    /// Rounds that have ended.
     pub rounds: u64,
+    /// Why it ended.
     pub ended: Ended,
 }
 

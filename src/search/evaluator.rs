@@ -19,7 +19,9 @@ use crate::search::proof::{Effort, Goal, Improvement, Task, improve};
 use crate::thermal::{Extent, Location};
 use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
 
+/// Why patterns cannot be judged.
 #[derive(Debug, Error, Clone, PartialEq)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum JudgeError {
     #[error(transparent)]
     Search(#[from] SearchError),
@@ -32,6 +34,7 @@ pub enum JudgeError {
 /// A pattern with its reference values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judged {
+    /// A classic's, the file's, or what the search calls it.
     pub name: String,
     pub(crate) pattern: Pattern,
     pub(crate) worst: WorstCase,
@@ -52,11 +55,15 @@ pub struct Judged {
 /// What a pattern is judged by.
 #[derive(Debug, Clone, Copy)]
 pub struct Evaluator<'a> {
+    /// The coil.
     pub model: &'a CoilModel,
+    /// Its temperatures under the profiles.
     pub solved: &'a SolvedProfiles,
+    /// What is made small.
     pub objective: Objective,
     /// None for models that have no guaranteed worst case.
     pub unit_step: Option<&'a UnitStep>,
+    /// What the profiles were made from.
     pub profiles: &'a ProfileSpec,
     /// Needed for the objective P95.
     pub tolerance: Option<&'a ToleranceSpec>,

@@ -22,15 +22,21 @@ use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;
 use crate::units::deg_per_h_from_rad_per_s;
 
+/// Why a search cannot run.
 /// What is to be searched.
 #[derive(Debug, Clone)]
 pub struct Request<'a> {
+    /// The coil.
     pub model: &'a CoilModel,
+    /// The temperature profiles that windings are judged on.
     pub profiles: &'a ProfileSpec,
     /// How much what is built spreads; needed for the objective P95.
     pub tolerance: Option<&'a ToleranceSpec>,
+    /// What is made small.
     pub objective: Objective,
+    /// What the winding shop can wind.
     pub class: WindabilityClass,
+    /// How it is searched.
     pub plan: Plan,
     /// Where an interrupted search of the same request was.
     pub saved: Option<State>,
@@ -51,7 +57,9 @@ pub struct Request<'a> {
 /// Why an observer ends a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Halt {
+    /// Its time is over.
     Clock,
+    /// Someone asked for it.
     Signal,
 }
 
@@ -86,6 +94,7 @@ pub struct Unobserved;
 impl Observer for Unobserved {}
 
 #[derive(Debug, Error, Clone, PartialEq)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum RunError {
     #[error(transparent)]
     Judge(#[from] JudgeError),

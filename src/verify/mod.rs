@@ -133,10 +133,15 @@ pub struct Shop {
 /// What the schedule should be for.
 #[derive(Debug, Clone, Copy)]
 pub struct Truth<'a> {
+    /// The coil.
     pub model: &'a CoilModel,
+    /// The temperature profiles that windings are judged on.
     pub profiles: &'a ProfileSpec,
+    /// Of the model file; 64 hexadecimal digits.
     pub model_sha256: &'a str,
+    /// The winding shop.
     pub shop: &'a Shop,
+    /// What the program's own pages hold.
     pub assets: &'a Assets,
 }
 
@@ -155,6 +160,7 @@ pub struct Assets {
 pub struct Violation {
     /// Counted from 1; none for the file as a whole.
     pub row: Option<usize>,
+    /// Which entry of the file, as it is written there.
     pub field: String,
     pub(crate) expected: String,
     pub(crate) found: String,
@@ -173,9 +179,11 @@ impl std::fmt::Display for Violation {
 /// What was found, and how the rate error was checked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verification {
+    /// In the file's order; empty where everything is as it should be.
     pub violations: Vec<Violation>,
     /// Comparisons made.
     pub checks: usize,
+    /// How the rate error was checked.
     pub rate_check: RateCheck,
     /// What was worked out again by code of this module's own.
     pub(crate) recomputed: Vec<&'static str>,

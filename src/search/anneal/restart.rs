@@ -22,7 +22,9 @@ use crate::search::cost::{Cost, Position, Proposal};
 /// A geometric cooling schedule; temperatures in the unit of the cost.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cooling {
+    /// In the cost's unit, at the first move.
     pub hot: f64,
+    /// In the cost's unit, at the last move.
     pub cold: f64,
     pub(crate) moves: u64,
 }
@@ -47,8 +49,10 @@ pub struct Restart {
     pub(crate) moves: u64,
     pub(crate) segments: Vec<usize>,
     pub(crate) best_segments: Vec<usize>,
+    /// The smallest on its way.
     pub best_cost: f64,
     pub(crate) random: ChaCha8Rng,
+    /// What judging its moves has cost.
     pub work: Work,
 }
 
@@ -68,6 +72,7 @@ impl Restart {
         }
     }
 
+    /// Whether the schedule is at its end.
     pub fn is_done(&self, cooling: &Cooling) -> bool {
         self.moves >= cooling.moves
     }

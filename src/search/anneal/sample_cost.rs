@@ -25,6 +25,7 @@ pub struct SampleCost {
 }
 
 impl SampleCost {
+    /// Of a compiled objective, over the patterns of a class.
     pub fn new(matrix: SampleMatrix, class: WindabilityClass, norm: Norm) -> Self {
         Self { space: Space::new(matrix, class), norm, frozen: None }
     }

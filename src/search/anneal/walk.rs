@@ -39,6 +39,7 @@ struct SegmentWeights {
 }
 
 impl Space {
+    /// Of a compiled objective, over the patterns of a class.
     pub fn new(matrix: SampleMatrix, class: WindabilityClass) -> Self {
         let signs = if class == WindabilityClass::Standard { sign_columns(&matrix) } else { None };
         let fixed = matrix.equal_lengths().then(|| {
@@ -56,10 +57,12 @@ impl Space {
         Self { matrix, class, signs, fixed }
     }
 
+    /// What the winding shop can wind.
     pub fn class(&self) -> WindabilityClass {
         self.class
     }
 
+    /// The compiled objective.
     pub fn matrix(&self) -> &SampleMatrix {
         &self.matrix
     }

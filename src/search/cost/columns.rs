@@ -124,6 +124,7 @@ impl Columns {
         self.samples
     }
 
+    /// How many there are.
     pub fn count(&self) -> usize {
         self.data.len() / self.padded
     }
@@ -174,7 +175,9 @@ impl Columns {
 /// What judging moves has cost: counted, so that tests can bound it on any machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Work {
+    /// Moves judged.
     pub moves: u64,
+    /// Moves that were made.
     pub accepted: u64,
     /// Sum over moves of the samples looked at, padding included.
     pub samples: u64,

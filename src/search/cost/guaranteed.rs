@@ -42,7 +42,9 @@ use crate::search::cost::worst_case::SearchError;
 use crate::thermal::{Drive, Field, Instant, StepResponse, ThermalHistory, solve};
 use crate::units::REFERENCE_TEMPERATURE_K;
 
+/// Why a model has no guaranteed worst case.
 #[derive(Debug, Error, Clone, PartialEq)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum GuaranteedError {
     #[error(
         "there is no guaranteed worst case with {kind}: the rate error then depends on more than the rates of the drive"
@@ -83,6 +85,7 @@ pub(crate) struct BoundParts {
 /// The guaranteed worst case of one pattern.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Guaranteed {
+    /// No profile within the largest rate of temperature makes a larger error.
     pub rate_rad_per_s: f64,
     max_rate_k_per_s: f64,
     /// Times and values at which G turns, from (0, G(0+)) to where the rest no longer matters.

@@ -54,10 +54,13 @@ pub struct InFull {
 
 /// A cost over the patterns of a class.
 pub trait Cost: Clone + Send + Sync + std::fmt::Debug {
+    /// What moves from pattern to pattern.
     type Position: Position<Self>;
 
+    /// How a search over it is paced.
     const PACE: Pace;
 
+    /// Of the patterns.
     fn layers(&self) -> usize;
 
     /// Numbers of which the cost is made.
@@ -97,6 +100,7 @@ pub trait Cost: Clone + Send + Sync + std::fmt::Debug {
 
 /// A pattern, its cost, and the proposal made last.
 pub trait Position<C> {
+    /// Of the pattern that it is at.
     fn cost(&self) -> f64;
 
     /// P(j), innermost layer first.

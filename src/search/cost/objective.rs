@@ -29,6 +29,7 @@ pub enum Objective {
 pub(crate) const POINTING_S: f64 = SECONDS_PER_HOUR;
 
 impl Objective {
+    /// All of them, in the order in which they are shown.
     pub const ALL: [Objective; 6] = [
         Objective::WorstRate,
         Objective::WorstPhase,

@@ -25,14 +25,17 @@ pub struct Layout {
     pub(crate) layers: usize,
     /// Both halves of the fibre respond alike: their weights share a column.
     pub(crate) halves_alike: bool,
+    /// Whether temperatures vary along the axis: weights have first moments then.
     pub axial: bool,
 }
 
 impl Layout {
+    /// Of the half from end A.
     pub fn column_a(&self, layer: usize) -> usize {
         layer
     }
 
+    /// Of the half from end B.
     pub fn column_b(&self, layer: usize) -> usize {
         if self.halves_alike { layer } else { self.layers + layer }
     }
@@ -42,6 +45,7 @@ impl Layout {
         self.column_b(self.layers - 1) + 1 + layer
     }
 
+    /// How many there are.
     pub fn columns(&self) -> usize {
         self.layers * (1 + usize::from(!self.halves_alike) + usize::from(self.axial))
     }
@@ -57,7 +61,9 @@ pub struct Origin {
 /// The compiled objective: columns over samples, and the lengths that turn a pattern into weights.
 #[derive(Debug, Clone)]
 pub struct SampleMatrix {
+    /// Which column belongs to which layer and half.
     pub layout: Layout,
+    /// One row a sample.
     pub columns: Columns,
     lengths_m: Vec<f64>,
 }
@@ -229,10 +235,12 @@ impl SampleMatrix {
         Self { layout: self.layout, columns, lengths_m: self.lengths_m.clone() }
     }
 
+    /// Of the patterns.
     pub fn layers(&self) -> usize {
         self.layout.layers
     }
 
+    /// Instants of profiles, all profiles together.
     pub fn samples(&self) -> usize {
         self.columns.samples()
     }

@@ -20,7 +20,9 @@ use crate::rate::{CoilModel, Past, RateError, RateModel, WeightResponse};
 use crate::thermal::{Drive, Field, HeatPath, Instant, Solver, StepResponse, ThermalError, ThermalHistory};
 use crate::units::{REFERENCE_TEMPERATURE_K, RotationRate};
 
+/// Why patterns cannot be judged on profiles.
 #[derive(Debug, Error, Clone, PartialEq)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum SearchError {
     #[error(transparent)]
     Thermal(#[from] ThermalError),
@@ -46,9 +48,11 @@ pub struct SolvedProfiles {
     profiles: Vec<SolvedProfile>,
 }
 
+/// A profile and the pack's temperatures under it.
 #[derive(Debug)]
 pub struct SolvedProfile {
     pub(crate) profile: Profile,
+    /// The same for every pattern.
     pub field: Field,
     /// One list of instants a piece, from just after its start to just before its end.
     pub(crate) pieces: Vec<Vec<Instant>>,
@@ -63,8 +67,10 @@ pub struct SolvedProfile {
 pub struct WorstCase {
     /// With its sign.
     pub rate_rad_per_s: f64,
+    /// The profile's name.
     pub profile: String,
     pub(crate) profile_index: usize,
+    /// From the profile's start.
     pub time_s: f64,
 }
 
@@ -146,6 +152,7 @@ impl SolvedProfiles {
         Ok((!soaked.is_empty()).then_some(Self { profiles: soaked }))
     }
 
+    /// In the order in which they were given.
     pub fn profiles(&self) -> &[SolvedProfile] {
         &self.profiles
     }

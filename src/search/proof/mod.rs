@@ -74,9 +74,13 @@ pub enum Goal<'a> {
 /// What is to be proved.
 #[derive(Debug, Clone, Copy)]
 pub struct Task<'a> {
+    /// The coil.
     pub model: &'a CoilModel,
+    /// Its temperatures under the profiles.
     pub solved: &'a SolvedProfiles,
+    /// The patterns among which the best is sought.
     pub class: WindabilityClass,
+    /// What is made small.
     pub goal: Goal<'a>,
 }
 
@@ -122,6 +126,7 @@ pub struct Certificate {
     pub best_rad_per_s: f64,
     /// No pattern of the class has a smaller worst rate.
     pub(crate) lower_bound_rad_per_s: f64,
+    /// Whether it is a whole proof.
     pub status: Status,
     /// Nodes whose bound was computed.
     pub nodes: u64,
