@@ -13,9 +13,11 @@ use crate::text::{is_unseen, visible};
 /// One fault: what was expected, what was found, what to do; and where.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault {
+    /// What is wrong, expected and found.
     pub message: String,
     /// Bytes of the source; none for a fault of the file as a whole.
     pub span: Option<Range<usize>>,
+    /// The remedy.
     pub note: Option<String>,
 }
 
@@ -33,8 +35,11 @@ impl Fault {
 /// All faults of one file; never empty.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Faults {
+    /// Its path, as the user gave it.
     pub file: String,
+    /// Its text, for the lines that are shown.
     pub source: String,
+    /// All of them, in the source's order.
     pub faults: Vec<Fault>,
 }
 

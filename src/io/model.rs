@@ -19,20 +19,27 @@ use crate::thermal::{Flange, Location};
 /// A model file, understood.
 #[derive(Debug, Clone)]
 pub struct ModelFile {
+    /// Where it was read.
     pub path: PathBuf,
     /// As read, for hashes and for edits that keep comments.
     pub source: String,
+    /// The coil.
     pub model: CoilModel,
     /// The declared pattern and its name.
     pub pattern: Option<NamedPattern>,
     /// The file that the declared pattern stands in, where it is no winding's name.
     pub pattern_file: Option<PathBuf>,
+    /// The temperature profiles that windings are judged on.
     pub profiles: ProfileSpec,
+    /// What a search takes unless it is told otherwise.
     pub search: SearchSettings,
+    /// The winding shop and the fibre's description.
     pub production: Production,
+    /// How built coils spread; None where the file does not say.
     pub tolerance: Option<ToleranceSpec>,
     /// How its records are to be read.
     pub record: RecordFormat,
+    /// What could be meant otherwise.
     pub advice: Vec<Advice>,
     /// winding.length_m, where it is stated.
     pub stated_length_m: Option<f64>,
@@ -96,19 +103,26 @@ pub(crate) fn location_of(word: usize) -> Location {
 /// A pattern under the name by which it was asked for.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NamedPattern {
+    /// A classic's name or the pattern file's.
     pub name: String,
+    /// The winding itself.
     pub pattern: Pattern,
 }
 
+/// What a model file states under `[search]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SearchSettings {
+    /// What the winding shop can wind.
     pub windability: WindabilityClass,
+    /// What is made small.
     pub objective: Objective,
+    /// Of the search's random numbers.
     pub seed: u64,
 }
 
 /// What a reader of the results should know, though it is no fault.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum Advice {
     #[error("[profiles] is absent: profiles of up to 60 °C/h are sampled, 64 of 4 ramps over 6000 s, seed 1")]
     DefaultProfiles,

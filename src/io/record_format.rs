@@ -11,10 +11,15 @@ use crate::units::{
 pub enum Quantity {
     /// The day of a time of day that stands in a column of its own.
     Date,
+    /// When a row was written.
     Time,
+    /// Of the thermometer that drives the model.
     Temperature,
+    /// The gyro's rate error.
     Rate,
+    /// Of a thermometer at the bore.
     InnerTemperature,
+    /// Of the air outside the film.
     AmbientTemperature,
     /// What a table turned the gyro by, about its sensitive axis.
     Table,
@@ -29,8 +34,11 @@ pub enum Quantity {
 pub enum SensorPlace {
     /// Counted from 1 innermost.
     Layer(usize),
+    /// A flange of the spool.
     Flange,
+    /// The spool at the bore.
     Spool,
+    /// The gyro's electronics.
     Electronics,
     /// The light source.
     Source,

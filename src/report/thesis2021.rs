@@ -6,6 +6,7 @@ use super::plot::{Axis, Chart, Mark, Series};
 use super::yan1998::ReproductionFile;
 use crate::reproduce::thesis2021::{BAND_DEG_PER_S, LINES, Reproduction, TITLE};
 
+/// The answer of `reproduce thesis2021`.
 #[derive(Debug, Serialize)]
 pub struct ReproductionJson {
     pub(crate) publication: &'static str,
@@ -37,6 +38,7 @@ pub(crate) struct ErratumJson {
 pub(crate) const RECORD: &str = "simulated from the chapter's stated numbers: it prints no record";
 
 impl ReproductionJson {
+    /// With the files that were written beside it.
     pub fn new(reproduction: &Reproduction, files: Vec<String>) -> Self {
         let comparisons = reproduction.comparisons.iter().map(|c| ComparisonJson {
             place: c.place,

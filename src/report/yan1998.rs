@@ -16,6 +16,7 @@ pub struct ReproductionFile {
     pub(crate) contents: String,
 }
 
+/// The answer of `reproduce yan1998`.
 #[derive(Debug, Serialize)]
 pub struct ReproductionJson {
     pub(crate) publication: &'static str,
@@ -44,6 +45,7 @@ pub(crate) struct ErratumJson {
 }
 
 impl ReproductionJson {
+    /// With the files that were written beside it.
     pub fn new(reproduction: &Reproduction, files: Vec<String>) -> Self {
         let peaks = reproduction.peaks.iter().map(|peak| PeakJson {
             length_m: peak.length_m,

@@ -26,6 +26,7 @@ pub struct Part<'a> {
 }
 
 impl<'a> Part<'a> {
+    /// All of its cells.
     pub fn whole(campaign: &'a CampaignFile, cells: &'a [Cell]) -> Self {
         Self { campaign, cells: cells.iter().collect() }
     }

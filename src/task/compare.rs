@@ -13,10 +13,13 @@ use super::{Observer, TaskError, pattern_or_own};
 /// What is to be compared.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
+    /// The coil, its settings and how its records are read.
     pub model: &'a ModelFile,
     /// The winding that was measured; none for the model's own.
     pub pattern: Option<&'a NamedPattern>,
+    /// In the order in which they are shown.
     pub measurements: &'a [Measurement],
+    /// Whether such rows are left out.
     pub gross_errors: GrossErrors,
     /// The layers' temperatures of each record in turn; empty where the records' own sensors tell.
     pub fields: &'a [FieldFile],
@@ -32,9 +35,11 @@ impl<'a> Request<'a> {
 /// The document, and what it was made from.
 #[derive(Debug)]
 pub struct Answer {
+    /// As the program prints it.
     pub document: CompareJson,
     /// As they were used.
     pub records: Vec<Record>,
+    /// One a measurement.
     pub comparisons: Vec<Comparison>,
 }
 

@@ -27,9 +27,11 @@ use super::{Observer, TaskError, pattern_or_own};
 /// How to compensate.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
+    /// The coil, its settings and how its records are read.
     pub model: &'a ModelFile,
     /// None for the model's own.
     pub pattern: Option<&'a NamedPattern>,
+    /// What the compensator is made from.
     pub method: Method,
     /// What film, noise, delay and offset (or the lines, or the regression) are fitted to: records of one gyro.
     pub fit: &'a [Measurement],
@@ -49,6 +51,7 @@ impl<'a> Request<'a> {
 /// A compensator, and what belongs to it.
 #[derive(Debug)]
 pub struct Answer {
+    /// To run over rows or to write to a file.
     pub compensator: Compensator,
     /// The fitted records, without their gross errors.
     pub(crate) fitted: Vec<Record>,
@@ -194,6 +197,7 @@ pub struct CompensatedRecord {
     pub rate_rad_per_s: Vec<f64>,
     /// The rows to which something happened, and what.
     pub flags: Vec<(usize, Vec<Flag>)>,
+    /// How many rows met what.
     pub summary: StreamSummary,
 }
 
@@ -243,6 +247,7 @@ pub(crate) type Curves = Vec<(&'static str, Vec<f64>)>;
 /// Every method, fitted to some records and tried on others.
 #[derive(Debug)]
 pub struct AllMethods {
+    /// As the program prints it.
     pub document: CompensateJson,
     /// In rad/s.
     pub curves: Curves,

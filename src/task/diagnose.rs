@@ -33,9 +33,11 @@ use super::{Observer, TaskError, pattern_or_own};
 /// What is to be diagnosed.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
+    /// The coil, its settings and how its records are read.
     pub model: &'a ModelFile,
     /// None for the model's own.
     pub pattern: Option<&'a NamedPattern>,
+    /// To fit to.
     pub measurements: &'a [Measurement],
     /// Only judged by.
     pub holdout: &'a [Measurement],
@@ -55,6 +57,7 @@ impl<'a> Request<'a> {
 /// What was found.
 #[derive(Debug)]
 pub struct Answer {
+    /// As the program prints it.
     pub document: DiagnosisJson,
     pub(crate) diagnosis: Diagnosis,
     /// None where it was not asked for or there is nothing to tell apart.

@@ -18,6 +18,7 @@ use super::{Observer, TaskError, advise, own_and_classics};
 /// What is to be evaluated.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
+    /// The coil and its profiles.
     pub model: &'a ModelFile,
     /// Empty for the model's own and all classics that fit.
     pub patterns: &'a [NamedPattern],
@@ -26,6 +27,7 @@ pub struct Request<'a> {
 /// The document, and the profiles that attain the guaranteed worst cases.
 #[derive(Debug)]
 pub struct Answer {
+    /// As the program prints it.
     pub document: EvaluateJson,
     /// One a pattern, in their order; or why there is none.
     pub extremes: Result<Vec<Profile>, GuaranteedError>,

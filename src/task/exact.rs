@@ -24,8 +24,11 @@ use super::{Observer, TaskError, advise};
 /// What is to be proved.
 #[derive(Debug, Clone)]
 pub struct Request<'a> {
+    /// The coil and its profiles.
     pub model: &'a ModelFile,
+    /// The patterns among which the best is sought.
     pub class: WindabilityClass,
+    /// What is made small.
     pub objective: Objective,
     /// Patterns to begin with, besides the model's own, the classics and what a short search finds.
     pub starts: Vec<Pattern>,

@@ -27,9 +27,11 @@ use super::{Observer, TaskError, pattern_or_own};
 /// What is to be added, and what it is fitted to.
 #[derive(Debug, Clone)]
 pub struct Request<'a> {
+    /// The coil, its settings and how its records are read.
     pub model: &'a ModelFile,
     /// None for the model's own.
     pub pattern: Option<&'a NamedPattern>,
+    /// What is added, with the parameters that are fixed.
     pub effect: DeclaredEffect,
     /// Records to fit to; without any the effect keeps its values.
     pub fit: &'a [Measurement],

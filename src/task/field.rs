@@ -12,6 +12,7 @@ use super::{Observer, TaskError, advise, own_and_classics};
 /// Windings under a field.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
+    /// The coil.
     pub model: &'a ModelFile,
     /// Of as many layers as the coil.
     pub field: &'a ThermalHistory,
@@ -22,16 +23,20 @@ pub struct Request<'a> {
 /// A winding under a field.
 #[derive(Debug, Clone)]
 pub struct PatternUnderField {
+    /// The winding and its name.
     pub named: NamedPattern,
     /// At the field's times.
     pub rate_rad_per_s: Vec<f64>,
     /// The row of the largest size.
     pub worst_row: usize,
+    /// Of the light there, with its sign.
     pub worst_phase_rad: f64,
+    /// What it takes to wind it.
     pub windability: WindabilityJson,
 }
 
 impl PatternUnderField {
+    /// The largest size of the rate error.
     pub fn worst_rate_deg_per_h(&self) -> f64 {
         deg_per_h_from_rad_per_s(self.rate_rad_per_s[self.worst_row].abs())
     }

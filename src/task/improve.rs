@@ -43,6 +43,7 @@ use super::{Observer, TaskError, compare, diagnose, optimise, pattern_or_own, sc
 /// What was measured, and where everything goes.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
+    /// The coil, its settings and how its records are read.
     pub model: &'a ModelFile,
     /// The winding that was measured; none for the model's own.
     pub pattern: Option<&'a NamedPattern>,
@@ -50,6 +51,7 @@ pub struct Request<'a> {
     pub measurements: &'a [Measurement],
     /// Only judged by.
     pub holdout: &'a [Measurement],
+    /// Where everything goes.
     pub folder: &'a Path,
     /// Of the search; none for the model's own.
     pub seed: Option<u64>,

@@ -26,6 +26,7 @@ pub enum GrossErrors {
 /// A record with its origin.
 #[derive(Debug, Clone)]
 pub struct Measurement {
+    /// As it was read.
     pub record: Record,
     /// The file, or what stands for it.
     pub file: String,

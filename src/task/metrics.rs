@@ -19,7 +19,9 @@ pub(crate) const DEFAULT_AVERAGE_S: f64 = 10.0;
 /// How records are measured.
 #[derive(Debug, Clone, Copy)]
 pub struct Settings {
+    /// Over which the residual is averaged.
     pub average_s: f64,
+    /// Whether such rows are left out.
     pub gross_errors: GrossErrors,
     /// Where the gyro stood and how its axis pointed, where that is known.
     pub attitude: Option<Attitude>,

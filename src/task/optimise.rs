@@ -18,18 +18,25 @@ const PATIENCE_WITH_BUDGET: u64 = 4 * DEFAULT_PATIENCE;
 /// What is asked of a search; none stands for the model's own or the usual.
 #[derive(Debug, Clone, Default)]
 pub struct Wishes {
+    /// Of the search; None for the model's own, as everywhere here.
     pub seed: Option<u64>,
+    /// What the winding shop can wind.
     pub class: Option<WindabilityClass>,
+    /// What is made small.
     pub objective: Option<Objective>,
     /// Whether a clock will end it.
     pub has_budget: bool,
+    /// At most.
     pub rounds: Option<u64>,
+    /// At most, counted at the end of a round.
     pub moves: Option<u64>,
     /// Rounds without a better pattern.
     pub patience: Option<u64>,
     /// A rate error that is good enough.
     pub target_deg_per_h: Option<f64>,
+    /// Independent of each other.
     pub restarts_per_round: Option<usize>,
+    /// Of each restart.
     pub moves_per_restart: Option<u64>,
     /// A pattern to begin with.
     pub start: Option<NamedPattern>,

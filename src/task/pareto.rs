@@ -31,10 +31,13 @@ pub(crate) const DEFAULT_ROUNDS: u64 = 3;
 /// What is to be weighed.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
+    /// The coil and its profiles.
     pub model: &'a ModelFile,
+    /// Of the searches.
     pub seed: u64,
     /// Any number is tried besides.
     pub most_captive: u8,
+    /// Of each search, at most.
     pub rounds: u64,
     /// Where what is done is kept, so that the same request goes on after an interruption.
     pub kept_in: Option<&'a Path>,

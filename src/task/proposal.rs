@@ -33,9 +33,11 @@ pub struct Proposed {
 /// What is to be added, and what it is fitted to.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
+    /// The coil, its settings and how its records are read.
     pub model: &'a ModelFile,
     /// None for the model's own.
     pub pattern: Option<&'a NamedPattern>,
+    /// What the experiment is to tell apart.
     pub proposed: &'a [Proposed],
     /// Records to fit to; without any the effects keep their values.
     pub fit: &'a [Measurement],
@@ -46,6 +48,7 @@ pub struct Request<'a> {
 /// The extended model's text, and the document but for where it was written.
 #[derive(Debug)]
 pub struct Answer {
+    /// The file's text, with comments.
     pub source: String,
     pub(crate) effects: Vec<FindingJson>,
     pub(crate) before: CompareJson,

@@ -22,6 +22,7 @@ pub const FILES: [&str; 8] = [
 /// What is to be wound.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
+    /// The coil and its winding shop.
     pub model: &'a ModelFile,
     /// None for the model's own.
     pub pattern: Option<&'a NamedPattern>,
@@ -30,6 +31,7 @@ pub struct Request<'a> {
 /// The schedule and the document that claims it.
 #[derive(Debug)]
 pub struct Answer {
+    /// As the program prints it.
     pub document: ScheduleJson,
     pub(crate) schedule: Schedule,
     pub(crate) pattern: NamedPattern,

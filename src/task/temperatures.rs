@@ -16,10 +16,18 @@ use super::{Observer, TaskError, advise, own_and_classics};
 #[derive(Debug, Clone, Copy)]
 pub enum Driver<'a> {
     /// A profile of the model by its name, or its first; so many rows, evenly spaced.
-    Profile { name: Option<&'a str>, rows: u32 },
+    Profile {
+        /// None for the model's first.
+        name: Option<&'a str>,
+        /// From the profile's start to its end.
+        rows: u32,
+    },
     /// The same at the instants at which windings are judged: close behind every kink, on both sides of it, and where the error of
     /// the model's own pattern and of each classic is largest.
-    Judged { name: Option<&'a str> },
+    Judged {
+        /// None for the model's first.
+        name: Option<&'a str>,
+    },
     /// A record; its rows are its own.
     Measurement(&'a Measurement),
 }
@@ -27,16 +35,20 @@ pub enum Driver<'a> {
 /// What is asked.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
+    /// The coil and its profiles.
     pub model: &'a ModelFile,
+    /// What warms it.
     pub driver: Driver<'a>,
 }
 
 /// The field in the layers.
 #[derive(Debug)]
 pub struct Answer {
+    /// Its name.
     pub model: String,
     /// The profile's or the record's name.
     pub drive: String,
+    /// Of every layer.
     pub history: ThermalHistory,
 }
 

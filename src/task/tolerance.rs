@@ -11,11 +11,13 @@ use super::{Observer, TaskError, advise, own_and_classics};
 /// What is to be studied.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
+    /// The coil and how built ones spread.
     pub model: &'a ModelFile,
     /// Empty for the model's own and all classics that fit; QUA always joins them where it fits.
     pub patterns: &'a [NamedPattern],
     /// Coils to draw; none for the model's own number.
     pub samples: Option<usize>,
+    /// Of the draws; None for the model's own.
     pub seed: Option<u64>,
     /// A coil whose worst case is larger is scrap.
     pub limit_rad_per_s: Option<f64>,

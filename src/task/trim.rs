@@ -14,6 +14,7 @@ use super::{Observer, TaskError, pattern_or_own};
 /// What was measured of which coil.
 #[derive(Debug, Clone)]
 pub struct Request<'a> {
+    /// The coil.
     pub model: &'a ModelFile,
     /// None for the model's own.
     pub pattern: Option<&'a NamedPattern>,

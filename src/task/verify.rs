@@ -11,7 +11,9 @@ use crate::verify::{Claim, RateCheck, Truth, verify};
 /// What is to be checked against what.
 #[derive(Debug)]
 pub struct Request<'a> {
+    /// The coil and its profiles, as the schedule should have them.
     pub model: &'a ModelFile,
+    /// The file that is checked.
     pub claim: &'a Claim,
     /// What the document calls the claim.
     pub claim_name: &'a str,
@@ -20,6 +22,7 @@ pub struct Request<'a> {
 /// The document, and how many profiles the rate was worked out over.
 #[derive(Debug)]
 pub struct Answer {
+    /// As the program prints it.
     pub document: VerifyJson,
     pub(crate) profiles: usize,
 }

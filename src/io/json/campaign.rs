@@ -150,8 +150,10 @@ pub struct CampaignJson {
 /// The answer of `campaign --emit`.
 #[derive(Debug, Serialize)]
 pub struct WorkflowJson {
+    /// What is run.
     #[serde(flatten)]
     pub campaign: CampaignJson,
+    /// Which workflow engine it was written for.
     pub engine: String,
     /// Jobs that the cells are dealt to.
     pub parts: usize,

@@ -20,6 +20,7 @@ use super::inputs::InputsJson;
 pub(crate) use super::noise::NoiseJson;
 use super::proposals::ProposalJson;
 
+/// The answer of `diagnose`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DiagnosisJson {
     pub(crate) model: String,
@@ -58,6 +59,7 @@ pub struct DiagnosisJson {
     pub(crate) inputs: InputsJson,
 }
 
+/// One set of effects and its probability.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ShareJson {
     pub(crate) effects: Vec<String>,
@@ -92,6 +94,7 @@ pub(crate) struct EstimateJson {
     pub(crate) logarithmic: bool,
 }
 
+/// A declared number that was fitted anew.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RefittedJson {
     pub(crate) kind: String,
@@ -466,6 +469,7 @@ impl PlainJson {
     }
 }
 
+/// The answer of `extend`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ExtendJson {
     /// The new model file.

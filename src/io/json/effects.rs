@@ -4,11 +4,14 @@ use serde::Serialize;
 
 use crate::effect::{Acts, EffectSpec};
 
+/// The answer of `effects`.
 #[derive(Debug, Serialize)]
 pub struct EffectsJson {
+    /// In the catalogue's order.
     pub effects: Vec<EffectJson>,
 }
 
+/// One description of the catalogue.
 #[derive(Debug, Serialize)]
 pub struct EffectJson {
     pub(crate) kind: &'static str,
@@ -45,6 +48,7 @@ pub(crate) struct ChoiceJson {
 }
 
 impl EffectJson {
+    /// As the catalogue describes it.
     pub fn of(spec: &EffectSpec) -> Self {
         Self {
             kind: spec.kind,

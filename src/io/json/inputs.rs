@@ -19,6 +19,7 @@ pub(crate) struct InputsJson {
     pub(crate) records: Vec<RecordInputJson>,
 }
 
+/// A record that a document was made from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RecordInputJson {
     pub(crate) file: String,

@@ -50,11 +50,13 @@ pub struct Document<T: Serialize> {
 }
 
 impl<T: Serialize> Document<T> {
+    /// With this program's version of the schema.
     pub fn new(body: T) -> Self {
         Self { schema_version: SCHEMA_VERSION, body }
     }
 }
 
+/// What it takes to wind a pattern.
 #[derive(Debug, Clone, Serialize)]
 pub struct WindabilityJson {
     pub(crate) class: String,
@@ -64,6 +66,7 @@ pub struct WindabilityJson {
 }
 
 impl WindabilityJson {
+    /// By the winding graph.
     pub fn of(pattern: &Pattern) -> Self {
         let found = WindingGraph::new(pattern).windability();
         Self {
@@ -147,6 +150,7 @@ impl PatternJson {
     }
 }
 
+/// The answer of `evaluate`.
 #[derive(Debug, Serialize)]
 pub struct EvaluateJson {
     pub(crate) model: String,
@@ -240,6 +244,7 @@ pub struct ExactJson {
     pub(crate) seconds: f64,
 }
 
+/// One fault of a file.
 #[derive(Debug, Serialize)]
 pub struct FaultJson {
     pub(crate) message: String,
@@ -249,6 +254,7 @@ pub struct FaultJson {
 }
 
 impl FaultJson {
+    /// All of a file, in the source's order.
     pub fn all(faults: &Faults) -> Vec<Self> {
         let shown = |fault: &Fault| Self {
             message: fault.message.clone(),
@@ -259,24 +265,36 @@ impl FaultJson {
     }
 }
 
+/// The answer of `check`.
 #[derive(Debug, Serialize)]
 pub struct CheckJson {
+    /// Its path, as the user gave it.
     pub file: String,
+    /// What makes it unusable; empty for a good file.
     pub faults: Vec<FaultJson>,
+    /// What could be meant otherwise; nothing is refused for it.
     pub advice: Vec<String>,
 }
 
+/// One classic winding.
 #[derive(Debug, Serialize)]
 pub struct ClassicJson {
+    /// Its short name: QUA.
     pub name: String,
+    /// Its name in words.
     pub title: String,
+    /// Of the coil that it was made for.
     pub layers: usize,
+    /// P(j), counted from 1, innermost layer first.
     pub segments: Vec<usize>,
+    /// What it takes to wind it.
     pub windability: WindabilityJson,
 }
 
+/// The answer of `patterns`.
 #[derive(Debug, Serialize)]
 pub struct PatternsJson {
+    /// Those that exist for the layer count.
     pub patterns: Vec<ClassicJson>,
 }
 
@@ -291,6 +309,7 @@ pub(crate) struct ViolationJson {
     pub(crate) message: String,
 }
 
+/// The answer of `verify`.
 #[derive(Debug, Serialize)]
 pub struct VerifyJson {
     pub(crate) model: String,
@@ -323,12 +342,17 @@ pub(crate) struct CompletionsJson {
 /// A JSON Schema with what it is of.
 #[derive(Debug, Serialize)]
 pub struct SchemaJson {
+    /// Of which file or document.
     pub kind: String,
+    /// A JSON Schema of the draft 2020-12.
     pub schema: serde_json::Value,
 }
 
+/// The answer of `report`.
 #[derive(Debug, Serialize)]
 pub struct ReportJson {
+    /// The page's path.
     pub report: String,
+    /// Its size.
     pub bytes: usize,
 }

@@ -46,6 +46,7 @@ pub(in crate::io) const STEP_COLUMNS: [&str; 13] = [
     "cumulative_m",
 ];
 
+/// A schedule, a traveller's data or a machine program.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ScheduleJson {
@@ -54,6 +55,7 @@ pub struct ScheduleJson {
     pub(crate) document: String,
     pub(crate) program: String,
     pub(crate) model: String,
+    /// Of the model file that it was made from; 64 hexadecimal digits.
     pub model_sha256: String,
     pub(crate) pattern: String,
     /// Of the pattern's name and segments, so that neither changes alone.
@@ -63,11 +65,15 @@ pub struct ScheduleJson {
     /// Whole turns more (or, below zero, fewer) than whole layers at either end of the fibre; absent without any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub end_a_turns: Option<i32>,
+    /// As `end_a_turns`, at end B.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub end_b_turns: Option<i32>,
+    /// What it takes to wind the pattern.
     pub windability: ClaimedWindability,
+    /// The largest size of the rate error over the profiles.
     pub worst_rate_deg_per_h: f64,
     pub(crate) worst_profile: String,
+    /// When it occurs in its profile.
     pub worst_time_s: f64,
     /// The fibre in words.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -79,17 +85,21 @@ pub struct ScheduleJson {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) midpoint_layer: Option<i64>,
     pub(crate) start_mark_m: f64,
+    /// Segments of half A less those of half B: what must be trimmed from end A, or, below zero, from end B.
     pub expected_trim_m: f64,
     pub(crate) reels: Vec<ReelJson>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) production: Option<ProductionJson>,
+    /// In winding order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub steps: Vec<StepJson>,
 }
 
+/// What a document says it takes to wind the pattern.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClaimedWindability {
+    /// "standard", "captive:N" or "any".
     pub class: String,
     pub(crate) reels: i64,
     pub(crate) captive: i64,
@@ -126,20 +136,28 @@ pub(crate) struct ProductionJson {
     pub(crate) winding_speed_turns_per_min: f64,
 }
 
+/// One layer's winding.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StepJson {
+    /// Counted from 1.
     pub step: i64,
     pub(crate) layer: i64,
     pub(crate) half: String,
+    /// Counted from 1 at end A.
     pub segment: i64,
     pub(crate) supply_reel: String,
+    /// From which flange to which, in words.
     pub direction: String,
+    /// Of this layer.
     pub turns: f64,
     pub(crate) fibre_from_m: f64,
     pub(crate) fibre_to_m: f64,
+    /// Of this layer's fibre.
     pub length_m: f64,
+    /// Of this layer's middle.
     pub radius_mm: f64,
+    /// Largest climb of the crossovers that the step completes, in layers.
     pub climb: i64,
     pub(crate) cumulative_m: f64,
     #[serde(default, skip_serializing_if = "Option::is_none")]

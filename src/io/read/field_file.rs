@@ -35,6 +35,7 @@ const EXPECTED: &str = "expected time_s with layer_1_c, layer_2_c, … (one row 
 /// A field, and what was noticed while reading it.
 #[derive(Debug)]
 pub struct ReadField {
+    /// Temperatures and rates of every layer.
     pub field: GivenField,
     /// What was assumed or left out, in words.
     pub(crate) remarks: Vec<String>,

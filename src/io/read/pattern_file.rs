@@ -14,7 +14,9 @@ use crate::text::sink::TomlComment;
 use super::kind_of_file::FileKind;
 use super::toml_reader::{TomlReader, parse};
 
+/// Why a name leads to no pattern.
 #[derive(Debug, Error)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum ResolveError {
     #[error(transparent)]
     Classic(#[from] ClassicError),

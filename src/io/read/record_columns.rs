@@ -279,6 +279,7 @@ fn unbracketed(name: &str) -> (&str, Option<&str>) {
 /// How a file's cells are divided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Division {
+    /// The byte between two cells.
     pub separator: u8,
     pub(crate) decimal_comma: bool,
 }

@@ -25,6 +25,7 @@ const MOST_FAULTS: usize = 50;
 /// A record, and what was noticed while reading it.
 #[derive(Debug)]
 pub struct ReadRecord {
+    /// In SI units.
     pub record: Record,
     /// Rows that were skipped: a cell without a number, a stamp that repeats or jumps back.
     pub skipped_rows: usize,

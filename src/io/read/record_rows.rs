@@ -268,6 +268,7 @@ pub(crate) fn contradicts_mean(interval_s: f64, rate_mean_s: f64) -> Option<Stri
 #[derive(Debug, Default)]
 pub struct StreamNoticed {
     pub(crate) rows: usize,
+    /// Rows without a number where one is needed.
     pub skipped_rows: usize,
     pub(crate) remarks: Vec<String>,
 }

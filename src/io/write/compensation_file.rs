@@ -23,14 +23,19 @@ use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s};
 /// What a stream did.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct StreamSummary {
+    /// Rows read.
     pub rows: usize,
     pub(crate) delay_rows: usize,
+    /// Could not be read and were passed on as they stand.
     pub malformed: usize,
+    /// Stamped no later than the row before.
     pub clock_back: usize,
     pub(crate) gap: usize,
     pub(crate) temperature_held: usize,
+    /// A further column's last good value stood in.
     pub channel_held: usize,
     pub(crate) rate_held: usize,
+    /// The rate was a gross error.
     pub rate_rejected: usize,
     /// Standard deviations over the rows without a flag.
     pub(crate) rate_deviation_deg_per_h: Option<f64>,
@@ -57,6 +62,7 @@ impl StreamSummary {
 
 /// Why a stream ended before its input did.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "its messages say what each means")]
 pub enum StreamError {
     #[error("{0}")]
     Header(#[from] Faults),
@@ -413,6 +419,7 @@ impl MeasuresJson {
     }
 }
 
+/// The answer of `compensate --fit`.
 #[derive(Debug, Serialize)]
 pub struct CompensateJson {
     pub(crate) model: String,

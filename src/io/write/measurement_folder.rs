@@ -19,8 +19,11 @@ use crate::io::model::ModelFile;
 use super::comparison_rows::ComparisonRow;
 use crate::io::table::{rows_as_csv, rows_of_csv};
 
+/// The document of `compare` in a folder of pages.
 pub const COMPARISON_FILE: &str = "comparison.json";
+/// The document of `diagnose` in a folder of pages.
 pub const DIAGNOSIS_FILE: &str = "diagnosis.json";
+/// The document of `metrics` in a folder of pages.
 pub const METRICS_FILE: &str = "metrics.json";
 /// The model with the listed effects and the proposed terms.
 pub(crate) const PROPOSED_FILE: &str = "proposed.toml";

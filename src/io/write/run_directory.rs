@@ -24,9 +24,13 @@ use super::checkpoint::CHECKPOINT_FILE;
 /// A request, as far as the search's course depends on it.
 #[derive(Debug, Clone)]
 pub struct Request<'a> {
+    /// The model file as it was read.
     pub file: &'a ModelFile,
+    /// What the winding shop can wind.
     pub class: WindabilityClass,
+    /// What is made small.
     pub objective: Objective,
+    /// How it is searched.
     pub plan: &'a Plan,
     /// As given on the command line, if it was.
     pub budget: Option<&'a str>,

@@ -15,11 +15,14 @@ use crate::units::min_from_s;
 /// Who runs the parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Engine {
+    /// A graph of files, on one machine or a cluster.
     Snakemake,
+    /// A cluster's queue, as one array of tasks.
     Slurm,
 }
 
 impl Engine {
+    /// As on the command line.
     pub fn key(self) -> &'static str {
         match self {
             Engine::Snakemake => "snakemake",
@@ -40,17 +43,21 @@ impl Engine {
 /// What is to be run.
 #[derive(Debug, Clone)]
 pub struct Workflow<'a> {
+    /// What will run it.
     pub engine: Engine,
     /// This program, where the parts find it.
     pub program: &'a Path,
+    /// The campaign's file.
     pub campaign: &'a Path,
     /// What the cells are made from.
     pub inputs: &'a [PathBuf],
+    /// The cells' identifiers, in the grid's order.
     pub ids: Vec<&'a str>,
     /// Of all cells, on one thread.
     pub estimated_s: f64,
     /// What a part should take.
     pub part_s: f64,
+    /// Of each part.
     pub threads: u16,
 }
 

@@ -24,6 +24,7 @@ pub struct Axis {
 }
 
 impl Axis {
+    /// Evenly spaced, with a range from the data.
     pub fn linear(label: impl Into<String>) -> Self {
         Self { label: label.into(), scale: Scale::Linear, include: Vec::new() }
     }

@@ -226,11 +226,13 @@ impl Chart {
         self
     }
 
+    /// With this horizontal axis.
     pub fn x(mut self, axis: Axis) -> Self {
         self.x = axis;
         self
     }
 
+    /// With this vertical axis.
     pub fn y(mut self, axis: Axis) -> Self {
         self.y = axis;
         self
@@ -242,11 +244,13 @@ impl Chart {
         self
     }
 
+    /// With this mark, over those before it.
     pub fn mark(mut self, mark: Mark) -> Self {
         self.marks.push(mark);
         self
     }
 
+    /// With this band behind all marks.
     pub fn band(mut self, band: Band) -> Self {
         self.bands.push(band);
         self
