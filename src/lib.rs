@@ -29,6 +29,10 @@
 // What is not meant for others is `pub(crate)`, and what nobody uses goes. The build with all default features is the one that
 // tells: without them, what only the command line, pages or tables use counts as unused or out of reach.
 #![cfg_attr(all(feature = "cli", feature = "mat"), warn(unreachable_pub))]
+// What others can use says what it is; a variant of an error says it by its message.
+#![warn(missing_docs)]
+// A body that outgrows 60 lines (clippy.toml) holds two steps, or says why it does not.
+#![cfg_attr(not(test), warn(clippy::too_many_lines))]
 #![cfg_attr(not(all(feature = "cli", feature = "mat")), allow(dead_code, unused_imports))]
 // The heads of modules speak to those who read the source.
 #![allow(rustdoc::private_intra_doc_links)]

@@ -279,6 +279,10 @@ fn retreat<const N: usize>(system: &System, movement: Move, r: &mut [f64; N]) {
 }
 
 #[inline(always)]
+#[expect(
+    clippy::too_many_lines,
+    reason = "the inner loop of every fit: one pass over a row, unrolled for each size, without a call between"
+)]
 fn forward_of<const N: usize>(system: &System, rows: &[Row], values: &Values, keep: bool) -> Trace {
     let n = system.size;
     let steps: Vec<Noise<N>> = system

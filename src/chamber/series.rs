@@ -161,6 +161,10 @@ impl Series {
     }
 
     /// Steps, windows and bends of all rows.
+    #[expect(
+        clippy::too_many_lines,
+        reason = "windows, events and steps of a row follow from each other by what is worked out once"
+    )]
     fn plan(&mut self, rate_mean_s: f64, block_s: f64) {
         let bends = bends(&self.times_s, &self.values[0]);
         let wanted_s = if self.averaged > 1 { block_s } else { rate_mean_s };

@@ -74,6 +74,50 @@ pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliE
     Ok(if arguments.strict && !adequate { Ending::No } else { Ending::Done })
 }
 
+/// With so many digits; "-" where there is none.
+fn number(value: Option<f64>, digits: usize) -> String {
+    value.map_or("-".to_owned(), |v| format!("{v:.digits$}"))
+}
+
+/// The table of a record's measures.
+fn measures(record: &RecordComparisonJson) -> String {
+    let noise = |of: fn(&NoisePartsJson) -> String| record.noise.as_ref().map_or("-".to_owned(), of);
+    let measures = [
+        ("RMSE", format!("{:.5}", record.rmse_deg_per_h), "°/h"),
+        (
+            "noise floor of the record",
+            format!("{:.5} ± {:.5}", record.noise_floor_deg_per_h, record.noise_floor_standard_error_deg_per_h),
+            "°/h",
+        ),
+        (
+            "white noise",
+            noise(|n| match n.white_standard_error_deg_per_h {
+                Some(error) => format!("{:.5} ± {error:.5}", n.white_deg_per_h),
+                None => format!("{:.5}", n.white_deg_per_h),
+            }),
+            "°/h",
+        ),
+        ("wander", noise(|n| format!("{:.5}", n.wander_deg_per_h)), "°/h"),
+        ("air that the sensor cannot see", noise(|n| format!("{:.5}", n.unresolved_air_deg_per_h)), "°/h"),
+        ("offset", format!("{:.5}", record.offset_deg_per_h), "°/h"),
+        ("NRMSE fit", number(record.nrmse_fit_percent, 2), "%"),
+        ("R²", number(record.r_squared, 5), ""),
+        ("reduced chi-square", format!("{:.4}", record.reduced_chi_square), ""),
+        ("expected from what the readings leave open", format!("{:.4}", record.boundary_chi_square), ""),
+        ("against noise and that", format!("{:.4}", record.whitened_chi_square), ""),
+        ("Ljung-Box p-value", format!("{:.4}", record.ljung_box.p_value), ""),
+        (
+            "film found",
+            match (record.estimated_film_w_per_m2_k, record.estimated_film_standard_error_w_per_m2_k) {
+                (Some(film), Some(error)) => format!("{film:.2} ± {error:.2}"),
+                (film, _) => number(film, 2),
+            },
+            "W/(m²K)",
+        ),
+    ];
+    table(&["measure", "value", "unit"], measures.map(|(n, v, u)| vec![n.to_owned(), v, u.to_owned()]))
+}
+
 fn text(body: &CompareJson) -> String {
     let lacks = |verdict: &str| {
         if verdict == "missing" { "the model lacks something" } else { "the model lacks nothing that these show" }
@@ -84,43 +128,8 @@ fn text(body: &CompareJson) -> String {
         for finding in &record.findings {
             text += &format!("  {finding}\n");
         }
-        let number = |value: Option<f64>, digits: usize| value.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
-        let noise = |of: fn(&NoisePartsJson) -> String| record.noise.as_ref().map_or("-".to_owned(), of);
-        let measures = [
-            ("RMSE", format!("{:.5}", record.rmse_deg_per_h), "°/h"),
-            (
-                "noise floor of the record",
-                format!("{:.5} ± {:.5}", record.noise_floor_deg_per_h, record.noise_floor_standard_error_deg_per_h),
-                "°/h",
-            ),
-            (
-                "white noise",
-                noise(|n| match n.white_standard_error_deg_per_h {
-                    Some(error) => format!("{:.5} ± {error:.5}", n.white_deg_per_h),
-                    None => format!("{:.5}", n.white_deg_per_h),
-                }),
-                "°/h",
-            ),
-            ("wander", noise(|n| format!("{:.5}", n.wander_deg_per_h)), "°/h"),
-            ("air that the sensor cannot see", noise(|n| format!("{:.5}", n.unresolved_air_deg_per_h)), "°/h"),
-            ("offset", format!("{:.5}", record.offset_deg_per_h), "°/h"),
-            ("NRMSE fit", number(record.nrmse_fit_percent, 2), "%"),
-            ("R²", number(record.r_squared, 5), ""),
-            ("reduced chi-square", format!("{:.4}", record.reduced_chi_square), ""),
-            ("expected from what the readings leave open", format!("{:.4}", record.boundary_chi_square), ""),
-            ("against noise and that", format!("{:.4}", record.whitened_chi_square), ""),
-            ("Ljung-Box p-value", format!("{:.4}", record.ljung_box.p_value), ""),
-            (
-                "film found",
-                match (record.estimated_film_w_per_m2_k, record.estimated_film_standard_error_w_per_m2_k) {
-                    (Some(film), Some(error)) => format!("{film:.2} ± {error:.2}"),
-                    (film, _) => number(film, 2),
-                },
-                "W/(m²K)",
-            ),
-        ];
         text.push('\n');
-        text += &table(&["measure", "value", "unit"], measures.map(|(n, v, u)| vec![n.to_owned(), v, u.to_owned()]));
+        text += &measures(record);
         text.push('\n');
         text += &table(
             &["part of the record", "rows", "share of rows", "share of squared error", "RMSE °/h"],

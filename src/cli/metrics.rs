@@ -9,6 +9,7 @@ use super::watching::Watching;
 use super::{CliError, Ending};
 use crate::io::json::inputs::RecordInputJson;
 use crate::io::json::metrics::{MetricsJson, NoiseJson, RecordMetricsJson};
+use crate::io::json::scale_factor::PositionsJson;
 use crate::io::json::scale_factor::{EstimateJson, ScaleFactorJson};
 use crate::io::read::record_columns::RecordFormat;
 use crate::io::read::table_file::Source;
@@ -188,16 +189,7 @@ fn text(body: &MetricsJson) -> String {
     }
     for record in body.records.iter().filter(|r| !r.noise.is_empty()) {
         text += &format!("\nnoise of {}, intervals that hold together with 95 %\n", record.file);
-        let row = |n: &NoiseJson| {
-            let [value, low, high] = known([n.value, n.low, n.high], 0.5 * (n.high - n.low));
-            let (value, within) = match (n.value > 0.0, n.low > 0.0) {
-                (true, true) => (value, format!("{low} to {high}")),
-                (true, false) => (value, format!("0 to {high}")),
-                (false, _) => ("not seen".to_owned(), format!("at most {high}")),
-            };
-            vec![n.kind.replace('_', " "), value, within, n.unit.clone()]
-        };
-        text += &table(&["kind", "value", "interval", "unit"], record.noise.iter().map(row));
+        text += &table(&["kind", "value", "interval", "unit"], record.noise.iter().map(noise_row));
     }
     for record in &body.records {
         if let Some(scale) = &record.scale_factor {
@@ -217,18 +209,32 @@ fn text(body: &MetricsJson) -> String {
         text.push('\n');
         text += &table(&["record", "earth's rate °/h", "bias without it °/h"], rows);
     }
-    if let Some(found) = &body.positions {
-        let (value, error) = with_error(found.scale_error_ppm.value, found.scale_error_ppm.standard_error);
-        let error = error.map_or(String::new(), |e| format!(" ± {e}"));
-        text += &format!(
-            "\nsteps of the offset between attitudes: scale factor off by {value}{error} ppm, bias of the gyro itself {} °/h\n",
-            usual(found.bias_deg_per_h)
-        );
-    }
+    text.extend(body.positions.as_ref().map(words_on_positions));
     for record in &body.records {
         text.extend(record.cautions.iter().map(|caution| format!("\ncaution: {}: {caution}\n", record.file)));
     }
     text
+}
+
+/// What steps of the offset between attitudes tell.
+fn words_on_positions(found: &PositionsJson) -> String {
+    let (value, error) = with_error(found.scale_error_ppm.value, found.scale_error_ppm.standard_error);
+    let error = error.map_or(String::new(), |e| format!(" ± {e}"));
+    format!(
+        "\nsteps of the offset between attitudes: scale factor off by {value}{error} ppm, bias of the gyro itself {} °/h\n",
+        usual(found.bias_deg_per_h)
+    )
+}
+
+/// A kind of noise, its value and interval as far as they are known.
+fn noise_row(n: &NoiseJson) -> Vec<String> {
+    let [value, low, high] = known([n.value, n.low, n.high], 0.5 * (n.high - n.low));
+    let (value, within) = match (n.value > 0.0, n.low > 0.0) {
+        (true, true) => (value, format!("{low} to {high}")),
+        (true, false) => (value, format!("0 to {high}")),
+        (false, _) => ("not seen".to_owned(), format!("at most {high}")),
+    };
+    vec![n.kind.replace('_', " "), value, within, n.unit.clone()]
 }
 
 /// A value and its standard error, as far as it is known.

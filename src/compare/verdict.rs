@@ -96,6 +96,7 @@ pub enum Finding {
 }
 
 impl std::fmt::Display for Finding {
+    #[expect(clippy::too_many_lines, reason = "a sentence for each finding")]
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let percent = |share: &f64| format!("{:.0} %", percent_from_fraction(*share));
         match self {

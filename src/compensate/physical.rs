@@ -391,6 +391,7 @@ struct LinearModel {
 }
 
 /// None where that is not the whole model.
+#[expect(clippy::too_many_lines, reason = "probes of one model, and the check that they say all of it")]
 fn linear_gains(model: &CoilModel, pattern: &Pattern, layers: usize) -> Result<Option<LinearModel>, CompensateError> {
     let names = model.missing_channels(&[]);
     let rate = RateModel::new(model, pattern, &names)?;

@@ -92,6 +92,7 @@ pub struct Schedule {
 impl Schedule {
     /// # Errors
     /// A pattern of another layer count than the coil's.
+    #[expect(clippy::too_many_lines, reason = "a step field by field, in the order of the schedule's columns")]
     pub fn new(coil: &Coil, pattern: &Pattern) -> Result<Self, RateError> {
         let Laid { pieces, .. } = Laid::new(coil, pattern)?;
         let mut ends_m = vec![0.0];

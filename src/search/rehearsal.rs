@@ -66,6 +66,7 @@ impl Evaluator<'_> {
     ///
     /// # Errors
     /// None that a model which could be solved would cause.
+    #[expect(clippy::too_many_lines, reason = "set up once, then one loop of search and cut")]
     pub(super) fn rehearsed(
         &self,
         class: WindabilityClass,

@@ -112,6 +112,7 @@ impl From<SearchError> for RunError {
 ///
 /// # Errors
 /// A model that cannot be solved, an objective that it has not; a saved state of another search.
+#[expect(clippy::too_many_lines, reason = "the steps of a search in their order, each one call")]
 pub fn run(request: &Request, observer: &mut dyn Observer) -> Result<Option<Answer>, RunError> {
     if request.cuts {
         return run_with_cuts(request, observer);

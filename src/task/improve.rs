@@ -75,6 +75,10 @@ impl Observer for Quietly<'_> {
 ///
 /// # Errors
 /// As its steps.
+#[expect(
+    clippy::too_many_lines,
+    reason = "the whole way in its order; each step is a call, and the page names them all"
+)]
 pub fn run(request: &Request, observer: &dyn Observer) -> Result<Option<ImproveJson>, TaskError> {
     let (file, folder) = (request.model, request.folder);
     let old = pattern_or_own(file, request.pattern)?;

@@ -76,62 +76,74 @@ pub(super) fn leave_one_out(trial: &Trial, observer: &dyn Observer) -> Result<Le
     let mut methods = Vec::new();
     let steps = (Method::ALL.len() * records.len()) as f64;
     for (number, method) in Method::ALL.into_iter().enumerate() {
-        let mut all = Vec::new();
-        let mut found = Vec::new();
-        for (place, record) in records.iter().enumerate() {
-            observer.at(
-                (number * records.len() + place) as f64 / steps,
-                &format!("{}, fitted without {}", method.key(), trial.files[place]),
-            );
-            let file = trial.files[place].to_owned();
-            let fitted = trial.fit(method, Some(place));
-            found.push(match fitted.and_then(|compensator| Ok((trial.tried(&compensator, record)?, compensator))) {
-                Ok((left, compensator)) => {
-                    all.extend_from_slice(&left);
-                    LeftOutJson {
-                        file,
-                        rms_deg_per_h: Some(shown(rms(&left))),
-                        deviation_deg_per_h: Some(shown(standard_deviation(&left))),
-                        delay_rows: Some(compensator.delay_rows(record.interval_s())),
-                        measures: Some(measures(record, left)?),
-                        reason: None,
-                    }
-                }
-                Err(error) => LeftOutJson::failed(file, error.to_string()),
-            });
-        }
-        let is_whole = found.iter().all(|one| one.reason.is_none());
-        let fitted_rms = trial.fit(method, None).ok().and_then(|compensator| {
-            let left: Result<Vec<Vec<f64>>, _> =
-                records.iter().map(|record| trial.tried(&compensator, record)).collect();
-            Some(shown(rms(&left.ok()?.concat())))
-        });
-        let left_out_rms = is_whole.then(|| shown(rms(&all)));
-        let only_fits = matches!((fitted_rms, left_out_rms), (Some(own), Some(other)) if other > ONLY_FITS * own);
-        let reason = match (fitted_rms, left_out_rms) {
-            (Some(own), Some(other)) if only_fits => Some(format!(
-                "leaves {own:.5} °/h of records that it was fitted to, {other:.5} °/h of those that it was not shown: it only fits"
-            )),
-            (_, Some(other)) if other >= by_offset_rms_deg_per_h => Some(format!(
-                "no better on a record that it was not shown than the mean rate of the others, which leaves {by_offset_rms_deg_per_h:.5} °/h"
-            )),
-            (_, None) => found.iter().find_map(|one| Some(format!("{}: {}", one.file, one.reason.as_ref()?))),
-            _ => None,
+        let at = |place: usize| {
+            let words = format!("{}, fitted without {}", method.key(), trial.files[place]);
+            observer.at((number * records.len() + place) as f64 / steps, &words);
         };
-        if is_whole {
-            curves.push((method.key(), all));
-        }
-        methods.push(LeftOutMethodJson {
-            method: method.key(),
-            fitted_rms_deg_per_h: fitted_rms,
-            left_out_rms_deg_per_h: left_out_rms,
-            only_fits,
-            reason,
-            records: found,
-        });
+        let (row, all) = of_method(trial, method, by_offset_rms_deg_per_h, at)?;
+        curves.extend(all.map(|all| (method.key(), all)));
+        methods.push(row);
     }
     let document = LeaveOneOutJson { by_offset_rms_deg_per_h, records: listed, methods };
     Ok(LeftOut { document, curves, times_s: one_behind_the_other(&records) })
+}
+
+/// One method on every record, fitted to the others, and what it leaves of all of them where it could always be fitted.
+fn of_method(
+    trial: &Trial,
+    method: Method,
+    by_offset_rms_deg_per_h: f64,
+    at: impl Fn(usize),
+) -> Result<(LeftOutMethodJson, Option<Vec<f64>>), TaskError> {
+    let records: Vec<&Record> = trial.days.iter().map(|day| day.record).collect();
+    let shown = deg_per_h_from_rad_per_s;
+    let mut all = Vec::new();
+    let mut found = Vec::new();
+    for (place, record) in records.iter().enumerate() {
+        at(place);
+        let file = trial.files[place].to_owned();
+        let fitted = trial.fit(method, Some(place));
+        found.push(match fitted.and_then(|compensator| Ok((trial.tried(&compensator, record)?, compensator))) {
+            Ok((left, compensator)) => {
+                all.extend_from_slice(&left);
+                LeftOutJson {
+                    file,
+                    rms_deg_per_h: Some(shown(rms(&left))),
+                    deviation_deg_per_h: Some(shown(standard_deviation(&left))),
+                    delay_rows: Some(compensator.delay_rows(record.interval_s())),
+                    measures: Some(measures(record, left)?),
+                    reason: None,
+                }
+            }
+            Err(error) => LeftOutJson::failed(file, error.to_string()),
+        });
+    }
+    let is_whole = found.iter().all(|one| one.reason.is_none());
+    let fitted_rms = trial.fit(method, None).ok().and_then(|compensator| {
+        let left: Result<Vec<Vec<f64>>, _> = records.iter().map(|record| trial.tried(&compensator, record)).collect();
+        Some(shown(rms(&left.ok()?.concat())))
+    });
+    let left_out_rms = is_whole.then(|| shown(rms(&all)));
+    let only_fits = matches!((fitted_rms, left_out_rms), (Some(own), Some(other)) if other > ONLY_FITS * own);
+    let reason = match (fitted_rms, left_out_rms) {
+        (Some(own), Some(other)) if only_fits => Some(format!(
+            "leaves {own:.5} °/h of records that it was fitted to, {other:.5} °/h of those that it was not shown: it only fits"
+        )),
+        (_, Some(other)) if other >= by_offset_rms_deg_per_h => Some(format!(
+            "no better on a record that it was not shown than the mean rate of the others, which leaves {by_offset_rms_deg_per_h:.5} °/h"
+        )),
+        (_, None) => found.iter().find_map(|one| Some(format!("{}: {}", one.file, one.reason.as_ref()?))),
+        _ => None,
+    };
+    let row = LeftOutMethodJson {
+        method: method.key(),
+        fitted_rms_deg_per_h: fitted_rms,
+        left_out_rms_deg_per_h: left_out_rms,
+        only_fits,
+        reason,
+        records: found,
+    };
+    Ok((row, is_whole.then_some(all)))
 }
 
 fn one_behind_the_other(records: &[&Record]) -> Vec<f64> {

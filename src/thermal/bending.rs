@@ -92,6 +92,7 @@ pub(super) struct System {
 
 impl System {
     /// `path` conducts as at T_m.
+    #[expect(clippy::too_many_lines, reason = "modes first, then what each input makes of them")]
     pub(super) fn new(path: &HeatPath, drive: &Drive, middle_k: f64) -> Result<Self, ThermalError> {
         let network = Network::new(path);
         let axis = Axis::new(path);

@@ -98,6 +98,7 @@ pub(super) fn modes(path: &HeatPath, network: &Network, axial: &AxialModes) -> R
 }
 
 impl Joined {
+    #[expect(clippy::too_many_lines, reason = "one assembly: every coupling is taken from the same rows")]
     fn new(path: &HeatPath, network: &Network, axial: &AxialModes) -> Result<Self, ThermalError> {
         let axis = Axis::new(path).ok_or(ThermalError::Eigen)?;
         let places = Places::new(path, network, axial.mean.len());
@@ -196,6 +197,7 @@ impl Joined {
     }
 
     /// E and what drives the parts; their heat capacities.
+    #[expect(clippy::too_many_lines, reason = "one assembly: every part adds to the same matrix and inputs")]
     fn fill_parts(
         &mut self,
         path: &HeatPath,

@@ -143,6 +143,7 @@ pub(super) struct Mode {
 impl Pack {
     /// # Errors
     /// Values so extreme that the eigenvalues do not converge or are not positive.
+    #[expect(clippy::too_many_lines, reason = "modes, then what each input makes of them, from the same sums")]
     pub fn new(path: &HeatPath) -> Result<Self, ThermalError> {
         let network = Network::new(path);
         let axial = AxialModes::new(path, &network)?;

@@ -83,6 +83,7 @@ pub struct SteppedField {
 impl SteppedField {
     /// # Errors
     /// Values so extreme that nothing converges; a conductivity that does not stay positive.
+    #[expect(clippy::too_many_lines, reason = "what is worked out once of a drive, then one loop over its panels")]
     pub(crate) fn new(path: &HeatPath, drive: &Drive) -> Result<Self, ThermalError> {
         let (given, drive) = (drive, &path.start.map_or_else(|| drive.clone(), |start| drive.after(&start)));
         let values = || drive.boundary_k.values().iter().chain(drive.ambient_k().values()).copied();
@@ -300,6 +301,7 @@ impl March<'_> {
         (last.fold(0.0, f64::max) - rounding).max(0.0) * per_s / (BENDING * self.scale_k_per_s).max(f64::MIN_POSITIVE)
     }
 
+    #[expect(clippy::too_many_lines, reason = "one fixed-point iteration over tables that it alone has")]
     fn step(&mut self, from_s: f64, length_s: f64, rate: &[f64], bent: &Bent) -> Result<Step, ThermalError> {
         let system = self.system;
         let (modes, nodes) = (rate.len(), DEGREE + 1);

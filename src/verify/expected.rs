@@ -2,7 +2,7 @@
 
 use super::physics::wound_turns;
 use super::winding::{Piece, Winding};
-use super::{Claim, Findings, Printed, Truth};
+use super::{Claim, Findings, Printed, Row, Truth};
 use crate::coil::LayerLength;
 use crate::units::{nm_from_m, um_from_m};
 
@@ -137,6 +137,10 @@ impl Supply {
 }
 
 /// Compares every field of every row, and what is claimed of the whole.
+#[expect(
+    clippy::too_many_lines,
+    reason = "the columns of a row, in the schedule's order: what is counted along the rows is read by the next"
+)]
 pub(super) fn check(truth: &Truth, claim: &Claim, winding: &Winding, findings: &mut Findings) {
     let Winding { segments, pieces, order, .. } = winding;
     let count = segments.len();
@@ -203,23 +207,39 @@ pub(super) fn check(truth: &Truth, claim: &Claim, winding: &Winding, findings: &
         let rotation = if from_low[i] { "cw" } else { "ccw" };
         findings.same_if(here, "rotation", &rotation.to_owned(), row.rotation.as_ref());
         findings.near_if(here, "axial_pitch_mm", coil.axial_pitch_m(), row.axial_pitch_m, Printed::Millimetres);
-        let shop = truth.shop;
-        let tension_n = shop.tension_n * (1.0 - shop.tension_taper_per_layer * piece.layer as f64).max(0.0);
-        findings.near_if(here, "tension_n", tension_n, row.tension_n, Printed::Plain);
-        for (field, sign, found) in
-            [("tension_min_n", -1.0, row.tension_min_n), ("tension_max_n", 1.0, row.tension_max_n)]
-        {
-            findings.near_if(here, field, tension_n * (1.0 + sign * shop.tension_limit), found, Printed::Plain);
-        }
-        let speed = shop.winding_speed_turns_per_min;
-        findings.near_if(here, "turns_per_min", speed, row.turns_per_min, Printed::Plain);
+        check_winder(truth, row, here, piece.layer, findings);
         let changed = i == 0 || fed_by[i] != fed_by[i - 1];
         findings.same_if(here, "reel_change", &changed, row.reel_change.as_ref());
-        let every = shop.potting_every_layers;
+        let every = truth.shop.potting_every_layers;
         let goes_on = order.get(i + 1).is_some_and(|next| pieces[*next].layer == piece.layer);
         let potting = !goes_on && (layer == count || (every > 0 && layer as i64 % every == 0));
         findings.same_if(here, "potting", &potting, row.potting.as_ref());
     }
+    check_segments(claim, segments, findings);
+    check_ends(claim, winding.ends, findings);
+    check_name(claim, segments, findings);
+    check_whole(claim, &supply, max_climb, findings);
+    check_reels(truth, claim, &supply, pieces, findings);
+    check_fibre(truth, claim, winding, balance_m, findings);
+    if let Some(found) = &claim.shop {
+        check_shop(truth, found, findings);
+    }
+}
+
+/// What the winding machine is set to for a row.
+fn check_winder(truth: &Truth, row: &Row, here: Option<usize>, layer: usize, findings: &mut Findings) {
+    let shop = truth.shop;
+    let tension_n = shop.tension_n * (1.0 - shop.tension_taper_per_layer * layer as f64).max(0.0);
+    findings.near_if(here, "tension_n", tension_n, row.tension_n, Printed::Plain);
+    for (field, sign, found) in [("tension_min_n", -1.0, row.tension_min_n), ("tension_max_n", 1.0, row.tension_max_n)]
+    {
+        findings.near_if(here, field, tension_n * (1.0 + sign * shop.tension_limit), found, Printed::Plain);
+    }
+    let speed = shop.winding_speed_turns_per_min;
+    findings.near_if(here, "turns_per_min", speed, row.turns_per_min, Printed::Plain);
+}
+
+fn check_segments(claim: &Claim, segments: &[usize], findings: &mut Findings) {
     let claimed: Vec<i64> = segments.iter().map(|&s| s as i64).collect();
     findings.checks += 1;
     if let Some(found) = claim.segments.as_ref().filter(|found| **found != claimed) {
@@ -231,13 +251,14 @@ pub(super) fn check(truth: &Truth, claim: &Claim, winding: &Winding, findings: &
             super::EMIT_AGAIN,
         );
     }
-    check_ends(claim, winding.ends, findings);
-    check_name(claim, segments, findings);
-    check_whole(claim, &supply, max_climb, findings);
-    check_reels(truth, claim, &supply, pieces, findings);
+}
+
+/// The fibre as a whole: its words, its middle, where winding starts and what is left over.
+fn check_fibre(truth: &Truth, claim: &Claim, winding: &Winding, balance_m: f64, findings: &mut Findings) {
+    let Winding { pieces, order, .. } = winding;
     let length_m = pieces.last().map_or(0.0, |piece| piece.to_m);
     findings.near_if(None, "length_m", length_m, claim.length_m, Printed::Metres);
-    let fibre = coil.fibre();
+    let fibre = truth.model.coil.fibre();
     let (coated_um, wave_nm) = (um_from_m(fibre.outer_diameter_m), nm_from_m(fibre.wavelength_m));
     let fibre = format!("{coated_um:.1} µm over the coating, n {} at {wave_nm:.0} nm", fibre.refractive_index);
     findings.same_if(None, "fibre", &fibre, claim.fibre.as_ref());
@@ -254,9 +275,6 @@ pub(super) fn check(truth: &Truth, claim: &Claim, winding: &Winding, findings: &
     // Ends with turns of their own are as long as they shall be.
     let trim_m = if winding.ends == [0, 0] { balance_m } else { 0.0 };
     findings.near_if(None, "expected_trim_m", trim_m, claim.expected_trim_m, Printed::Metres);
-    if let Some(found) = &claim.shop {
-        check_shop(truth, found, findings);
-    }
 }
 
 fn check_whole(claim: &Claim, supply: &Supply, max_climb: usize, findings: &mut Findings) {

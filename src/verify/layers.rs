@@ -188,6 +188,7 @@ impl Layers {
 
     /// The layers' means under drive and air of one kelvin, and under a heat flow of one watt a square metre into the bore; and
     /// what surface and spool give back to what drives them.
+    #[expect(clippy::too_many_lines, reason = "one elimination: assembled, swept and read again over the same nodes")]
     fn means(&self, s: C, cosine: &Cosine) -> (Vec<C>, Vec<C>, [C; 2]) {
         let capacity = self.heat_capacity_j_per_m3_k;
         let diffusivity = self.conductivity_w_per_m_k / capacity;

@@ -95,6 +95,10 @@ pub(super) enum Bias {
 impl Physics {
     /// # Errors
     /// The name of an effect that is not known here.
+    #[expect(
+        clippy::too_many_lines,
+        reason = "an arm for each effect: a second reading of the catalogue that calls nothing of the first"
+    )]
     pub(crate) fn read(model: &CoilModel) -> Result<Self, &'static str> {
         let (conductivity, heat_capacity) = match model.material {
             Material::Conductivity { w_per_m_k, heat_capacity_j_per_m3_k } => (w_per_m_k, heat_capacity_j_per_m3_k),

@@ -52,6 +52,7 @@ struct Rows {
 }
 
 /// What the rows wind, if they are a winding of this coil at all.
+#[expect(clippy::too_many_lines, reason = "ends, pieces and order follow from each other by what is worked out once")]
 pub(super) fn read(truth: &Truth, claim: &Claim, findings: &mut Findings) -> Option<Winding> {
     let Rows { segments, added } = rows(truth, claim, findings)?;
     let count = segments.len();

@@ -172,6 +172,7 @@ fn size(values: &[f64]) -> f64 {
     rms(&finite)
 }
 
+#[expect(clippy::too_many_lines, reason = "an answer field by field")]
 fn proposal(
     question: &Question,
     discovered: &Discovered,

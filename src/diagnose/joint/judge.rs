@@ -14,6 +14,10 @@ const JUDGED: usize = 8;
 const LOOKED_INTO: usize = 3;
 
 /// Held-out records, posterior masses, and what is as good without some of its members.
+#[expect(
+    clippy::too_many_lines,
+    reason = "the steps of one judgement: each orders or weighs what the step before left"
+)]
 pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mut Vec<Explanation>) {
     let order = |list: &mut Vec<Explanation>| {
         list.sort_by(|a, b| b.total().total_cmp(&a.total()).then_with(|| a.key().cmp(&b.key())))

@@ -51,6 +51,7 @@ pub(super) fn with_dialect(mut schema: Value) -> Value {
 }
 
 /// The schema of a model file.
+#[expect(clippy::too_many_lines, reason = "one schema, table by table")]
 pub fn model_schema() -> Value {
     let windings: Vec<&str> = Classic::ALL.iter().map(|c| c.key()).collect();
     let winding = table(
@@ -253,6 +254,7 @@ pub fn pattern_schema() -> Value {
 }
 
 /// The schema of a schedule, a traveller or a winder's program as JSON.
+#[expect(clippy::too_many_lines, reason = "one schema, key by key")]
 pub fn schedule_schema() -> Value {
     let word = |description: &str| described("string", description);
     let number = |description: &str| described("number", description);

@@ -133,6 +133,7 @@ pub(crate) struct ChoiceJson {
 }
 
 /// The `[materials]` table of a model file.
+#[expect(clippy::too_many_lines, reason = "one schema, table by table")]
 pub(super) fn schema() -> Value {
     let material = |of: &str| {
         let names: Vec<&str> = MATERIALS.iter().map(|entry| entry.name).collect();

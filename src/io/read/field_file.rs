@@ -104,6 +104,7 @@ struct Table {
 }
 
 impl Table {
+    #[expect(clippy::too_many_lines, reason = "each kind of row beside what is said where it is wrong")]
     fn read(source: &str) -> Result<Self, Vec<Fault>> {
         let mut rows = CsvRows::new(source.as_bytes());
         // A text in memory does not fail.
@@ -213,6 +214,10 @@ impl Table {
     }
 
     /// One row a time and layer, or a time, layer and turn.
+    #[expect(
+        clippy::too_many_lines,
+        reason = "two passes over the same order: which places there are, then that each time has them"
+    )]
     fn long(&self) -> Result<ThermalHistory, Fault> {
         let column = |holds: Holds| self.column(holds).unwrap_or_default();
         let (times, layers, turns) = (column(Holds::Time), column(Holds::Layer), self.column(Holds::Turn));

@@ -17,6 +17,8 @@ use super::toml_reader::{Limits, TableReader, TomlReader, nearest};
 const DIAMETER_ROUNDING: f64 = 1e-6;
 /// κ below this is none that an error could be a share of.
 const LEAST_PATH_PER_K: f64 = 1e-9;
+/// Of glass and coatings [µm].
+const DIAMETER_UM: Limits = Limits::between(1.0, 5_000.0);
 
 /// Materials as stated, before the coil is known.
 pub(super) struct Stated {
@@ -37,18 +39,10 @@ pub(super) fn read_materials(
     let before = r.fault_count();
     let own = read_own(r, table);
     let span = table.span();
-    let named = |r: &mut TomlReader, table: &mut TableReader, key: &'static str, is_needed: bool| {
-        let stated = match is_needed {
-            true => table.needed_text(r, key, "the name of a material (`coilwright materials` lists them)"),
-            false => table.text(r, key),
-        };
-        let span = table.span_of(key);
-        stated.and_then(|name| known(r, &own, name, key, span))
-    };
     let is_present = table.is_present();
-    let adhesive = named(r, table, "adhesive", is_present);
+    let adhesive = named(r, table, &own, "adhesive", is_present);
     let has_spool = table.has("spool");
-    let spool = named(r, table, "spool", false);
+    let spool = named(r, table, &own, "spool", false);
     let spool_span = table.span_of("spool_thickness_mm");
     let thickness_mm = match has_spool {
         true => table.needed_number(r, "spool_thickness_mm", Limits::between(0.01, 1e3)),
@@ -62,37 +56,20 @@ pub(super) fn read_materials(
     let mut fibre_table =
         if is_present && !is_of_library { table.needed_table(r, "fibre") } else { table.table(r, "fibre") };
     let surface_span = fibre_table.span_of("coatings").or_else(|| fibre_table.span());
-    let glass = named(r, &mut fibre_table, "glass", is_present && !is_of_library);
-    let diameter = Limits::between(1.0, 5_000.0);
-    let glass_diameter_um = fibre_table.needed_number(r, "glass_diameter_um", diameter);
+    let glass = named(r, &mut fibre_table, &own, "glass", is_present && !is_of_library);
+    let glass_diameter_um = fibre_table.needed_number(r, "glass_diameter_um", DIAMETER_UM);
     let hole_diameter_um = fibre_table.number(r, "hole_diameter_um", Limits::between(0.0, 5_000.0)).unwrap_or(0.0);
     let usual = if hole_diameter_um > 0.0 { (0.0, 0.0) } else { STRAIN_OPTIC };
     let optic = Limits::between(-1.0, 1.0);
     let p11 = fibre_table.number(r, "strain_optic_p11", optic).unwrap_or(usual.0);
     let p12 = fibre_table.number(r, "strain_optic_p12", optic).unwrap_or(usual.1);
-    let mut coatings: Vec<(Material, f64)> = Vec::new();
-    let mut below_um = glass_diameter_um;
     if let Some(glass_um) = glass_diameter_um.filter(|glass_um| hole_diameter_um >= *glass_um) {
         let message = format!(
             "materials.fibre.hole_diameter_um must be less than glass_diameter_um = {glass_um}, found {hole_diameter_um}: the hole lies in the glass"
         );
         r.fault(Fault::new(message, fibre_table.span_of("hole_diameter_um")));
     }
-    for mut coating in fibre_table.tables(r, "coatings") {
-        let material = named(r, &mut coating, "material", true);
-        let outer_um = coating.needed_number(r, "outer_diameter_um", diameter);
-        if let (Some(below), Some(outer)) = (below_um, outer_um)
-            && outer <= below
-        {
-            let message = format!(
-                "materials.fibre.coatings.outer_diameter_um must be more than the {below} µm that it covers, found {outer}: list the coatings from within outwards"
-            );
-            r.fault(Fault::new(message, coating.span_of("outer_diameter_um")));
-        }
-        below_um = outer_um.or(below_um);
-        coatings.extend(material.zip(outer_um.map(|outer| m_from_um(0.5 * outer))));
-        coating.finish(r);
-    }
+    let coatings = read_coatings(r, &mut fibre_table, &own, glass_diameter_um);
     fibre_table.finish(r);
     if !is_present || r.fault_count() > before {
         return None;
@@ -114,6 +91,49 @@ pub(super) fn read_materials(
         spool: spool.zip(thickness_mm).map(|(material, mm)| Spool { material, thickness_m: m_from_mm(mm) }),
     };
     Some(Stated { materials, own, spool_span, span, surface_span })
+}
+
+/// The material that stands under a key, if it is known.
+fn named(
+    r: &mut TomlReader,
+    table: &mut TableReader,
+    own: &[Material],
+    key: &'static str,
+    is_needed: bool,
+) -> Option<Material> {
+    let stated = match is_needed {
+        true => table.needed_text(r, key, "the name of a material (`coilwright materials` lists them)"),
+        false => table.text(r, key),
+    };
+    let span = table.span_of(key);
+    stated.and_then(|name| known(r, own, name, key, span))
+}
+
+/// Each coating with its outer radius, from the glass outwards.
+fn read_coatings(
+    r: &mut TomlReader,
+    fibre_table: &mut TableReader,
+    own: &[Material],
+    glass_diameter_um: Option<f64>,
+) -> Vec<(Material, f64)> {
+    let mut coatings = Vec::new();
+    let mut below_um = glass_diameter_um;
+    for mut coating in fibre_table.tables(r, "coatings") {
+        let material = named(r, &mut coating, own, "material", true);
+        let outer_um = coating.needed_number(r, "outer_diameter_um", DIAMETER_UM);
+        if let (Some(below), Some(outer)) = (below_um, outer_um)
+            && outer <= below
+        {
+            let message = format!(
+                "materials.fibre.coatings.outer_diameter_um must be more than the {below} µm that it covers, found {outer}: list the coatings from within outwards"
+            );
+            r.fault(Fault::new(message, coating.span_of("outer_diameter_um")));
+        }
+        below_um = outer_um.or(below_um);
+        coatings.extend(material.zip(outer_um.map(|outer| m_from_um(0.5 * outer))));
+        coating.finish(r);
+    }
+    coatings
 }
 
 /// Whether materials fit the model's coil; the model made of them.

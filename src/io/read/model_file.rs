@@ -55,6 +55,10 @@ pub(super) fn looks_like_a_record(source: &str) -> bool {
 ///
 /// # Errors
 /// All faults of the text at once.
+#[expect(
+    clippy::too_many_lines,
+    reason = "a step for each table of the file, in its order; what is checked last spans them"
+)]
 pub fn parse_model(path: &Path, source: &str) -> Result<ModelFile, Faults> {
     let file = path.display().to_string();
     let document = parse(&file, source).map_err(|faults| match looks_like_a_record(source) {
@@ -267,6 +271,11 @@ fn read_coil(r: &mut TomlReader, table: &mut TableReader, layers: Option<usize>,
         length_m,
         fibre,
     };
+    made_coil(r, table, spec, crossover_turns).map(|coil| coil.with_sagnac(sagnac))
+}
+
+/// The coil of what is stated, where it can be one.
+fn made_coil(r: &mut TomlReader, table: &TableReader, spec: CoilSpec, crossover_turns: f64) -> Option<Coil> {
     // Fibre cannot be pressed into less than its own diameter.
     if spec.radial_pitch_m < spec.fibre.outer_diameter_m * (1.0 - PITCH_ROUNDING) {
         let message = format!(
@@ -278,7 +287,7 @@ fn read_coil(r: &mut TomlReader, table: &mut TableReader, layers: Option<usize>,
         return None;
     }
     match Coil::with_crossovers(spec, crossover_turns) {
-        Ok(coil) => Some(coil.with_sagnac(sagnac)),
+        Ok(coil) => Some(coil),
         Err(error) => {
             let span = match error {
                 CoilError::LengthDisagrees { .. } => table.span_of("length_m"),

@@ -71,6 +71,10 @@ impl Quantity {
 
 impl Column {
     /// Of a name, and of the cell of a units' row below it.
+    #[expect(
+        clippy::too_many_lines,
+        reason = "name, brackets, the row below and what is mapped decide together what a column is"
+    )]
     fn new(name: &str, below: Option<&str>, format: &RecordFormat, decimal_comma: bool) -> Result<Self, String> {
         let mapped = format.mapped.iter().find(|m| m.name == name);
         let (bare, bracketed) = unbracketed(name);

@@ -115,6 +115,7 @@ impl<'s> Reading<'s> {
         self.format.has_mapping() || self.is_table
     }
 
+    #[expect(clippy::too_many_lines, reason = "head, rows and what is said of the whole, each of which may end it")]
     fn record(mut self) -> Result<ReadRecord, Faults> {
         let mut rows = CsvRows::new(self.source.as_bytes());
         if self.is_table {

@@ -77,6 +77,7 @@ impl<'c> Cells<'c> {
     }
 
     /// What was read last of a text.
+    #[expect(clippy::too_many_lines, reason = "each kind of cell beside what is said where it is wrong")]
     pub(super) fn read(&mut self, piece: Piece, row: &CsvRows<impl BufRead>) -> CellsRead {
         self.numbers.clear();
         if let Piece::Broken(why) = piece {
@@ -290,6 +291,7 @@ pub fn stream_rows(
 ///
 /// # Errors
 /// All faults of the input at once, with line or row, and column.
+#[expect(clippy::too_many_lines, reason = "one loop over rows whose state nothing else has")]
 pub(crate) fn stream_source(
     name: &str,
     source: Source<'_>,

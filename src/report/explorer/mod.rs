@@ -32,6 +32,7 @@ fn policy() -> String {
 ///
 /// # Errors
 /// None that data with finite numbers could cause.
+#[expect(clippy::too_many_lines, reason = "a page as it stands on the screen")]
 pub(crate) fn explorer_page(model: &str, data: &ExplorerDataJson) -> Result<String, serde_json::Error> {
     let json = JsonText::embedded(&serde_json::to_string(data)?).into_string();
     let number = |id: &str, title: &str, value: &str, unit: &str| {

@@ -231,6 +231,23 @@ fn draw_marks(chart: &Chart, layout: &Layout, root: &Area, lying: bool) -> Drawn
     Ok(())
 }
 
+/// Draws a run of points as a line, a dashed one, or, where it is one point, as a dot.
+fn draw_run(
+    root: &Area,
+    run: &[(f64, f64)],
+    is_dashed: bool,
+    hue: RGBColor,
+) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {
+    let path: Vec<(i32, i32)> = thin(run).into_iter().map(|(x, y)| at(x, y)).collect();
+    if is_dashed {
+        root.draw(&DashedPathElement::new(path, 6 * FINE, 4 * FINE, hue.stroke_width(3 * FINE as u32 / 2)))
+    } else if path.len() == 1 {
+        root.draw(&Circle::new(path[0], 2 * FINE, hue.filled()))
+    } else {
+        root.draw(&PathElement::new(path, hue.stroke_width(7 * FINE as u32 / 4)))
+    }
+}
+
 /// Draws one series; whether there was anything to draw.
 fn draw_series(
     chart: &Chart,
@@ -250,15 +267,7 @@ fn draw_series(
             for run in runs(series.points.iter().map(place)) {
                 any = true;
                 let run = if series.shape == Shape::Step { steps(&run) } else { run };
-                let path: Vec<(i32, i32)> = thin(&run).into_iter().map(|(x, y)| at(x, y)).collect();
-                if series.shape == Shape::Dashed {
-                    let style = hue.stroke_width(3 * FINE as u32 / 2);
-                    root.draw(&DashedPathElement::new(path, 6 * FINE, 4 * FINE, style))?;
-                } else if path.len() == 1 {
-                    root.draw(&Circle::new(path[0], 2 * FINE, hue.filled()))?;
-                } else {
-                    root.draw(&PathElement::new(path, hue.stroke_width(7 * FINE as u32 / 4)))?;
-                }
+                draw_run(root, &run, series.shape == Shape::Dashed, hue)?;
             }
         }
         Shape::Cells => {

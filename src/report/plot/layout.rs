@@ -1,7 +1,7 @@
 //! Where the parts of a chart go, in pixels of its natural size.
 
 use super::axis::{Ruler, three_digits};
-use super::{Along, Chart, Shape};
+use super::{Along, Axis, Chart, Shape};
 
 pub(super) const TEXT_PX: i32 = 13;
 pub(super) const ROW_PX: i32 = 19;
@@ -51,6 +51,46 @@ pub(super) enum LegendShape {
     Scale,
 }
 
+/// The chart's axes, reaching as far as cells, error bars and bars do.
+fn reaching_axes(chart: &Chart) -> (Axis, Axis) {
+    let mut x_axis = chart.x.clone();
+    let mut y_axis = chart.y.clone();
+    for series in chart.series.iter().filter(|s| s.shape == Shape::Cells) {
+        for (x, y) in &series.points {
+            let (half_x, half_y) = (0.5 * series.cell.0, 0.5 * series.cell.1);
+            x_axis = x_axis.reaching(x - half_x).reaching(x + half_x);
+            y_axis = y_axis.reaching(y - half_y).reaching(y + half_y);
+        }
+    }
+    for series in &chart.series {
+        for ((_, y), error) in series.points.iter().zip(&series.errors) {
+            y_axis = y_axis.reaching(y + error);
+        }
+    }
+    if !chart.categories.is_empty() {
+        x_axis = x_axis.reaching(0.0);
+    }
+    if chart.series.iter().any(|s| s.shape == Shape::Histogram) {
+        y_axis = y_axis.reaching(0.0);
+    }
+    (x_axis, y_axis)
+}
+
+/// Room for the numbers at the ends of lying bars.
+fn make_room_for_numbers(x: &mut Ruler, chart: &Chart) {
+    let width = chart.width_px as i32;
+    let longest = chart.series.iter().flat_map(|s| &s.labels).map(|l| text_width_px(l)).max().unwrap_or(0);
+    let share = (f64::from(longest + 8) / (0.75 * f64::from(width))).min(0.6);
+    let room = (x.high - x.low) * (share / (1.0 - share)).max(0.1);
+    x.high += room;
+    if x.low < 0.0 && chart.series.iter().flat_map(|s| &s.points).any(|p| p.0 < 0.0) {
+        x.low -= room;
+    } else {
+        x.low = x.base(&chart.x);
+    }
+    x.ticks.retain(|t| t.position >= x.low && t.position <= x.high);
+}
+
 impl Layout {
     pub(super) fn new(chart: &Chart) -> Self {
         let width = chart.width_px as i32;
@@ -66,26 +106,7 @@ impl Layout {
         };
         let has = |wanted: Shape| chart.series.iter().any(|s| s.shape == wanted);
         let x_margin = if lying || has(Shape::Points) { 0.04 } else { 0.0 };
-        let mut x_axis = chart.x.clone();
-        let mut y_axis = chart.y.clone();
-        for series in chart.series.iter().filter(|s| s.shape == Shape::Cells) {
-            for (x, y) in &series.points {
-                let (half_x, half_y) = (0.5 * series.cell.0, 0.5 * series.cell.1);
-                x_axis = x_axis.reaching(x - half_x).reaching(x + half_x);
-                y_axis = y_axis.reaching(y - half_y).reaching(y + half_y);
-            }
-        }
-        for series in &chart.series {
-            for ((_, y), error) in series.points.iter().zip(&series.errors) {
-                y_axis = y_axis.reaching(y + error);
-            }
-        }
-        if lying {
-            x_axis = x_axis.reaching(0.0);
-        }
-        if has(Shape::Histogram) {
-            y_axis = y_axis.reaching(0.0);
-        }
+        let (x_axis, y_axis) = reaching_axes(chart);
         let x_values: Vec<f64> = if lying {
             chart.series.iter().flat_map(|s| s.points.iter()).map(|p| p.0).collect()
         } else {
@@ -93,17 +114,7 @@ impl Layout {
         };
         let mut x = x_axis.ruler(x_values.into_iter().chain(marks(Along::X)), x_wanted, x_margin);
         if lying {
-            // Room for the numbers at the ends of the bars.
-            let longest = chart.series.iter().flat_map(|s| &s.labels).map(|l| text_width_px(l)).max().unwrap_or(0);
-            let share = (f64::from(longest + 8) / (0.75 * f64::from(width))).min(0.6);
-            let room = (x.high - x.low) * (share / (1.0 - share)).max(0.1);
-            x.high += room;
-            if x.low < 0.0 && chart.series.iter().flat_map(|s| &s.points).any(|p| p.0 < 0.0) {
-                x.low -= room;
-            } else {
-                x.low = x.base(&chart.x);
-            }
-            x.ticks.retain(|t| t.position >= x.low && t.position <= x.high);
+            make_room_for_numbers(&mut x, chart);
         }
         let legend_width = width - 24;
         let (legend, rows) = legend(chart, legend_width);

@@ -22,6 +22,7 @@ pub(super) struct Found<'f> {
 }
 
 /// Each number of the chapter beside the computed one.
+#[expect(clippy::too_many_lines, reason = "a row for each number of the chapter, in the chapter's order")]
 pub(super) fn comparisons(found: &Found) -> Vec<Comparison> {
     let row = |place, what, unit, published: Option<f64>, computed, explanation| Comparison {
         place,

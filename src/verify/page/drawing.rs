@@ -13,6 +13,7 @@ const OF_REEL: [&str; 8] = ["#2f7fd6", "#d9730d", "#1a9850", "#9b5fc0", "#d64550
 const INK: &str = "currentColor";
 
 /// `reels` are the names as listed, `of_layer` the place in that list of each layer's.
+#[expect(clippy::too_many_lines, reason = "the drawing as the page has it, tag after tag")]
 pub(super) fn draw(page: &mut Expected, title: &str, segments: &[usize], reels: &[String], of_layer: &[usize]) {
     let count = segments.len();
     let height = TOP + ROW * count as f64 + 44.0;
