@@ -4,7 +4,9 @@
 
 mod conversions;
 mod materials;
+mod promises;
 mod source;
+mod surface;
 
 use std::collections::BTreeSet;
 
