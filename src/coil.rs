@@ -2,7 +2,6 @@
 
 use thiserror::Error;
 
-/// Why numbers make no coil.
 /// The fibre's optical properties.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fibre {
@@ -92,8 +91,10 @@ pub struct Coil {
 /// A stated and a computed length may differ by this much: windings are never quite full.
 const LENGTH_AGREEMENT: f64 = 0.02;
 
+/// Why numbers make no coil.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum CoilError {
     #[error(
         "winding.layers must be an even number of at least 2, found {found}: both halves of the fibre need the same number of layers"

@@ -7,6 +7,21 @@
 //! Quantities are in SI and their names end in the unit; [`RotationRate`](units::RotationRate) shows a rate in °/h.
 //!
 //! # Example
+//! The winding whose worst rate error over random ramps of temperature is the smallest, beside the classic ones:
+//! ```
+//! use coilwright::{CoilModel, ProfileSpec, search};
+//!
+//! let model = CoilModel::builder("a coil of 200 m", 12).mean_diameter_m(0.075).length_m(200.0).build()?;
+//! let ramps = ProfileSpec { count: 4, ..ProfileSpec::default() };
+//! let request = search::Request::new(&model, &ramps);
+//! let answer = search::run(&request, &mut search::Unobserved)?.expect("nobody ends it");
+//! println!("wind {:?}: {}", answer.best.pattern.segments(), answer.best.worst); // "… °/h at … s of …"
+//! for classic in &answer.baselines {
+//!     assert!(answer.best.objective_rad_per_s <= classic.objective_rad_per_s, "{}", classic.name);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! How large the rate error of a quadrupole winding becomes while a coil's surface warms at 10 °C/h:
 //! ```
 //! use coilwright::{Classic, CoilModel, Piece, Profile, SolvedProfiles, units::k_per_s_from_c_per_h};

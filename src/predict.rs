@@ -24,7 +24,6 @@ use crate::rate::{CoilModel, Past, RateError, RateModel};
 use crate::record::{Record, RecordError};
 use crate::thermal::{GivenField, ThermalError, ThermalHistory};
 
-/// Why a record cannot be predicted.
 /// A model's prediction of one record.
 ///
 /// # Shapes
@@ -82,8 +81,10 @@ struct Course {
     slopes_per_s: Vec<f64>,
 }
 
+/// Why a record cannot be predicted.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum PredictError {
     #[error("the course of the air needs at least {needed} readings of temperature, found {found}")]
     TooFew { needed: usize, found: usize },

@@ -7,7 +7,6 @@ use thiserror::Error;
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::units::k_per_s_from_c_per_h;
 
-/// Why ramps make no profile.
 /// A ramp (or, at rate zero, a soak) of one duration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Piece {
@@ -24,8 +23,10 @@ pub struct Profile {
     pieces: Vec<Piece>,
 }
 
+/// Why ramps make no profile.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum ProfileError {
     #[error("a ramp profile needs at least one piece")]
     Empty,
@@ -36,6 +37,21 @@ pub enum ProfileError {
 }
 
 impl Profile {
+    /// A profile of pieces, one behind the other.
+    ///
+    /// # Example
+    /// ```
+    /// use coilwright::{Piece, Profile, units::k_per_s_from_c_per_h};
+    ///
+    /// let ramp = Piece { rate_k_per_s: k_per_s_from_c_per_h(10.0), duration_s: 1800.0 };
+    /// let soak = Piece { rate_k_per_s: 0.0, duration_s: 600.0 };
+    /// let profile = Profile::new("ramp and soak", vec![ramp, soak])?;
+    /// assert_eq!(profile.duration_s(), 2400.0);
+    /// // 10 °C/h for half an hour.
+    /// assert!((profile.temperature(293.15).value(2000.0) - 298.15).abs() < 1e-9);
+    /// # Ok::<(), coilwright::profile::ProfileError>(())
+    /// ```
+    ///
     /// # Errors
     /// No piece, a rate that is not finite, a duration that is not positive.
     pub fn new(name: impl Into<String>, pieces: Vec<Piece>) -> Result<Self, ProfileError> {
@@ -122,6 +138,17 @@ impl Default for ProfileSpec {
 
 impl ProfileSpec {
     /// The listed profiles, then the sampled ones. The same seed gives the same profiles on every machine.
+    ///
+    /// # Example
+    /// ```
+    /// use coilwright::ProfileSpec;
+    ///
+    /// let spec = ProfileSpec { count: 3, seed: 7, ..ProfileSpec::default() };
+    /// let profiles = spec.profiles();
+    /// assert_eq!(profiles.len(), 3);
+    /// assert!(profiles.iter().all(|p| p.max_rate_k_per_s() <= spec.max_rate_k_per_s));
+    /// assert_eq!(profiles, spec.profiles());
+    /// ```
     pub fn profiles(&self) -> Vec<Profile> {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         let sampled = (0..self.count).map(|i| self.sample(i, &mut random));

@@ -41,7 +41,6 @@ pub use builder::CoilModelBuilder;
 pub(crate) use laid::Laid;
 pub use past::Past;
 
-/// Why a model has no rate error for a pattern.
 /// A coil, how it is heated, and which physics is taken into account; everything but the pattern.
 #[derive(Debug, Clone)]
 pub struct CoilModel {
@@ -63,8 +62,10 @@ pub struct CoilModel {
     pub effects: Vec<DeclaredEffect>,
 }
 
+/// Why a model has no rate error for a pattern.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum RateError {
     #[error("the pattern has {pattern} layers and the coil {coil}: use a pattern of the coil's layer count")]
     Layers { pattern: usize, coil: usize },
@@ -232,6 +233,19 @@ struct SteadyLayer {
 }
 
 impl RateModel {
+    /// A coil with a pattern.
+    ///
+    /// # Example
+    /// ```
+    /// use coilwright::{Classic, CoilModel, RateModel};
+    ///
+    /// let model = CoilModel::builder("eight layers", 8).mean_diameter_m(0.08).turns_per_layer(98.0).build()?;
+    /// let rate = RateModel::new(&model, &Classic::Qua.pattern(8)?, &[])?;
+    /// // Δφ = Ω 2πLD/(λ c): a phase is linear in the rate.
+    /// assert!((rate.phase_rad(2e-9) / rate.phase_rad(1e-9) - 2.0).abs() < 1e-12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// `channels` names a record's further columns, in the order in which [`PackState::channels`] will hold them.
     ///
     /// # Errors

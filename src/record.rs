@@ -6,7 +6,6 @@ use crate::numeric::piecewise::trailing_means;
 use crate::numeric::statistics::{gross_errors, robust_deviation};
 use crate::units::rad_per_s_from_deg_per_h;
 
-/// Why columns make no record.
 /// A further column of a record, by its name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
@@ -39,6 +38,7 @@ pub struct Row {
 
 /// A value that stands alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct GrossError {
     /// Index 0 is the first.
     pub row: usize,
@@ -69,8 +69,10 @@ pub struct Record {
     channels: Vec<Channel>,
 }
 
+/// Why columns make no record.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum RecordError {
     #[error("a record needs at least {needed} rows, found {found}")]
     TooShort { needed: usize, found: usize },
@@ -90,6 +92,19 @@ pub(crate) const MIN_ROWS: usize = 3;
 pub const LEAST_INTERVAL_S: f64 = 1e-6;
 
 impl Record {
+    /// A record of columns of one entry a row: times, the driving thermometer, and the gyro's rate error.
+    ///
+    /// # Example
+    /// ```
+    /// use coilwright::{Record, units::rad_per_s_from_deg_per_h};
+    ///
+    /// let rate = rad_per_s_from_deg_per_h(0.02);
+    /// let record = Record::new("bench", vec![0.0, 1.0, 2.0], vec![293.15, 293.16, 293.17], vec![rate; 3])?;
+    /// assert_eq!((record.rows(), record.interval_s()), (3, 1.0));
+    /// assert!(Record::new("back in time", vec![0.0, 2.0, 1.0], vec![293.15; 3], vec![rate; 3]).is_err());
+    /// # Ok::<(), coilwright::record::RecordError>(())
+    /// ```
+    ///
     /// # Errors
     /// Too few rows, columns of unequal length, times that do not increase or are too close, needed numbers that are not finite.
     pub fn new(

@@ -209,6 +209,7 @@ pub(crate) fn fraction_from_percent(percent: f64) -> f64 {
 
 /// The unit in which a user states an effect's parameter; the key's name ends in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Unit {
     /// A ratio or a count.
     One,

@@ -123,6 +123,7 @@ pub(crate) struct Chamber<'a> {
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum ChamberError {
     #[error(transparent)]
     Thermal(#[from] ThermalError),

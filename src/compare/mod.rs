@@ -97,6 +97,7 @@ pub(crate) struct LargestError {
 
 /// What the residual may go along with.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Quantity {
     /// T of the pack's mean.
     Temperature,

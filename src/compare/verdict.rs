@@ -18,6 +18,7 @@ pub enum Verdict {
 
 /// One statement about where the error lies.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Finding {
     /// The whole χ² is too large.
     Excess {

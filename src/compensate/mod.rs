@@ -31,9 +31,9 @@ use learned::Learned;
 use physical::{MOST_DELAY_ROWS, Physical};
 use stream::{Compensated, Reading, Stream};
 
-/// Why nothing can be compensated.
 /// Ways to compensate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Method {
     /// The coil's own model, driven by the thermometers.
     Physical,
@@ -73,8 +73,10 @@ pub enum Compensator {
     Learned(Learned),
 }
 
+/// Why nothing can be compensated.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum CompensateError {
     #[error(
         "no difference equation holds {}: leave {} out of the model, or compensate with piecewise or regression",

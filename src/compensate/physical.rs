@@ -96,6 +96,7 @@ struct Part {
 
 /// A conductivity that was taken at one temperature.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Linearised {
     /// The temperature at which it was taken.
     pub at_k: f64,

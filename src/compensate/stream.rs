@@ -32,6 +32,7 @@ pub struct Reading {
 
 /// What happened to a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Flag {
     /// The row could not be read; it is passed on as it is.
     Malformed,

@@ -5,6 +5,7 @@ use thiserror::Error;
 /// Something that a reader of the answer should know.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum Caution {
     #[error("{record}: {rows} rows were left out because of gross errors")]
     Outliers { record: String, rows: usize },
@@ -29,6 +30,7 @@ pub enum Caution {
 /// Why an effect that fits was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum Refusal {
     #[error("it does not explain data that it was not fitted to")]
     Unconfirmed,

@@ -48,7 +48,6 @@ pub(crate) use standing::{Standing, standing};
 pub use terms::Terms;
 pub(crate) use together::{declared_with, extend_together};
 
-/// Why records cannot be diagnosed.
 /// What is asked.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
@@ -257,8 +256,10 @@ pub(crate) struct RecordNoise {
     pub(crate) noise: Noise,
 }
 
+/// Why records cannot be diagnosed.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum DiagnoseError {
     #[error("a diagnosis needs at least one record")]
     NoRecord,

@@ -51,7 +51,6 @@ pub(crate) const VARIABLES: [&str; 10] =
 /// The model's own thermal rate error.
 pub(crate) const THERMAL_RATE: &str = "thermal_rate";
 
-/// Why a formula makes no effect.
 /// A variable of one layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum OfLayer {
@@ -94,8 +93,10 @@ pub struct Formula {
     channels: Vec<String>,
 }
 
+/// Why a formula makes no effect.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum FormulaError {
     #[error(transparent)]
     Expression(#[from] ExpressionError),

@@ -10,7 +10,6 @@ use crate::coil::Coil;
 use crate::stress::Materials;
 use crate::units::Unit;
 
-/// Why a declaration makes no effect.
 /// An effect with its parameters, as a model declares it.
 #[derive(Debug, Clone)]
 pub struct DeclaredEffect {
@@ -31,8 +30,10 @@ pub struct DeclaredParameter {
     pub(crate) upper: f64,
 }
 
+/// Why a declaration makes no effect.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum EffectError {
     #[error("{kind} takes {expected} parameters, found {found}")]
     Count { kind: &'static str, expected: usize, found: usize },
@@ -95,6 +96,17 @@ impl DeclaredEffect {
     }
 
     /// The effect at the start values of a fit and its first choices.
+    ///
+    /// # Example
+    /// ```
+    /// use coilwright::{CoilModel, DeclaredEffect, effect};
+    ///
+    /// let film = effect::find("surface_film").expect("in the catalogue");
+    /// let model = CoilModel::builder("behind a film", 8).mean_diameter_m(0.08).turns_per_layer(98.0);
+    /// let model = model.effect(DeclaredEffect::at_start(film)).build()?;
+    /// assert_eq!(model.effects[0].kind(), "surface_film");
+    /// # Ok::<(), coilwright::coil::CoilError>(())
+    /// ```
     pub fn at_start(spec: &'static EffectSpec) -> Self {
         Self {
             spec,

@@ -304,6 +304,7 @@ pub(crate) enum Acts {
 
 /// What kind of knowledge an effect is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Nature {
     /// A mechanism with an equation of its own.
     Physical,

@@ -15,6 +15,7 @@ const LARGEST_TEXT_BYTES: u64 = 16 * 1024 * 1024;
 /// Why a file was not written.
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum WriteError {
     #[error("cannot create the folder {path}: {source}", path = .path.display())]
     Folder { path: PathBuf, source: std::io::Error },

@@ -123,6 +123,7 @@ pub struct SearchSettings {
 /// What a reader of the results should know, though it is no fault.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum Advice {
     #[error("[profiles] is absent: profiles of up to 60 °C/h are sampled, 64 of 4 ramps over 6000 s, seed 1")]
     DefaultProfiles,

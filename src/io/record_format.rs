@@ -31,6 +31,7 @@ pub enum Quantity {
 
 /// Where a further thermometer is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SensorPlace {
     /// Counted from 1 innermost.
     Layer(usize),

@@ -92,6 +92,7 @@ pub(crate) struct Allan {
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum MetricsError {
     #[error("the averaging time must be positive, found {found_s} s")]
     Average { found_s: f64 },

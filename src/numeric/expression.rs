@@ -49,6 +49,7 @@ pub struct Variable {
 /// What is wrong with a formula, and where (bytes).
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum ExpressionError {
     #[error("the formula is {found} characters long: {LONGEST} are the most that is understood")]
     TooLong { found: usize },

@@ -2,7 +2,6 @@
 
 use thiserror::Error;
 
-/// Why knots and values make no function.
 /// Continuous, piecewise linear, constant before its first and after its last knot.
 ///
 /// # Shapes
@@ -13,8 +12,10 @@ pub struct PiecewiseLinear {
     values: Vec<f64>,
 }
 
+/// Why knots and values make no function.
 #[derive(Debug, Error, Clone, Copy, PartialEq)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum PiecewiseError {
     #[error(
         "a piecewise-linear function needs at least one knot and a value at each, found {knots} knots and {values} values"

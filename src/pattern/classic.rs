@@ -8,7 +8,6 @@ use thiserror::Error;
 
 use super::{EndTurns, Half, Pattern};
 
-/// Why a classic winding does not exist for a layer count.
 /// A winding that has a name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Classic {
@@ -28,8 +27,10 @@ pub enum Classic {
     Hex,
 }
 
+/// Why a classic winding does not exist for a layer count.
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum ClassicError {
     #[error(
         "winding.layers must be a multiple of {multiple} for {article} {name}, found {found}: use {nearby}",
@@ -84,6 +85,8 @@ impl Classic {
         }
     }
 
+    /// By its key, in whatever case.
+    ///
     /// # Errors
     /// A name that no winding has.
     pub fn from_key(key: &str) -> Result<Self, ClassicError> {
@@ -111,6 +114,17 @@ impl Classic {
     }
 
     /// The pattern for a layer count.
+    ///
+    /// # Example
+    /// ```
+    /// use coilwright::Classic;
+    ///
+    /// // Reel A winds segments 1 and 2, reel B 3 and 4: A, B, B, A from the spool outwards.
+    /// assert_eq!(Classic::Qua.pattern(4)?.segments(), [2, 3, 4, 1]);
+    /// assert!(Classic::Qua.pattern(6).is_err());
+    /// assert_eq!(Classic::from_key("QUA")?, Classic::Qua);
+    /// # Ok::<(), coilwright::pattern::classic::ClassicError>(())
+    /// ```
     ///
     /// # Errors
     /// A layer count that is no multiple of the winding's word: never truncated silently.

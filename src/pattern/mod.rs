@@ -8,12 +8,25 @@ use thiserror::Error;
 
 pub use ends::{EndTurns, WoundPiece};
 
-/// Why numbers make no pattern.
 /// A permutation layer → segment, innermost layer first.
 ///
 /// Segments are numbered 1 … N in the order of arclength from end A; half A is 1 … N/2. Layers are indexed from
 /// 0, the innermost. The type can hold nothing but a permutation of an even number of segments, and turns more or fewer at the
 /// ends only where there is room for them.
+///
+/// # Example
+/// ```
+/// use coilwright::Pattern;
+///
+/// let pattern = Pattern::new(vec![2, 3, 4, 1])?;
+/// assert_eq!(pattern.layers(), 4);
+/// assert_eq!(pattern.reversed().segments(), [3, 2, 1, 4]);
+/// assert_eq!(
+///     Pattern::new(vec![1, 1]).unwrap_err().to_string(),
+///     "segment 1 lies on layer 1 and again on layer 2: each segment lies on exactly one layer"
+/// );
+/// # Ok::<(), coilwright::pattern::PatternError>(())
+/// ```
 #[derive(Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Pattern {
     segments: Vec<usize>,
@@ -59,8 +72,10 @@ impl std::fmt::Display for Half {
     }
 }
 
+/// Why numbers make no pattern.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum PatternError {
     #[error("a pattern needs an even number of at least 2 segments, found {found}")]
     Count { found: usize },
@@ -81,6 +96,8 @@ pub enum PatternError {
 }
 
 impl Pattern {
+    /// Of the segment on each layer, innermost first.
+    ///
     /// # Errors
     /// An odd or too small count, a segment out of range, a segment named twice. Layers in errors count from 1.
     pub fn new(segments: Vec<usize>) -> Result<Self, PatternError> {

@@ -35,6 +35,7 @@ pub struct WindingGraph {
 
 /// The state after one layer has been wound.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct WindingStep {
     /// Runs of fibre still unwound; each hangs on a reel.
     pub reels: usize,

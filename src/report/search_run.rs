@@ -21,6 +21,7 @@ use crate::units::{
 };
 
 #[derive(Debug, Error, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum ReportError {
     #[error(transparent)]
     Search(#[from] SearchError),

@@ -53,7 +53,6 @@ const BANDWIDTH_HZ: f64 = 1.0;
 const SEED: u64 = 2021;
 const STRETCH: usize = 2048;
 
-/// Why the thesis cannot be reproduced.
 /// A printed number beside the computed one.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Comparison {
@@ -76,6 +75,7 @@ pub struct Reproduction {
     pub(crate) errata: &'static [(&'static str, &'static str, &'static str)],
 }
 
+/// Why the thesis cannot be reproduced.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[allow(missing_docs, reason = "its messages say what each means")]
 pub enum ThesisError {

@@ -119,15 +119,17 @@ pub(crate) struct Outlook {
     pub(crate) gain: Option<Gain>,
 }
 
-/// The answer of `super::run`.
+/// The answer of [`super::run()`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Answer {
+    /// No pattern that was found or tried is better.
     pub best: Judged,
     /// The classics that fit the layer count.
-    pub(crate) baselines: Vec<Judged>,
+    pub baselines: Vec<Judged>,
     /// QUA's objective over the best pattern's; none where QUA does not fit the layer count or the error is zero.
-    pub(crate) improvement_over_qua: Option<f64>,
-    pub(crate) statement: String,
+    pub improvement_over_qua: Option<f64>,
+    /// What was found, in words.
+    pub statement: String,
     /// None where the temperature has no grid or the search was interrupted.
     pub(crate) grid_check: Option<GridCheck>,
     /// None where no former pattern was given.
@@ -139,7 +141,8 @@ pub struct Answer {
     pub(crate) evaluations_when_found: u64,
     pub(crate) evaluations_now: u64,
     pub(crate) state: State,
-    pub(crate) ended: Ended,
+    /// How the search came to its end.
+    pub ended: Ended,
     /// None where the search was interrupted.
     pub(crate) validation: Option<Validation>,
     pub(crate) recommendation: Option<Recommendation>,

@@ -30,6 +30,7 @@ pub(crate) const MOST_LAYERS: usize = 400;
 /// Why a caller's cost cannot be searched.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum CustomError {
     #[error("layers must be even and from 2 to {MOST_LAYERS}, found {found}")]
     Layers { found: usize },
@@ -96,6 +97,7 @@ pub fn default_function_plan(layers: usize, seed: u64) -> Plan {
 
 /// What a search for a caller's cost found.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct CustomAnswer {
     /// Best first, no two alike.
     pub found: Vec<Found>,

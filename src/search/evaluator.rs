@@ -22,6 +22,7 @@ use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
 /// Why patterns cannot be judged.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum JudgeError {
     #[error(transparent)]
     Search(#[from] SearchError),
@@ -36,8 +37,10 @@ pub enum JudgeError {
 pub struct Judged {
     /// A classic's, the file's, or what the search calls it.
     pub name: String,
-    pub(crate) pattern: Pattern,
-    pub(crate) worst: WorstCase,
+    /// Which segment lies on which layer.
+    pub pattern: Pattern,
+    /// Over the profiles, whatever was made small.
+    pub worst: WorstCase,
     /// Δφ at the worst rate \[rad\].
     pub(crate) phase_rad: f64,
     /// None for models that have no guaranteed worst case.

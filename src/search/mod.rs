@@ -21,5 +21,6 @@ pub(crate) mod swap;
 pub(crate) mod validation;
 mod weighing;
 
-pub(crate) use answer::Answer;
+pub use answer::{Answer, Ended};
+pub use cost::objective::Objective;
 pub use run::{Observer, Request, Unobserved, run};

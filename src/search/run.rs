@@ -11,6 +11,7 @@ use super::cost::guaranteed::UnitStep;
 use super::cost::objective::Objective;
 use super::cost::tolerance::ToleranceSpec;
 use super::cost::worst_case::{SearchError, SolvedProfiles};
+use super::custom::default_plan;
 use super::cutting::run_with_cuts;
 use super::end_turns::{EndChoice, WithEnds};
 use super::evaluator::{EQUALLY_GOOD, Evaluator, JudgeError, Judged, improvement_over_qua};
@@ -22,7 +23,6 @@ use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;
 use crate::units::deg_per_h_from_rad_per_s;
 
-/// Why a search cannot run.
 /// What is to be searched.
 #[derive(Debug, Clone)]
 pub struct Request<'a> {
@@ -93,8 +93,10 @@ pub struct Unobserved;
 
 impl Observer for Unobserved {}
 
+/// Why a search cannot run.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum RunError {
     #[error(transparent)]
     Judge(#[from] JudgeError),
@@ -109,6 +111,21 @@ impl From<SearchError> for RunError {
 }
 
 /// Searches; `None` if the observer ended it before anything was found.
+///
+/// # Example
+/// ```
+/// use coilwright::search::{Objective, Request, Unobserved, run};
+/// use coilwright::{CoilModel, ProfileSpec};
+///
+/// let model = CoilModel::builder("eight layers", 8).mean_diameter_m(0.08).turns_per_layer(98.0).build()?;
+/// let profiles = ProfileSpec { count: 2, ..ProfileSpec::default() };
+/// let request = Request { objective: Objective::GuaranteedRate, prove: true, ..Request::new(&model, &profiles) };
+/// let answer = run(&request, &mut Unobserved)?.expect("nobody ends it");
+/// // No pattern is better than the best, QUA among them.
+/// let qua = answer.baselines.iter().find(|judged| judged.name == "QUA").expect("eight layers have one");
+/// assert!(answer.best.objective_rad_per_s <= qua.objective_rad_per_s);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// A model that cannot be solved, an objective that it has not; a saved state of another search.
@@ -217,6 +234,26 @@ pub fn run(request: &Request, observer: &mut dyn Observer) -> Result<Option<Answ
 }
 
 impl<'a> Request<'a> {
+    /// As the program searches where nothing else is asked for: the smallest worst rate that needs no captive reel, by the usual effort,
+    /// with the seed 1; nothing proved, nothing judged on unseen profiles.
+    pub fn new(model: &'a CoilModel, profiles: &'a ProfileSpec) -> Self {
+        Self {
+            model,
+            profiles,
+            tolerance: None,
+            objective: Objective::WorstRate,
+            class: WindabilityClass::Standard,
+            plan: default_plan(model.coil.layers(), 1),
+            saved: None,
+            former: None,
+            prove: false,
+            recommend: false,
+            cuts: false,
+            uncertain: &[],
+            ends: EndChoice::default(),
+        }
+    }
+
     /// What the request's patterns are judged by.
     pub fn evaluator(&self, solved: &'a SolvedProfiles, unit_step: Option<&'a UnitStep>) -> Evaluator<'a> {
         let Request { model, profiles, tolerance, objective, .. } = *self;

@@ -34,6 +34,7 @@ impl<'a> Request<'a> {
 
 /// The document, and what it was made from.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Answer {
     /// As the program prints it.
     pub document: CompareJson,

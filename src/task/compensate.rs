@@ -192,6 +192,7 @@ pub fn write_exported(paths: &[PathBuf; 2], texts: [String; 2]) -> Result<(), Wr
 
 /// A record, compensated row by row.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct CompensatedRecord {
     /// Where nothing is known yet, NaN.
     pub rate_rad_per_s: Vec<f64>,

@@ -26,6 +26,7 @@ pub struct Request<'a> {
 
 /// The document, and the profiles that attain the guaranteed worst cases.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Answer {
     /// As the program prints it.
     pub document: EvaluateJson,

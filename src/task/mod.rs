@@ -87,6 +87,7 @@ impl Observer for Unobserved {}
 /// Why a request cannot be answered.
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum TaskError {
     #[error(transparent)]
     Faults(#[from] Faults),

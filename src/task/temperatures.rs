@@ -43,6 +43,7 @@ pub struct Request<'a> {
 
 /// The field in the layers.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Answer {
     /// Its name.
     pub model: String,

@@ -37,7 +37,6 @@ pub use path::{
 };
 use stepped::SteppedField;
 
-/// Why a heat path cannot be solved.
 /// What drives the field: temperatures against time, the pack being in a steady state before the first knot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drive {
@@ -73,6 +72,7 @@ impl Drive {
 /// A part of the heat path that not every pack can have.
 #[derive(Debug, Error, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum HeatPart {
     #[error("a film or an ambient sensor")]
     AmbientSensor,
@@ -102,8 +102,10 @@ pub enum HeatPart {
     VaryingConductivityBesideFlange,
 }
 
+/// Why a heat path cannot be solved.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum ThermalError {
     #[error(
         "{part} needs a pack that ends somewhere: set thermal.model = \"pack\", or add the effect that ends the pack"

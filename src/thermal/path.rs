@@ -50,6 +50,7 @@ pub enum Extent {
 
 /// What the driving temperature is the temperature of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Location {
     /// The outermost layer itself.
     OuterLayer,

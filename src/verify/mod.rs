@@ -193,6 +193,7 @@ pub struct Verification {
 
 /// How far the claimed rate error could be checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum RateCheck {
     /// Not claimed, or not to be worked out: the rows are no winding, or an effect is not known (a violation says so).
     None,

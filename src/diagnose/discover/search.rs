@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use super::NEAR;
 use super::courses::Courses;
 use super::grammar::{Family, Term};
-use crate::chamber::{Column, Effort, Fit, Input, Scored, Scorer};
+use crate::chamber::{Assumption, Column, Effort, Fit, Input, Scored, Scorer};
 use crate::diagnose::joint::{
     EFFECT, Explanation, Member, Proposal, Question, Winding, fitted, proposals, rates, with, without,
 };
@@ -241,14 +241,19 @@ impl Tools<'_, '_> {
     /// A set that was fitted in another chamber, in this one.
     pub(crate) fn refitted(&self, set: &Set) -> Option<Set> {
         let fit = &set.explanation.fit;
-        let mut assumed = fit.assumed.clone();
-        let first = set.first_input();
-        for (place, term) in set.terms.iter().enumerate() {
-            assumed.inputs[first + place] = self.input(term, set.amplitude(place));
-        }
-        let begin = (assumed, fit.free.clone());
+        let begin = (self.assumed_with(set, &set.terms), fit.free.clone());
         let found = fitted(self.question, self.windings, set.explanation.members.clone(), &begin, fit, Effort::FULL)?;
         Some(self.followed(self.set(found, set.terms.clone())))
+    }
+
+    /// What the set's fit assumes, with the courses of these terms as its inputs and the amplitudes as they were found.
+    fn assumed_with(&self, set: &Set, terms: &[Term]) -> Assumption {
+        let mut assumed = set.explanation.fit.assumed.clone();
+        let first = set.first_input();
+        for (place, term) in terms.iter().enumerate() {
+            assumed.inputs[first + place] = self.input(term, set.amplitude(place));
+        }
+        assumed
     }
 
     pub(crate) fn with_listed(&self, set: &Set, proposal: &Proposal) -> Option<Set> {
@@ -350,12 +355,7 @@ impl Tools<'_, '_> {
             longest = longest.max((moved - here).abs() / covariance[(i, i)].sqrt());
             terms[*term].inner[*inner] = moved;
         }
-        let mut assumed = set.explanation.fit.assumed.clone();
-        let first = set.first_input();
-        for (place, term) in terms.iter().enumerate() {
-            assumed.inputs[first + place] = self.input(term, set.amplitude(place));
-        }
-        let begin = (assumed, set.explanation.fit.free.clone());
+        let begin = (self.assumed_with(set, &terms), set.explanation.fit.free.clone());
         let members = set.explanation.members.clone();
         let fit = &set.explanation.fit;
         let found = fitted(self.question, self.windings, members, &begin, fit, Effort::QUICK)?;

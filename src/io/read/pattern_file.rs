@@ -17,6 +17,7 @@ use super::toml_reader::{TomlReader, parse};
 /// Why a name leads to no pattern.
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum ResolveError {
     #[error(transparent)]
     Classic(#[from] ClassicError),

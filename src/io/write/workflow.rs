@@ -14,6 +14,7 @@ use crate::units::min_from_s;
 
 /// Who runs the parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Engine {
     /// A graph of files, on one machine or a cluster.
     Snakemake,

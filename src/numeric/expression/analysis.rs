@@ -10,6 +10,7 @@ use super::{Expression, Memory, Node, Operator, call};
 
 /// Why a formula has no value, and which part of it (bytes).
 #[derive(Debug, Error, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum EvaluationError {
     #[error("division by zero in {part}")]
     DivisionByZero { at: Range<usize>, part: String },

@@ -49,6 +49,7 @@ pub(crate) const DEFAULT_PATIENCE: u64 = 6;
 
 /// Why a search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Stop {
     /// The plan's rounds are done.
     Rounds,

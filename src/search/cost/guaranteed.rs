@@ -45,6 +45,7 @@ use crate::units::REFERENCE_TEMPERATURE_K;
 /// Why a model has no guaranteed worst case.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum GuaranteedError {
     #[error(
         "there is no guaranteed worst case with {kind}: the rate error then depends on more than the rates of the drive"

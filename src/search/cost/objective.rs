@@ -9,6 +9,7 @@ use crate::units::SECONDS_PER_HOUR;
 
 /// What a search makes small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Objective {
     /// The largest |Ω| over all profiles and times.
     WorstRate,

@@ -114,6 +114,7 @@ pub(crate) enum Spread {
 }
 
 #[derive(Debug, Error, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum ToleranceError {
     #[error("tolerance.film_percent_sd needs a film: declare the effect surface_film or leave the spread out")]
     NoFilm,

@@ -23,6 +23,7 @@ use crate::units::{REFERENCE_TEMPERATURE_K, RotationRate};
 /// Why patterns cannot be judged on profiles.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[allow(missing_docs, reason = "its messages say what each means")]
+#[non_exhaustive]
 pub enum SearchError {
     #[error(transparent)]
     Thermal(#[from] ThermalError),
@@ -158,6 +159,23 @@ impl SolvedProfiles {
     }
 
     /// The largest |Ω| of a pattern over all profiles and times.
+    ///
+    /// # Example
+    /// ```
+    /// use coilwright::{Classic, CoilModel, ProfileSpec, SolvedProfiles};
+    ///
+    /// let model = CoilModel::builder("eight layers", 8).mean_diameter_m(0.08).turns_per_layer(98.0).build()?;
+    /// let ramps = ProfileSpec { count: 2, ..ProfileSpec::default() };
+    /// // Solved once, whatever is wound.
+    /// let solved = SolvedProfiles::new(&model, &ramps.profiles())?;
+    /// let qua = Classic::Qua.pattern(8)?;
+    /// let worst = solved.worst_case(&model, &qua)?;
+    /// assert!(worst.time_s <= ramps.duration_s);
+    /// // The ends exchanged, the rate error has the other sign.
+    /// let mirrored = solved.worst_case(&model, &qua.reversed())?;
+    /// assert!((mirrored.rate_rad_per_s + worst.rate_rad_per_s).abs() < 1e-9 * worst.rate_rad_per_s.abs());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// A pattern of another layer count.
