@@ -23,15 +23,8 @@
 
 use pulp::{Arch, NullaryFnOnce};
 
-pub(super) use super::row::{Move, Row};
+pub(super) use super::row::{MEASURED, Move, RATE, Row};
 use super::sparse::{Sparse, Square};
-
-/// Thermometers that a record may have: the sensor, one at the bore, one in the air.
-pub(super) const THERMOMETERS: usize = 3;
-/// Measurements of a row: the thermometers and the rate.
-pub(super) const MEASURED: usize = THERMOMETERS + 1;
-/// The rate among a row's measurements.
-pub(super) const RATE: usize = THERMOMETERS;
 
 /// Relative change of every S from row to row below which a row counts as settled, and how many of them freeze the gains:
 /// together they cost less than 0.2 of log likelihood on 1 500 rows (a test).

@@ -1,6 +1,11 @@
 //! What happens up to and at one row of a record.
 
-use super::filter::MEASURED;
+/// Thermometers that a record may have: the sensor, one at the bore, one in the air.
+const THERMOMETERS: usize = 3;
+/// Measurements of a row: the thermometers and the rate.
+pub(super) const MEASURED: usize = THERMOMETERS + 1;
+/// The rate among a row's measurements.
+pub(super) const RATE: usize = THERMOMETERS;
 
 /// What happens between two rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -14,9 +14,7 @@ use thiserror::Error;
 
 use super::anneal::limits::{Limits, draw, neighbour};
 use super::anneal::quantile;
-use super::anneal::rounds::{
-    DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Found, Optimisation, Plan, Rounds, Rules, default_moves_per_restart,
-};
+use super::anneal::rounds::{Found, Optimisation, Plan, Rounds};
 use super::answer::Ended;
 use super::cost::columns::Work;
 use super::cost::samples::SampleMatrix;
@@ -81,13 +79,7 @@ pub fn sensitivity_matrix(layers: usize, sensitivities: &[f64], constant: &[f64]
 
 /// The usual effort of a search for layers of this count.
 pub fn default_plan(layers: usize, seed: u64) -> Plan {
-    Plan {
-        seed,
-        restarts_per_round: DEFAULT_RESTARTS_PER_ROUND,
-        moves_per_restart: default_moves_per_restart(layers),
-        rules: Rules { rounds: u64::MAX, patience: DEFAULT_PATIENCE, moves: None, target: None },
-        starts: Vec::new(),
-    }
+    Plan::usual(layers, seed)
 }
 
 /// As [`default_plan`], where a move costs what a caller's function costs.

@@ -11,7 +11,6 @@ use super::cost::guaranteed::UnitStep;
 use super::cost::objective::Objective;
 use super::cost::tolerance::ToleranceSpec;
 use super::cost::worst_case::{SearchError, SolvedProfiles};
-use super::custom::default_plan;
 use super::cutting::run_with_cuts;
 use super::end_turns::{EndChoice, WithEnds};
 use super::evaluator::{EQUALLY_GOOD, Evaluator, JudgeError, Judged, improvement_over_qua};
@@ -243,7 +242,7 @@ impl<'a> Request<'a> {
             tolerance: None,
             objective: Objective::WorstRate,
             class: WindabilityClass::Standard,
-            plan: default_plan(model.coil.layers(), 1),
+            plan: Plan::usual(model.coil.layers(), 1),
             saved: None,
             former: None,
             prove: false,

@@ -17,7 +17,9 @@ use rand_chacha::ChaCha8Rng;
 
 use super::limits::{Limits, draw, neighbour};
 use super::restart::generator;
+use super::rounds;
 use crate::search::cost::columns::Work;
+use crate::search::cost::objective::Objective;
 use crate::search::cost::sampled_coils::{QuantileWorst, SampledCoils};
 use crate::search::cost::{Cost, InFull, Pace, Position, Proposal};
 
@@ -27,6 +29,16 @@ const COILS_THAT_TELL: usize = 40;
 /// Moves of a restart for a layer count.
 pub(crate) fn default_moves_per_restart(layers: usize) -> u64 {
     ((layers as u64).pow(2) * 16).max(1000)
+}
+
+impl Objective {
+    /// Moves of a restart for a layer count.
+    pub(crate) fn default_moves_per_restart(self, layers: usize) -> u64 {
+        match self {
+            Objective::P95 => default_moves_per_restart(layers),
+            _ => rounds::default_moves_per_restart(layers),
+        }
+    }
 }
 
 /// The quantile of the worst case over sampled coils, within limits.

@@ -47,6 +47,19 @@ pub fn default_moves_per_restart(layers: usize) -> u64 {
 pub(crate) const DEFAULT_RESTARTS_PER_ROUND: usize = 8;
 pub(crate) const DEFAULT_PATIENCE: u64 = 6;
 
+impl Plan {
+    /// The usual effort of a search for layers of this count: until six rounds have brought nothing better.
+    pub fn usual(layers: usize, seed: u64) -> Self {
+        Self {
+            seed,
+            restarts_per_round: DEFAULT_RESTARTS_PER_ROUND,
+            moves_per_restart: default_moves_per_restart(layers),
+            rules: Rules { rounds: u64::MAX, patience: DEFAULT_PATIENCE, moves: None, target: None },
+            starts: Vec::new(),
+        }
+    }
+}
+
 /// Why a search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]

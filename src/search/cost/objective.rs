@@ -84,14 +84,6 @@ impl Objective {
         }
     }
 
-    /// Moves of a restart for a layer count.
-    pub(crate) fn default_moves_per_restart(self, layers: usize) -> u64 {
-        match self {
-            Objective::P95 => crate::search::anneal::quantile::default_moves_per_restart(layers),
-            _ => crate::search::anneal::rounds::default_moves_per_restart(layers),
-        }
-    }
-
     /// The samples of the declared profiles whose norm is the objective, in rad/s; for the rms no more of them than
     /// columns.
     ///
