@@ -29,6 +29,7 @@ mod reproduce;
 mod resume;
 mod schemas;
 mod sinks;
+mod snapshots;
 mod stress;
 mod tables;
 mod terminal;
