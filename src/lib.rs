@@ -17,7 +17,8 @@
 //! let answer = search::run(&request, &mut search::Unobserved)?.expect("nobody ends it");
 //! println!("wind {:?}: {}", answer.best.pattern.segments(), answer.best.worst); // "… °/h at … s of …"
 //! for classic in &answer.baselines {
-//!     assert!(answer.best.objective_rad_per_s <= classic.objective_rad_per_s, "{}", classic.name);
+//!     // But for rounding: windings may tie.
+//!     assert!(answer.best.objective_rad_per_s <= classic.objective_rad_per_s * (1.0 + 1e-9), "{}", classic.name);
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -122,7 +122,7 @@ pub(crate) struct Outlook {
 /// The answer of [`super::run()`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Answer {
-    /// No pattern that was found or tried is better.
+    /// No pattern that was found or tried is better, but for rounding.
     pub best: Judged,
     /// The classics that fit the layer count.
     pub baselines: Vec<Judged>,
