@@ -22,7 +22,6 @@ pub struct Request<'a> {
 
 /// A winding under a field.
 #[derive(Debug, Clone)]
-#[non_exhaustive]
 pub struct PatternUnderField {
     /// The winding and its name.
     pub named: NamedPattern,
