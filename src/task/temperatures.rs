@@ -43,7 +43,6 @@ pub struct Request<'a> {
 
 /// The field in the layers.
 #[derive(Debug)]
-#[non_exhaustive]
 pub struct Answer {
     /// Its name.
     pub model: String,
