@@ -40,45 +40,36 @@ const SETTLED: f64 = 2e-3;
 pub(super) struct Point {
     pub(crate) variances: [f64; COMPONENTS],
     /// Of the columns, by group.
-    group_variances: Vec<f64>,
+    pub(super) group_variances: Vec<f64>,
     pub(crate) minus_two_log_likelihood: f64,
 }
 
 #[derive(Debug, Clone)]
-struct Octave {
-    n: f64,
-    weight: f64,
+pub(super) struct Octave {
+    pub(super) n: f64,
+    pub(super) weight: f64,
     yy: f64,
     xy: DVector<f64>,
-    xx: DMatrix<f64>,
-    units: [f64; COMPONENTS],
+    pub(super) xx: DMatrix<f64>,
+    pub(super) units: [f64; COMPONENTS],
 }
 
 #[derive(Debug, Clone)]
 pub(super) struct Likelihood {
-    octaves: Vec<Octave>,
+    pub(super) octaves: Vec<Octave>,
     /// Which group each column is in; None for the ramp.
     groups: Vec<Option<usize>>,
     group_count: usize,
     y_scale: f64,
-    ramp_scale: Option<f64>,
-}
-
-/// A ramp in its own units: its slope, the standard error at given variances, and by how much what octaves say in common makes
-/// the likelihood claim more than it knows.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Ramp {
-    pub slope: f64,
-    pub error: f64,
-    pub inflation: f64,
+    pub(super) ramp_scale: Option<f64>,
 }
 
 /// What is left of y at given variances.
-struct Rest {
+pub(super) struct Rest {
     /// Square sums by octave, with what is uncertain in β.
     squares: Vec<f64>,
-    beta: DVector<f64>,
-    covariance: DMatrix<f64>,
+    pub(super) beta: DVector<f64>,
+    pub(super) covariance: DMatrix<f64>,
     minus_two_log_likelihood: f64,
 }
 
@@ -157,7 +148,7 @@ impl Likelihood {
         FAINT * varies.map(most).fold(f64::INFINITY, f64::min)
     }
 
-    fn model(&self, variances: &[f64; COMPONENTS]) -> Vec<f64> {
+    pub(super) fn model(&self, variances: &[f64; COMPONENTS]) -> Vec<f64> {
         let sum = |o: &Octave| variances.iter().zip(o.units).map(|(v, u)| v * u).sum::<f64>();
         self.octaves.iter().map(|o| sum(o).max(f64::MIN_POSITIVE)).collect()
     }
@@ -166,7 +157,7 @@ impl Likelihood {
         self.groups[column].map_or(LOOSE, |g| group_variances[g])
     }
 
-    fn rest(&self, variances: &[f64; COMPONENTS], group_variances: &[f64]) -> Option<Rest> {
+    pub(super) fn rest(&self, variances: &[f64; COMPONENTS], group_variances: &[f64]) -> Option<Rest> {
         let model = self.model(variances);
         let p = self.groups.len();
         let mut precision = DMatrix::zeros(p, p);
@@ -311,37 +302,6 @@ impl Likelihood {
             })
             .collect();
         self.octaves.iter_mut().zip(weights).for_each(|(o, w)| o.weight = w);
-    }
-
-    /// The ramp as the point has it, in its own units, and one of those in units of y a second.
-    pub(super) fn ramp(&self, point: &Point) -> Option<(Ramp, f64)> {
-        let rest = self.ramp_scale.and(self.rest(&point.variances, &point.group_variances))?;
-        let model = self.model(&point.variances);
-        // What each octave says of the slope, and how much of that its random walk says in common with others.
-        let told: Vec<(f64, f64, f64)> = self
-            .octaves
-            .iter()
-            .zip(&model)
-            .map(|(o, s)| {
-                let walk = (point.variances[4] * o.units[4] + point.variances[5] * o.units[5]) / s;
-                (o.weight * o.xx[(0, 0)] / s, walk, o.n)
-            })
-            .collect();
-        let alone: f64 = told.iter().map(|t| t.0).sum();
-        let mut common: f64 = 0.0;
-        for (j, (info, walk, n)) in told.iter().enumerate() {
-            common += info * self.octaves[j].weight;
-            for (k, (other, other_walk, other_n)) in told.iter().enumerate().filter(|(k, _)| *k != j) {
-                // Σ corr over the finer one's coefficients below one of the coarser: ¾ √(2^d); x is constant in an octave.
-                let apart = j.abs_diff(k) as i32;
-                let correlation = 0.75 * 2f64.powi(apart).sqrt() * (walk * other_walk).sqrt();
-                let weights = (self.octaves[j].weight * self.octaves[k].weight).sqrt();
-                common += weights * (info * other).sqrt() * correlation * n.min(*other_n) / (n * other_n).sqrt();
-            }
-        }
-        let inflation = if alone > 0.0 { (common / alone).max(1.0) } else { 1.0 };
-        let error = rest.covariance[(0, 0)].max(0.0).sqrt();
-        Some((Ramp { slope: rest.beta[0], error, inflation }, self.y_scale / self.ramp_scale?))
     }
 
     /// The same octaves without a ramp of this slope, in the ramp's own units, and without any other.

@@ -17,8 +17,8 @@
 //!
 //! β is integrated out (restricted likelihood), so that a record that follows its temperature loses exactly the octaves that the
 //! temperature explains, and one that doesn't loses nothing: τ_g is estimated with the rest. An interval is where the likelihood,
-//! maximised over everything else, stays within the χ² quantile of 98.98 %: all five intervals hold together with 95 %. That of
-//! the ramp is maximised over a walk's strength too, so that a slow walk is not taken for a ramp.
+//! maximised over everything else, stays within the χ² quantile of 98.98 %: all five intervals hold together with 95 %. Of
+//! the ramp's, which a slow walk and flicker imitate, see `ramp.rs`.
 //! A value is the best fit with those noises that the intervals show not to be zero; one that may be absent is 0.
 //!
 //! Upper ends are sought with the w_j of the best fit and with those of the end itself, where the noise in question is strongest; the
@@ -32,6 +32,7 @@
 //! (1981) 165; coefficients: IEEE Std 952.
 
 mod likelihood;
+mod ramp;
 
 use crate::numeric::pyramid::Level;
 use likelihood::{Likelihood, Point};
@@ -63,7 +64,9 @@ pub struct NoiseStrengths {
     pub(crate) explained: f64,
 }
 
-/// χ² with one degree of freedom at 0.95^(1/5).
+/// Each of five intervals, so that all hold with 95 %: 0.95^(1/5).
+const CONFIDENCE: f64 = 0.989_793_78;
+/// χ² with one degree of freedom at [`CONFIDENCE`].
 const LIKELIHOOD_RATIO: f64 = 6.602;
 /// Relative, of an octave's variance.
 const STRAY: f64 = 0.03;
@@ -75,8 +78,6 @@ const WEIGHTINGS: usize = 2;
 const DOUBTS: usize = 4;
 /// An end of an interval is found to this part of itself.
 const FINE: f64 = 2e-3;
-/// … and the ramp's to this part of its distance.
-const RAMP_FINE: f64 = 1e-2;
 const MOST_DOUBLINGS: usize = 80;
 
 /// Which of the likelihood's components make up each kind: quantisation, white, flicker, random walk.
@@ -110,7 +111,7 @@ pub fn noise_strengths(levels: &[(usize, Level)], interval_s: f64, groups: &[usi
         white: strength(1),
         flicker: strength(2),
         random_walk: strength(3),
-        ramp: ramp(&likelihood, &point, &best),
+        ramp: ramp::interval(&likelihood, &point, &best),
         explained: likelihood.explained(&best),
     })
 }
@@ -201,53 +202,6 @@ fn parsimonious(likelihood: &Likelihood, point: &Point, found: &[Interval]) -> P
     let fewer = likelihood.maximised(&start, None);
     let is_as_good = fewer.minus_two_log_likelihood - point.minus_two_log_likelihood <= LIKELIHOOD_RATIO;
     if is_as_good { fewer } else { point.clone() }
-}
-
-/// The size of the ramp, and where its likelihood, maximised over all else, stays within the quantile: a ramp is told from a slow
-/// walk only as far as that can be.
-fn ramp(likelihood: &Likelihood, point: &Point, best: &Point) -> Interval {
-    let none = Interval { value: 0.0, low: 0.0, high: 0.0 };
-    let (Some((ramp, unit)), Some((by_best, _))) = (likelihood.ramp(point), likelihood.ramp(best)) else { return none };
-    let above = |slope: f64, from: Option<&Point>| {
-        let rest = likelihood.without_ramp(slope);
-        let fresh = rest.maximised(&rest.start_in(point), None);
-        let near = from.map(|from| rest.maximised(from, None));
-        let is_lower = |near: &Point| near.minus_two_log_likelihood < fresh.minus_two_log_likelihood;
-        near.filter(is_lower).unwrap_or(fresh)
-    };
-    let middle = above(ramp.slope, Some(point));
-    let other = above(by_best.slope, Some(best));
-    let least = middle.minus_two_log_likelihood.min(other.minus_two_log_likelihood);
-    let limit = least + LIKELIHOOD_RATIO * ramp.inflation.max(by_best.inflation);
-    let end = |direction: f64| {
-        let (mut inside, mut from) = (0.0, middle.clone());
-        let mut outside = 2.0 * ramp.error.max(by_best.error).max(f64::MIN_POSITIVE);
-        let step = |off: f64, from: &mut Point| {
-            let at = above(ramp.slope + direction * off, Some(from));
-            let is_inside = at.minus_two_log_likelihood <= limit;
-            if is_inside {
-                *from = at;
-            }
-            is_inside
-        };
-        for _ in 0..MOST_DOUBLINGS {
-            if !step(outside, &mut from) {
-                break;
-            }
-            inside = outside;
-            outside *= 2.0;
-        }
-        while outside - inside > RAMP_FINE * outside {
-            let middle = 0.5 * (inside + outside);
-            if step(middle, &mut from) { inside = middle } else { outside = middle }
-        }
-        ramp.slope + direction * outside
-    };
-    let (first, last) = (end(-1.0), end(1.0));
-    let high = first.abs().max(last.abs());
-    let low = if first * last > 0.0 { first.abs().min(last.abs()) } else { 0.0 };
-    let value = if low > 0.0 { by_best.slope.abs().clamp(low, high) } else { 0.0 };
-    Interval { value: unit * value, low: unit * low, high: unit * high }
 }
 
 #[cfg(test)]
