@@ -56,6 +56,45 @@ impl ReproductionJson {
 pub(crate) const TABLE_HEAD: [&str; 6] =
     ["place", "what", "published", "computed", "unit", "why they differ, or what it is"];
 
+/// What the chapter has, and where it is.
+const ITEMS: [(&str, &str); 26] = [
+    (
+        "(3-1) bias from output and scale factor",
+        "row (3-1); `metrics` of counts with `--columns rate=NAME:counts,scale=N`: `bias_deg_per_h`",
+    ),
+    ("(3-2) bias stability", "rows (3-2); `metrics`: `bias_stability_deg_per_h`, `--average` sets the mean"),
+    ("(3-3) bias repeatability", "row (3-3); `metrics` of several records: `repeatability_deg_per_h`"),
+    ("(3-4) sensitivity to temperature", "rows (3-4); `metrics`: `temperature_sensitivity_deg_per_h_per_c`"),
+    ("(3-5) random walk from RMS and bandwidth", "row (3-5); `metrics`: `noise[]`, white, with an interval"),
+    ("(3-6) angle by random walk", "row (3-6)"),
+    ("(3-7) random walk by fit of B_s²", "row (3-7); `metrics`: `allan` has the same averaging times"),
+    ("Allan variance, spectral density", "`metrics`: `allan`; figure3-3.svg"),
+    (
+        "Fig. 3-1, F = S(1 + ε)(I + E + D)",
+        "effects `scale_factor_error`, `scale_factor_temperature`, `scale_factor_asymmetry`, a table's rate as a column",
+    ),
+    (
+        "E: temperature, its rate, its gradient's rate",
+        "effects `bias_temperature`, `bias_temperature_rate`, `bias_gradient_rate`",
+    ),
+    ("D: bias, random walk, quantisation", "`metrics`: `bias_deg_per_h`, `noise[]`"),
+    ("sums over 1 s of outputs at 100 Hz", "the record's rows; of one's own `--average-rows 100`"),
+    ("Fig. 3-2, rate over temperature, before", "figure3-2.svg"),
+    ("peak to peak and sensitivity, before", "rows Fig. 3-2 and (3-4)"),
+    ("Fig. 3-3, spectrum", "figure3-3.svg"),
+    ("means over 5 s", "every row of record.csv"),
+    ("filter G(z)", "row 3.3, bandwidth; every row of record.csv"),
+    ("step 1, the shift of a start-up", "rows 3.3 step 1; `compensate --turn-on`"),
+    ("step 2, (3-8) to (3-10), lines by least squares", "rows (3-9), (3-10); `compensate --method piecewise`"),
+    ("(3-11) lines and break points", "rows (3-11), errata"),
+    ("Fig. 3-4, rate over temperature, after", "figure3-4.svg and its row"),
+    ("Figs. 3-5 and 3-6, rate over time", "figure3-5-6.svg and their rows"),
+    ("Figs. 3-7 and 3-8, angle over time", "figure3-7-8.svg and their rows"),
+    ("peak to peak and sensitivity, after", "rows 3.3 and (3-4), errata"),
+    ("all four numbers in °/h", "rows in °/h"),
+    ("3.5, estimate by a Kalman filter", "rows 3.5"),
+];
+
 /// Published beside computed.
 pub(crate) fn table_rows(reproduction: &Reproduction) -> Vec<Vec<String>> {
     let row = |c: &crate::reproduce::thesis2021::Comparison| {
@@ -90,6 +129,13 @@ pub fn files(reproduction: &Reproduction, command: &str) -> Vec<ReproductionFile
     let figure_5 = chart("Figs. 3-5 and 3-6: rate over time, after and before", "time [s]")
         .with(Series::line("before", over(time, before)))
         .with(Series::line("after", over(time, after)));
+    let angle = |column: usize| -> Vec<(f64, f64)> { reproduction.angles.iter().map(|r| (r[0], r[column])).collect() };
+    let figure_7 = Chart::new("Figs. 3-7 and 3-8: angle over time, after and before")
+        .size(760, 400)
+        .x(Axis::linear("time [s]"))
+        .y(Axis::linear("angle [°]"))
+        .with(Series::line("before", angle(1)))
+        .with(Series::line("lines and shift taken off", angle(2)));
     let density = reproduction.spectrum.iter().map(|d| (d.frequency_hz, d.density)).collect();
     let figure_3 = Chart::new("Fig. 3-3: power spectral density before")
         .size(760, 400)
@@ -109,6 +155,7 @@ pub fn files(reproduction: &Reproduction, command: &str) -> Vec<ReproductionFile
         file("figure3-3.svg", figure_3.svg()),
         file("figure3-4.svg", figure_4.svg()),
         file("figure3-5-6.svg", figure_5.svg()),
+        file("figure3-7-8.svg", figure_7.svg()),
     ]
 }
 
@@ -131,6 +178,10 @@ fn words(reproduction: &Reproduction, command: &str) -> String {
     text += "\n## Errata: what is printed and what is used\n\n";
     for (place, printed, used) in reproduction.errata {
         text += &format!("- {place}: {printed}. Used: {used}.\n");
+    }
+    text += "\n## The chapter item by item\n\n| in the chapter | here |\n|---|---|\n";
+    for (item, place) in ITEMS {
+        text += &format!("| {item} | {place} |\n");
     }
     text
 }

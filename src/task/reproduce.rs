@@ -18,6 +18,7 @@ const KINDS: &[&str] = &[
     "record.csv",
     "figure3-#.svg",
     "figure3-5-6.svg",
+    "figure3-7-8.svg",
 ];
 
 /// Writes a publication's files as a whole into a folder that the caller holds; their paths.

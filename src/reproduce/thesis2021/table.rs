@@ -2,11 +2,16 @@
 
 use super::{BAND_BIT, BAND_DEG_PER_S, Comparison, LINES, in_deg_per_s};
 use crate::compensate::empirical::PiecewiseBias;
-use crate::metrics::Metrics;
+use crate::metrics::{Metrics, TemperaturePoint};
 use crate::units::{
-    REFERENCE_TEMPERATURE_K, SECONDS_PER_HOUR, celsius_from_kelvin, percent_from_fraction, rad_per_s_from_deg_per_s,
-    s_from_h,
+    REFERENCE_TEMPERATURE_K, SECONDS_PER_HOUR, celsius_from_kelvin, kelvin_from_celsius, percent_from_fraction,
+    rad_per_s_from_deg_per_s, s_from_h,
 };
+
+/// Outputs that are summed to a row.
+const OUTPUTS: f64 = 100.0;
+/// Between the zones' printed ends, 25 and 30 °C, and the lower break point is a point of 25 °C.
+const MIDDLE_C: f64 = 25.0;
 
 /// What the simulated record shows.
 pub(super) struct Found<'f> {
@@ -17,6 +22,10 @@ pub(super) struct Found<'f> {
     pub(crate) walk: f64,
     pub(crate) walk_by_fit: f64,
     pub(crate) shifts: [f64; 2],
+    /// Of the biases of several start-ups [°/s].
+    pub(crate) repeatability: f64,
+    /// Of another start-up, an hour on and over its whole warming: before and behind the lines [°].
+    pub(crate) angles: [[f64; 2]; 2],
     /// Of a rate of one degree an hour, with its standard error.
     pub(crate) estimate: (f64, f64),
 }
@@ -33,6 +42,18 @@ pub(super) fn comparisons(found: &Found) -> Vec<Comparison> {
         explanation,
     };
     let sensitivity = |m: &Metrics| m.temperature_sensitivity_rad_per_s_per_k.map_or(f64::NAN, in_deg_per_s);
+    // Eq. (3-4) about the middle of the chapter's own zones.
+    let about_the_middle = |m: &Metrics| {
+        let from_middle = |p: &&TemperaturePoint| (p.temperature_k - kelvin_from_celsius(MIDDLE_C)).abs();
+        let middle = m.temperature_points.iter().min_by(|a, b| from_middle(a).total_cmp(&from_middle(b)));
+        let slope = |point: &TemperaturePoint, middle: &TemperaturePoint| {
+            ((point.bias_rad_per_s - middle.bias_rad_per_s) / (point.temperature_k - middle.temperature_k)).abs()
+        };
+        let slopes = middle.into_iter().flat_map(|middle| {
+            m.temperature_points.iter().filter(move |p| *p != middle).map(move |p| slope(p, middle))
+        });
+        in_deg_per_s(slopes.fold(f64::NAN, f64::max))
+    };
     let (before, after) =
         (in_deg_per_s(found.measured.peak_to_peak_rad_per_s), in_deg_per_s(found.left.peak_to_peak_rad_per_s));
     let bit = |value: f64| value * BAND_BIT / BAND_DEG_PER_S;
@@ -44,6 +65,8 @@ pub(super) fn comparisons(found: &Found) -> Vec<Comparison> {
             ))
         })
     };
+    let drawn = "lines of the first start-up, shift removed, on one with other noise and 1 °/h more; the chapter draws it, the text has no number";
+    let summed = "of sums over 1 s, a hundred outputs: printed before Eq. (3-11), which has a hundredth of it";
     let hourly = "the same number in °/h";
     let until = |i: usize| found.lines.lines.get(i).map_or(f64::NAN, |l| celsius_from_kelvin(l.until_k));
     let simulated = "simulated from the printed lines and band; the fit finds them again as far as the noise lets it";
@@ -81,6 +104,14 @@ pub(super) fn comparisons(found: &Found) -> Vec<Comparison> {
             "no number is printed",
         ),
         row(
+            "(3-3)",
+            "bias repeatability",
+            "°/s",
+            None,
+            found.repeatability,
+            "of six start-ups whose offsets were drawn with 1 °/h (0.000278 °/s), behind the lines; no number is printed",
+        ),
+        row(
             "Fig. 3-2",
             "peak to peak before",
             "°/s",
@@ -94,7 +125,15 @@ pub(super) fn comparisons(found: &Found) -> Vec<Comparison> {
             "°/s/°C",
             Some(0.00089),
             sensitivity(found.measured),
-            "against the point at 20 °C; the chapter does not say which point m is",
+            "against the point at 20 °C; the chapter does not say which point m is: see the next row",
+        ),
+        row(
+            "(3-4)",
+            "temperature sensitivity before, m at 25 °C",
+            "°/s/°C",
+            Some(0.00089),
+            about_the_middle(found.measured),
+            "the printed lines themselves give 0.00088 from 14 to 25 °C and 0.00090 from 25 to 42 °C: m is in the middle zone",
         ),
         row(
             "(3-5)",
@@ -134,8 +173,12 @@ pub(super) fn comparisons(found: &Found) -> Vec<Comparison> {
             "°",
             None,
             found.left.drift_angle_rad / rad_per_s_from_deg_per_s(1.0),
-            "no number is printed",
+            "nothing but rounding: the lines were fitted to this record, so the mean of what they leave is 0; no number is printed",
         ),
+        row("Fig. 3-8", "drift angle of another start-up, 1 h, before", "°", None, found.angles[0][0], drawn),
+        row("Fig. 3-7", "drift angle of another start-up, 1 h, after", "°", None, found.angles[0][1], drawn),
+        row("Fig. 3-8", "drift angle of another start-up, 5 h, before", "°", None, found.angles[1][0], drawn),
+        row("Fig. 3-7", "drift angle of another start-up, 5 h, after", "°", None, found.angles[1][1], drawn),
         row(
             "3.3",
             "bandwidth of G(z)",
@@ -176,6 +219,12 @@ pub(super) fn comparisons(found: &Found) -> Vec<Comparison> {
             found.estimate.1 * SECONDS_PER_HOUR,
             "the filter's own; what the lines were fitted with counts once more",
         ),
+        row("(3-9)", "K_l", "bit/°C", Some(33.86), OUTPUTS * slope(0), summed),
+        row("(3-9)", "K_m", "bit/°C", Some(10.45), OUTPUTS * slope(1), summed),
+        row("(3-9)", "K_h", "bit/°C", Some(40.82), OUTPUTS * slope(2), summed),
+        row("(3-10)", "R_0l", "bit", Some(-732.29), OUTPUTS * at_zero(0), summed),
+        row("(3-10)", "R_0m", "bit", Some(-200.33), OUTPUTS * at_zero(1), summed),
+        row("(3-10)", "R_0h", "bit", Some(-1149.2), OUTPUTS * at_zero(2), summed),
         row("(3-11)", "slope of the lower line", "bit/°C", Some(LINES[0].0), slope(0), simulated),
         row("(3-11)", "slope of the middle line", "bit/°C", Some(LINES[1].0), slope(1), simulated),
         row("(3-11)", "slope of the upper line", "bit/°C", Some(LINES[2].0), slope(2), simulated),
@@ -236,7 +285,7 @@ pub(super) fn comparisons(found: &Found) -> Vec<Comparison> {
             "%",
             Some(96.0),
             percent_from_fraction(1.0 - after / before),
-            "follows from the erratum: 59 % of 0.0163 °/s",
+            "1 − 0.00163/0.04 as printed; with the erratum 1 − 0.0163/0.04 = 59 %",
         ),
         row(
             "(3-4)",
