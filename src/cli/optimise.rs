@@ -54,7 +54,7 @@ pub(crate) struct Arguments {
     pub(super) output: Option<PathBuf>,
     /// Takes up the interrupted run in the output folder; begins one if there is none
     #[arg(long, requires = "output", conflicts_with = "fresh")]
-    resume: bool,
+    pub(super) resume: bool,
     /// Begins again although the output folder holds an unfinished run
     #[arg(long, requires = "output")]
     fresh: bool,
@@ -78,9 +78,9 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE")]
     diagnosis: Option<PathBuf>,
     /// Temperatures of the layers that were computed elsewhere (CSV: time_s, layer_1_c, …, or time_s, layer, temperature_c), used
-    /// instead of the profiles; may be repeated, each file is a case. Such a search proves nothing, leaves no checkpoint to resume from
-    /// and writes pattern, schedule and summary.json without a page
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["resume", "fresh", "compare_with", "cutting_planes", "diagnosis", "prove", "trim_turns", "split_layer"])]
+    /// instead of the profiles; may be repeated, each file is a case. Such a search proves nothing and writes pattern, schedule,
+    /// summary.json and checkpoints, but no page
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["compare_with", "cutting_planes", "diagnosis", "prove", "trim_turns", "split_layer"])]
     pub(super) field: Vec<PathBuf>,
     /// Tries for so long to prove that the best pattern is the best of its class
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
@@ -200,6 +200,7 @@ pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliE
         plan: &plan,
         budget: options.budget.as_deref(),
         cutting_planes: arguments.cutting_planes,
+        fields: &[],
     };
     let uncertain = match &arguments.diagnosis {
         None => Vec::new(),
@@ -237,7 +238,7 @@ pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliE
 }
 
 /// A saved state that fits no search is the checkpoint's fault.
-fn of_run(error: RunError, folder: Option<&Path>) -> CliError {
+pub(super) fn of_run(error: RunError, folder: Option<&Path>) -> CliError {
     match error {
         RunError::Judge(error) => error.into(),
         RunError::Resume => CliError::Checkpoint { path: folder.map(|f| f.join(CHECKPOINT_FILE)).unwrap_or_default() },
@@ -245,7 +246,7 @@ fn of_run(error: RunError, folder: Option<&Path>) -> CliError {
 }
 
 /// The state to go on from; refuses to write over an unfinished run unasked.
-fn saved_state(
+pub(super) fn saved_state(
     arguments: &Arguments,
     folder: &Path,
     request: &Request,

@@ -1,24 +1,23 @@
 //! `optimise --field`: the search under temperatures that were computed elsewhere.
 
-use std::ops::ControlFlow;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use super::optimise::Arguments;
-use super::progress::{Progress, StopFlag};
+use super::optimise::{Arguments, of_run, saved_state};
+use super::progress::StopFlag;
 use super::screen::{Screen, held, table};
+use super::watch::Watch;
 use super::watching::Watching;
 use super::{CliError, Ending};
 use crate::io::json::field::FieldSearchJson;
 use crate::io::model::ModelFile;
-use crate::io::write::run_directory::check_kept;
-use crate::search::Observer;
-use crate::search::anneal::rounds::Rounds;
+use crate::io::write::checkpoint::CHECKPOINT_FILE;
+use crate::io::write::run_directory::{Request, check_kept};
 use crate::search::answer::Ended;
-use crate::search::run::Halt;
+use crate::search::run::RunError;
+use crate::task::TaskError;
 use crate::task::evaluate::{COLUMNS, cells};
 use crate::task::optimise::Wishes;
 use crate::task::under_fields::{self, FieldFile, Search};
-use crate::units::deg_per_h_from_rad_per_s;
 
 pub(super) fn run(
     arguments: &Arguments,
@@ -35,11 +34,28 @@ pub(super) fn run(
     folder.map_or(Ok(()), |folder| check_kept(folder, screen.named().chain(file.files())))?;
     let _held = folder.map(|folder| held(folder, "optimise")).transpose()?;
     let class = wishes.class(file);
-    let request = Search { model: file, fields: &fields, class, objective, plan: wishes.plan(file)? };
+    let plan = wishes.plan(file)?;
+    let digests = digests(arguments, &fields)?;
+    let request = Request {
+        file,
+        class,
+        objective,
+        plan: &plan,
+        budget: options.budget.as_deref(),
+        cutting_planes: false,
+        fields: &digests,
+    };
+    let saved = folder.map_or(Ok(None), |folder| saved_state(arguments, folder, &request, screen))?;
     let started = Instant::now();
-    let progress = screen.progress("optimise", request.plan.rules.moves);
-    let mut watch = Watch { progress, stop, budget, started };
-    let found = under_fields::search(&request, &Watching::quiet(screen), &mut watch)?;
+    let is_taken_up = folder.is_some_and(|f| arguments.resume && f.join(CHECKPOINT_FILE).exists());
+    let mut watch = Watch::new(arguments, &request, budget, started, stop, screen, is_taken_up);
+    let search = Search { model: file, fields: &fields, class, objective, plan: plan.clone(), saved };
+    let found = under_fields::search(&search, &Watching::quiet(screen), &mut watch);
+    watch.fault.take().map_or(Ok(()), Err)?;
+    let found = match found {
+        Err(TaskError::Run(RunError::Resume)) => return Err(of_run(RunError::Resume, folder)),
+        found => found?,
+    };
     let seconds = started.elapsed().as_secs_f64();
     let Some(found) = found else {
         screen.note("interrupted before anything was found");
@@ -55,6 +71,22 @@ pub(super) fn run(
     Ok(if interrupted { Ending::Interrupted } else { Ending::Done })
 }
 
+/// What a checkpoint knows its fields by.
+fn digests(arguments: &Arguments, fields: &[FieldFile]) -> Result<Vec<String>, CliError> {
+    let of = |field: &FieldFile| match &field.sha256 {
+        Some(digest) => Ok(digest.clone()),
+        None if arguments.resume => {
+            let message = format!(
+                "{} is a pipe, and the search that it belongs to cannot be told: give the file again that it was written from",
+                field.file
+            );
+            Err(CliError::Option { option: "--resume", message })
+        }
+        None => Ok("a pipe".to_owned()),
+    };
+    fields.iter().map(of).collect()
+}
+
 fn text(body: &FieldSearchJson) -> String {
     let segments: Vec<String> = body.best.segments.iter().map(ToString::to_string).collect();
     format!(
@@ -66,32 +98,4 @@ fn text(body: &FieldSearchJson) -> String {
         body.rounds,
         body.stopped_by
     )
-}
-
-/// Progress, the clock and the wish to stop.
-struct Watch<'a> {
-    progress: Progress,
-    stop: &'a StopFlag,
-    budget: Option<Duration>,
-    started: Instant,
-}
-
-impl Observer for Watch<'_> {
-    fn advanced(&mut self, search: &dyn Rounds) -> ControlFlow<Halt> {
-        let best = search.best().map_or_else(String::new, |best| {
-            format!("round {}, best {:.4} °/h", search.state().round + 1, deg_per_h_from_rad_per_s(best.cost))
-        });
-        self.progress.at(search.evaluations(), &best);
-        if self.stop.is_set() {
-            return ControlFlow::Break(Halt::Signal);
-        }
-        match self.budget {
-            Some(budget) if self.started.elapsed() >= budget => ControlFlow::Break(Halt::Clock),
-            _ => ControlFlow::Continue(()),
-        }
-    }
-
-    fn goes_on(&self) -> bool {
-        !self.stop.is_set()
-    }
 }

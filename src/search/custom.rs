@@ -14,7 +14,7 @@ use thiserror::Error;
 
 use super::anneal::limits::{Limits, draw, neighbour};
 use super::anneal::quantile;
-use super::anneal::rounds::{Found, Optimisation, Plan, Rounds};
+use super::anneal::rounds::{Found, Optimisation, Plan, Rounds, State};
 use super::answer::Ended;
 use super::cost::columns::Work;
 use super::cost::samples::SampleMatrix;
@@ -103,7 +103,21 @@ pub struct CustomAnswer {
 
 /// Makes a cost small; `None` if the observer ended it before anything was found.
 pub fn search<C: Cost>(cost: C, plan: Plan, observer: &mut dyn Observer) -> Option<CustomAnswer> {
-    let mut search = Optimisation::new(cost, plan);
+    run(Optimisation::new(cost, plan), observer)
+}
+
+/// As [`search`], from a saved state; everything else must be as it was when it was saved. `None` for a state that no search
+/// for this cost can have been in.
+pub(crate) fn resume<C: Cost>(
+    cost: C,
+    plan: Plan,
+    state: State,
+    observer: &mut dyn Observer,
+) -> Option<Option<CustomAnswer>> {
+    Some(run(Optimisation::resume(cost, plan, state)?, observer))
+}
+
+fn run<C: Cost>(mut search: Optimisation<C>, observer: &mut dyn Observer) -> Option<CustomAnswer> {
     observer.begun(&search);
     let ended = loop {
         let goes_on = search.advance();

@@ -309,6 +309,7 @@ impl Way<'_> {
             plan: &plan,
             budget: None,
             cutting_planes: false,
+            fields: &[],
         };
         // A search of something else, or none, is begun anew.
         request.saved = read_checkpoint(folder, &written.fingerprint()).ok().flatten();

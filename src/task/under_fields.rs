@@ -14,13 +14,14 @@ use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
 use crate::pattern::windability::WindabilityClass;
 use crate::rate::RateModel;
-use crate::search::anneal::rounds::Plan;
+use crate::search::anneal::rounds::{Plan, State};
 use crate::search::anneal::sample_cost::SampleCost;
 use crate::search::answer::Ended;
 use crate::search::aside::PointingError;
 use crate::search::cost::objective::Objective;
 use crate::search::cost::worst_case::WorstCase;
 use crate::search::evaluator::name_of;
+use crate::search::run::RunError;
 use crate::search::{self, custom};
 use crate::thermal::{GivenField, ThermalHistory};
 use crate::units::deg_per_h_from_rad_per_s;
@@ -182,6 +183,8 @@ pub(crate) struct Search<'a> {
     pub(crate) class: WindabilityClass,
     pub(crate) objective: Objective,
     pub(crate) plan: Plan,
+    /// The state to go on from; everything else must be as it was when it was saved.
+    pub(crate) saved: Option<State>,
 }
 
 /// The document, and the pattern that it names.
@@ -215,7 +218,8 @@ pub(crate) fn objective(model: &ModelFile, stated: Option<Objective>) -> Result<
 /// Searches; None if it was ended before anything was found.
 ///
 /// # Errors
-/// Fields that do not fit the coil; a formula without a value, or one that patterns cannot be searched with.
+/// Fields that do not fit the coil; a formula without a value, or one that patterns cannot be searched with; a saved state that
+/// no such search can have been in.
 pub(crate) fn search(
     request: &Search,
     observer: &dyn Observer,
@@ -224,10 +228,12 @@ pub(crate) fn search(
     let Search { model, fields, class, objective, .. } = *request;
     let cases = cases(model, fields, observer)?;
     let matrix = matrix_of(model, cases.iter().map(|case| &case.states))?;
-    let Some(answer) = custom::search(SampleCost::new(matrix, class, objective.norm()), request.plan.clone(), watch)
-    else {
-        return Ok(None);
+    let cost = SampleCost::new(matrix, class, objective.norm());
+    let answer = match request.saved.clone() {
+        None => custom::search(cost, request.plan.clone(), watch),
+        Some(state) => custom::resume(cost, request.plan.clone(), state, watch).ok_or(RunError::Resume)?,
     };
+    let Some(answer) = answer else { return Ok(None) };
     let judge = |named: &NamedPattern| judged(model, &cases, objective, named);
     let classics = own_and_classics(model).into_iter().filter(|named| Classic::from_key(&named.name).is_ok());
     let mut baselines = Vec::new();
@@ -285,7 +291,6 @@ pub(crate) fn search(
 #[cfg(feature = "report")]
 mod folder {
     use super::{Found, ModelFile, Path, TaskError};
-    use crate::io::fault::Faults;
     use crate::io::folder::Replacement;
     use crate::io::json::Document;
     use crate::io::read::pattern_file::print_pattern;
@@ -300,11 +305,6 @@ mod folder {
         /// # Errors
         /// Files that cannot be written.
         pub(crate) fn write(&self, folder: &Path, model: &ModelFile) -> Result<(), TaskError> {
-            let checkpoint = folder.join(CHECKPOINT_FILE);
-            if checkpoint.exists() {
-                let message = "belongs to a search over profiles: choose another folder";
-                return Err(Faults::of_file(checkpoint.display().to_string(), message).into());
-            }
             let d = &self.document;
             let fields: Vec<&str> = d.fields.iter().map(|f| f.file.as_str()).collect();
             let comments = [
@@ -323,7 +323,9 @@ mod folder {
             files.add("model.toml", model.source.as_bytes())?;
             let summary = serde_json::to_string_pretty(&Document::new(d))? + "\n";
             files.add("summary.json", summary.as_bytes())?;
-            files.commit(&KINDS)?;
+            // What the request was, and how far it came, stays: the search can be taken up again.
+            let kinds = KINDS.into_iter().filter(|kind| ![CHECKPOINT_FILE, "run.toml"].contains(kind));
+            files.commit(&kinds.collect::<Vec<_>>())?;
             Ok(())
         }
     }

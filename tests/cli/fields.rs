@@ -115,6 +115,50 @@ fn a_search_under_fields_finds_the_best_of_all_standard_patterns_under_them() {
 }
 
 #[test]
+fn a_search_under_a_field_that_was_interrupted_ends_as_if_it_had_not_been() {
+    let rows = |shift_c: f64| {
+        let head =
+            "time_s,".to_owned() + &(1..=12).map(|j| format!("layer_{j}_c")).collect::<Vec<_>>().join(",") + "\n";
+        (0..40).map(|i| 15.0 * f64::from(i)).fold(head, |mut text, time_s| {
+            let cells = (1..=12).map(|j| (temperature_c(j, time_s) + shift_c * time_s * j as f64).to_string());
+            writeln!(text, "{time_s},{}", cells.collect::<Vec<_>>().join(",")).unwrap();
+            text
+        })
+    };
+    let (folder, field) = folder_with("field.csv", rows(0.0));
+    let field = field.display().to_string();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let search = |out: &str, more: &[&str]| {
+        let usual = ["optimise", PAPER, "--field", &field, "--patience", "3", "-o", out];
+        run(&[&usual, more].concat())
+    };
+    let (whole, broken) = (at("whole"), at("broken"));
+    assert_eq!(code(&search(&whole, &[])), 0);
+    // Ended by the clock after its first slice.
+    assert_eq!(code(&search(&broken, &["--budget", "1ms"])), 0);
+    let read = |folder: &str, name: &str| std::fs::read_to_string(format!("{folder}/{name}")).unwrap();
+    assert!(
+        read(&broken, "summary.json").contains("\"clock\"")
+            && read(&broken, "checkpoint.json").contains("\"stop\":null")
+    );
+    let again = search(&broken, &[]);
+    assert!(code(&again) == 2 && stderr(&again).contains("--resume"), "{}", stderr(&again));
+    // Temperatures of another day are another search, and so is none.
+    let other = folder.path().join("other.csv");
+    std::fs::write(&other, rows(1e-4)).unwrap();
+    let other = other.display().to_string();
+    let mixed = run(&["optimise", PAPER, "--field", &other, "--patience", "3", "-o", &broken, "--resume"]);
+    assert!(code(&mixed) == 2 && stderr(&mixed).contains("fields_sha256 was"), "{}", stderr(&mixed));
+    let profiles = run(&["optimise", PAPER, "--patience", "3", "-o", &broken, "--resume"]);
+    assert!(code(&profiles) == 2 && stderr(&profiles).contains("fields_sha256 was"), "{}", stderr(&profiles));
+    let resumed = search(&broken, &["--resume"]);
+    assert!(code(&resumed) == 0 && stderr(&resumed).contains("resuming"), "{}", stderr(&resumed));
+    for name in ["summary.json", "best.toml", "schedule.csv", "schedule.json", "checkpoint.json", "model.toml"] {
+        assert!(read(&whole, name) == read(&broken, name), "{name}");
+    }
+}
+
+#[test]
 fn compare_takes_the_layers_temperatures_from_a_file_and_finds_only_noise_where_they_are_the_true_ones() {
     const NOISE_DEG_PER_H: f64 = 0.002;
     let (folder, path) = folder_with("coil.toml", FLANGED);

@@ -36,6 +36,8 @@ pub struct Request<'a> {
     pub budget: Option<&'a str>,
     /// Whether worst admissible profiles join the searched ones.
     pub cutting_planes: bool,
+    /// Of temperatures from elsewhere: each file's SHA-256; none where profiles are searched.
+    pub fields: &'a [String],
 }
 
 impl Request<'_> {
@@ -64,6 +66,9 @@ impl Request<'_> {
         }
         if self.cutting_planes {
             table["cutting_planes"] = toml_edit::value(true);
+        }
+        if !self.fields.is_empty() {
+            table["fields_sha256"] = toml_edit::value(self.fields.iter().collect::<toml_edit::Array>());
         }
         for start in &plan.starts {
             let segments: toml_edit::Array = start.iter().map(|&s| s as i64).collect();
