@@ -18,6 +18,7 @@ mod fields;
 mod heat_paths;
 mod help;
 mod improve;
+mod loggers;
 mod mangled;
 mod metrics;
 mod names;

@@ -3,6 +3,7 @@
 //! A reader collects every fault of its file with the source line; a format that people write too is printed beside its
 //! reader, so that what is printed can be read.
 
+mod averaging;
 pub(crate) mod boundary_table;
 pub mod campaign_file;
 pub(crate) mod csv_rows;

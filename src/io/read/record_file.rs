@@ -13,9 +13,10 @@ use crate::numeric::statistics::median;
 use crate::record::{Channel, MIN_ROWS, Record, RecordError, TABLE_RATE};
 use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s};
 
+use super::averaging::{self, average};
 use super::csv_rows::{CsvRows, Piece};
 use super::record_columns::{Column, FLAGS, Quantity, RecordFormat, read_header};
-use super::record_rows::{Cells, CellsRead, NO_HEADER, PLAUSIBLE_C, assumptions, average, implausible, suspicions};
+use super::record_rows::{Cells, CellsRead, NO_HEADER, PLAUSIBLE_C, assumptions, implausible, suspicions};
 use super::table_file::Source;
 
 /// Ten million rows of three columns or so.
@@ -184,6 +185,7 @@ impl<'s> Reading<'s> {
         let mut remarks = head.remarks();
         remarks.extend(assumptions(&columns, head.division));
         let averaged = average(&columns, values, self.format.average_rows);
+        remarks.extend(averaging::remark(self.format.average_rows, rows, averaged.first().map_or(0, Vec::len)));
         let skipped_rows = self.skipped;
         let built = build(self.file, self.lax(), &columns, averaged);
         match built {

@@ -8,6 +8,7 @@ use crate::numeric::statistics::median;
 use crate::record::{LEAST_INTERVAL_S, MIN_ROWS, RecordError, Row, usual_interval_s};
 use crate::units::celsius_from_kelvin;
 
+use super::averaging::{self, Averager};
 use super::csv_rows::{CsvRows, Piece};
 use super::record_columns::{Column, Division, FLAGS, Quantity, RecordFormat, SensorPlace, read_header};
 use super::record_head::Head;
@@ -181,28 +182,6 @@ impl<'c> Cells<'c> {
     }
 }
 
-/// Of `rows` rows each; the stamp is that of the last, since a rate's mean ends at its stamp.
-pub(super) fn average(columns: &[Column], values: Vec<Vec<f64>>, rows: usize) -> Vec<Vec<f64>> {
-    if rows <= 1 {
-        return values;
-    }
-    let mean = |chunk: &[f64]| chunk.iter().sum::<f64>() / chunk.len() as f64;
-    let Some(times) = columns.iter().position(|c| c.quantity == Quantity::Time).map(|place| values[place].clone())
-    else {
-        return values;
-    };
-    let steps: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
-    let usual_s = median(&steps);
-    // A mean across a gap is a mean over another time: it is left out.
-    let is_whole = |from: usize| times[from + rows - 1] - times[from] < (rows as f64 - 0.5) * usual_s;
-    let starts: Vec<usize> = (0..times.len() / rows).map(|i| i * rows).filter(|from| is_whole(*from)).collect();
-    let reduced = |column: &Column, values: &[f64]| -> Vec<f64> {
-        let last = column.quantity == Quantity::Time;
-        starts.iter().map(|f| if last { values[f + rows - 1] } else { mean(&values[*f..f + rows]) }).collect()
-    };
-    columns.iter().zip(&values).map(|(column, values)| reduced(column, values)).collect()
-}
-
 /// Units that nothing stated, and how cells are divided where that is not by commas.
 pub(super) fn assumptions(columns: &[Column], division: Division) -> Vec<String> {
     let mut said = Vec::new();
@@ -228,7 +207,8 @@ pub(super) fn assumptions(columns: &[Column], division: Division) -> Vec<String>
             ));
         }
         if let Some(unit) = column.assumed_unit() {
-            said.push(format!("column {} states no unit: taken as {unit}", column.name));
+            let of = if column.quantity == Quantity::Time { "numbers in it, not stamps, are " } else { "" };
+            said.push(format!("column {} states no unit: {of}taken as {unit}", column.name));
         }
     }
     said
@@ -318,6 +298,7 @@ pub(crate) fn stream_source(
     let mut noticed = StreamNoticed { remarks, ..StreamNoticed::default() };
     let (mut faults, mut uncounted) = (Vec::new(), 0);
     let mut chunk: Vec<Row> = Vec::with_capacity(CHUNK);
+    let mut averager = Averager::new(format.average_rows);
     loop {
         let piece = match rows.next().map_err(unreadable)? {
             Some(Piece::Aside) => continue,
@@ -337,7 +318,7 @@ pub(crate) fn stream_source(
                 noticed.rows += 1;
                 if chunk.len() == CHUNK {
                     look(&chunk, noticed.rows == CHUNK, &columns[temperature], &mut noticed.remarks, &mut faults);
-                    sink(&chunk);
+                    sink(averager.averaged(&chunk));
                     chunk.clear();
                 }
             }
@@ -371,8 +352,9 @@ pub(crate) fn stream_source(
         return Err(Faults { file: name.to_owned(), source: String::new(), faults });
     }
     if !chunk.is_empty() {
-        sink(&chunk);
+        sink(averager.averaged(&chunk));
     }
+    noticed.remarks.extend(averaging::remark(format.average_rows, noticed.rows, averager.made()));
     Ok(noticed)
 }
 
