@@ -56,4 +56,5 @@ for (kind, length), group in groups.items():
         print(f"| {kind} | {length} | {name} | {true:.4g} | {cells[0]} | {cells[1]} | {len(group)} |")
 
 off = [float(row["allan_off_allantools"]) for row in rows if row["allan_off_allantools"]]
-print(f"\nAllan deviations against allantools: {len(off)} records, largest relative difference {max(off):.1e}.")
+if off:
+    print(f"\nAllan deviations against allantools: {len(off)} records, largest relative difference {max(off):.1e}.")
