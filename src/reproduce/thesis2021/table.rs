@@ -66,7 +66,7 @@ pub(super) fn comparisons(found: &Found) -> Vec<Comparison> {
         })
     };
     let drawn = "lines of the first start-up, shift removed, on one with other noise and 1 °/h more; the chapter draws it, the text has no number";
-    let summed = "of sums over 1 s, a hundred outputs: printed before Eq. (3-11), which has a hundredth of it";
+    let summed = "of sums over 1 s, a hundred outputs: printed before Eq. (3-11), which has a hundredth of it; off by as much as the lines below, by the noise";
     let hourly = "the same number in °/h";
     let until = |i: usize| found.lines.lines.get(i).map_or(f64::NAN, |l| celsius_from_kelvin(l.until_k));
     let simulated = "simulated from the printed lines and band; the fit finds them again as far as the noise lets it";
