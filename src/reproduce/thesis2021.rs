@@ -27,7 +27,9 @@ use crate::metrics::{Metrics, MetricsError};
 use crate::numeric::spectrum::{Density, power_spectral_density};
 use crate::numeric::statistics::{line, mean, rms, standard_deviation};
 use crate::record::{Record, RecordError};
-use crate::units::{celsius_from_kelvin, kelvin_from_celsius, rad_per_s_from_deg_per_h, rad_per_s_from_deg_per_s};
+use crate::units::{
+    celsius_from_kelvin, kelvin_from_celsius, rad_per_s_from_deg_per_h, rad_per_s_from_deg_per_s, s_from_h,
+};
 
 pub(crate) const TITLE: &str = "Master's thesis on a line-of-sight stabilisation with a fibre-optic gyro (2021), chapter 3: \
                          temperature drift of the gyro and its compensation";
@@ -53,8 +55,8 @@ const BANDWIDTH_HZ: f64 = 1.0;
 const SEED: u64 = 2021;
 /// Start-ups that repeatability is of: those after the first two.
 const START_UPS: u64 = 6;
-/// Of the chapter's "short term".
-const SHORT_TERM_S: f64 = 3600.0;
+/// The chapter's "short term".
+const SHORT_TERM_H: f64 = 1.0;
 const STRETCH: usize = 2048;
 
 /// A printed number beside the computed one.
@@ -273,7 +275,7 @@ pub fn reproduce() -> Result<Reproduction, ThesisError> {
         walk_by_fit: walk_by_fit(&noise, 1.0),
         shifts: [shift, removed],
         repeatability: standard_deviation(&start_ups(&lines)?),
-        angles: [until(SHORT_TERM_S), until(f64::INFINITY)],
+        angles: [until(s_from_h(SHORT_TERM_H)), until(f64::INFINITY)],
         estimate,
     });
     let all: Vec<f64> = raw_rows.iter().map(|r| r.1).collect();
