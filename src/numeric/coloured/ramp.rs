@@ -169,3 +169,42 @@ fn unit(units: &[f64], at: &Point, kind: usize) -> f64 {
         parts.iter().map(|c| units[*c]).sum::<f64>() / parts.len() as f64
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where the kernel of a sum of Haar coefficients changes, and by how much: blocks of 2^−level, all of [0, 1].
+    fn kernel(level: i32) -> Vec<(f64, f64)> {
+        let width = 0.5f64.powi(level);
+        let block = |b: i32| {
+            [(0.0, -1.0), (0.5, 2.0), (1.0, -1.0)].map(|(at, by)| ((f64::from(b) + at) * width, by / width.sqrt()))
+        };
+        (0..1 << level).flat_map(block).collect()
+    }
+
+    #[test]
+    fn sums_of_coefficients_are_correlated_as_the_noises_covariance_says() {
+        // −ln|t| of flicker and −|t| of a walk, integrated twice.
+        let flicker = |t: f64| if t == 0.0 { 0.0 } else { t * t * (0.5 * t.abs().ln() - 0.75) };
+        let walk = |t: f64| t.abs().powi(3) / 6.0;
+        let covariance = |of: &dyn Fn(f64) -> f64, a: i32, b: i32| -> f64 {
+            let (a, b) = (kernel(a), kernel(b));
+            a.iter().flat_map(|(x, p)| b.iter().map(move |(y, q)| p * q * of(x - y))).sum()
+        };
+        for apart in 1..FLICKER_SUMS.len() as i32 {
+            let correlation = |of: &dyn Fn(f64) -> f64| {
+                covariance(of, 0, apart) / (covariance(of, 0, 0) * covariance(of, apart, apart)).sqrt()
+            };
+            assert!((correlation(&flicker) - FLICKER_SUMS[apart as usize]).abs() < 1e-4, "{apart}");
+            assert!((correlation(&walk) - WALK_SUMS).abs() < 1e-3, "{apart}");
+        }
+    }
+
+    #[test]
+    fn a_mean_with_many_degrees_of_freedom_has_the_quantile_of_chi_squared_and_with_few_a_larger_one() {
+        assert!((student_ratio(1e7) / super::super::LIKELIHOOD_RATIO - 1.0).abs() < 1e-3);
+        // Student's quantile of 0.99490 with three degrees of freedom is 5.80.
+        assert!((student_ratio(3.0) - 4.0 * (1.0f64 + 5.80 * 5.80 / 3.0).ln()).abs() < 0.05, "{}", student_ratio(3.0));
+    }
+}
