@@ -114,7 +114,7 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
     for note in groundwork.notes() {
         observer.note(&note);
     }
-    let after = SolvedProfiles::after_the_ends(&file.model, &file.profiles.profiles())?;
+    let after = groundwork.solved.after_the_ends(&file.model)?;
     let mut patterns = Vec::with_capacity(all.len());
     let mut extremes = Vec::new();
     for (index, named) in all.iter().enumerate() {

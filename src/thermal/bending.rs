@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 
 use super::modal::heated_mode;
 use super::network::{Axis, Network};
-use super::{BoreHeat, Drive, HeatPath, ThermalError};
+use super::{BoreHeat, HeatPath, ThermalError};
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::numeric::tridiagonal::diagonalise_full;
 use crate::units::REFERENCE_TEMPERATURE_K;
@@ -72,7 +72,6 @@ pub(super) struct System {
     diffusivity_m2_per_s: f64,
     pub(super) middle_k: f64,
     pub(super) heat: Option<BoreHeat>,
-    pub(super) start_s: f64,
     /// C^{−1/2} V for each axial mode, nodes × modes; one for all where they share it.
     pub(super) radial: Vec<DMatrix<f64>>,
     /// Places along the axis × axial modes.
@@ -93,7 +92,7 @@ pub(super) struct System {
 impl System {
     /// `path` conducts as at T_m.
     #[expect(clippy::too_many_lines, reason = "modes first, then what each input makes of them")]
-    pub(super) fn new(path: &HeatPath, drive: &Drive, middle_k: f64) -> Result<Self, ThermalError> {
+    pub(super) fn new(path: &HeatPath, middle_k: f64) -> Result<Self, ThermalError> {
         let network = Network::new(path);
         let axis = Axis::new(path);
         let diffusivity_m2_per_s = path.material.diffusivity_m2_per_s();
@@ -127,7 +126,6 @@ impl System {
             diffusivity_m2_per_s,
             middle_k,
             heat: path.bore_heat,
-            start_s: drive.start_s(),
             radial,
             axial,
             decay_per_s,
@@ -192,10 +190,10 @@ impl System {
         seen
     }
 
-    /// Adds what the bore's heat has made of each mode.
-    pub(super) fn add_heat(&self, time_s: f64, contents: &mut [f64]) {
+    /// Adds what the bore's heat has made of each mode so long after the start.
+    pub(super) fn add_heat(&self, since_s: f64, contents: &mut [f64]) {
         let Some(heat) = &self.heat else { return };
-        let since_s = (time_s - self.start_s).max(0.0);
+        let since_s = since_s.max(0.0);
         let building = (-since_s / heat.time_constant_s).exp();
         for ((c, b), l) in contents.iter_mut().zip(&self.by_heat).zip(&self.decay_per_s) {
             *c += b * heated_mode(heat, *l, since_s, (-l * since_s).exp(), building).0;

@@ -19,6 +19,7 @@ mod panel;
 mod path;
 pub(crate) mod reduced;
 mod stepped;
+mod varying;
 
 use std::sync::Arc;
 
@@ -36,6 +37,7 @@ pub use path::{
     PackShape, Spool, SpoolFlange, SpoolWall, Start,
 };
 use stepped::SteppedField;
+use varying::Varying;
 
 /// What drives the field: temperatures against time, the pack being in a steady state before the first knot.
 #[derive(Debug, Clone, PartialEq)]
@@ -214,6 +216,8 @@ pub(crate) struct Solver {
     path: HeatPath,
     /// Of a pack that is linear.
     pack: Option<Arc<Prepared>>,
+    /// Of one that is not.
+    varying: Arc<Varying>,
 }
 
 impl Solver {
@@ -223,7 +227,7 @@ impl Solver {
         check(path)?;
         let is_modal = path.extent == Extent::Pack && path.conductivity_slope_per_k == 0.0;
         let pack = is_modal.then(|| Ok(Arc::new(Prepared::new(Pack::new(path)?)))).transpose()?;
-        Ok(Self { path: path.clone(), pack })
+        Ok(Self { path: path.clone(), pack, varying: Arc::default() })
     }
 
     pub(crate) fn path(&self) -> &HeatPath {
@@ -244,7 +248,7 @@ impl Solver {
                 let drive = Drive { boundary_k, ambient_k: drive.ambient_k.clone() };
                 Field::HalfSpace(HalfSpaceField::new(half_space::HalfSpace::new(path), &drive))
             }
-            Extent::Pack => Field::Stepped(Box::new(SteppedField::new(path, drive)?)),
+            Extent::Pack => Field::Stepped(Box::new(SteppedField::new(path, &self.varying, drive)?)),
         })
     }
 }

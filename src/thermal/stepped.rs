@@ -8,7 +8,7 @@
 //!
 //! | symbol | meaning | unit | in code |
 //! |---|---|---|---|
-//! | T_m | middle of the drive's range: there the modes are those of the pack itself | K | `middle_k` |
+//! | T_m | near the middle of the drive's range: there the modes are those of the pack itself | K | `middle_k` |
 //! | ν | Kirchhoff's transform less the temperature | K | `bent` |
 //! | λ_i, V | decay rates and modes of the linear pack at T_m | 1/s, – | `Modes` |
 //! | g, c, e | what bends a mode, by how much, and at which rate | – | `bent`, `contents`, `rate` |
@@ -27,19 +27,17 @@
 //! Acta Numerica 19 (2010) 209, section 2.2.
 
 use std::collections::HashMap;
-use std::rc::Rc;
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
 use super::bending::{System, Track};
-use super::modal::{PackField, Prepared};
-use super::pack::Pack;
+use super::modal::PackField;
 use super::panel::{DEGREE, Panel, Weights};
+use super::varying::{Shared, Varying, conducting};
 use super::{Drive, HeatPath, Instant, Material, Side, ThermalError, ThermalHistory, Wanted};
 use crate::numeric::lobatto::Lobatto;
 use crate::numeric::piecewise::PiecewiseLinear;
-use crate::units::REFERENCE_TEMPERATURE_K;
 
 /// The first panel behind a knot that is tried, and the shortest, in units of the time in which heat crosses half a layer.
 const FIRST: f64 = 128.0;
@@ -60,7 +58,6 @@ const ROUNDING: f64 = 1e-12;
 const MOST_SUBSTITUTIONS: usize = 200;
 /// Lengths of panels whose weights are kept.
 const MOST_KNOWN_LENGTHS: usize = 64;
-
 /// What a solved panel leaves behind.
 #[derive(Debug, Clone)]
 struct Piece {
@@ -84,27 +81,20 @@ impl SteppedField {
     /// # Errors
     /// Values so extreme that nothing converges; a conductivity that does not stay positive.
     #[expect(clippy::too_many_lines, reason = "what is worked out once of a drive, then one loop over its panels")]
-    pub(crate) fn new(path: &HeatPath, drive: &Drive) -> Result<Self, ThermalError> {
+    pub(super) fn new(path: &HeatPath, varying: &Varying, drive: &Drive) -> Result<Self, ThermalError> {
         let (given, drive) = (drive, &path.start.map_or_else(|| drive.clone(), |start| drive.after(&start)));
         let values = || drive.boundary_k.values().iter().chain(drive.ambient_k().values()).copied();
         let (lowest_k, highest_k) = values().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
         let slope_per_k = path.conductivity_slope_per_k;
-        let factor = |temperature_k: f64| 1.0 + slope_per_k * (temperature_k - REFERENCE_TEMPERATURE_K);
+        let factor = |temperature_k: f64| conducting(path, temperature_k);
         for temperature_k in [lowest_k, highest_k] {
             if !(factor(temperature_k) > 0.0) {
                 return Err(ThermalError::ConductivityNotPositive { temperature_k, slope_per_k });
             }
         }
-        let middle_k = 0.5 * (lowest_k + highest_k);
-        let at_middle = HeatPath {
-            material: path.material.scaled(factor(middle_k)),
-            conductivity_slope_per_k: slope_per_k / factor(middle_k),
-            ..path.clone()
-        };
-        let mut system = System::new(&at_middle, drive, middle_k)?;
-        system.start_s = given.start_s();
-        let linear = Pack::new(&at_middle)?;
-        let settling_s = linear.settling_s() * factor(middle_k) / factor(lowest_k).min(factor(highest_k));
+        let shared = varying.about(path, 0.5 * (lowest_k + highest_k))?;
+        let (system, middle_k) = (&shared.system, shared.middle_k);
+        let settling_s = shared.settling_s * factor(middle_k) / factor(lowest_k).min(factor(highest_k));
         let warming_s = path.bore_heat.map_or(0.0, |heat| 40.0 * heat.time_constant_s);
         let mut knots: Vec<f64> = drive.boundary_k.knots().iter().chain(drive.ambient_k().knots()).copied().collect();
         knots.retain(|k| *k >= drive.start_s());
@@ -123,7 +113,9 @@ impl SteppedField {
         let panel = Panel::new()?;
         let ambient = drive.ambient_k();
         let mut march = March {
-            system: &system,
+            shared: &shared,
+            system,
+            heated_s: given.start_s(),
             tracks: [(&drive.boundary_k, &system.by_boundary), (ambient, &system.by_ambient)]
                 .into_iter()
                 .filter(|(_, by_input)| by_input.iter().any(|b| *b != 0.0))
@@ -131,9 +123,10 @@ impl SteppedField {
                 .collect(),
             drive,
             panel: &panel,
-            span_k: highest_k - lowest_k,
+            span_k: 2.0 * (highest_k - middle_k).abs().max((lowest_k - middle_k).abs()),
             scale_k_per_s: scale_k_per_s(path, drive),
             shortest_s: 0.0,
+            first_s: FIRST * shared.shortest_s,
             pieces: Vec::new(),
             weights: HashMap::new(),
         };
@@ -141,14 +134,14 @@ impl SteppedField {
         let mut bent = march.still()?;
         for pair in knots.windows(2) {
             let is_one = is_sampled && pair[1] <= last_s;
-            let first_s = if is_one { pair[1] - pair[0] } else { FIRST * linear.shortest_s() };
-            march.shortest_s = if is_one { first_s } else { SHORTEST * linear.shortest_s() };
+            let first_s = if is_one { pair[1] - pair[0] } else { march.first_s };
+            march.shortest_s = if is_one { first_s } else { SHORTEST * shared.shortest_s };
             (rate, bent) = march.through(pair[0], pair[1], first_s, rate, bent)?;
         }
         let pieces = march.pieces;
         Ok(Self {
             layers: path.shape.layers,
-            linear: PackField::new(Arc::new(Prepared::new(linear)), given),
+            linear: PackField::new(Arc::clone(&shared.linear), given),
             pieces,
             lobatto: panel.lobatto,
         })
@@ -217,7 +210,10 @@ fn scale_k_per_s(path: &HeatPath, drive: &Drive) -> f64 {
 
 /// On the way through a drive.
 struct March<'a> {
+    shared: &'a Shared,
     system: &'a System,
+    /// When the bore's heat begins.
+    heated_s: f64,
     tracks: Vec<Track<'a>>,
     drive: &'a Drive,
     panel: &'a Panel,
@@ -226,9 +222,11 @@ struct March<'a> {
     scale_k_per_s: f64,
     /// A panel of this length is not cut.
     shortest_s: f64,
+    /// The first length that is tried; others are this times powers of [`GROWTH`], but for a last one.
+    first_s: f64,
     pieces: Vec<Piece>,
-    /// By the length's bits: panels behind every knot begin with the same lengths.
-    weights: HashMap<u64, Rc<Weights>>,
+    /// By the length's bits.
+    weights: HashMap<u64, Arc<Weights>>,
 }
 
 impl March<'_> {
@@ -272,10 +270,11 @@ impl March<'_> {
             let left_s = to_s - time_s;
             let step_s = if length_s * 1.5 >= left_s { left_s } else { length_s };
             let before = self.tracks.clone();
-            match self.step(time_s, step_s, &rate, &bent)? {
+            let end_s = if step_s == left_s { to_s } else { time_s + step_s };
+            match self.step(time_s, end_s, step_s, &rate, &bent)? {
                 Step::Done { rate: next, bent: at_end, is_easy } => {
                     (rate, bent) = (next, at_end);
-                    time_s = if step_s == left_s { to_s } else { time_s + step_s };
+                    time_s = end_s;
                     length_s *= if is_easy { GROWTH * GROWTH } else { GROWTH };
                 }
                 Step::TooLong => {
@@ -290,6 +289,24 @@ impl March<'_> {
         Ok((rate, bent))
     }
 
+    /// Of panels of a length. Those that begin behind a knot come again under every drive.
+    fn weights(&mut self, length_s: f64) -> Arc<Weights> {
+        let key = length_s.to_bits();
+        if let Some(known) = self.weights.get(&key) {
+            return Arc::clone(known);
+        }
+        let growths = (length_s / self.first_s).log2() / GROWTH.log2();
+        let weights = if growths.fract() == 0.0 {
+            self.shared.weights(self.panel, length_s)
+        } else {
+            Arc::new(self.panel.weights(&self.system.decay_per_s, length_s))
+        };
+        if self.weights.len() < MOST_KNOWN_LENGTHS {
+            self.weights.insert(key, Arc::clone(&weights));
+        }
+        weights
+    }
+
     /// How fast the last term of ν's polynomials changes, in units of what may be.
     fn bending(&self, temperatures: &DMatrix<f64>, length_s: f64) -> f64 {
         let half = 0.5 * self.system.slope_per_k;
@@ -301,29 +318,28 @@ impl March<'_> {
         (last.fold(0.0, f64::max) - rounding).max(0.0) * per_s / (BENDING * self.scale_k_per_s).max(f64::MIN_POSITIVE)
     }
 
+    /// `end_s`: the panel's end, where rounding would put a node behind a knot.
     #[expect(clippy::too_many_lines, reason = "one fixed-point iteration over tables that it alone has")]
-    fn step(&mut self, from_s: f64, length_s: f64, rate: &[f64], bent: &Bent) -> Result<Step, ThermalError> {
+    fn step(
+        &mut self,
+        from_s: f64,
+        end_s: f64,
+        length_s: f64,
+        rate: &[f64],
+        bent: &Bent,
+    ) -> Result<Step, ThermalError> {
         let system = self.system;
         let (modes, nodes) = (rate.len(), DEGREE + 1);
-        let times_s = self.panel.places.iter().map(|x| from_s + x * length_s);
+        let times_s = self.panel.places.iter().map(|x| (from_s + x * length_s).min(end_s));
         let mut linear = DMatrix::zeros(modes, nodes);
         for (mut column, time_s) in linear.column_iter_mut().zip(times_s.clone()) {
             for track in &mut self.tracks {
                 track.add_to(time_s, system.middle_k, &system.decay_per_s, column.as_mut_slice());
             }
-            system.add_heat(time_s, column.as_mut_slice());
+            system.add_heat(time_s - self.heated_s, column.as_mut_slice());
         }
         let drive_k: Vec<f64> = times_s.map(|t| self.drive.boundary_k.value(t) - system.middle_k).collect();
-        let weights = match self.weights.get(&length_s.to_bits()) {
-            Some(known) => Rc::clone(known),
-            None => {
-                let weights = Rc::new(self.panel.weights(&system.decay_per_s, length_s));
-                if self.weights.len() < MOST_KNOWN_LENGTHS {
-                    self.weights.insert(length_s.to_bits(), Rc::clone(&weights));
-                }
-                weights
-            }
-        };
+        let weights = self.weights(length_s);
         // The first guess: what bends the pack goes on as it did.
         let places = &self.panel.places;
         let mut from_bent =
@@ -374,7 +390,11 @@ impl March<'_> {
 mod tests {
     use super::*;
     use crate::numeric::piecewise::PiecewiseLinear;
-    use crate::thermal::modal::PackField;
+    use crate::thermal::modal::{PackField, Prepared};
+    use crate::thermal::pack::Pack;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
     use crate::thermal::{BoreHeat, Extent, Flange, FlangeFilm, Location, Material, PackShape, Spool};
 
     fn path(location: Location) -> HeatPath {
@@ -394,7 +414,7 @@ mod tests {
         let instants: Vec<Instant> = (0..240).map(|i| Instant::after(1.0 + 4.9 * i as f64)).collect();
         let exact =
             PackField::new(Arc::new(Prepared::new(Pack::new(path).unwrap())), &drive()).at(&instants, Wanted::All);
-        let stepped = SteppedField::new(path, &drive()).unwrap().at(&instants, Wanted::All);
+        let stepped = SteppedField::new(path, &Varying::default(), &drive()).unwrap().at(&instants, Wanted::All);
         let share =
             |a: &[f64], b: &[f64], scale: f64| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / scale;
         let largest = |a: &[f64]| a.iter().map(|v| v.abs()).fold(1e-300, f64::max);
@@ -423,14 +443,44 @@ mod tests {
     }
 
     #[test]
+    fn temperatures_are_continuous_at_knots_wherever_these_lie() {
+        let mut random = ChaCha8Rng::seed_from_u64(20);
+        let varying = Varying::default();
+        let path = HeatPath { conductivity_slope_per_k: 0.002, film_w_per_m2_k: Some(20.0), ..path(Location::Ambient) };
+        let mut largest_k = 0.0_f64;
+        for _ in 0..60 {
+            let mut knots = vec![0.0];
+            let mut values = vec![293.15];
+            for i in 0..4 {
+                knots.push(knots[i] + random.random_range(100.0..2000.0));
+                values.push(293.15 + random.random_range(-20.0..20.0));
+            }
+            let drive = Drive::boundary(PiecewiseLinear::new(knots.clone(), values).unwrap());
+            let field = SteppedField::new(&path, &varying, &drive).unwrap();
+            let sides: Vec<Instant> =
+                knots[1..].iter().flat_map(|&t| [Instant::before(t), Instant::after(t)]).collect();
+            let found = field.at(&sides, Wanted::All);
+            for pair in found.temperature_k.chunks_exact(2 * path.shape.layers) {
+                let (before, after) = pair.split_at(path.shape.layers);
+                largest_k = before.iter().zip(after).map(|(b, a)| (b - a).abs()).fold(largest_k, f64::max);
+            }
+        }
+        println!("temperatures jump by {largest_k:.1e} K at most");
+        assert!(largest_k < 1e-4);
+    }
+
+    #[test]
     fn a_steep_slope_of_the_conductivity_is_refused_and_a_small_one_changes_the_field_in_proportion() {
         let mut steep = path(Location::OuterLayer);
         steep.conductivity_slope_per_k = -0.5;
-        assert!(matches!(SteppedField::new(&steep, &drive()), Err(ThermalError::ConductivityNotPositive { .. })));
+        assert!(matches!(
+            SteppedField::new(&steep, &Varying::default(), &drive()),
+            Err(ThermalError::ConductivityNotPositive { .. })
+        ));
         let instants: Vec<Instant> = (0..50).map(|i| Instant::after(20.0 * i as f64)).collect();
         let with_slope = |slope_per_k: f64| {
             let path = HeatPath { conductivity_slope_per_k: slope_per_k, ..path(Location::OuterLayer) };
-            SteppedField::new(&path, &drive()).unwrap().at(&instants, Wanted::All).temperature_k
+            SteppedField::new(&path, &Varying::default(), &drive()).unwrap().at(&instants, Wanted::All).temperature_k
         };
         let (none, one, two) = (with_slope(0.0), with_slope(1e-3), with_slope(2e-3));
         let change = |a: &[f64]| a.iter().zip(&none).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);

@@ -8,6 +8,8 @@
 //! bore or a bias follows the pack's temperature the error can still grow then, which [`SolvedProfiles::after_the_ends`]
 //! shows.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 use thiserror::Error;
 
@@ -54,7 +56,7 @@ pub struct SolvedProfiles {
 pub struct SolvedProfile {
     pub(crate) profile: Profile,
     /// The same for every pattern.
-    pub field: Field,
+    pub field: Arc<Field>,
     /// One list of instants a piece, from just after its start to just before its end.
     pub(crate) pieces: Vec<Vec<Instant>>,
     /// The field at all of them, in order.
@@ -134,22 +136,25 @@ impl SolvedProfiles {
     ///
     /// # Errors
     /// A heat path that cannot be solved.
-    pub(crate) fn after_the_ends(model: &CoilModel, profiles: &[Profile]) -> Result<Option<Self>, SearchError> {
+    pub(crate) fn after_the_ends(&self, model: &CoilModel) -> Result<Option<Self>, SearchError> {
         let (path, remembers) = (model.heat_path()?, model.remembers());
-        let (settling_s, solver) = (settling_s(&path)?, Solver::new(&path)?);
-        let soaked: Vec<SolvedProfile> = profiles
+        let settling_s = settling_s(&path)?;
+        let soaked: Vec<SolvedProfile> = self
+            .profiles
             .par_iter()
-            .filter_map(|profile| {
+            .filter_map(|solved| {
+                let profile = &solved.profile;
                 let soak = Piece { rate_k_per_s: 0.0, duration_s: settling_s };
                 let last = profile.pieces()[profile.pieces().len() - 1];
                 let settles = last.rate_k_per_s == 0.0 && last.duration_s >= settling_s;
                 let pieces = profile.pieces().iter().copied().chain([soak]).collect();
                 (!settles).then(|| {
                     let longer = Profile::new(profile.name(), pieces).expect("a soak of a positive duration");
-                    SolvedProfile::new(longer, profile.pieces().len(), &solver, remembers)
+                    // Behind its last piece a drive stays where it is.
+                    SolvedProfile::on(longer, profile.pieces().len(), Arc::clone(&solved.field), &path, remembers)
                 })
             })
-            .collect::<Result<_, ThermalError>>()?;
+            .collect();
         Ok((!soaked.is_empty()).then_some(Self { profiles: soaked }))
     }
 
@@ -239,9 +244,15 @@ impl SolvedProfile {
         remembers: bool,
     ) -> Result<Self, ThermalError> {
         let drive = Drive::boundary(profile.temperature(REFERENCE_TEMPERATURE_K));
-        let field = solver.field(&drive)?;
-        let knots = drive.boundary_k.knots();
-        let of = |knots: &[f64]| instants_of_piece(knots[0], knots[1], solver.path(), remembers);
+        let field = Arc::new(solver.field(&drive)?);
+        Ok(Self::on(profile, first_piece, field, solver.path(), remembers))
+    }
+
+    /// Of a field that is known.
+    fn on(profile: Profile, first_piece: usize, field: Arc<Field>, path: &HeatPath, remembers: bool) -> Self {
+        let boundary_k = profile.temperature(REFERENCE_TEMPERATURE_K);
+        let knots = boundary_k.knots();
+        let of = |knots: &[f64]| instants_of_piece(knots[0], knots[1], path, remembers);
         let pieces: Vec<Vec<Instant>> = knots[first_piece..]
             .windows(2)
             .map(of)
@@ -251,7 +262,7 @@ impl SolvedProfile {
         let before: Vec<Instant> =
             if remembers { knots[..=first_piece].windows(2).flat_map(of).collect() } else { Vec::new() };
         let lead = field.at(&before);
-        Ok(Self { profile, field, pieces, history, lead })
+        Self { profile, field, pieces, history, lead }
     }
 
     /// What is remembered where the samples begin.
@@ -352,7 +363,7 @@ mod tests {
         let soaked = [Profile::new("soaked", vec![ramp, soak]).unwrap()];
         let within = SolvedProfiles::new(&model, &short).unwrap();
         let whole = SolvedProfiles::new(&model, &soaked).unwrap();
-        let after = SolvedProfiles::after_the_ends(&model, &short).unwrap().unwrap();
+        let after = within.after_the_ends(&model).unwrap().unwrap();
         let mut grows = 0;
         for classic in [Classic::Zyl, Classic::Dip, Classic::Qua] {
             let worst = |solved: &SolvedProfiles| {
@@ -363,6 +374,6 @@ mod tests {
             grows += usize::from(after > 1.01 * within);
         }
         assert!(grows > 0);
-        assert!(SolvedProfiles::after_the_ends(&model, &soaked).unwrap().is_none());
+        assert!(whole.after_the_ends(&model).unwrap().is_none());
     }
 }
