@@ -217,7 +217,7 @@ pub(super) fn check(truth: &Truth, claim: &Claim, winding: &Winding, findings: &
     }
     check_segments(claim, segments, findings);
     check_ends(claim, winding.ends, findings);
-    check_name(claim, segments, findings);
+    check_name(claim, winding, findings);
     check_whole(claim, &supply, max_climb, findings);
     check_reels(truth, claim, &supply, pieces, findings);
     check_fibre(truth, claim, winding, balance_m, findings);
@@ -340,9 +340,10 @@ fn check_shop(truth: &Truth, found: &super::Shop, findings: &mut Findings) {
     findings.same(None, every, &shop.potting_every_layers, &found.potting_every_layers);
 }
 
-/// A classic winding's name must stand for that winding.
-fn check_name(claim: &Claim, segments: &[usize], findings: &mut Findings) {
+/// A classic winding's name must stand for that winding, which has whole layers only.
+fn check_name(claim: &Claim, winding: &Winding, findings: &mut Findings) {
     let Some(name) = &claim.pattern else { return };
+    let segments = &winding.segments;
     let count = segments.len();
     let h = count / 2;
     let of_word = |word: &str| {
@@ -375,8 +376,10 @@ fn check_name(claim: &Claim, segments: &[usize], findings: &mut Findings) {
         _ => return,
     };
     findings.checks += 1;
-    if expected != segments {
+    if expected != *segments || winding.ends != [0, 0] {
         let remedy = "name the pattern by what it is, or wind the one that is named";
-        findings.add(None, "pattern", format!("the name of {segments:?}"), name.clone(), remedy);
+        let [a, b] = winding.ends;
+        let ends = if [a, b] == [0, 0] { String::new() } else { format!(" with {a:+} turns at end A, {b:+} at end B") };
+        findings.add(None, "pattern", format!("the name of {segments:?}{ends}"), name.clone(), remedy);
     }
 }

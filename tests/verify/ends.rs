@@ -148,6 +148,20 @@ fn ends_that_were_altered_are_violations() {
     assert_eq!(fields, ["the place along the axis"]);
 }
 
+#[test]
+fn a_classic_name_stands_for_whole_layers_only() {
+    let file = model(LONG);
+    let named = classic(Classic::Qua, 40).unwrap();
+    let pattern = named.pattern.clone().with_end_turns(EndTurns { a: -9, b: 7 }).unwrap();
+    for (form, text) in forms(&file, &NamedPattern { name: "qua".to_owned(), pattern }) {
+        let found = judged(&file, &text).unwrap();
+        let fields: Vec<&str> = found.violations.iter().map(|violation| violation.field.as_str()).collect();
+        // A table of steps alone does not say its pattern's name.
+        assert!(fields == ["pattern"] || (fields.is_empty() && !text.contains("qua")), "{form}: {fields:?}");
+    }
+    assert!(forms(&file, &named).iter().all(|(_, text)| judged(&file, text).unwrap().violations.is_empty()));
+}
+
 fn document_pattern(named: &NamedPattern) -> coilwright::pattern::Pattern {
     named.pattern.clone().with_end_turns(EndTurns { a: -9, b: 7 }).unwrap()
 }
