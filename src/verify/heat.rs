@@ -84,6 +84,8 @@ pub(super) struct Heat {
     /// Whether anything depends on more than the rates; temperatures stay zero otherwise.
     wants_rise: bool,
     solution: Solution,
+    /// Rate of the drive before the start, and for how long.
+    ramp_before: Option<[f64; 2]>,
     /// A layer's own time.
     first_s: f64,
 }
@@ -94,6 +96,7 @@ impl Heat {
         let (layers, pitch_m) = (coil.layers(), coil.radial_pitch_m());
         let diffusivity_m2_per_s = physics.diffusivity_m2_per_s();
         let heat = physics.bore_heat;
+        let longest_s = longest_s + physics.ramp_before.map_or(0.0, |[_, lasted_s]| lasted_s);
         let solution = if !physics.is_pack {
             let depths_m: Vec<f64> = (0..layers).map(|j| (layers - 1 - j) as f64 * pitch_m).collect();
             let gathered = Response::half_space(&depths_m, diffusivity_m2_per_s, longest_s);
@@ -105,7 +108,14 @@ impl Heat {
             Solution::Linear(Response::new(&Layers::new(model, physics, height_m), heat, longest_s))
         };
         let first_s = 0.02 * pitch_m * pitch_m / (4.0 * diffusivity_m2_per_s);
-        Self { layers, has_heat: heat.is_some(), wants_rise: physics.depends_on_temperature(), solution, first_s }
+        Self {
+            layers,
+            has_heat: heat.is_some(),
+            wants_rise: physics.depends_on_temperature(),
+            solution,
+            ramp_before: physics.ramp_before,
+            first_s,
+        }
     }
 
     /// Whether any time can be asked for, free of steps.
@@ -146,8 +156,16 @@ impl Heat {
         }
     }
 
-    /// Adds what the ramps have no part in.
+    /// Adds what the profile's ramps have no part in.
     pub(super) fn finish(&self, state: &mut State) {
+        if let Some([rate_k_per_s, lasted_s]) = self.ramp_before {
+            self.add(state, rate_k_per_s, state.time_s + lasted_s);
+            self.add(state, -rate_k_per_s, state.time_s);
+            // Rises are counted from where the profile starts.
+            let risen_k = rate_k_per_s * lasted_s;
+            state.rise_k.iter_mut().for_each(|rise| *rise -= risen_k);
+            state.ambient_rise_k -= risen_k;
+        }
         if let (Solution::Linear(response), true) = (&self.solution, self.has_heat) {
             let State { rise_k, rate_k_per_s, moment_k_per_s, .. } = state;
             response.add_heat(state.time_s, rate_k_per_s, rise_k, moment_k_per_s);

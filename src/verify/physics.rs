@@ -32,6 +32,8 @@ pub(super) struct Physics {
     pub(crate) layer_changes: Vec<(usize, f64)>,
     /// Heat capacity and conductance inwards per area of the pack's outer surface, from the coil outwards.
     pub(crate) housings: Vec<[f64; 2]>,
+    /// Rate of the drive before the start, and for how long.
+    pub(crate) ramp_before: Option<[f64; 2]>,
     /// Parts that are not worked out a second time: a spool's flanges and wall, an uneven start, a sensor on spool or flange.
     pub(crate) is_beyond: bool,
     pub(crate) conductivity_slope_per_k: f64,
@@ -117,6 +119,7 @@ impl Physics {
             gaps: Vec::new(),
             layer_changes: Vec::new(),
             housings: Vec::new(),
+            ramp_before: None,
             is_beyond: matches!(model.location, Location::Spool | Location::Flange(_)),
             conductivity_slope_per_k: 0.0,
             missing_turns: 0.0,
@@ -160,6 +163,9 @@ impl Physics {
                 }
                 (_, "axial_gradient", &[film_w_per_m2_k]) => {
                     p.flanges.push(HeatedFlange { is_first: choices == [0], film_w_per_m2_k });
+                }
+                (_, "unsteady_start", &[0.0, 0.0, 0.0, rate_k_per_s, lasted_s]) => {
+                    p.ramp_before = Some([rate_k_per_s, lasted_s]);
                 }
                 (_, "spool_flange" | "spool_conduction" | "unsteady_start", _) => p.is_beyond = true,
                 (_, "housing", &[capacity, gap_m, gas, emissivity, middle_k, spacers]) => {
@@ -207,6 +213,8 @@ impl Physics {
         }
         let varies = !p.flanges.is_empty() || p.conductivity_slope_per_k != 0.0;
         p.is_beyond |= !p.housings.is_empty() && varies;
+        // What is stepped begins at rest.
+        p.is_beyond |= p.ramp_before.is_some() && p.conductivity_slope_per_k != 0.0;
         Ok(p)
     }
 

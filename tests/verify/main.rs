@@ -176,6 +176,10 @@ const EFFECTS: &[&str] = &[
      [[effect]]\nkind = 'spool_mass'\nheat_capacity_j_per_m2_k = 3000.0\ncontact_w_per_m2_k = 200.0\n\
      mount_w_per_m2_k = 25.0\n[[effect]]\nkind = 'self_heating'\npower_w_per_m2 = 50.0\ntime_constant_s = 600.0",
     "kind = 'stress_gradient'\nstrength = 0.05",
+    "kind = 'unsteady_start'\nrate_c_per_h = 40.0\nlasted_s = 5000.0",
+    "kind = 'unsteady_start'\nrate_c_per_h = -50.0\nlasted_s = 900.0\n[[effect]]\nkind = 'surface_film'\nfilm_w_per_m2_k = 30.0\n\
+     [[effect]]\nkind = 'thermo_optic_temperature'\nslope_per_k = 0.002\n[[effect]]\nkind = 'axial_gradient'\n\
+     film_w_per_m2_k = 20.0\nflange = 'first'",
     "kind = 'layer_gain'\nlayer = 9\nchange = -0.08",
     "kind = 'layer_gap'\nabove_layer = 7\nconductance_w_per_m2_k = 250.0",
     "kind = 'layer_gap'\nabove_layer = 11\nconductance_w_per_m2_k = 120.0",
