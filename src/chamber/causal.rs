@@ -4,11 +4,11 @@ use super::fit::Fit;
 use super::learned::Learned;
 use super::parameter::Place;
 use super::prior::{PRIORS, Quantity};
-use super::system::{Gains, Layout, Numbers, Parts, driven_by_air, dynamics, places, response};
+use super::system::{Gains, Layout, Numbers, Parts, Shows, driven_by_air, dynamics, places, response};
 use super::{Chamber, FEWEST_MODES, HALF_SPACE_MODES, MODES_PER_ROW, MOST_MODES};
 use crate::thermal::pack::Pack;
 use crate::thermal::reduced::Reduced;
-use crate::thermal::{Extent, HeatPath, Location, ThermalError};
+use crate::thermal::{Extent, HeatPath, ThermalError};
 
 /// Chamber, sensor and film in numbers.
 #[derive(Debug, Clone)]
@@ -132,8 +132,9 @@ impl Causal {
         surroundings: &Surroundings,
         row_s: f64,
     ) -> Result<Self, ThermalError> {
-        let shows_air = path.location != Location::OuterLayer;
-        let film = if shows_air { path.film_w_per_m2_k.unwrap_or(f64::INFINITY) } else { surroundings.film_w_per_m2_k };
+        let shows = Shows::of(path.location);
+        let own = path.film_w_per_m2_k.unwrap_or(f64::INFINITY);
+        let film = if path.film_is_unknown() { surroundings.film_w_per_m2_k } else { own };
         let (driven, skin_s) = driven_by_air(path, film);
         let modes = if path.extent == Extent::HalfSpace {
             HALF_SPACE_MODES
@@ -141,11 +142,11 @@ impl Causal {
             let slow = Pack::new(&driven)?.decays_per_s().iter().filter(|l| *l * row_s < MODES_PER_ROW).count();
             slow.clamp(FEWEST_MODES, MOST_MODES)
         };
-        let reduced = Reduced::new(&driven, modes, row_s, LONGEST_S)?;
+        let reduced = Reduced::new(&driven, path.sensors_part(), modes, row_s, LONGEST_S)?;
         let mut outputs = layer_gains.to_vec();
         outputs.resize(reduced.outputs, 0.0);
         let gains = Gains { outputs, air: air_gain };
-        let parts = Parts { reduced: &reduced, gains: &gains, skin_s, shows_air, lag_s, drift: false, cycle: false };
+        let parts = Parts { reduced: &reduced, gains: &gains, skin_s, shows, lag_s, drift: false, cycle: false };
         let layout = Layout::with(&parts, false, false);
         let mut numbers = surroundings.numbers;
         // Only the gyro's own states hang on these.

@@ -15,7 +15,7 @@
 
 use super::filter::{MEASURED, RATE, Values};
 use super::series::Series;
-use super::system::{Gains, driven_by_air};
+use super::system::{Gains, Shows, driven_by_air};
 use crate::effect::PackState;
 use crate::rate::{Past, RateModel};
 use crate::thermal::reduced::Reduced;
@@ -83,7 +83,7 @@ pub(super) struct Asked<'a> {
     pub(crate) rate: &'a RateModel,
     /// Whether the rate is more than the gains say.
     pub(crate) beyond_linear: bool,
-    pub(crate) shows_air: bool,
+    pub(crate) shows: Shows,
     pub(crate) lag_s: f64,
 }
 
@@ -104,18 +104,22 @@ pub(super) fn known(asked: &Asked, series: &Series, reference: &Reference) -> Re
         return Ok(values);
     }
     let rows = series.times_s.len();
-    let outputs = asked.reduced.outputs;
     let mut rates = vec![0.0; rows];
     if asked.path.has_own_course() || asked.path.conductivity_slope_per_k != 0.0 {
         let changes = changes(asked, series, reference)?;
-        let outer: Vec<f64> = (0..rows).map(|k| changes[k * outputs + asked.reduced.layers - 1]).collect();
-        if !asked.shows_air {
-            values.of[0] = lagged(&outer, &series.times_s, asked.lag_s);
+        let columns = changes.len() / rows;
+        let shown = match asked.shows {
+            Shows::Air => None,
+            Shows::Part => asked.reduced.part,
+            Shows::OuterLayer => Some(asked.reduced.layers - 1),
+        };
+        if let Some(shown) = shown {
+            let of_shown: Vec<f64> = changes.chunks_exact(columns).map(|row| row[shown]).collect();
+            values.of[0] = lagged(&of_shown, &series.times_s, asked.lag_s);
         }
-        values.of[1] = (0..rows).map(|k| changes[k * outputs]).collect();
-        let content: Vec<f64> = (0..rows)
-            .map(|k| changes[k * outputs..(k + 1) * outputs].iter().zip(&asked.gains.outputs).map(|(c, g)| c * g).sum())
-            .collect();
+        values.of[1] = changes.chunks_exact(columns).map(|row| row[0]).collect();
+        let of_rate = |row: &[f64]| row.iter().zip(&asked.gains.outputs).map(|(c, g)| c * g).sum();
+        let content: Vec<f64> = changes.chunks_exact(columns).map(of_rate).collect();
         for k in 1..rows {
             rates[k] += (content[k] - content[k - 1]) / (series.times_s[k] - series.times_s[k - 1]);
         }
@@ -144,9 +148,9 @@ fn lagged(values: &[f64], times_s: &[f64], lag_s: f64) -> Vec<f64> {
     out
 }
 
-/// Known changes of the outputs, row-major rows × outputs.
+/// Known changes of the outputs and of the part that carries the sensor, row-major rows × these.
 pub(super) fn changes(asked: &Asked, series: &Series, reference: &Reference) -> Result<Vec<f64>, ThermalError> {
-    let (rows, outputs) = (series.times_s.len(), asked.reduced.outputs);
+    let (rows, outputs) = (series.times_s.len(), asked.reduced.residue.len());
     let mut changes = vec![0.0; rows * outputs];
     for (k, line) in changes.chunks_exact_mut(outputs).enumerate() {
         if let Some(heat) = asked.reduced.own_k(series.times_s[k] - series.start_s) {
@@ -175,10 +179,11 @@ pub(super) fn changes(asked: &Asked, series: &Series, reference: &Reference) -> 
             path.material = path.material.scaled(factor);
             path = path.driven_only();
             let (path, _) = driven_by_air(&path, asked.film_w_per_m2_k);
-            let there = Reduced::new(&path, asked.modes, series.shortest_s(), series.duration_s)?;
-            fields.push(driven(&there, series, &reference.air_k));
+            let part = asked.path.sensors_part();
+            let there = Reduced::new(&path, part, asked.modes, series.shortest_s(), series.duration_s)?;
+            fields.push(there.driven(&series.times_s, &reference.air_k));
         }
-        let here = driven(asked.reduced, series, &reference.air_k);
+        let here = asked.reduced.driven(&series.times_s, &reference.air_k);
         for (k, temperature_k) in temperatures.iter().enumerate() {
             let x = (temperature_k - nodes[1]) / (nodes[2] - nodes[1]);
             let weights = [0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0)];
@@ -190,27 +195,6 @@ pub(super) fn changes(asked: &Asked, series: &Series, reference: &Reference) -> 
         }
     }
     Ok(changes)
-}
-
-/// Outputs while an air drives a pack that was in equilibrium with its first value; linear between rows.
-fn driven(reduced: &Reduced, series: &Series, air_k: &[f64]) -> Vec<f64> {
-    let mut modes = vec![air_k[0]; reduced.modes()];
-    let mut out = Vec::with_capacity(air_k.len() * reduced.outputs);
-    for k in 0..air_k.len() {
-        if k > 0 {
-            let step_s = series.times_s[k] - series.times_s[k - 1];
-            let slope = (air_k[k] - air_k[k - 1]) / step_s;
-            for (x, l) in modes.iter_mut().zip(&reduced.decay_per_s) {
-                let lag = slope / l;
-                *x = air_k[k] - lag + (*x - air_k[k - 1] + lag) * (-l * step_s).exp();
-            }
-        }
-        for j in 0..reduced.outputs {
-            let sum: f64 = reduced.row(j).iter().zip(&modes).map(|(a, x)| a * x).sum();
-            out.push(sum + reduced.residue[j] * air_k[k]);
-        }
-    }
-    out
 }
 
 /// Adds what the full model says at the reference beyond its linear part; NaN where a channel has no value.

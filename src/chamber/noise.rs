@@ -8,7 +8,7 @@
 use super::filter::RATE;
 use super::fit::Fit;
 use super::prior::Quantity;
-use super::system::{Numbers, Parts};
+use super::system::{Numbers, Parts, Shows};
 use super::{Chamber, ChamberError, Place};
 
 /// What the rate of a record consists of beside the coil [rad/s].
@@ -52,7 +52,7 @@ impl Remedy {
             Remedy::QuieterSensor => scale(Quantity::ReadingNoise, 0.1),
             Remedy::FinerResolution => {}
             Remedy::SensorInAir => {
-                parts.shows_air = true;
+                parts.shows = Shows::Air;
                 parts.lag_s = 0.0;
             }
             Remedy::CalmerAir => {

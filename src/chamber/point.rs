@@ -4,13 +4,13 @@ use super::filter::{self, Innovation, Trace, Values};
 use super::known::{Asked, Reference, known, taken_off};
 use super::prior::Quantity;
 use super::series::Series;
-use super::system::{Gains, Layout, Numbers, Parts, driven_by_air, system};
+use super::system::{Gains, Layout, Numbers, Parts, Shows, driven_by_air, system};
 use super::{Assumption, ChamberError};
 use crate::effect::PackState;
 use crate::rate::{Past, RateModel};
 use crate::record::Record;
 use crate::thermal::reduced::Reduced;
-use crate::thermal::{HeatPath, Location, check};
+use crate::thermal::{HeatPath, check};
 
 /// The coil's side of a model: what does not depend on chamber and noise.
 #[derive(Debug)]
@@ -22,7 +22,7 @@ pub(super) struct CoilSide {
     pub(crate) gains: Gains,
     rate: RateModel,
     skin_s: Option<f64>,
-    shows_air: bool,
+    shows: Shows,
     lag_s: f64,
     beyond_linear: bool,
 }
@@ -51,11 +51,12 @@ impl CoilSide {
     ) -> Result<Self, ChamberError> {
         let model = &assumed.model;
         let path = model.heat_path()?;
-        let shows_air = path.location != Location::OuterLayer;
-        let film_w_per_m2_k = if shows_air { path.film_w_per_m2_k.unwrap_or(f64::INFINITY) } else { film };
+        let shows = Shows::of(path.location);
+        let film_w_per_m2_k = if path.film_is_unknown() { film } else { path.film_w_per_m2_k.unwrap_or(f64::INFINITY) };
         check(&path)?;
         let (driven, skin_s) = driven_by_air(&path, film_w_per_m2_k);
-        let reduced = Reduced::new(&driven, modes, observed.series.shortest_s(), observed.series.duration_s.max(1.0))?;
+        let (shortest_s, longest_s) = (observed.series.shortest_s(), observed.series.duration_s.max(1.0));
+        let reduced = Reduced::new(&driven, path.sensors_part(), modes, shortest_s, longest_s)?;
         let rate = RateModel::new(model, &assumed.pattern, &observed.channels)?;
         let gains = gains(&rate, &reduced, observed);
         let beyond_linear = model.effects.iter().any(|e| {
@@ -63,7 +64,7 @@ impl CoilSide {
             !bound.is_linear() || bound.path_depends_on_temperature() || !e.channels().is_empty()
         });
         let lag_s = model.sensor_lag_s();
-        Ok(Self { path, film_w_per_m2_k, modes, reduced, gains, rate, skin_s, shows_air, lag_s, beyond_linear })
+        Ok(Self { path, film_w_per_m2_k, modes, reduced, gains, rate, skin_s, shows, lag_s, beyond_linear })
     }
 
     pub(crate) fn parts<'a>(&'a self, assumed: &Assumption) -> Parts<'a> {
@@ -71,7 +72,7 @@ impl CoilSide {
             reduced: &self.reduced,
             gains: &self.gains,
             skin_s: self.skin_s,
-            shows_air: self.shows_air,
+            shows: self.shows,
             lag_s: self.lag_s,
             drift: assumed.drift,
             cycle: assumed.cycle,
@@ -87,7 +88,7 @@ impl CoilSide {
             gains: &self.gains,
             rate: &self.rate,
             beyond_linear: self.beyond_linear,
-            shows_air: self.shows_air,
+            shows: self.shows,
             lag_s: self.lag_s,
         }
     }
@@ -181,7 +182,8 @@ impl CoilSide {
         if asked.path.has_own_course() || asked.path.conductivity_slope_per_k != 0.0 {
             let about = before.unwrap_or(&found);
             let changes = super::known::changes(&asked, &observed.series, about)?;
-            found.outputs_k.iter_mut().zip(changes).for_each(|(o, c)| *o += c);
+            let of_outputs = changes.chunks_exact(changes.len() / rows).flat_map(|row| &row[..outputs]);
+            found.outputs_k.iter_mut().zip(of_outputs).for_each(|(o, c)| *o += c);
         }
         Ok(found)
     }
@@ -285,7 +287,7 @@ pub(super) fn smoothed(
 
 /// The film as a number of the chamber, where the model does not state one.
 pub(super) fn film_is_free(assumed: &Assumption) -> Result<bool, ChamberError> {
-    Ok(assumed.model.heat_path()?.location == Location::OuterLayer)
+    Ok(assumed.model.heat_path()?.film_is_unknown())
 }
 
 /// All quantities that an assumption has, for each record or for all.

@@ -68,17 +68,36 @@ pub(super) struct Parts<'a> {
     pub(crate) gains: &'a Gains,
     /// The drive follows the air with this time [s]; None: the film is in the modes.
     pub(crate) skin_s: Option<f64>,
-    /// The sensor shows the air, not the outermost layer.
-    pub(crate) shows_air: bool,
+    pub(crate) shows: Shows,
     pub(crate) lag_s: f64,
     pub(crate) drift: bool,
     pub(crate) cycle: bool,
 }
 
+/// What the sensor shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Shows {
+    Air,
+    /// A housing, the spool or a flange.
+    Part,
+    OuterLayer,
+}
+
+impl Shows {
+    pub(crate) fn of(location: Location) -> Self {
+        match location {
+            Location::Ambient => Shows::Air,
+            Location::OuterLayer => Shows::OuterLayer,
+            Location::Housing(_) | Location::Spool | Location::Flange(_) => Shows::Part,
+        }
+    }
+}
+
 /// Heat capacity that a pack is taken to have where only its diffusivity is known [J/(m³K)].
 const USUAL_CAPACITY_J_PER_M3_K: f64 = 1.7e6;
 
-/// A heat path as the air drives it, and the time of a skin where there is no film in it.
+/// A heat path as the air drives it, and the time of a skin where there is no film in it. A part that carries the sensor follows the air
+/// with the coil.
 pub(super) fn driven_by_air(path: &HeatPath, film_w_per_m2_k: f64) -> (HeatPath, Option<f64>) {
     let mut driven = path.clone();
     driven.conductivity_slope_per_k = 0.0;
@@ -96,7 +115,7 @@ pub(super) fn driven_by_air(path: &HeatPath, film_w_per_m2_k: f64) -> (HeatPath,
             heat_capacity_j_per_m3_k: USUAL_CAPACITY_J_PER_M3_K,
         };
     }
-    if path.location == Location::OuterLayer {
+    if path.location != Location::Ambient {
         driven.film_w_per_m2_k = Some(film_w_per_m2_k);
         driven.location = Location::Ambient;
     }
@@ -305,7 +324,12 @@ pub(super) fn places(parts: &Parts, layout: &Layout) -> [Vec<f64>; RATE] {
 }
 
 fn sensor_place(parts: &Parts, layout: &Layout) -> Vec<f64> {
-    if parts.shows_air { layout.air_row() } else { layout.output(parts.reduced, parts.reduced.layers - 1) }
+    match parts.shows {
+        Shows::Air => layout.air_row(),
+        // What carries the sensor is the last row.
+        Shows::Part => layout.output(parts.reduced, parts.reduced.part.unwrap_or(parts.reduced.layers - 1)),
+        Shows::OuterLayer => layout.output(parts.reduced, parts.reduced.layers - 1),
+    }
 }
 
 fn rate_row(layout: &Layout, f: &[f64], response: &[f64], shape: &Shape) -> Vec<f64> {

@@ -1,5 +1,6 @@
 //! A pack in a chamber whose air is known: what its layers do, and what the sensor shows.
 
+use super::reduced::Reduced;
 use super::{Drive, Extent, HeatPath, Instant, Location, Material, ThermalError};
 use crate::numeric::piecewise::PiecewiseLinear;
 
@@ -18,6 +19,9 @@ pub(crate) struct Exposure {
 
 /// Times at which the sensor's input is worked out between two readings.
 const STEPS_PER_READING: usize = 5;
+
+/// Modes that are enough for a part that carries the sensor.
+const PART_MODES: usize = 24;
 
 /// A path as a pack in the air, where a film stands in front of it.
 fn behind_film(path: &HeatPath) -> HeatPath {
@@ -49,13 +53,28 @@ pub(crate) fn expose(
         let shown_k = lagging(air_k, lag_s, times_s);
         return Ok(Exposure { path: path.clone(), drive: by_air, shown_k });
     }
-    let mut in_air = behind_film(path);
-    in_air.film_w_per_m2_k = film_w_per_m2_k;
     let between = |w: &[f64]| -> Vec<f64> {
         let share = |step: usize| step as f64 / STEPS_PER_READING as f64;
         (0..STEPS_PER_READING).map(|step| w[0] + share(step) * (w[1] - w[0])).collect()
     };
     let fine_s: Vec<f64> = times_s.windows(2).flat_map(between).chain(times_s.last().copied()).collect();
+    if let Some(part) = path.sensors_part() {
+        let in_air = HeatPath {
+            location: Location::Ambient,
+            film_w_per_m2_k: path.film_w_per_m2_k.or(film_w_per_m2_k),
+            ..path.clone()
+        };
+        let longest_s = fine_s[fine_s.len() - 1] - fine_s[0];
+        let reduced = Reduced::new(&in_air, Some(part), PART_MODES, 0.0, longest_s)?;
+        let fine_air: Vec<f64> = fine_s.iter().map(|&t| air_k.value(t)).collect();
+        let rows = reduced.driven(&fine_s, &fine_air);
+        let of_part = rows.chunks_exact(reduced.residue.len()).map(|row| row[reduced.outputs]).collect();
+        let of_part_k = PiecewiseLinear::new(fine_s, of_part).expect("the times are in order");
+        let shown_k = lagging(&of_part_k, lag_s, times_s);
+        return Ok(Exposure { path: in_air, drive: by_air, shown_k });
+    }
+    let mut in_air = behind_film(path);
+    in_air.film_w_per_m2_k = film_w_per_m2_k;
     let layers = path.shape.layers;
     let instants: Vec<Instant> = fine_s.iter().map(|&t| Instant::after(t)).collect();
     let field = super::solve(&in_air, &by_air)?.at(&instants);

@@ -24,7 +24,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::network::{Axis, Network};
-use super::pack::{AxialModes, Mode};
+use super::pack::{AxialModes, Mode, part_node};
 use super::{HeatPath, Location, ThermalError};
 use crate::numeric::tridiagonal::diagonalise_full;
 
@@ -53,6 +53,8 @@ struct Joined {
     inputs: [Vec<f64>; 4],
     /// Outputs × modes of the pack.
     seen: DMatrix<f64>,
+    /// Of the parts, what the temperature of the one that is asked for is made of; empty without one.
+    part: Vec<(usize, f64)>,
 }
 
 /// The parts' places among the unknowns.
@@ -91,15 +93,25 @@ impl Places {
 }
 
 /// The modes of everything together.
-pub(super) fn modes(path: &HeatPath, network: &Network, axial: &AxialModes) -> Result<Vec<Mode>, ThermalError> {
-    let joined = Joined::new(path, network, axial)?;
+pub(super) fn modes(
+    path: &HeatPath,
+    network: &Network,
+    axial: &AxialModes,
+    part: Option<Location>,
+) -> Result<Vec<Mode>, ThermalError> {
+    let joined = Joined::new(path, network, axial, part)?;
     let basis = joined.basis()?;
     joined.projected(&basis)
 }
 
 impl Joined {
     #[expect(clippy::too_many_lines, reason = "one assembly: every coupling is taken from the same rows")]
-    fn new(path: &HeatPath, network: &Network, axial: &AxialModes) -> Result<Self, ThermalError> {
+    fn new(
+        path: &HeatPath,
+        network: &Network,
+        axial: &AxialModes,
+        part: Option<Location>,
+    ) -> Result<Self, ThermalError> {
         let axis = Axis::new(path).ok_or(ThermalError::Eigen)?;
         let places = Places::new(path, network, axial.mean.len());
         let (pack, layers) = (network.pack(), network.layers);
@@ -135,10 +147,25 @@ impl Joined {
             own: DMatrix::zeros(places.count, places.count),
             inputs: [(); 4].map(|()| Vec::new()),
             seen: DMatrix::zeros(2 * layers, n * axial.mean.len()),
+            part: Vec::new(),
         };
         let ends: Vec<(usize, f64)> = axis.flanges.clone();
         let plain = ends.len() - path.spool_flanges.len();
         let capacities = joined.fill_parts(path, network, axial, &axis, &places, face);
+        if let Some(part) = part {
+            let own = match part {
+                Location::Spool => {
+                    places.spool.map(|first| (0..axial.mean.len()).map(|m| (first + m, axial.mean[m])).collect())
+                }
+                Location::Flange(flange) => {
+                    let index = path.spool_flanges.iter().position(|own| own.flange == flange);
+                    index.and_then(|index| places.flanges[index]).map(|place| vec![(place, 1.0)])
+                }
+                other => part_node(path, network, other).map(|node| vec![(places.housings.0 + node - pack.end, 1.0)]),
+            };
+            let own: Vec<(usize, f64)> = own.ok_or(ThermalError::Eigen)?;
+            joined.part = own.into_iter().map(|(place, share)| (place, share / capacities[place].sqrt())).collect();
+        }
         let around = places.around();
         let mut of_modes = [(); 4].map(|()| Vec::new());
         for m in 0..axial.mean.len() {
@@ -409,11 +436,15 @@ impl Joined {
         let images: Vec<Vec<f64>> = basis.iter().map(|v| self.times(v)).collect();
         let matrix =
             DMatrix::from_fn(count, count, |a, b| 0.5 * (dot(&basis[a], &images[b]) + dot(&basis[b], &images[a])));
-        let outputs = self.seen.nrows();
+        let outputs = self.seen.nrows() + usize::from(!self.part.is_empty());
         let mut rows = DMatrix::zeros(outputs + self.inputs.len(), count);
         for (v, direction) in basis.iter().enumerate() {
             let q = DVector::from_column_slice(&direction[..self.decay_per_s.len()]);
-            rows.view_mut((0, v), (outputs, 1)).copy_from(&(&self.seen * q));
+            rows.view_mut((0, v), (self.seen.nrows(), 1)).copy_from(&(&self.seen * q));
+            if !self.part.is_empty() {
+                let parts = &direction[self.decay_per_s.len()..];
+                rows[(outputs - 1, v)] = self.part.iter().map(|(place, share)| share * parts[*place]).sum();
+            }
             for (kind, input) in self.inputs.iter().enumerate() {
                 rows[(outputs + kind, v)] = dot(input, direction);
             }

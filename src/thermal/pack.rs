@@ -145,14 +145,22 @@ impl Pack {
     /// Values so extreme that the eigenvalues do not converge or are not positive.
     #[expect(clippy::too_many_lines, reason = "modes, then what each input makes of them, from the same sums")]
     pub fn new(path: &HeatPath) -> Result<Self, ThermalError> {
+        Self::with_part(path, None)
+    }
+
+    /// With the temperature of a part around the coil (housing, spool, flange) as one more output, the last.
+    ///
+    /// # Errors
+    /// As [`Pack::new`]; a part that is not there, or is the drive.
+    pub(super) fn with_part(path: &HeatPath, part: Option<Location>) -> Result<Self, ThermalError> {
         let network = Network::new(path);
         let axial = AxialModes::new(path, &network)?;
         let layers = network.layers;
-        let outputs = layers * if axial.has_moments() { 2 } else { 1 };
+        let outputs = layers * if axial.has_moments() { 2 } else { 1 } + usize::from(part.is_some());
         let mut modes = if path.is_joined() {
-            joined::modes(path, &network, &axial)?
+            joined::modes(path, &network, &axial, part)?
         } else {
-            separable_modes(path, &network, &axial)?
+            separable_modes(path, &network, &axial, part)?
         };
         if modes.iter().any(|mode| !(mode.decay_per_s > 0.0)) {
             return Err(ThermalError::Eigen);
@@ -267,18 +275,40 @@ impl Pack {
 }
 
 /// Products of radial and axial modes.
-fn separable_modes(path: &HeatPath, network: &Network, axial: &AxialModes) -> Result<Vec<Mode>, ThermalError> {
+fn separable_modes(
+    path: &HeatPath,
+    network: &Network,
+    axial: &AxialModes,
+    part: Option<Location>,
+) -> Result<Vec<Mode>, ThermalError> {
+    let part = part.map(|part| part_node(path, network, part).ok_or(ThermalError::Eigen)).transpose()?;
     let mut modes = Vec::with_capacity(network.nodes() * axial.mean.len());
     // A spool does not conduct along the axis: only without one do all axial modes share their radial ones.
-    let shared = (network.pack_nodes == network.nodes()).then(|| radial(path, network, axial, 0.0)).transpose()?;
+    let shared =
+        (network.pack_nodes == network.nodes()).then(|| radial(path, network, axial, part, 0.0)).transpose()?;
     for m in 0..axial.mean.len() {
         let extra_per_s = axial.diffusivity_m2_per_s * axial.decay_per_m2[m];
         match &shared {
-            Some(shared) => modes.extend(radial_modes(shared, extra_per_s, network, axial, m)),
-            None => modes.extend(radial_modes(&radial(path, network, axial, extra_per_s)?, 0.0, network, axial, m)),
+            Some(shared) => modes.extend(radial_modes(shared, extra_per_s, network, axial, part, m)),
+            None => {
+                let own = radial(path, network, axial, part, extra_per_s)?;
+                modes.extend(radial_modes(&own, 0.0, network, axial, part, m));
+            }
         }
     }
     Ok(modes)
+}
+
+/// The node of a part around the coil; none where that is not there.
+pub(super) fn part_node(path: &HeatPath, network: &Network, part: Location) -> Option<usize> {
+    match part {
+        Location::Spool => (network.spool_nodes > 0).then_some(0),
+        Location::Housing(place) => {
+            let index = path.enclosure().0.iter().position(|housing| housing.place == place)?;
+            Some(network.pack().end + index)
+        }
+        _ => None,
+    }
 }
 
 /// Radial modes: their decays, and what layers (rows) and inputs (the last rows) see of each.
@@ -288,12 +318,18 @@ struct Radial {
 }
 
 /// With `extra_per_s` added to every cell's decay.
-fn radial(path: &HeatPath, network: &Network, axial: &AxialModes, extra_per_s: f64) -> Result<Radial, ThermalError> {
+fn radial(
+    path: &HeatPath,
+    network: &Network,
+    axial: &AxialModes,
+    part: Option<usize>,
+    extra_per_s: f64,
+) -> Result<Radial, ThermalError> {
     let (n, layers) = (network.nodes(), network.layers);
     let has_moments = axial.has_moments();
-    let (boundary_row, ambient_row, heat_row, start_row, flange_row) =
-        (layers, layers + 1, layers + 2, layers + 3, layers + 4);
-    let mut rows = DMatrix::zeros(layers + 4 + usize::from(has_moments), n);
+    let (boundary_row, ambient_row, heat_row, start_row, part_row, flange_row) =
+        (layers, layers + 1, layers + 2, layers + 3, layers + 4, layers + 5);
+    let mut rows = DMatrix::zeros(layers + 5 + usize::from(has_moments), n);
     let boundary = network.boundary();
     for (i, capacity) in network.capacity.iter().enumerate() {
         let root = capacity.sqrt();
@@ -311,6 +347,9 @@ fn radial(path: &HeatPath, network: &Network, axial: &AxialModes, extra_per_s: f
                 i if network.pack().contains(&i) => start.pack_above_k,
                 _ => start.housing_above_k,
             });
+        if part == Some(i) {
+            rows[(part_row, i)] = 1.0 / root;
+        }
         if has_moments && network.pack().contains(&i) {
             rows[(flange_row, i)] = root * axial.diffusivity_m2_per_s;
         }
@@ -325,12 +364,13 @@ fn radial_modes(
     extra_per_s: f64,
     network: &Network,
     axial: &AxialModes,
+    part: Option<usize>,
     m: usize,
 ) -> impl Iterator<Item = Mode> {
     let (n, layers) = (network.nodes(), network.layers);
     let has_moments = axial.has_moments();
-    let (boundary_row, ambient_row, heat_row, start_row, flange_row) =
-        (layers, layers + 1, layers + 2, layers + 3, layers + 4);
+    let (boundary_row, ambient_row, heat_row, start_row, part_row, flange_row) =
+        (layers, layers + 1, layers + 2, layers + 3, layers + 4, layers + 5);
     let rows = &radial.rows;
     (0..n).map(move |i| {
         let mut seen = vec![0.0; layers * if has_moments { 2 } else { 1 }];
@@ -339,6 +379,9 @@ fn radial_modes(
             if has_moments {
                 seen[layers + layer] = axial.moment[m] * rows[(layer, i)];
             }
+        }
+        if part.is_some() {
+            seen.push(axial.mean[m] * rows[(part_row, i)]);
         }
         let from_flange = if has_moments { axial.flange_per_m2[m] * rows[(flange_row, i)] } else { 0.0 };
         Mode {

@@ -293,6 +293,19 @@ impl HeatPath {
         }
     }
 
+    /// The part that carries the sensor, where that is neither the air nor the coil itself.
+    pub(crate) fn sensors_part(&self) -> Option<Location> {
+        match self.location {
+            Location::OuterLayer | Location::Ambient => None,
+            part => Some(part),
+        }
+    }
+
+    /// Whether nothing says how fast what the sensor sits on follows the air: the film is not stated, or lies behind a prescribed layer.
+    pub(crate) fn film_is_unknown(&self) -> bool {
+        self.location == Location::OuterLayer || (self.sensors_part().is_some() && self.film_w_per_m2_k.is_none())
+    }
+
     /// Whether parts meet that do not share the modes of the axis: one temperature of a flange or a housing faces all places.
     pub(crate) fn is_joined(&self) -> bool {
         let along = self.spool_wall.is_some() || !self.enclosure().0.is_empty();

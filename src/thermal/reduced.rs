@@ -23,17 +23,19 @@ use nalgebra::{DMatrix, DVector};
 use super::half_space::HalfSpace;
 use super::modal::heated_mode;
 use super::pack::Pack;
-use super::{BoreHeat, Extent, HeatPath, ThermalError};
+use super::{BoreHeat, Extent, HeatPath, Location, ThermalError};
 
 /// A heat path's slow part.
 ///
 /// # Shapes
-/// Outputs: the layers' means, innermost first, then (with a heated flange) their first axial moments. `amplitude` is
-/// row-major outputs × modes.
+/// Outputs: the layers' means, innermost first, then (with a heated flange) their first axial moments. Rows: these, and the part that
+/// carries the sensor, where it is one. `amplitude` is row-major rows × modes.
 #[derive(Debug, Clone)]
 pub(crate) struct Reduced {
     pub(crate) layers: usize,
     pub(crate) outputs: usize,
+    /// The row of the part that carries the sensor.
+    pub(crate) part: Option<usize>,
     /// Ascending.
     pub(crate) decay_per_s: Vec<f64>,
     pub(crate) amplitude: Vec<f64>,
@@ -53,20 +55,27 @@ struct OwnCourse {
 const FIT_POINTS: usize = 80;
 
 impl Reduced {
-    /// At most `modes` states; a half space is fitted between `shortest_s` and `longest_s`.
+    /// At most `modes` states, and the temperature of a part around the coil that carries the sensor; a half space is fitted between `shortest_s` and `longest_s`.
     ///
     /// # Errors
-    /// As [`Pack::new`]; a half space whose fit is singular.
-    pub(crate) fn new(path: &HeatPath, modes: usize, shortest_s: f64, longest_s: f64) -> Result<Self, ThermalError> {
+    /// As [`Pack::new`]; a half space whose fit is singular; a part that is not there.
+    pub(crate) fn new(
+        path: &HeatPath,
+        part: Option<Location>,
+        modes: usize,
+        shortest_s: f64,
+        longest_s: f64,
+    ) -> Result<Self, ThermalError> {
         match path.extent {
-            Extent::Pack => Ok(Self::of_pack(&Pack::new(path)?, modes)),
+            Extent::Pack => Ok(Self::of_pack(&Pack::with_part(path, part)?, part.is_some(), modes)),
             Extent::HalfSpace => Self::of_half_space(path, modes, shortest_s, longest_s),
         }
     }
 
-    fn of_pack(pack: &Pack, modes: usize) -> Self {
+    fn of_pack(pack: &Pack, has_part: bool, modes: usize) -> Self {
         let joint = pack.joint();
-        let outputs = pack.outputs;
+        let rows = pack.outputs;
+        let outputs = rows - usize::from(has_part);
         // What a mode takes away while the drive ramps; where a flange is heated the slowest modes need not matter most.
         let lag = |i: usize| joint.amplitude.column(i).iter().map(|a| a.abs()).sum::<f64>() / pack.decay_per_s[i];
         let mut kept: Vec<usize> = (0..pack.modes()).collect();
@@ -76,8 +85,9 @@ impl Reduced {
         let mut reduced = Self {
             layers: pack.layers,
             outputs,
+            part: has_part.then_some(outputs),
             decay_per_s: kept.iter().map(|&i| pack.decay_per_s[i]).collect(),
-            amplitude: Vec::with_capacity(outputs * kept.len()),
+            amplitude: Vec::with_capacity(rows * kept.len()),
             residue: joint.steady.as_slice().to_vec(),
             own: (pack.heat.is_some() || pack.start.is_some()).then(|| OwnCourse {
                 decay_per_s: pack.decay_per_s.clone(),
@@ -85,7 +95,7 @@ impl Reduced {
                 start: pack.start.as_ref().map(|start| start.content.clone()),
             }),
         };
-        for j in 0..outputs {
+        for j in 0..rows {
             for &i in &kept {
                 let a = joint.amplitude[(j, i)];
                 reduced.amplitude.push(a);
@@ -123,7 +133,7 @@ impl Reduced {
             })),
             decay_per_s: decay_per_s.clone(),
         });
-        Ok(Self { layers, outputs: layers, decay_per_s, amplitude, residue, own })
+        Ok(Self { layers, outputs: layers, part: None, decay_per_s, amplitude, residue, own })
     }
 
     pub(crate) fn modes(&self) -> usize {
@@ -135,14 +145,36 @@ impl Reduced {
         &self.amplitude[output * self.modes()..(output + 1) * self.modes()]
     }
 
-    /// What the bore's heat, and a start that was not steady, add to each output so long after power-on; None without either.
+    /// The temperatures of all rows while an air drives the pack that was in equilibrium with its first value; the air is straight
+    /// between times.
+    pub(crate) fn driven(&self, times_s: &[f64], air_k: &[f64]) -> Vec<f64> {
+        let mut modes = vec![air_k[0]; self.modes()];
+        let mut out = Vec::with_capacity(air_k.len() * self.residue.len());
+        for k in 0..air_k.len() {
+            if k > 0 {
+                let step_s = times_s[k] - times_s[k - 1];
+                let slope = (air_k[k] - air_k[k - 1]) / step_s;
+                for (x, l) in modes.iter_mut().zip(&self.decay_per_s) {
+                    let lag = slope / l;
+                    *x = air_k[k] - lag + (*x - air_k[k - 1] + lag) * (-l * step_s).exp();
+                }
+            }
+            for (j, residue) in self.residue.iter().enumerate() {
+                let sum: f64 = self.row(j).iter().zip(&modes).map(|(a, x)| a * x).sum();
+                out.push(sum + residue * air_k[k]);
+            }
+        }
+        out
+    }
+
+    /// What the bore's heat, and a start that was not steady, add to each row so long after power-on; None without either.
     pub(crate) fn own_k(&self, since_s: f64) -> Option<Vec<f64>> {
         let own = self.own.as_ref()?;
         let left = DVector::from_iterator(
             own.decay_per_s.len(),
             own.decay_per_s.iter().map(|&l| (-l * since_s.max(0.0)).exp()),
         );
-        let mut sum = own.start.as_ref().map_or_else(|| DVector::zeros(self.outputs), |start| start * &left);
+        let mut sum = own.start.as_ref().map_or_else(|| DVector::zeros(self.residue.len()), |start| start * &left);
         if let Some((heat, content)) = &own.heat {
             let building = (-since_s / heat.time_constant_s).exp();
             let contents = own.decay_per_s.iter().zip(left.iter());
@@ -181,7 +213,7 @@ mod tests {
         let mut path = path(Extent::Pack);
         path.film_w_per_m2_k = Some(25.0);
         path.bore_heat = Some(BoreHeat { power_w_per_m2: 100.0, time_constant_s: 500.0 });
-        let reduced = Reduced::new(&path, 5, 10.0, 1e4).unwrap();
+        let reduced = Reduced::new(&path, None, 5, 10.0, 1e4).unwrap();
         let drive = Drive::boundary(PiecewiseLinear::new(vec![0.0, 900.0], vec![0.0, 15.0]).unwrap());
         let field = solve(&path, &drive).unwrap();
         for time_s in [10.0, 60.0, 300.0, 900.0] {
@@ -198,7 +230,7 @@ mod tests {
     fn eight_exponentials_are_a_half_space_within_a_sixtieth() {
         let mut path = path(Extent::HalfSpace);
         path.location = Location::OuterLayer;
-        let reduced = Reduced::new(&path, 8, 10.0, 15_000.0).unwrap();
+        let reduced = Reduced::new(&path, None, 8, 10.0, 15_000.0).unwrap();
         let half_space = HalfSpace::new(&path);
         let mut exact = vec![0.0; 24];
         for time_s in [10.0_f64, 40.0, 200.0, 1000.0, 6000.0, 14_000.0] {
