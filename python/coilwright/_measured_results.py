@@ -191,6 +191,7 @@ class TrimResult(Result):
     cut_m: float
     end: str
     turns_at_other_end: float
+    turns_at_other_end_standard_error: float | None
     present_rate_deg_per_h: float
     predicted_rate_deg_per_h: float
     predicted_rate_standard_error_deg_per_h: float | None

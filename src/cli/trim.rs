@@ -46,15 +46,17 @@ fn text(body: &TrimJson) -> String {
         "; no more than its error allows: measure a steeper or longer ramp first"
     };
     format!(
-        "{} with {}\nasymmetric length  {:.4}{} m (surplus at end A where positive){doubt}\ncut                {:.4} m at end {}, or wind {:.3} turns more at the other end\n\
+        "{} with {}\nasymmetric length  {:.4}{} m (surplus at end A where positive){doubt}\ncut                {:.4}{} m at end {}, or wind {:.3}{} turns more at the other end\n\
          largest rate error {:.4} °/h now, {:.4}{} °/h after the cut, under the same temperatures\n",
         body.model,
         body.pattern,
         length.value,
         error(length.standard_error, 4),
         body.cut_m,
+        error(length.standard_error, 4),
         body.end,
         body.turns_at_other_end,
+        error(body.turns_at_other_end_standard_error, 3),
         body.present_rate_deg_per_h,
         body.predicted_rate_deg_per_h,
         error(body.predicted_rate_standard_error_deg_per_h, 4),

@@ -42,6 +42,7 @@ pub(crate) struct Trim {
     pub(crate) end: End,
     /// As many turns more on the outermost layer at the other end do the same.
     pub(crate) turns_at_other_end: f64,
+    pub(crate) turns_standard_error: Option<f64>,
     /// The largest rate error under the records' temperatures: of the coil as it is, and after the cut.
     pub(crate) present_rad_per_s: f64,
     pub(crate) predicted_rad_per_s: f64,
@@ -100,13 +101,14 @@ pub(crate) fn trim(request: &Request) -> Result<Trim, DiagnoseError> {
     };
     let coil = &request.model.coil;
     let outermost_m = coil.bore_radius_m() + (coil.layers() as f64 - 0.5) * coil.radial_pitch_m();
-    let length_m = 2.0 * offset_m;
+    let (length_m, turn_m) = (2.0 * offset_m, std::f64::consts::TAU * outermost_m);
     Ok(Trim {
         asymmetric_length_m: length_m,
         standard_error_m: error_m.map(|e| 2.0 * e),
         cut_m: length_m.abs(),
         end: if length_m >= 0.0 { End::A } else { End::B },
-        turns_at_other_end: length_m.abs() / (std::f64::consts::TAU * outermost_m),
+        turns_at_other_end: length_m.abs() / turn_m,
+        turns_standard_error: error_m.map(|e| 2.0 * e / turn_m),
         present_rad_per_s: size(&present),
         predicted_rad_per_s: size(&after),
         uncertain_rad_per_s,

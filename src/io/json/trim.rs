@@ -19,6 +19,7 @@ pub struct TrimJson {
     pub(crate) end: &'static str,
     /// As many turns more on the outermost layer at the other end do the same.
     pub(crate) turns_at_other_end: f64,
+    pub(crate) turns_at_other_end_standard_error: Option<f64>,
     /// Whether the length is more than two standard errors.
     pub(crate) is_significant: bool,
     /// The largest rate error under the records' temperatures, as the coil is, and after the cut.
@@ -52,6 +53,7 @@ impl TrimJson {
                 End::B => "B",
             },
             turns_at_other_end: trim.turns_at_other_end,
+            turns_at_other_end_standard_error: trim.turns_standard_error,
             is_significant: trim.standard_error_m.is_some_and(|e| trim.cut_m > 2.0 * e),
             present_rate_deg_per_h: deg_per_h_from_rad_per_s(trim.present_rad_per_s),
             predicted_rate_deg_per_h: deg_per_h_from_rad_per_s(trim.predicted_rad_per_s),
