@@ -251,7 +251,8 @@ pub fn optimise(
         let (class, objective) = (request.class, request.objective);
         let stated = budget.map(|budget| format!("{}s", budget.as_secs_f64()));
         let budget_stated = stated.as_deref();
-        let run = Run { file: &file, class, objective, plan: &plan, budget: budget_stated, cutting_planes };
+        let run =
+            Run { file: &file, class, objective, plan: &plan, budget: budget_stated, cutting_planes, fields: &[] };
         let mut watch = SearchWatch {
             prove,
             kept: output.clone().map(|folder| (folder, run)),
