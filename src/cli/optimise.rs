@@ -21,6 +21,7 @@ use crate::io::read::posterior::drawn_models;
 use crate::io::write::checkpoint::{BROKEN_FILE, CHECKPOINT_FILE, read_checkpoint, set_broken_aside};
 use crate::io::write::run_directory::{Request, check_kept};
 use crate::pattern::windability::WindabilityClass;
+use crate::rate::CoilModel;
 use crate::search;
 use crate::search::anneal::rounds::{DEFAULT_RESTARTS_PER_ROUND, State};
 use crate::search::answer::Ended;
@@ -202,13 +203,7 @@ pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliE
         cutting_planes: arguments.cutting_planes,
         fields: &[],
     };
-    let uncertain = match &arguments.diagnosis {
-        None => Vec::new(),
-        Some(path) => {
-            let found = read_diagnosis(path)?;
-            drawn_models(&file.model, &found.posterior, &found.refitted, DRAWN_MODELS, plan.seed)
-        }
-    };
+    let uncertain = models_of(arguments.diagnosis.as_deref(), &file, plan.seed)?;
     searched.uncertain = &uncertain;
     let folder = arguments.output.as_deref();
     folder.map_or(Ok(()), |folder| check_kept(folder, screen.named().chain(file.files())))?;
@@ -235,6 +230,13 @@ pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliE
     }
     screen.answer(document, text)?;
     Ok(if answer.ended == Ended::Signal { Ending::Interrupted } else { Ending::Done })
+}
+
+/// Models that may be the true one by a diagnosis; none without one.
+fn models_of(diagnosis: Option<&Path>, file: &ModelFile, seed: u64) -> Result<Vec<CoilModel>, CliError> {
+    let Some(path) = diagnosis else { return Ok(Vec::new()) };
+    let found = read_diagnosis(path)?;
+    Ok(drawn_models(&file.model, &found.posterior, &found.refitted, DRAWN_MODELS, seed))
 }
 
 /// A saved state that fits no search is the checkpoint's fault.

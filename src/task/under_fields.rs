@@ -259,14 +259,6 @@ pub(crate) fn search(
         consider(&named, &shown, cost);
     }
     let Some((named, best, cost)) = best else { return Ok(None) };
-    let over = if fields.len() == 1 { "the field".to_owned() } else { format!("{} fields", fields.len()) };
-    let shown = |cost: f64| format!("{:.4} {}", deg_per_h_from_rad_per_s(cost), objective.unit());
-    let against = qua.map_or_else(String::new, |qua| format!("; QUA has {}", shown(qua)));
-    let statement = format!(
-        "The best pattern found has a {} of {} in the class {class}, over {over}{against}. It holds for these temperatures only.",
-        objective.title(),
-        shown(cost)
-    );
     let document = FieldSearchJson {
         model: model.model.name.clone(),
         fields: fields.iter().map(FieldFile::shown).collect(),
@@ -276,7 +268,7 @@ pub(crate) fn search(
         best,
         baselines,
         improvement_over_qua: qua.filter(|_| cost > 0.0).map(|qua| qua / cost),
-        statement,
+        statement: statement(request, cost, qua),
         proof: ProofJson::none(),
         evaluations: answer.evaluations,
         evaluations_per_s: None,
@@ -286,6 +278,18 @@ pub(crate) fn search(
         reproducible: matches!(answer.ended, Ended::Rule(_)),
     };
     Ok(Some(Found { document, best: named, ended: answer.ended }))
+}
+
+fn statement(request: &Search, cost: f64, qua: Option<f64>) -> String {
+    let Search { fields, class, objective, .. } = *request;
+    let over = if fields.len() == 1 { "the field".to_owned() } else { format!("{} fields", fields.len()) };
+    let shown = |cost: f64| format!("{:.4} {}", deg_per_h_from_rad_per_s(cost), objective.unit());
+    let against = qua.map_or_else(String::new, |qua| format!("; QUA has {}", shown(qua)));
+    format!(
+        "The best pattern found has a {} of {} in the class {class}, over {over}{against}. It holds for these temperatures only.",
+        objective.title(),
+        shown(cost)
+    )
 }
 
 #[cfg(feature = "report")]

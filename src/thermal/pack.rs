@@ -143,7 +143,6 @@ pub(super) struct Mode {
 impl Pack {
     /// # Errors
     /// Values so extreme that the eigenvalues do not converge or are not positive.
-    #[expect(clippy::too_many_lines, reason = "modes, then what each input makes of them, from the same sums")]
     pub fn new(path: &HeatPath) -> Result<Self, ThermalError> {
         Self::with_part(path, None)
     }
@@ -152,6 +151,7 @@ impl Pack {
     ///
     /// # Errors
     /// As [`Pack::new`]; a part that is not there, or is the drive.
+    #[expect(clippy::too_many_lines, reason = "modes, then what each input makes of them, from the same sums")]
     pub(super) fn with_part(path: &HeatPath, part: Option<Location>) -> Result<Self, ThermalError> {
         let network = Network::new(path);
         let axial = AxialModes::new(path, &network)?;

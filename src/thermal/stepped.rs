@@ -319,7 +319,6 @@ impl March<'_> {
     }
 
     /// `end_s`: the panel's end, where rounding would put a node behind a knot.
-    #[expect(clippy::too_many_lines, reason = "one fixed-point iteration over tables that it alone has")]
     fn step(
         &mut self,
         from_s: f64,
