@@ -103,8 +103,8 @@ impl Wishes {
         former: Option<NamedPattern>,
     ) -> Result<search::Request<'a>, TaskError> {
         let (class, objective) = (self.class(file), self.objective(file));
-        if prove && matches!(objective, Objective::P95 | Objective::Pointing) {
-            let message = format!("proofs are of worst, guaranteed and rms rates, not of {}", objective.key());
+        if prove && objective == Objective::P95 {
+            let message = format!("proofs are of worst, guaranteed and rms rates and of the pointing error, not of {}", objective.key());
             return Err(TaskError::Option { option: "--prove", message });
         }
         if self.cutting_planes && !matches!(objective, Objective::WorstRate | Objective::WorstPhase) {
