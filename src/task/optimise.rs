@@ -104,7 +104,10 @@ impl Wishes {
     ) -> Result<search::Request<'a>, TaskError> {
         let (class, objective) = (self.class(file), self.objective(file));
         if prove && objective == Objective::P95 {
-            let message = format!("proofs are of worst, guaranteed and rms rates and of the pointing error, not of {}", objective.key());
+            let message = format!(
+                "proofs are of worst, guaranteed and rms rates and of the pointing error, not of {}",
+                objective.key()
+            );
             return Err(TaskError::Option { option: "--prove", message });
         }
         if self.cutting_planes && !matches!(objective, Objective::WorstRate | Objective::WorstPhase) {

@@ -92,6 +92,19 @@ fn optimise_ends_as_soon_as_the_best_permutation_is_proved() {
 }
 
 #[test]
+fn a_search_for_the_pointing_error_is_proved_by_the_bound_that_exact_finds() {
+    let asked = ["--windability", "any", "--objective", "pointing"];
+    let searched = json(&[&["optimise", MODEL, "--prove", "20s", "--seed", "5"][..], &asked].concat());
+    let exact = json(&[&["exact", MODEL][..], &asked].concat());
+    for body in [&searched, &exact] {
+        assert_eq!(body["proof"]["status"], "optimal");
+    }
+    let error_deg =
+        |body: &serde_json::Value| body["best"]["worst_pointing_error_deg"].as_f64().expect("an angle").abs();
+    assert!((error_deg(&searched) / error_deg(&exact) - 1.0).abs() < 1e-6, "{searched}");
+}
+
+#[test]
 fn a_search_ends_at_its_target_before_it_proves_that_nothing_is_better_and_says_when_it_found_it() {
     let search = |target: f64| {
         let target = target.to_string();
