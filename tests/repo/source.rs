@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::OnceLock;
 
-use proc_macro2::{Delimiter, TokenStream, TokenTree};
+use proc_macro2::{Delimiter, Group, TokenStream, TokenTree};
 
 pub struct Token {
     pub text: String,
@@ -134,6 +134,16 @@ pub fn flatten(text: &str) -> Vec<Token> {
     tokens
 }
 
+/// What a group begins and ends with.
+pub fn delimiters(group: &Group) -> (&'static str, &'static str) {
+    match group.delimiter() {
+        Delimiter::Parenthesis => ("(", ")"),
+        Delimiter::Brace => ("{", "}"),
+        Delimiter::Bracket => ("[", "]"),
+        Delimiter::None => ("", ""),
+    }
+}
+
 fn push_tokens(stream: TokenStream, without_tests: bool, tokens: &mut Vec<Token>) {
     let trees: Vec<TokenTree> = stream.into_iter().collect();
     let mut i = 0;
@@ -159,12 +169,7 @@ fn push_tokens(stream: TokenStream, without_tests: bool, tokens: &mut Vec<Token>
         }
         match &trees[i] {
             TokenTree::Group(group) => {
-                let (open, close) = match group.delimiter() {
-                    Delimiter::Parenthesis => ("(", ")"),
-                    Delimiter::Brace => ("{", "}"),
-                    Delimiter::Bracket => ("[", "]"),
-                    Delimiter::None => ("", ""),
-                };
+                let (open, close) = delimiters(group);
                 tokens.push(Token { text: open.to_owned(), line });
                 push_tokens(group.stream(), without_tests, tokens);
                 tokens.push(Token { text: close.to_owned(), line: group.span_close().start().line });

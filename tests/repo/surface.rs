@@ -9,7 +9,7 @@ use std::str::FromStr;
 
 use proc_macro2::{Delimiter, Spacing, TokenStream, TokenTree};
 
-use crate::source::Source;
+use crate::source::{Source, delimiters};
 
 /// What differs between two surfaces, and what that asks of the version.
 pub struct Difference {
@@ -143,12 +143,7 @@ fn words(tokens: &[TokenTree]) -> Vec<String> {
         let was_joint = std::mem::take(&mut is_joint);
         match token {
             TokenTree::Group(group) => {
-                let (open, close) = match group.delimiter() {
-                    Delimiter::Parenthesis => ("(", ")"),
-                    Delimiter::Brace => ("{", "}"),
-                    Delimiter::Bracket => ("[", "]"),
-                    Delimiter::None => ("", ""),
-                };
+                let (open, close) = delimiters(group);
                 words.push(open.to_owned());
                 words.extend(self::words(&group.stream().into_iter().collect::<Vec<_>>()));
                 words.push(close.to_owned());
