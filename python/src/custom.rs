@@ -9,9 +9,7 @@ use coilwright::search::anneal::sample_cost::SampleCost;
 use coilwright::search::cost::Cost;
 use coilwright::search::cost::columns::Norm;
 use coilwright::search::cost::samples::SampleMatrix;
-use coilwright::search::custom::{
-    CustomAnswer, FunctionCost, default_function_plan, default_plan, search, sensitivity_matrix,
-};
+use coilwright::search::custom::{CustomAnswer, FunctionCost, default_function_plan, search, sensitivity_matrix};
 use coilwright::search::run::Unobserved;
 use coilwright::task::TaskError;
 use coilwright::task::field;
@@ -126,7 +124,7 @@ pub fn search_matrix(
     let (matrix, read_at) = matrix_of(py, &sensitivities, constant.as_ref())?;
     let (class, norm) = (class(py, &options, WindabilityClass::Standard)?, norm_of(py, options.objective.as_deref())?);
     admitted(py, class, matrix.layers(), init.as_ref())?;
-    let plan = planned(py, default_plan(matrix.layers(), options.seed.unwrap_or(1)), &options, init)?;
+    let plan = planned(py, Plan::usual(matrix.layers(), options.seed.unwrap_or(1)), &options, init)?;
     let (budget, seed) = (duration_of(py, "budget_s", options.budget_s)?, plan.seed);
     let worked = work(py, progress, move |watcher| {
         let answer = run(&watcher, SampleCost::new(matrix, class, norm), plan, budget)?;
@@ -145,7 +143,7 @@ pub fn time_search_matrix(
     let layers = sensitivities.shape()[1];
     let values = sensitivities.as_slice().map_err(|_| wrong(py, "expected a contiguous array"))?.to_vec();
     let (class, norm) = (class(py, &options, WindabilityClass::Standard)?, norm_of(py, options.objective.as_deref())?);
-    let plan = planned(py, default_plan(layers, options.seed.unwrap_or(1)), &options, None)?;
+    let plan = planned(py, Plan::usual(layers, options.seed.unwrap_or(1)), &options, None)?;
     let seed = plan.seed;
     py.detach(|| {
         let started = Instant::now();
@@ -172,7 +170,7 @@ pub fn search_field(
     let (class, norm) = (class(py, &options, file.search.windability)?, norm_of(py, options.objective.as_deref())?);
     let layers = file.model.coil.layers();
     admitted(py, class, layers, init.as_ref())?;
-    let mut plan = planned(py, default_plan(layers, options.seed.unwrap_or(file.search.seed)), &options, init)?;
+    let mut plan = planned(py, Plan::usual(layers, options.seed.unwrap_or(file.search.seed)), &options, init)?;
     plan.rules.target = plan.rules.target.map(coilwright::units::rad_per_s_from_deg_per_h);
     let (budget, seed) = (duration_of(py, "budget_s", options.budget_s)?, plan.seed);
     let worked = work(py, progress, move |watcher| {

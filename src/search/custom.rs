@@ -77,14 +77,9 @@ pub fn sensitivity_matrix(layers: usize, sensitivities: &[f64], constant: &[f64]
     Ok(SampleMatrix::of_sensitivities(layers, sensitivities, constant))
 }
 
-/// The usual effort of a search for layers of this count.
-pub fn default_plan(layers: usize, seed: u64) -> Plan {
-    Plan::usual(layers, seed)
-}
-
-/// As [`default_plan`], where a move costs what a caller's function costs.
+/// As [`Plan::usual`], where a move costs what a caller's function costs.
 pub fn default_function_plan(layers: usize, seed: u64) -> Plan {
-    Plan { moves_per_restart: quantile::default_moves_per_restart(layers), ..default_plan(layers, seed) }
+    Plan { moves_per_restart: quantile::default_moves_per_restart(layers), ..Plan::usual(layers, seed) }
 }
 
 /// What a search for a caller's cost found.
@@ -303,9 +298,9 @@ mod tests {
             let smallest = all.map(|p| cost_of(&p, &constant)).fold(f64::INFINITY, f64::min);
             let matrix = sensitivity_matrix(LAYERS, &sensitivities(), &constant).unwrap();
             let of_array =
-                search(SampleCost::new(matrix, class, Norm::Largest), default_plan(LAYERS, 1), &mut Unobserved);
+                search(SampleCost::new(matrix, class, Norm::Largest), Plan::usual(LAYERS, 1), &mut Unobserved);
             let function = FunctionCost::new(LAYERS, class, |p: &[usize]| cost_of(p, &constant)).unwrap();
-            let plan = Plan { moves_per_restart: 2000, ..default_plan(LAYERS, 1) };
+            let plan = Plan { moves_per_restart: 2000, ..Plan::usual(LAYERS, 1) };
             let of_function = search(function, plan, &mut Unobserved);
             for answer in [of_array.unwrap(), of_function.unwrap()] {
                 let best = &answer.found[0];
@@ -321,7 +316,7 @@ mod tests {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let function = |p: &[usize]| cost_of(p, &[0.0; 3]);
             let cost = FunctionCost::new(LAYERS, WindabilityClass::Any, function).unwrap();
-            let plan = Plan { moves_per_restart: 300, ..default_plan(LAYERS, 7) };
+            let plan = Plan { moves_per_restart: 300, ..Plan::usual(LAYERS, 7) };
             pool.install(|| search(cost, plan, &mut Unobserved))
         };
         assert_eq!(of(1), of(2));

@@ -7,7 +7,6 @@ use crate::pattern::windability::WindabilityClass;
 use crate::search::anneal::rounds::{DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Plan, Rules, State};
 use crate::search::answer::{Answer, Ended};
 use crate::search::cost::objective::Objective;
-use crate::search::end_turns::EndChoice;
 use crate::search::run::RunError;
 use crate::search::{self, Observer};
 use crate::units::deg_per_h_from_rad_per_s;
@@ -62,19 +61,12 @@ pub(crate) fn search_cell(
     observer: &mut dyn Observer,
 ) -> Option<CellJson> {
     let request = search::Request {
-        model: &cell.file.model,
-        profiles: &cell.file.profiles,
         tolerance: cell.file.tolerance.as_ref(),
         objective: cell.objective,
         class: cell.class,
         plan: plan(grid, cell),
         saved,
-        former: None,
-        prove: false,
-        recommend: false,
-        cuts: false,
-        uncertain: &[],
-        ends: EndChoice::default(),
+        ..search::Request::new(&cell.file.model, &cell.file.profiles)
     };
     match search::run(&request, observer) {
         Ok(answer) => answer.filter(|answer| answer.ended != Ended::Signal).map(|answer| found(id, cell, &answer)),
