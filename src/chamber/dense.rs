@@ -50,7 +50,7 @@ pub(super) mod tests {
         }
     }
 
-    fn effect(kind: &str, values: &[f64]) -> DeclaredEffect {
+    pub(crate) fn effect(kind: &str, values: &[f64]) -> DeclaredEffect {
         let spec = find(kind).unwrap();
         DeclaredEffect::new(spec, values.to_vec(), vec![0; spec.choices.len()]).unwrap()
     }

@@ -119,7 +119,7 @@ impl Chamber<'_> {
 
     /// Numbers for all records: those that were not fitted take the first fitted one's, their air as it was found to be where
     /// it was looked at, because an ascent from another day's air is long.
-    fn completed(&self, fit: &Fit, records: &[usize]) -> Vec<Numbers> {
+    pub(super) fn completed(&self, fit: &Fit, records: &[usize]) -> Vec<Numbers> {
         let first = fit.records.first().copied().unwrap_or(0);
         (0..self.records())
             .map(|r| {

@@ -245,12 +245,13 @@ impl Series {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::dense::tests::model;
     use super::*;
     use crate::numeric::piecewise::PiecewiseLinear;
+    use crate::pattern::Pattern;
     use crate::pattern::classic::Classic;
-    use crate::rate::RateModel;
+    use crate::rate::{CoilModel, RateModel};
     use crate::record::Record;
     use crate::thermal::{exposure::expose, solve};
     use rand::{RngExt, SeedableRng};
@@ -258,26 +259,32 @@ mod tests {
     use statrs::distribution::{ContinuousCDF, Normal};
 
     /// Up, and down with a stop of under three minutes; every kink at a time that is no row's.
-    const KINKS_S: [f64; 6] = [904.3, 1707.7, 2312.9, 2871.4, 3036.1, 4003.6];
+    pub(in crate::chamber) const KINKS_S: [f64; 6] = [904.3, 1707.7, 2312.9, 2871.4, 3036.1, 4003.6];
     const AIR_K: [f64; 8] = [293.0, 293.0, 313.0, 313.0, 306.0, 306.0, 293.0, 293.0];
 
-    #[test]
-    fn kinks_between_rows_are_found_to_a_tenth_of_a_row() {
-        let (model, pattern) = (model(Vec::new()), Classic::Zyl.pattern(8).unwrap());
-        let mut knots_s = vec![0.0];
-        knots_s.extend(KINKS_S);
-        knots_s.push(6000.0);
-        let air = PiecewiseLinear::new(knots_s.clone(), AIR_K.to_vec()).unwrap();
+    fn knots_s() -> Vec<f64> {
+        [&[0.0], &KINKS_S[..], &[6000.0]].concat()
+    }
+
+    /// A record in that air.
+    pub(in crate::chamber) fn kinked(model: &CoilModel, pattern: &Pattern) -> Record {
+        let air = PiecewiseLinear::new(knots_s(), AIR_K.to_vec()).unwrap();
         let times_s: Vec<f64> = (1..=600).map(|i| 10.0 * f64::from(i)).collect();
         let exposed = expose(&model.heat_path().unwrap(), Some(25.0), 0.0, &air, &times_s).unwrap();
         let history = solve(&exposed.path, &exposed.drive).unwrap().means(&times_s, 10.0);
-        let rates = RateModel::new(&model, &pattern, &[]).unwrap().series_rad_per_s(&history);
+        let rates = RateModel::new(model, pattern, &[]).unwrap().series_rad_per_s(&history);
         let mut random = ChaCha8Rng::seed_from_u64(3);
         let normal = Normal::new(0.0, 1.0).unwrap();
         let mut noise = |deviation: f64| deviation * normal.inverse_cdf(random.random::<f64>());
         let rates = rates.into_iter().map(|r| r + noise(2e-7)).collect();
         let temperature_k = exposed.shown_k.into_iter().map(|t| t + noise(0.003)).collect();
-        let record = Record::new("kinked", times_s, temperature_k, rates).unwrap();
+        Record::new("kinked", times_s, temperature_k, rates).unwrap()
+    }
+
+    #[test]
+    fn kinks_between_rows_are_found_to_a_tenth_of_a_row() {
+        let (model, pattern) = (model(Vec::new()), Classic::Zyl.pattern(8).unwrap());
+        let (record, knots_s) = (kinked(&model, &pattern), knots_s());
         let assumed = Assumption { drift: true, ..Assumption::new(model.clone(), pattern) };
         let (chamber, fit) = Chamber::new(&model, &[&record]).unwrap().settled_in_time(&assumed).unwrap();
         let slopes = chamber.slopes(&fit, 0).unwrap();

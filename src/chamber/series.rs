@@ -30,6 +30,8 @@ pub(super) struct Series {
     pub(crate) spans: Vec<(usize, usize)>,
     /// Rows of the record whose reading or rate was left out as a gross error.
     pub(crate) spikes: usize,
+    /// Kinks that were placed in its air.
+    pub(super) kinks: usize,
     /// Values in one row.
     pub(crate) averaged: usize,
     /// Resolution of the sensor [K]; 0 where readings are not on a grid.
@@ -131,6 +133,7 @@ impl Series {
             shapes: Vec::new(),
             spans: blocks.iter().map(|b| b.span).collect(),
             spikes,
+            kinks: 0,
             averaged,
             resolution_k,
             noise_floor_rad_per_s: white_noise(times_s, record.rate_rad_per_s()).deviation,

@@ -127,16 +127,8 @@ impl<'a> Chamber<'a> {
         let rows = self.times_s(record).len();
         let mut count = 0;
         for _ in 0..KINK_ROUNDS {
-            let mut found = 0;
             // With numbers as they are until nothing is found, and again once they have been fitted to that.
-            for _ in 0..KINK_PASSES {
-                let new = self.kinks(&day, record)?;
-                self.spread_kinks(&new, record);
-                found += new.len();
-                if new.is_empty() {
-                    break;
-                }
-            }
+            let found = self.pass_for_kinks(&day, record)?;
             count += found;
             if count > rows / FEWEST_ROWS_A_KINK {
                 return Ok(None);
@@ -170,6 +162,53 @@ impl<'a> Chamber<'a> {
         Ok(())
     }
 
+    /// The same chamber with the kinks of its straight air where the readings have them by this fit, the fit there, and what
+    /// the kinks that each record has more cost in log prior; None where no air is straight.
+    ///
+    /// # Errors
+    /// As [`Chamber::fit`].
+    pub(crate) fn with_own_kinks(
+        &self,
+        fit: &Fit,
+        effort: Effort,
+    ) -> Result<Option<(Self, Fit, Vec<f64>)>, ChamberError> {
+        let straight: Vec<usize> = (0..self.records()).filter(|&r| self.observed[r].series.kinks > 0).collect();
+        if straight.is_empty() {
+            return Ok(None);
+        }
+        let (mut chamber, mut fit) = (self.clone(), fit.clone());
+        for &r in &straight {
+            let series = &mut chamber.observed[r].series;
+            series.rows.iter_mut().for_each(|row| row.kink = 0.0);
+            series.kinks = 0;
+        }
+        // By numbers that were fitted to others, and by those that were fitted to these.
+        for effort in [Effort::SHORT, effort] {
+            for &r in &straight {
+                let own = Fit { numbers: self.completed(&fit, &[r]), ..fit.clone() };
+                chamber.pass_for_kinks(&own, r)?;
+            }
+            fit = chamber.fit(&fit.assumed.clone(), &fit.free.clone(), &fit.records.clone(), Some(&fit), effort)?;
+        }
+        let more = |r: usize| chamber.observed[r].series.kinks as f64 - self.observed[r].series.kinks as f64;
+        let prices = (0..self.records()).map(|r| more(r) * -KINKS_PER_ROW.ln()).collect();
+        Ok(Some((chamber, fit, prices)))
+    }
+
+    /// Places kinks until no more are found with numbers as they are; how many.
+    fn pass_for_kinks(&mut self, fit: &Fit, record: usize) -> Result<usize, ChamberError> {
+        let mut found = 0;
+        for _ in 0..KINK_PASSES {
+            let new = self.kinks(fit, record)?;
+            self.spread_kinks(&new, record);
+            found += new.len();
+            if new.is_empty() {
+                break;
+            }
+        }
+        Ok(found)
+    }
+
     /// Straight but for these bends.
     pub(super) fn bend_at(&mut self, bends: &[Bend], record: usize) {
         let series = &mut self.observed[record].series;
@@ -181,7 +220,9 @@ impl<'a> Chamber<'a> {
 
     /// Between two rows a kink is one at either.
     fn spread_kinks(&mut self, kinks: &[(usize, f64)], record: usize) {
-        let rows = &mut self.observed[record].series.rows;
+        let series = &mut self.observed[record].series;
+        series.kinks += kinks.len();
+        let rows = &mut series.rows;
         for &(row, size) in kinks {
             let near = row.saturating_sub(1)..(row + KINK_ROWS - 1).min(rows.len());
             rows[near].iter_mut().for_each(|r| r.kink += size * size);
@@ -275,4 +316,30 @@ fn peaks(values: &[f64], reach: usize) -> impl Iterator<Item = usize> {
         let (from, to) = (k.saturating_sub(reach), (k + reach + 1).min(count));
         values[k] > 0.0 && (from..to).all(|j| j == k || values[j] < values[k] || (values[j] <= values[k] && j > k))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::dense::tests::{effect, model};
+    use super::super::kinks::tests::{KINKS_S, kinked};
+    use super::*;
+    use crate::pattern::classic::Classic;
+
+    #[test]
+    fn a_coil_on_a_spool_needs_fewer_kinks_by_its_own_model_than_by_another() {
+        let (bare, pattern) = (model(Vec::new()), Classic::Zyl.pattern(8).unwrap());
+        let spool = model(vec![effect("spool_mass", &[8000.0, 300.0, 0.0])]);
+        let record = kinked(&spool, &pattern);
+        let declared = Assumption::new(bare.clone(), pattern.clone());
+        let (chamber, base) = Chamber::new(&bare, &[&record]).unwrap().settled(&declared, &[0]).unwrap();
+        let own = Assumption::new(spool, pattern);
+        let there = chamber.fit(&own, &[], &[0], Some(&base), Effort::QUICK).unwrap();
+        let (with_own, fit, prices) = chamber.with_own_kinks(&there, Effort::QUICK).unwrap().unwrap();
+        let kinks = |chamber: &Chamber| chamber.observed[0].series.kinks;
+        let (by_another, by_own) = (kinks(&chamber), kinks(&with_own));
+        assert!(KINKS_S.len() <= by_own && by_own < by_another, "{by_own} kinks, {by_another} before");
+        assert!((prices[0] + (by_another - by_own) as f64 * 150.0_f64.ln()).abs() < 1e-9);
+        let gain = fit.posterior() - prices[0] - there.posterior();
+        assert!(gain > 50.0, "{gain}");
+    }
 }

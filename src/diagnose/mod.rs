@@ -393,6 +393,10 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
             let found = joint::again(&question, found)?;
             (question, found)
         }
+        None if found.is_elsewhere => {
+            let found = joint::again(&question, found)?;
+            (question, found)
+        }
         None => (question, found),
     };
     let chamber = question.chamber;

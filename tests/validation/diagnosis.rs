@@ -1,4 +1,4 @@
-//! Reference: two of the seven records of [`crate::records`], whose hidden effects their simulator states (`truth.json` of
+//! Reference: three of the seven records of [`crate::records`], whose hidden effects their simulator states (`truth.json` of
 //! the set; the sizes are repeated here). All seven and 96 others: `results/independent-trials`.
 //! Tolerance: the effects themselves or a set of at most three that holds them, hold-out error within 10 % of the noise
 //! floor, parameters within three of their standard errors.
@@ -51,6 +51,12 @@ fn a_complete_model_of_a_cylindrical_coil_is_given_no_effect() {
 #[test]
 fn a_mismatch_of_the_halves_is_found_with_its_size() {
     assert_found("d-mismatch", &[("strain_mismatch", &[("mismatch", 0.004)])]);
+}
+
+#[test]
+fn a_spool_is_found_with_its_numbers_where_the_air_has_its_kinks_by_the_spool() {
+    let numbers = [("heat_capacity_j_per_m2_k", 5500.0), ("contact_w_per_m2_k", 400.0)];
+    assert_found("c-spool", &[("spool_mass", &numbers)]);
 }
 
 #[test]

@@ -12,6 +12,7 @@ mod beside;
 mod explanation;
 mod judge;
 mod odds;
+mod own_kinks;
 mod readings;
 mod screen;
 mod search;
@@ -60,6 +61,8 @@ pub(crate) struct Found {
     /// Of each candidate the gain in log likelihood that the score test promised, largest first, with the effect there.
     pub(crate) promised: Vec<(usize, f64)>,
     pub(crate) windings: Vec<Winding>,
+    /// Whether its fits are of another chamber than that which was asked about.
+    pub(crate) is_elsewhere: bool,
 }
 
 impl Found {

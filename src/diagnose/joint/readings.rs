@@ -31,6 +31,8 @@ pub(super) fn take_off(question: &Question, declared: &Fit, explanations: &mut [
     let (fitted, held_out) = (of(&question.fitted), of(&question.held_out));
     let blind = Question { chamber: &chamber, fitted, held_out, ..question.clone() };
     let none = alone(&blind, declared);
+    let own = own_kinks(&blind, declared);
+    let none: Vec<f64> = none.into_iter().zip(own).map(|(there, own)| there.max(own)).collect();
     changing.par_iter_mut().for_each(|e| {
         let own = alone(&blind, &e.fit);
         let gains = own.iter().zip(&none).map(|(own, none)| (own - none).max(0.0)).filter(|gain| gain.is_finite());
@@ -51,6 +53,18 @@ fn alone(blind: &Question, fit: &Fit) -> [f64; 2] {
     [fitted, blind.held_out_evidence(&start)]
 }
 
+/// … of the declared model with the kinks that the readings have by it; those of the chamber may be another's.
+fn own_kinks(blind: &Question, declared: &Fit) -> [f64; 2] {
+    match blind.chamber.with_own_kinks(&reduced(blind, declared), Effort::QUICK) {
+        Ok(Some((chamber, fit, prices))) => {
+            let [fitted, held_out] = alone(&Question { chamber: &chamber, ..blind.clone() }, &fit);
+            let price = |records: &[usize]| records.iter().map(|&r| prices[r]).sum::<f64>();
+            [fitted - price(&blind.fitted), held_out - price(&blind.held_out)]
+        }
+        _ => [f64::NEG_INFINITY; 2],
+    }
+}
+
 /// What readings depend on.
 fn is_seen(model: &CoilModel, without: &CoilModel) -> bool {
     match (model.heat_path(), without.heat_path()) {
@@ -60,7 +74,7 @@ fn is_seen(model: &CoilModel, without: &CoilModel) -> bool {
 }
 
 /// Whether readings would be others with a set's members.
-fn changes_readings(question: &Question, explanation: &Explanation) -> bool {
+pub(super) fn changes_readings(question: &Question, explanation: &Explanation) -> bool {
     explanation.members.iter().any(|member| match member {
         Member::Effect(candidate) => {
             is_seen(&question.model.with_effect(question.candidates[*candidate].effect.clone()), question.model)

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::explanation::{fitted, with, without};
 use super::judge::judge;
+use super::own_kinks::best_by_own_kinks;
 use super::screen::{Proposal, foremost, looked_at, proposals};
 use super::winding::promising;
 use super::{Explanation, Found, Member, Outcome, Question, Winding};
@@ -43,50 +44,60 @@ pub(crate) fn search(question: &Question, null: Fit, progress: &(dyn Fn(f64) + S
     let mut best = Explanation::new(question, &windings, Vec::new(), null);
     cache.insert(best.key(), best.clone());
     let mut promised = Vec::new();
+    let mut chamber = question.chamber.clone();
+    let mut is_elsewhere = false;
     for stage in 0..question.depth {
-        let mut proposals = looked_at(question, &best)?;
+        let here = Question { chamber: &chamber, ..question.clone() };
+        let mut proposals = looked_at(&here, &best)?;
         if stage == 0 {
             // Where a gyro that wanders as gyros do is enough, nothing is wound otherwise.
             if best.is_outside() || proposals.iter().any(|p| p.gain > PLAIN) {
-                windings = promising(question, &best.fit)?;
+                windings = promising(&here, &best.fit)?;
             }
             promised = foremost(&proposals);
         }
-        proposals.extend(discrete(question, &windings, &best));
-        let mut found = fit_all(question, &windings, &best, choose(proposals));
-        let most = found.iter().map(|e| e.merit - best.merit).fold(0.0, f64::max);
-        if most < PLAIN {
-            found.extend(fit_all(question, &windings, &best, outside(&best)));
-        }
-        let mut next: Option<Explanation> = None;
-        for explanation in found {
-            if !explanation.is_beyond_physical() && next.as_ref().is_none_or(|n| explanation.merit > n.merit) {
-                next = Some(explanation.clone());
-            }
-            keep(&mut cache, explanation);
-        }
+        proposals.extend(discrete(&here, &windings, &best));
+        let found = tried(&here, &windings, &best, proposals);
         progress(0.2 + 0.6 * (stage + 1) as f64 / question.depth as f64);
-        let Some(next) = next else { break };
-        let next = calmed(question, &windings, next);
+        let foremost = found.iter().find(|e| !e.is_beyond_physical()).cloned();
+        let own = best_by_own_kinks(&chamber, &here, &windings, &found);
+        found.into_iter().for_each(|explanation| keep(&mut cache, explanation));
+        let base = cache.get(&best.key()).map_or(best.merit, |b| b.merit);
+        let least = foremost.as_ref().map_or(base, |f| f.merit.max(base)) + WORTH_A_STEP;
+        let next = match own.filter(|own| own.merit > least) {
+            Some(own) => {
+                chamber = own.chamber;
+                is_elsewhere = true;
+                cache = carried(&Question { chamber: &chamber, ..question.clone() }, &windings, cache);
+                own.explanation
+            }
+            None => match foremost {
+                Some(next) => next,
+                None => break,
+            },
+        };
+        let here = Question { chamber: &chamber, ..question.clone() };
+        let next = calmed(&here, &windings, next);
         keep(&mut cache, next.clone());
         // What was fitted with the larger set may be a better chamber for the smaller one.
-        if let Some(again) = refit_without_last(question, &windings, &next) {
+        if let Some(again) = refit_without_last(&here, &windings, &next) {
             keep(&mut cache, again);
         }
         let base = cache.get(&best.key()).map_or(best.merit, |b| b.merit);
         if next.merit < base + WORTH_A_STEP {
             break;
         }
-        best = look_back(question, &windings, next, &mut cache);
+        best = look_back(&here, &windings, next, &mut cache);
         if best.members.iter().any(|m| m.is_outside()) {
             break;
         }
     }
-    complete(question, &windings, &best, &mut cache);
+    let here = Question { chamber: &chamber, ..question.clone() };
+    complete(&here, &windings, &best, &mut cache);
     let mut explanations: Vec<Explanation> = cache.into_values().collect();
-    judge(question, &windings, &mut explanations);
+    judge(&here, &windings, &mut explanations);
     progress(1.0);
-    Ok(Found { explanations, promised, windings })
+    Ok(Found { explanations, promised, windings, is_elsewhere })
 }
 
 /// What was found, judged again in a chamber that is looked through with the best of it ([`crate::chamber::Chamber::settled_from`]).
@@ -94,7 +105,7 @@ pub(crate) fn search(question: &Question, null: Fit, progress: &(dyn Fn(f64) + S
 /// # Errors
 /// A declared model that cannot be solved for these records.
 pub(crate) fn again(question: &Question, found: Found) -> Outcome<Found> {
-    let Found { explanations, promised, windings } = found;
+    let Found { explanations, promised, windings, .. } = found;
     let mut explanations: Vec<Explanation> = explanations
         .into_par_iter()
         .filter_map(|e| {
@@ -104,7 +115,25 @@ pub(crate) fn again(question: &Question, found: Found) -> Outcome<Found> {
         .collect();
     judge(question, &windings, &mut explanations);
     let has_declared = explanations.iter().any(|e| e.members.is_empty());
-    has_declared.then_some(Found { explanations, promised, windings }).ok_or(crate::chamber::ChamberError::Unsolvable)
+    has_declared
+        .then_some(Found { explanations, promised, windings, is_elsewhere: false })
+        .ok_or(crate::chamber::ChamberError::Unsolvable)
+}
+
+/// What promises most beside a set, fitted, best first; where none of it is plain, also what says that something else is there.
+fn tried(question: &Question, windings: &[Winding], best: &Explanation, proposals: Vec<Proposal>) -> Vec<Explanation> {
+    let mut found = fit_all(question, windings, best, choose(proposals));
+    let most = found.iter().map(|e| e.merit - best.merit).fold(0.0, f64::max);
+    if most < PLAIN {
+        found.extend(fit_all(question, windings, best, outside(best)));
+    }
+    found.sort_by(in_order);
+    found
+}
+
+/// Best first.
+fn in_order(a: &Explanation, b: &Explanation) -> std::cmp::Ordering {
+    b.merit.total_cmp(&a.merit).then_with(|| a.key().cmp(&b.key()))
 }
 
 fn keep(cache: &mut Cache, explanation: Explanation) {
@@ -112,6 +141,22 @@ fn keep(cache: &mut Cache, explanation: Explanation) {
     if cache.get(&key).is_none_or(|known| explanation.merit > known.merit) {
         cache.insert(key, explanation);
     }
+}
+
+/// What was found in one chamber in another: the declared model and the best.
+fn carried(question: &Question, windings: &[Winding], cache: Cache) -> Cache {
+    let mut all: Vec<Explanation> = cache.into_values().collect();
+    all.sort_by(in_order);
+    let mut kept = 0;
+    all.retain(|e| {
+        kept += 1;
+        e.members.is_empty() || kept <= TRIED
+    });
+    let there = all.into_par_iter().filter_map(|e| {
+        let begin = (e.fit.assumed.clone(), e.fit.free.clone());
+        fitted(question, windings, e.members, &begin, &e.fit, Effort::QUICK)
+    });
+    there.map(|e| (e.key(), e)).collect()
 }
 
 /// Members that are no effects of the catalogue. What cannot be scored is fitted wherever something is missing.
