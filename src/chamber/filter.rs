@@ -23,7 +23,7 @@
 
 use pulp::{Arch, NullaryFnOnce};
 
-pub(super) use super::row::{MEASURED, Move, RATE, Row};
+pub(super) use super::row::{AMBIENT, MEASURED, Move, RATE, Row};
 use super::sparse::{Sparse, Square};
 
 /// Relative change of every S from row to row below which a row counts as settled, and how many of them freeze the gains:

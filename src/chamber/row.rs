@@ -2,6 +2,8 @@
 
 /// Thermometers that a record may have: the sensor, one at the bore, one in the air.
 const THERMOMETERS: usize = 3;
+/// The thermometer in the air among a row's measurements.
+pub(super) const AMBIENT: usize = 2;
 /// Measurements of a row: the thermometers and the rate.
 pub(super) const MEASURED: usize = THERMOMETERS + 1;
 /// The rate among a row's measurements.

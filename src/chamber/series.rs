@@ -5,7 +5,7 @@
 //! mean of b rates      = (c·x(t) − c·x(t − b Δ))/(b Δ), exactly, where each is itself a mean over Δ
 //! ```
 
-use super::filter::{MEASURED, Move, RATE, Row};
+use super::filter::{AMBIENT, MEASURED, Move, RATE, Row};
 use crate::numeric::noise::white_noise;
 use crate::numeric::statistics::median;
 use crate::record::Record;
@@ -169,7 +169,11 @@ impl Series {
         reason = "windows, events and steps of a row follow from each other by what is worked out once"
     )]
     fn plan(&mut self, rate_mean_s: f64, block_s: f64) {
-        let bends = bends(&self.times_s, &self.values[0]);
+        // A thermometer in the air bends with it; any other shows later, and rounded off, what the air has done.
+        let bends = match &self.values[AMBIENT] {
+            air if air.iter().any(|v| v.is_finite()) => bends(&self.times_s, air, 0.0),
+            _ => bends(&self.times_s, &self.values[0], EARLIER_S),
+        };
         let wanted_s = if self.averaged > 1 { block_s } else { rate_mean_s };
         let times_s = &self.times_s;
         let windows_s: Vec<f64> = (0..times_s.len())
@@ -349,8 +353,8 @@ fn resolution(readings: &[f64]) -> f64 {
     if least.is_finite() { least } else { 0.0 }
 }
 
-/// How much the readings bend at each row, from 0 to 1 in a few levels, as early as the air does what bends them.
-fn bends(times_s: &[f64], readings: &[f64]) -> Vec<f64> {
+/// How much the readings bend at each row, from 0 to 1 in a few levels, so much earlier as the air does what bends them.
+fn bends(times_s: &[f64], readings: &[f64], earlier_s: f64) -> Vec<f64> {
     let known: Vec<(f64, f64)> =
         times_s.iter().zip(readings).filter(|(_, v)| v.is_finite()).map(|(t, v)| (*t, *v)).collect();
     if known.len() < 3 {
@@ -377,7 +381,7 @@ fn bends(times_s: &[f64], readings: &[f64]) -> Vec<f64> {
         .map(|i| (-half..=half).map(|o| at(&on_grid, i + o)).sum::<f64>() / (2 * half + 1) as f64)
         .collect();
     let apart = ((COMPARED_S / grid_s).round() as isize).max(1);
-    let earlier = (EARLIER_S / grid_s).round() as isize;
+    let earlier = (earlier_s / grid_s).round() as isize;
     let bend = |i: isize| (at(&smooth, i + apart) - 2.0 * at(&smooth, i) + at(&smooth, i - apart)).abs();
     let raw: Vec<f64> = (0..count as isize).map(|i| bend((i + earlier).min(count as isize - 1))).collect();
     let full = FULL_BEND * raw.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
