@@ -11,8 +11,8 @@
 //! temperature is stepped through every profile ([`super::stepping`]).
 
 use super::laplace::Response;
-use super::layers::Layers;
 use super::network::{Cut, Network};
+use super::parts::Parts;
 use super::physics::{BoreHeat, Physics};
 use super::stepping::Drive;
 use crate::profile::Profile;
@@ -80,7 +80,6 @@ enum Solution {
 #[derive(Debug)]
 pub(super) struct Heat {
     layers: usize,
-    has_heat: bool,
     /// Whether anything depends on more than the rates; temperatures stay zero otherwise.
     wants_rise: bool,
     solution: Solution,
@@ -105,12 +104,11 @@ impl Heat {
             let cuts = if !physics.flanges.is_empty() { CUTS_BESIDE_FLANGE } else { CUTS };
             Solution::Stepped { networks: cuts.map(|cut| Network::new(model, physics, height_m, cut)), heat }
         } else {
-            Solution::Linear(Response::new(&Layers::new(model, physics, height_m), heat, longest_s))
+            Solution::Linear(Response::new(&Parts::new(model, physics, height_m), heat, longest_s))
         };
         let first_s = 0.02 * pitch_m * pitch_m / (4.0 * diffusivity_m2_per_s);
         Self {
             layers,
-            has_heat: heat.is_some(),
             wants_rise: physics.depends_on_temperature(),
             solution,
             ramp_before: physics.ramp_before,
@@ -166,9 +164,9 @@ impl Heat {
             state.rise_k.iter_mut().for_each(|rise| *rise -= risen_k);
             state.ambient_rise_k -= risen_k;
         }
-        if let (Solution::Linear(response), true) = (&self.solution, self.has_heat) {
+        if let Solution::Linear(response) = &self.solution {
             let State { rise_k, rate_k_per_s, moment_k_per_s, .. } = state;
-            response.add_heat(state.time_s, rate_k_per_s, rise_k, moment_k_per_s);
+            response.add_own(state.time_s, rate_k_per_s, rise_k, moment_k_per_s);
         }
         state.rise_k.resize(self.layers, 0.0);
     }

@@ -1,4 +1,4 @@
-//! The response of a linear pack to a unit ramp, by inverting its Laplace transform ([`super::layers`]).
+//! The response of a linear pack to a unit ramp, by inverting its Laplace transform ([`super::parts`]).
 //!
 //! ```text
 //! û = 1/s²          f(t) = (1/2πi) ∫ e^{st} f̂(s) ds
@@ -13,7 +13,7 @@
 
 use nalgebra::Complex;
 
-use super::layers::Layers;
+use super::parts::{Parts, Transforms};
 use super::physics::BoreHeat;
 
 /// Λ: the latest time of a window over its earliest.
@@ -28,8 +28,7 @@ struct Node {
     s: Complex<f64>,
     weight: Complex<f64>,
     /// Transforms of the layers' rates, then of their first axial moments' rates.
-    ramp: Vec<Complex<f64>>,
-    heated: Option<Vec<Complex<f64>>>,
+    of: Transforms,
 }
 
 /// Rates and temperatures of the layers at any time after a unit ramp began, and of the bore's heat alone.
@@ -38,16 +37,20 @@ pub(super) struct Response {
     layers: usize,
     outermost_is_drive: bool,
     has_moments: bool,
+    /// By how much the layers begin warmer than the drive, those that are not the drive.
+    above_k: f64,
     /// The last time of each window, ascending.
     ends_s: Vec<f64>,
     windows: Vec<Vec<Node>>,
 }
 
 impl Response {
-    pub(crate) fn new(pack: &Layers, heat: Option<BoreHeat>, longest_s: f64) -> Self {
+    pub(crate) fn new(parts: &Parts, heat: Option<BoreHeat>, longest_s: f64) -> Self {
+        let pack = &parts.pack;
         Self {
-            has_moments: pack.has_moments(),
-            ..Self::of(pack.layers, pack.outermost_is_drive, longest_s, |s| pack.transform(heat, s))
+            has_moments: parts.has_moments(),
+            above_k: parts.pack_above_k,
+            ..Self::of(pack.layers, pack.outermost_is_drive, longest_s, |s| parts.transform(heat, s))
         }
     }
 
@@ -59,17 +62,17 @@ impl Response {
                 0.0 => Complex::new(0.0, 0.0),
                 depth_m => (-q * depth_m).exp() / s,
             };
-            (depths_m.iter().map(at).collect(), None)
+            Transforms { ramp: depths_m.iter().map(at).collect(), heated: None, started: None }
         };
         Self::of(depths_m.len(), true, longest_s, transform)
     }
 
-    /// `transform`: s T̂ of every layer under a unit ramp, but of an outermost one that is the drive; and under the bore's heat.
+    /// `transform`: s T̂ of every layer, but of an outermost one that is the drive.
     fn of(
         layers: usize,
         outermost_is_drive: bool,
         longest_s: f64,
-        transform: impl Fn(Complex<f64>) -> (Vec<Complex<f64>>, Option<Vec<Complex<f64>>>),
+        transform: impl Fn(Complex<f64>) -> Transforms,
     ) -> Self {
         let root = (8.0 * WINDOW + 1.0).sqrt();
         let step = root / NODES as f64;
@@ -83,13 +86,12 @@ impl Response {
                 let s = scale * along * along;
                 // f(t) = (h/π) Σ Im(e^{st} f̂ ds/du) over the upper half.
                 let weight = Complex::new(0.0, 1.0) * along * (2.0 * scale * step / std::f64::consts::PI);
-                let (ramp, heated) = transform(s);
-                Node { s, weight, ramp, heated }
+                Node { s, weight, of: transform(s) }
             };
             windows.push((0..NODES).map(node).collect());
             ends_s.push(end_s);
         }
-        Self { layers, outermost_is_drive, has_moments: false, ends_s, windows }
+        Self { layers, outermost_is_drive, has_moments: false, above_k: 0.0, ends_s, windows }
     }
 
     pub(crate) fn has_moments(&self) -> bool {
@@ -99,7 +101,7 @@ impl Response {
     /// Adds `factor` times the response to a unit ramp that has lasted for a while (a moment, at 0) to rates,
     /// temperatures (unless there is no place for them) and moments' rates.
     pub(crate) fn add_ramp(&self, factor: f64, lasted_s: f64, rate: &mut [f64], rise: &mut [f64], moment: &mut [f64]) {
-        self.add(factor, lasted_s, |node| Some(&node.ramp), rate, rise, moment);
+        self.add(factor, lasted_s, |node| Some(&node.of.ramp), rate, rise, moment);
         if self.outermost_is_drive {
             rate[self.layers - 1] += factor;
             if let Some(rise) = rise.get_mut(self.layers - 1) {
@@ -139,7 +141,7 @@ impl Response {
         moment: &mut [f64],
     ) {
         for (node, sum) in self.windows[window].iter().zip(sums) {
-            self.add_node(node, &node.ramp, (node.s * later_s).exp() * sum, rate, rise, moment);
+            self.add_node(node, &node.of.ramp, (node.s * later_s).exp() * sum, rate, rise, moment);
         }
     }
 
@@ -147,9 +149,14 @@ impl Response {
         self.outermost_is_drive
     }
 
-    /// Adds what the bore's heat has done since it began.
-    pub(crate) fn add_heat(&self, lasted_s: f64, rate: &mut [f64], rise: &mut [f64], moment: &mut [f64]) {
-        self.add(1.0, lasted_s, |node| node.heated.as_ref(), rate, rise, moment);
+    /// Adds what the bore's heat has done since the beginning, and what is left of an uneven start.
+    pub(crate) fn add_own(&self, lasted_s: f64, rate: &mut [f64], rise: &mut [f64], moment: &mut [f64]) {
+        // Parts that differ are at work from the first instant on.
+        let lasted_s = lasted_s.max(EARLIEST_S);
+        self.add(1.0, lasted_s, |node| node.of.heated.as_ref(), rate, rise, moment);
+        self.add(1.0, lasted_s, |node| node.of.started.as_ref(), rate, rise, moment);
+        let solved = self.layers - usize::from(self.outermost_is_drive);
+        rise.iter_mut().take(solved).for_each(|rise| *rise += self.above_k);
     }
 
     fn add<'a>(
@@ -242,7 +249,7 @@ pub(super) mod tests {
             (model.coil.bore_radius_m(), model.coil.bore_radius_m() + 4.0 * model.coil.radial_pitch_m());
         let constant_s =
             physics.heat_capacity_j_per_m3_k * (outer_m.powi(2) - inner_m.powi(2)) / (2.0 * 20.0 * outer_m);
-        let response = Response::new(&Layers::new(&model, &physics, 0.01), None, 1e5);
+        let response = Response::new(&Parts::new(&model, &physics, 0.01), None, 1e5);
         let mut worst = 0.0_f64;
         for i in 0..400 {
             let t = 1e-5 * 10f64.powf(10.0 * f64::from(i) / 399.0);

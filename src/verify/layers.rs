@@ -5,17 +5,16 @@
 //! (n+1)(n+2) a_{n+2} = Q (a_n + ε a_{n−1}) − ε (n+1)² a_{n+1}
 //! ```
 //!
-//! The power series gives what flows into a layer from the temperatures of its two faces, and its mean. Faces, spool and
-//! film make a tridiagonal system in s. Where flanges exchange heat, the axis has the waves of a slab,
-//! cos bζ + (β₁/b) sin bζ with (b² − β₁ β₂) tan b = b (β₁ + β₂) and β = h H/k of either flange; each carries such a system
-//! with K μ = K b²/H² added to s.
+//! The power series gives what flows into a layer from the temperatures of its two faces, and its mean. Faces make a
+//! tridiagonal system in s; what lies around the pack, and the waves along its axis whose K μ is added to s, stand in
+//! [`super::parts`].
 //!
 //! # Source
-//! Carslaw and Jaeger, Conduction of Heat in Solids (1959), sections 3.4 (matrices of layers), 3.11 and 13.4.
+//! Carslaw and Jaeger, Conduction of Heat in Solids (1959), sections 3.4 (matrices of layers) and 13.4.
 
 use nalgebra::Complex;
 
-use super::physics::{BoreHeat, Physics};
+use super::physics::Physics;
 use crate::rate::CoilModel;
 
 type C = Complex<f64>;
@@ -26,10 +25,9 @@ const SERIES_REACH: f64 = 6.0;
 const TERMS: usize = 60;
 /// Nothing comes through a layer of this Re(q) h.
 const OPAQUE: f64 = 40.0;
-/// Cosines along the axis, and how many more per unit of h H/k; their shares fall as the fourth power of their number.
-const COSINES: usize = 80;
-const COSINES_PER_BIOT: f64 = 0.5;
-const MOST_COSINES: usize = 400;
+
+/// What drives a pack: what touches its bore, of one kelvin; what its surface faces; a heat flow of one watt into the bore.
+pub(super) const CAUSES: usize = 3;
 
 /// The pack as plain numbers, per radian and height.
 #[derive(Debug, Clone)]
@@ -40,27 +38,24 @@ pub(super) struct Layers {
     faces_m: Vec<f64>,
     conductivity_w_per_m_k: f64,
     heat_capacity_j_per_m3_k: f64,
-    /// Heat capacity, contact and mount of the spool, times the bore's radius.
-    spool: Option<[f64; 3]>,
-    bore_radius_m: f64,
-    film: Option<f64>,
-    cosines: Option<Vec<Cosine>>,
+    /// Between the bore and a spool, times the bore's radius.
+    contact: Option<f64>,
+    /// Between the surface and what it faces, times the outer radius; none where its temperature is given.
+    pub(crate) film: Option<f64>,
     /// Layers inside a contact, and its conductance per area [W/(m² K)].
     gaps: Vec<(usize, f64)>,
-    /// Heat capacity and conductance inwards of each housing, and what joins the outermost to the drive, times the outer radius.
-    housings: Vec<[f64; 2]>,
-    outside: f64,
 }
 
-/// One cosine along the axis.
-#[derive(Debug, Clone, Copy)]
-struct Cosine {
-    decay_per_s: f64,
-    /// Of a uniform one, and of the air at the flange, per second.
-    uniform: f64,
-    from_air_per_s: f64,
-    mean: f64,
-    moment: f64,
+/// What each cause makes of a pack.
+#[derive(Debug)]
+pub(super) struct Felt {
+    /// The layers' means, but of an outermost one that is the drive.
+    pub(crate) means: [Vec<C>; CAUSES],
+    /// Temperature of the bore and of the surface.
+    pub(crate) bore: [C; CAUSES],
+    pub(crate) surface: [C; CAUSES],
+    /// ∫ r T dr.
+    pub(crate) content: [C; CAUSES],
 }
 
 /// What flows into a piece from either face, per kelvin of each, and its mean.
@@ -72,7 +67,7 @@ struct Piece {
 }
 
 impl Layers {
-    pub(crate) fn new(model: &CoilModel, physics: &Physics, height_m: f64) -> Self {
+    pub(crate) fn new(model: &CoilModel, physics: &Physics) -> Self {
         let coil = &model.coil;
         let (layers, bore_m, pitch_m) = (coil.layers(), coil.bore_radius_m(), coil.radial_pitch_m());
         let outermost_is_drive = !physics.driven_from_outside;
@@ -80,120 +75,37 @@ impl Layers {
         if outermost_is_drive {
             faces_m[layers] -= 0.5 * pitch_m;
         }
-        let film = physics.film_w_per_m2_k.filter(|_| !outermost_is_drive);
-        let cosines = (!physics.flanges.is_empty()).then(|| {
-            let biot = |first: bool| -> f64 {
-                let films = physics.flanges.iter().filter(|flange| flange.is_first == first);
-                films.map(|flange| flange.film_w_per_m2_k * height_m / physics.conductivity_w_per_m_k).sum()
-            };
-            let (at_first, at_second) = (biot(true), biot(false));
-            let per_s = physics.diffusivity_m2_per_s() / (height_m * height_m);
-            let count = (COSINES + (COSINES_PER_BIOT * (at_first + at_second)) as usize).min(MOST_COSINES);
-            (0..count)
-                .map(|n| {
-                    let b = root(n, at_first, at_second);
-                    let (sine, cosine, tilt) = (b.sin(), b.cos(), at_first / b);
-                    let twice = (2.0 * b).sin() / (2.0 * b);
-                    let norm = 0.5 * (1.0 + twice)
-                        + 0.5 * tilt * tilt * (1.0 - twice)
-                        + tilt * (1.0 - (2.0 * b).cos()) / (2.0 * b);
-                    let mean = sine / b + tilt * (1.0 - cosine) / b;
-                    let first_moment = sine / b + (cosine - 1.0) / (b * b) + tilt * (sine / (b * b) - cosine / b);
-                    Cosine {
-                        decay_per_s: per_s * b * b,
-                        uniform: mean / norm,
-                        from_air_per_s: per_s * (at_first + at_second * (cosine + tilt * sine)) / norm,
-                        mean,
-                        moment: first_moment - 0.5 * mean,
-                    }
-                })
-                .collect()
-        });
-        let outer_m = faces_m[layers];
-        let housings: Vec<[f64; 2]> = physics.housings.iter().map(|h| h.map(|v| v * outer_m)).collect();
         // The pack's own surface faces the innermost housing.
-        let film = housings.first().map(|housing| housing[1]).or(film.map(|h| h * outer_m));
+        let film = physics.housings.first().map(|housing| housing[1]).or(physics.film_w_per_m2_k);
         Self {
             layers,
             outermost_is_drive,
-            film,
-            outside: physics.film_w_per_m2_k.map_or(0.0, |h| h * outer_m),
-            housings,
+            film: film.filter(|_| !outermost_is_drive).map(|h| h * faces_m[layers]),
             faces_m,
             conductivity_w_per_m_k: physics.conductivity_w_per_m_k,
             heat_capacity_j_per_m3_k: physics.heat_capacity_j_per_m3_k,
-            spool: physics
-                .spool
-                .map(|s| [s.heat_capacity_j_per_m2_k, s.contact_w_per_m2_k, s.mount_w_per_m2_k].map(|v| v * bore_m)),
-            bore_radius_m: bore_m,
-            cosines,
+            contact: physics.spool.map(|spool| spool.contact_w_per_m2_k * bore_m),
             gaps: physics.gaps.clone(),
         }
     }
 
-    pub(crate) fn has_moments(&self) -> bool {
-        self.cosines.is_some()
+    pub(crate) fn bore_radius_m(&self) -> f64 {
+        self.faces_m[0]
     }
 
-    /// s T̂ of every layer (and of its moment) under a unit ramp, and under the bore's heat.
-    pub(crate) fn transform(&self, heat: Option<BoreHeat>, s: C) -> (Vec<C>, Option<Vec<C>>) {
-        let outputs = self.layers * if self.has_moments() { 2 } else { 1 };
-        let zero = C::new(0.0, 0.0);
-        let mut ramp = vec![zero; outputs];
-        let mut heated = heat.map(|_| vec![zero; outputs]);
-        let uniform = Cosine { decay_per_s: 0.0, uniform: 1.0, from_air_per_s: 0.0, mean: 1.0, moment: 0.0 };
-        // s q̂ = q∞/(1 + s τ).
-        let by_heat = heat.map(|h| h.power_w_per_m2 / (s * h.time_constant_s + 1.0));
-        for cosine in self.cosines.as_deref().unwrap_or(&[uniform]) {
-            let (mut by_drive, mut by_bore, from_inside) = self.means(s, cosine);
-            if !self.housings.is_empty() {
-                let [inner, heated] = self.innermost(s, from_inside);
-                for (of_bore, of_drive) in by_bore.iter_mut().zip(&by_drive) {
-                    *of_bore += of_drive * heated;
-                }
-                by_drive.iter_mut().for_each(|of_drive| *of_drive *= inner);
-            }
-            for layer in 0..self.layers {
-                let put = |out: &mut [C], value: C| {
-                    out[layer] += value * cosine.mean;
-                    if self.cosines.is_some() {
-                        out[self.layers + layer] += value * cosine.moment;
-                    }
-                };
-                put(&mut ramp, by_drive[layer] / s);
-                if let (Some(heated), Some(factor)) = (&mut heated, by_heat) {
-                    put(heated, by_bore[layer] * factor);
-                }
-            }
-        }
-        (ramp, heated)
+    pub(crate) fn outer_radius_m(&self) -> f64 {
+        self.faces_m[self.faces_m.len() - 1]
     }
 
-    /// The innermost housing's temperature per kelvin of the drive, and per watt a square metre into the bore; `inside` is what
-    /// comes back from within per kelvin of that housing, and per watt.
-    fn innermost(&self, s: C, inside: [C; 2]) -> [C; 2] {
-        // What the innermost passes on outwards: a chain of links, folded up from the drive inwards.
-        let (mut link, mut source) = (C::new(self.outside, 0.0), C::new(1.0, 0.0));
-        for (i, [capacity, inwards]) in self.housings.iter().enumerate().skip(1).rev() {
-            let own = s * capacity + link + inwards;
-            debug_assert!(i > 0);
-            source = source * link / (own - inwards);
-            link = (own - inwards) * inwards / own;
-        }
-        let [capacity, inwards] = self.housings[0];
-        let mount = self.spool.map_or(0.0, |spool| spool[2]);
-        let own = s * capacity + inwards + mount - inside[0] + link;
-        [link * source / own, inside[1] / own]
+    /// Layers that are solved for.
+    pub(crate) fn solved(&self) -> usize {
+        self.layers - usize::from(self.outermost_is_drive)
     }
 
-    /// The layers' means under drive and air of one kelvin, and under a heat flow of one watt a square metre into the bore; and
-    /// what surface and spool give back to what drives them.
-    #[expect(clippy::too_many_lines, reason = "one elimination: assembled, swept and read again over the same nodes")]
-    fn means(&self, s: C, cosine: &Cosine) -> (Vec<C>, Vec<C>, [C; 2]) {
-        let capacity = self.heat_capacity_j_per_m3_k;
-        let diffusivity = self.conductivity_w_per_m_k / capacity;
-        let per_s = s + cosine.decay_per_s;
-        let q = (per_s / diffusivity).sqrt();
+    /// What each cause makes of the pack; `per_s` is s + K μ.
+    #[expect(clippy::too_many_lines, reason = "one elimination: assembled, swept and read again over the same faces")]
+    pub(crate) fn felt(&self, per_s: C) -> Felt {
+        let q = (per_s * self.heat_capacity_j_per_m3_k / self.conductivity_w_per_m_k).sqrt();
         let mut cut = Vec::new();
         for (layer, pair) in self.faces_m.windows(2).enumerate() {
             let thickness_m = pair[1] - pair[0];
@@ -206,10 +118,9 @@ impl Layers {
         }
         let pieces: Vec<Piece> = cut.iter().map(|&(_, from_m, to_m)| self.piece(q, per_s, from_m, to_m)).collect();
         let zero = C::new(0.0, 0.0);
-        let spool = usize::from(self.spool.is_some());
         // Pieces share a face, but where a contact lies between them each has its own.
         let (mut contacts, mut inner_of) = (Vec::new(), Vec::with_capacity(cut.len()));
-        let mut face = spool;
+        let mut face = 0;
         for (i, &(layer, from_m, _)) in cut.iter().enumerate() {
             let is_first = i > 0 && cut[i - 1].0 != layer;
             if let Some((_, conductance)) = self.gaps.iter().find(|gap| is_first && gap.0 == layer) {
@@ -220,10 +131,8 @@ impl Layers {
             face += 1;
         }
         let last = face;
-        // What the flange's air makes of the pack by itself stands apart: it is the same everywhere in it.
-        let by_air = C::new(cosine.from_air_per_s, 0.0) / per_s;
         let (mut diagonal, mut off) = (vec![zero; last + 1], vec![zero; last]);
-        let (mut driven, mut warmed) = (vec![zero; last + 1], vec![zero; last + 1]);
+        let mut faces = [(); CAUSES].map(|()| vec![zero; last + 1]);
         for (i, piece) in pieces.iter().enumerate() {
             diagonal[inner_of[i]] += piece.inner;
             diagonal[inner_of[i] + 1] += piece.outer;
@@ -234,58 +143,56 @@ impl Layers {
             diagonal[inner + 1] += conductance;
             off[inner] = (-conductance).into();
         }
-        warmed[0] = (self.bore_radius_m * cosine.uniform).into();
-        if let Some([heat, contact, mount]) = self.spool {
-            diagonal[0] = s * heat + contact + mount;
-            off[0] = (-contact).into();
-            diagonal[1] += contact;
-            driven[0] = by_air * contact + mount * cosine.uniform;
-            driven[1] -= by_air * contact;
+        if let Some(contact) = self.contact {
+            diagonal[0] += contact;
+            faces[0][0] += contact;
         }
+        faces[2][0] += 1.0;
         match self.film {
             Some(film) => {
                 diagonal[last] += film;
-                driven[last] += (C::new(cosine.uniform, 0.0) - by_air) * film;
+                faces[1][last] += film;
             }
             None => {
                 // Its temperature is given.
-                let given = C::new(cosine.uniform, 0.0) - by_air;
-                driven[last - 1] -= off[last - 1] * given;
-                (diagonal[last], driven[last], warmed[last]) = (C::new(1.0, 0.0), given, zero);
+                faces[1][last - 1] -= off[last - 1];
+                (diagonal[last], faces[1][last], off[last - 1]) = (C::new(1.0, 0.0), C::new(1.0, 0.0), zero);
             }
         }
-        let is_given = self.film.is_none();
         for i in 1..=last {
-            if i == last && is_given {
-                break;
-            }
             let share = off[i - 1] / diagonal[i - 1];
-            let (before, before_warmed) = (driven[i - 1], warmed[i - 1]);
             diagonal[i] -= share * off[i - 1];
-            driven[i] -= share * before;
-            warmed[i] -= share * before_warmed;
+            for right in &mut faces {
+                let before = right[i - 1];
+                right[i] -= share * before;
+            }
         }
-        for right in [&mut driven, &mut warmed] {
+        for right in &mut faces {
             for i in (0..=last).rev() {
-                let next = if i < last && !(is_given && i + 1 == last) { off[i] * right[i + 1] } else { zero };
+                let next = if i < last { off[i] * right[i + 1] } else { zero };
                 right[i] = (right[i] - next) / diagonal[i];
             }
         }
-        let solved = self.layers - usize::from(self.outermost_is_drive);
-        let (mut by_drive, mut by_bore) = (vec![zero; self.layers], vec![zero; self.layers]);
-        let volume = |from_m: f64, to_m: f64| to_m * to_m - from_m * from_m;
-        for (i, (piece, &(layer, from_m, to_m))) in pieces.iter().zip(&cut).enumerate() {
-            if layer < solved {
-                let share = volume(from_m, to_m) / volume(self.faces_m[layer], self.faces_m[layer + 1]);
-                let mean = |of: &[C]| (piece.mean[0] * of[inner_of[i]] + piece.mean[1] * of[inner_of[i] + 1]) * share;
-                by_drive[layer] += mean(&driven) + by_air * share;
-                by_bore[layer] += mean(&warmed);
+        let of = |right: &[C]| {
+            let (mut means, mut content) = (vec![zero; self.layers], zero);
+            for (i, (piece, &(layer, from_m, to_m))) in pieces.iter().zip(&cut).enumerate() {
+                let held = (piece.mean[0] * right[inner_of[i]] + piece.mean[1] * right[inner_of[i] + 1])
+                    * (0.5 * (to_m * to_m - from_m * from_m));
+                content += held;
+                means[layer] += held;
             }
+            for (mean, pair) in means.iter_mut().zip(self.faces_m.windows(2)) {
+                *mean /= 0.5 * (pair[1] * pair[1] - pair[0] * pair[0]);
+            }
+            (means, content)
+        };
+        let held = faces.each_ref().map(|right| of(right));
+        Felt {
+            bore: faces.each_ref().map(|right| right[0]),
+            surface: faces.each_ref().map(|right| right[last]),
+            content: held.each_ref().map(|(_, content)| *content),
+            means: held.map(|(means, _)| means),
         }
-        let mount = self.spool.map_or(0.0, |spool| spool[2]);
-        let back = |of: &[C]| of[last] * self.film.unwrap_or(0.0) + if spool > 0 { of[0] * mount } else { zero };
-        let given_back = [back(&driven), back(&warmed)];
-        (by_drive, by_bore, given_back)
     }
 
     fn piece(&self, q: C, per_s: C, from_m: f64, to_m: f64) -> Piece {
@@ -321,21 +228,4 @@ impl Layers {
             mean: [u.2 - v.2 * u.0 / v.0, v.2 / v.0],
         }
     }
-}
-
-/// The n-th root of (b² − β₁ β₂) tan b = b (β₁ + β₂), in (nπ, (n + 1)π).
-fn root(n: usize, at_first: f64, at_second: f64) -> f64 {
-    let start = n as f64 * std::f64::consts::PI;
-    // The tangent's period takes the sign of sine and cosine along.
-    let (mut low, mut high) = (0.0, std::f64::consts::PI);
-    for _ in 0..100 {
-        let middle: f64 = 0.5 * (low + high);
-        let b = start + middle;
-        if (b * b - at_first * at_second) * middle.sin() < b * (at_first + at_second) * middle.cos() {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    start + 0.5 * (low + high)
 }

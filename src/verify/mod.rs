@@ -18,11 +18,13 @@ mod layers;
 mod network;
 mod optics;
 mod page;
+mod parts;
 mod physics;
 mod program;
 mod rate;
 mod stepping;
 mod strain;
+mod waves;
 mod winding;
 
 use crate::profile::ProfileSpec;

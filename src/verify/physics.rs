@@ -10,7 +10,7 @@ use crate::effect::Subject;
 use crate::effect::custom::Formula;
 use crate::rate::CoilModel;
 use crate::stress::Materials;
-use crate::thermal::{Extent, Location, Material};
+use crate::thermal::{Extent, Flange, Location, Material};
 
 /// What the heat flows through and what the light sees, with every declared effect.
 #[derive(Debug, Clone)]
@@ -34,7 +34,13 @@ pub(super) struct Physics {
     pub(crate) housings: Vec<[f64; 2]>,
     /// Rate of the drive before the start, and for how long.
     pub(crate) ramp_before: Option<[f64; 2]>,
-    /// Parts that are not worked out a second time: a spool's flanges and wall, an uneven start, a sensor on spool or flange.
+    /// k and thickness of a spool's wall that conducts along the axis.
+    pub(crate) spool_wall: Option<[f64; 2]>,
+    pub(crate) spool_flanges: Vec<SpoolFlange>,
+    pub(crate) sensor: Sensor,
+    /// By how much pack, spool and housings are warmer than the drive at the start.
+    pub(crate) above_k: Option<[f64; 3]>,
+    /// What is not worked out a second time: housings or a ramp before the start beside a conductivity that depends on temperature.
     pub(crate) is_beyond: bool,
     pub(crate) conductivity_slope_per_k: f64,
     /// Missing on every second layer, the innermost being the first.
@@ -68,6 +74,23 @@ pub(super) struct BoreHeat {
 pub(super) struct HeatedFlange {
     pub(crate) is_first: bool,
     pub(crate) film_w_per_m2_k: f64,
+}
+
+/// A flange of the spool, of one temperature; all per area of the pack's face.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SpoolFlange {
+    pub(crate) is_first: bool,
+    pub(crate) heat_capacity_j_per_m2_k: f64,
+    pub(crate) contact_w_per_m2_k: f64,
+    pub(crate) film_w_per_m2_k: f64,
+}
+
+/// Where the drive is: outside, or a part of the spool whose temperature a profile then is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Sensor {
+    Outside,
+    Spool,
+    Flange { is_first: bool },
 }
 
 /// κ_B − κ_A = m κ, everywhere or below a transition.
@@ -120,7 +143,15 @@ impl Physics {
             layer_changes: Vec::new(),
             housings: Vec::new(),
             ramp_before: None,
-            is_beyond: matches!(model.location, Location::Spool | Location::Flange(_)),
+            spool_wall: None,
+            spool_flanges: Vec::new(),
+            sensor: match model.location {
+                Location::Spool => Sensor::Spool,
+                Location::Flange(flange) => Sensor::Flange { is_first: flange == Flange::First },
+                Location::OuterLayer | Location::Ambient | Location::Housing(_) => Sensor::Outside,
+            },
+            above_k: None,
+            is_beyond: false,
             conductivity_slope_per_k: 0.0,
             missing_turns: 0.0,
             path_factor: 1.0,
@@ -164,10 +195,23 @@ impl Physics {
                 (_, "axial_gradient", &[film_w_per_m2_k]) => {
                     p.flanges.push(HeatedFlange { is_first: choices == [0], film_w_per_m2_k });
                 }
-                (_, "unsteady_start", &[0.0, 0.0, 0.0, rate_k_per_s, lasted_s]) => {
-                    p.ramp_before = Some([rate_k_per_s, lasted_s]);
+                (_, "unsteady_start", &[pack_k, spool_k, housing_k, rate_k_per_s, lasted_s]) => {
+                    p.ramp_before = (rate_k_per_s != 0.0).then_some([rate_k_per_s, lasted_s]);
+                    let above_k = [pack_k, spool_k, housing_k];
+                    p.above_k = (above_k != [0.0; 3]).then_some(above_k);
                 }
-                (_, "spool_flange" | "spool_conduction" | "unsteady_start", _) => p.is_beyond = true,
+                (_, "spool_conduction", &[conductivity, wall_m]) => p.spool_wall = Some([conductivity, wall_m]),
+                (_, "spool_flange", &[capacity, contact, film]) => {
+                    let is_first = choices == [0];
+                    // Declared again, it is that flange.
+                    p.spool_flanges.retain(|known| known.is_first != is_first);
+                    p.spool_flanges.push(SpoolFlange {
+                        is_first,
+                        heat_capacity_j_per_m2_k: capacity,
+                        contact_w_per_m2_k: contact,
+                        film_w_per_m2_k: film,
+                    });
+                }
                 (_, "housing", &[capacity, gap_m, gas, emissivity, middle_k, spacers]) => {
                     p.driven_from_outside = true;
                     // σ from the constants that define it: 2 π⁵ k⁴/(15 h³ c²).
@@ -211,10 +255,12 @@ impl Physics {
             // The outermost then has the drive's temperature: only its gap is left.
             p.film_w_per_m2_k = p.housings.pop().map(|[_, inwards]| inwards);
         }
-        let varies = !p.flanges.is_empty() || p.conductivity_slope_per_k != 0.0;
-        p.is_beyond |= !p.housings.is_empty() && varies;
-        // What is stepped begins at rest.
-        p.is_beyond |= p.ramp_before.is_some() && p.conductivity_slope_per_k != 0.0;
+        // What is stepped begins at rest, and knows no housing.
+        let is_at_rest_alone = p.housings.is_empty() && p.ramp_before.is_none() && p.sensor == Sensor::Outside;
+        p.is_beyond |= p.conductivity_slope_per_k != 0.0 && !is_at_rest_alone;
+        // A pack that is warmer than a surface whose temperature is given has no finite rate at first.
+        let is_given = p.film_w_per_m2_k.is_none() && p.housings.is_empty();
+        p.is_beyond |= is_given && p.above_k.is_some_and(|[pack_k, ..]| pack_k != 0.0);
         Ok(p)
     }
 

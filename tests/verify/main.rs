@@ -180,6 +180,27 @@ const EFFECTS: &[&str] = &[
     "kind = 'unsteady_start'\nrate_c_per_h = -50.0\nlasted_s = 900.0\n[[effect]]\nkind = 'surface_film'\nfilm_w_per_m2_k = 30.0\n\
      [[effect]]\nkind = 'thermo_optic_temperature'\nslope_per_k = 0.002\n[[effect]]\nkind = 'axial_gradient'\n\
      film_w_per_m2_k = 20.0\nflange = 'first'",
+    "kind = 'unsteady_start'\npack_above_k = 0.5\n[[effect]]\nkind = 'surface_film'\nfilm_w_per_m2_k = 30.0",
+    "kind = 'unsteady_start'\npack_above_k = -0.2\nspool_above_k = 0.6\nhousing_above_k = 0.3\nrate_c_per_h = 20.0\n\
+     lasted_s = 700.0\n[[effect]]\nkind = 'housing'\nplace = 'first'\nheat_capacity_j_per_m2_k = 3000.0\ngap_mm = 1.5\n\
+     [[effect]]\nkind = 'spool_mass'\nheat_capacity_j_per_m2_k = 3000.0\ncontact_w_per_m2_k = 200.0\n\
+     mount_w_per_m2_k = 25.0\n[[effect]]\nkind = 'thermo_optic_temperature'\nslope_per_k = 0.002\n[[effect]]\n\
+     kind = 'spool_flange'\nflange = 'second'\nheat_capacity_j_per_m2_k = 4900.0\ncontact_w_per_m2_k = 250.0\n\
+     film_w_per_m2_k = 12.0\n[[effect]]\nkind = 'spool_conduction'\nconductivity_w_per_m_k = 167.0\nwall_mm = 2.0",
+    "kind = 'spool_flange'\nflange = 'first'\nheat_capacity_j_per_m2_k = 4900.0\ncontact_w_per_m2_k = 300.0\n\
+     film_w_per_m2_k = 20.0",
+    "kind = 'spool_flange'\nflange = 'first'\nheat_capacity_j_per_m2_k = 2000.0\ncontact_w_per_m2_k = 900.0\n\
+     film_w_per_m2_k = 60.0\n[[effect]]\nkind = 'spool_flange'\nflange = 'second'\nheat_capacity_j_per_m2_k = 4900.0\n\
+     contact_w_per_m2_k = 100.0\nfilm_w_per_m2_k = 20.0\n[[effect]]\nkind = 'spool_mass'\n\
+     heat_capacity_j_per_m2_k = 4000.0\ncontact_w_per_m2_k = 300.0\nmount_w_per_m2_k = 20.0\n[[effect]]\n\
+     kind = 'spool_conduction'\nconductivity_w_per_m_k = 6.7\nwall_mm = 1.0\n[[effect]]\nkind = 'surface_film'\n\
+     film_w_per_m2_k = 30.0\n[[effect]]\nkind = 'self_heating'\npower_w_per_m2 = 50.0\ntime_constant_s = 600.0",
+    "kind = 'spool_mass'\nheat_capacity_j_per_m2_k = 4000.0\ncontact_w_per_m2_k = 300.0\n[[effect]]\n\
+     kind = 'spool_conduction'\nconductivity_w_per_m_k = 167.0\nwall_mm = 2.0\n[[effect]]\nkind = 'axial_gradient'\n\
+     film_w_per_m2_k = 20.0\nflange = 'first'",
+    "kind = 'axial_gradient'\nfilm_w_per_m2_k = 20.0\nflange = 'first'\n[[effect]]\nkind = 'housing'\nplace = 'first'\n\
+     heat_capacity_j_per_m2_k = 5000.0\ngap_mm = 1.5\n[[effect]]\nkind = 'spool_flange'\nflange = 'first'\n\
+     heat_capacity_j_per_m2_k = 900.0\ncontact_w_per_m2_k = 40.0\nfilm_w_per_m2_k = 8.0",
     "kind = 'layer_gain'\nlayer = 9\nchange = -0.08",
     "kind = 'layer_gap'\nabove_layer = 7\nconductance_w_per_m2_k = 250.0",
     "kind = 'layer_gap'\nabove_layer = 11\nconductance_w_per_m2_k = 120.0",
@@ -210,12 +231,10 @@ const EFFECTS: &[&str] = &[
 
 /// What the verification takes as given, and says so.
 const GIVEN: &[&str] = &[
-    "kind = 'spool_flange'\nflange = 'first'\nheat_capacity_j_per_m2_k = 4900.0\ncontact_w_per_m2_k = 300.0\n\
-     film_w_per_m2_k = 20.0",
-    "kind = 'spool_mass'\nheat_capacity_j_per_m2_k = 4000.0\ncontact_w_per_m2_k = 300.0\n[[effect]]\n\
-     kind = 'spool_conduction'\nconductivity_w_per_m_k = 167.0\nwall_mm = 2.0\n[[effect]]\nkind = 'axial_gradient'\n\
-     film_w_per_m2_k = 20.0\nflange = 'first'",
-    "kind = 'unsteady_start'\npack_above_k = 0.5\n[[effect]]\nkind = 'surface_film'\nfilm_w_per_m2_k = 30.0",
+    "kind = 'housing'\nplace = 'first'\nheat_capacity_j_per_m2_k = 5000.0\ngap_mm = 1.5\n[[effect]]\n\
+     kind = 'surface_film'\nfilm_w_per_m2_k = 30.0\n[[effect]]\nkind = 'conductivity_temperature'\nslope_per_k = 0.004",
+    "kind = 'unsteady_start'\nrate_c_per_h = 40.0\nlasted_s = 5000.0\n[[effect]]\n\
+     kind = 'conductivity_temperature'\nslope_per_k = 0.004",
 ];
 
 #[test]
@@ -257,6 +276,28 @@ fn the_rate_error_of_every_effect_is_found_again_by_code_of_its_own() {
             );
             assert_eq!(found.violations, [], "{name}");
         }
+    }
+}
+
+/// A sensor on the spool, or on a flange, makes that part's temperature the profile.
+#[test]
+fn a_sensor_on_the_spool_or_a_flange_is_worked_out_again() {
+    let spool = "[[effect]]\nkind = 'spool_mass'\nheat_capacity_j_per_m2_k = 4000.0\ncontact_w_per_m2_k = 300.0\n\
+                 mount_w_per_m2_k = 20.0\n[[effect]]\nkind = 'surface_film'\nfilm_w_per_m2_k = 30.0\n";
+    let flange = "[[effect]]\nkind = 'spool_flange'\nflange = 'second'\nheat_capacity_j_per_m2_k = 4900.0\n\
+                  contact_w_per_m2_k = 300.0\nfilm_w_per_m2_k = 10.0\n";
+    let wall = "[[effect]]\nkind = 'spool_conduction'\nconductivity_w_per_m_k = 167.0\nwall_mm = 2.0\n";
+    for (location, effects) in [
+        ("spool", spool.to_owned()),
+        ("spool", format!("{spool}{flange}")),
+        ("second_flange", format!("{spool}{flange}")),
+        ("second_flange", format!("{spool}{flange}{wall}")),
+    ] {
+        let file = model(&format!("{WARM}[sensor]\nlocation = '{location}'\n{effects}"));
+        let (_, document) = plan(&file, &classic(Classic::Qua, 12).unwrap());
+        let found = judged(&file, &serde_json::to_string(&document).unwrap()).unwrap();
+        assert!(matches!(found.rate_check, RateCheck::Independent { .. }), "{location}");
+        assert_eq!(found.violations, [], "{location} {effects}");
     }
 }
 
