@@ -195,6 +195,7 @@ class TrimResult(Result):
     present_rate_deg_per_h: float
     predicted_rate_deg_per_h: float
     predicted_rate_standard_error_deg_per_h: float | None
+    least: Result | None
 
     def _headline(self) -> str:
         doubt = "" if self._data["is_significant"] else ", no more than its error allows"

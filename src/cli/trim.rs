@@ -45,9 +45,20 @@ fn text(body: &TrimJson) -> String {
     } else {
         "; no more than its error allows: measure a steeper or longer ramp first"
     };
+    let larger = if body.predicted_rate_deg_per_h > body.present_rate_deg_per_h {
+        ": it grows, because what is left is the winding's own, which the surplus had balanced in part"
+    } else {
+        ""
+    };
+    let least = body.least.as_ref().map_or_else(String::new, |least| {
+        format!(
+            "smallest error     {:.4} °/h with {:.4} m cut at end {}, or {:.3} turns more at the other end: the winding's own error then is balanced\n",
+            least.rate_deg_per_h, least.cut_m, least.end, least.turns_at_other_end
+        )
+    });
     format!(
         "{} with {}\nasymmetric length  {:.4}{} m (surplus at end A where positive){doubt}\ncut                {:.4}{} m at end {}, or wind {:.3}{} turns more at the other end\n\
-         largest rate error {:.4} °/h now, {:.4}{} °/h after the cut, under the same temperatures\n",
+         largest rate error {:.4} °/h now, {:.4}{} °/h after the cut, under the same temperatures{larger}\n{least}",
         body.model,
         body.pattern,
         length.value,

@@ -3,6 +3,7 @@
 //! ```text
 //! Ω = n κ 2δ (Ṫ_pack − Ṫ_lead)/D + Ω_coil,   2δ: surplus fibre at end A (δ > 0) or end B
 //! cut 2δ at that end: what is left is Ω_coil
+//! cut 2δ (1 − s):     what is left is Ω_coil + s (Ω − Ω_coil), whose largest size is convex in s: it has one smallest value
 //! ```
 //!
 //! | symbol | meaning | unit | in code |
@@ -20,6 +21,7 @@
 
 use super::{DiagnoseError, Finding, Request, extend};
 use crate::effect::{DeclaredEffect, OFFSET_OF_MIDDLE};
+use crate::numeric::maximise::{Maximum, golden_section};
 use crate::predict::{PredictError, estimate_boundary, predict_from};
 use crate::rate::CoilModel;
 use crate::record::Record;
@@ -48,10 +50,50 @@ pub(crate) struct Trim {
     pub(crate) predicted_rad_per_s: f64,
     /// The largest that an error of one standard deviation in the cut would add.
     pub(crate) uncertain_rad_per_s: Option<f64>,
+    /// None where the surplus changes nothing.
+    pub(crate) least: Option<Least>,
+}
+
+/// The cut that leaves the smallest largest error, where what the winding itself makes is balanced as far as one length can.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Least {
+    pub(crate) cut_m: f64,
+    pub(crate) end: End,
+    pub(crate) turns_at_other_end: f64,
+    pub(crate) rad_per_s: f64,
+}
+
+/// At which end so much, positive at end A, is to be cut.
+fn end_of(length_m: f64) -> End {
+    if length_m >= 0.0 { End::A } else { End::B }
+}
+
+/// The share of a surplus that leaves the smallest largest error, and that error.
+fn least_share(without: &[f64], with: &[f64]) -> Option<Maximum> {
+    let pairs: Vec<(f64, f64)> =
+        without.iter().zip(with).map(|(a, b)| (*a, b - a)).filter(|(a, d)| a.is_finite() && d.is_finite()).collect();
+    let largest = |f: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(|pair| f(pair).abs()).fold(0.0, f64::max);
+    let (winding, surplus) = (largest(&|pair| pair.0), largest(&|pair| pair.1));
+    // Beyond it the surplus alone makes more than the winding.
+    let most = 2.0 * winding / surplus;
+    let found = (surplus > 0.0 && most.is_finite())
+        .then(|| golden_section(|s| -largest(&|pair| pair.0 + s * pair.1), -most, most))?;
+    Some(Maximum { value: -found.value, ..found })
 }
 
 fn in_record(record: &Record, error: PredictError) -> DiagnoseError {
     DiagnoseError::Record { record: record.name().to_owned(), source: Box::new(error) }
+}
+
+fn least_cut(without: &[f64], with: &[f64], length_m: f64, turn_m: f64) -> Option<Least> {
+    let found = least_share(without, with)?;
+    let cut_m = (1.0 - found.at) * length_m;
+    Some(Least {
+        cut_m: cut_m.abs(),
+        end: end_of(cut_m),
+        turns_at_other_end: cut_m.abs() / turn_m,
+        rad_per_s: found.value,
+    })
 }
 
 /// Fits the surplus fibre to the records; what its temperature follows is what fits better.
@@ -102,16 +144,32 @@ pub(crate) fn trim(request: &Request) -> Result<Trim, DiagnoseError> {
     let coil = &request.model.coil;
     let outermost_m = coil.bore_radius_m() + (coil.layers() as f64 - 0.5) * coil.radial_pitch_m();
     let (length_m, turn_m) = (2.0 * offset_m, std::f64::consts::TAU * outermost_m);
+    let least = least_cut(&after, &present, length_m, turn_m);
     Ok(Trim {
         asymmetric_length_m: length_m,
         standard_error_m: error_m.map(|e| 2.0 * e),
         cut_m: length_m.abs(),
-        end: if length_m >= 0.0 { End::A } else { End::B },
+        end: end_of(length_m),
         turns_at_other_end: length_m.abs() / turn_m,
         turns_standard_error: error_m.map(|e| 2.0 * e / turn_m),
         present_rad_per_s: size(&present),
         predicted_rad_per_s: size(&after),
         uncertain_rad_per_s,
+        least,
         finding: extension.finding,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_smallest_largest_error_is_where_two_sizes_are_equal() {
+        // |3 − s| and |−1 + 2 s| meet at s = 4/3: 5/3. What is no number counts for nothing.
+        let without = [3.0, -1.0, f64::NAN];
+        let found = least_share(&without, &[2.0, 1.0, 0.0]).unwrap();
+        assert!((found.at - 4.0 / 3.0).abs() < 1e-6 && (found.value - 5.0 / 3.0).abs() < 1e-6, "{found:?}");
+        assert_eq!(least_share(&without, &without), None);
+    }
 }

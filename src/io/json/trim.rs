@@ -27,6 +27,8 @@ pub struct TrimJson {
     pub(crate) predicted_rate_deg_per_h: f64,
     /// The largest that one standard error of the cut adds.
     pub(crate) predicted_rate_standard_error_deg_per_h: Option<f64>,
+    /// The cut that leaves the smallest largest error; null where none changes it.
+    pub(crate) least: Option<LeastJson>,
     /// The fitted surplus, and what looks the same in these records.
     pub(crate) effect: FindingJson,
     pub(crate) inputs: InputsJson,
@@ -36,6 +38,23 @@ pub struct TrimJson {
 pub(crate) struct EstimateJson {
     pub(crate) value: f64,
     pub(crate) standard_error: Option<f64>,
+}
+
+/// Where what the winding itself makes is balanced as far as one length can.
+#[derive(Debug, Serialize)]
+pub(crate) struct LeastJson {
+    pub(crate) cut_m: f64,
+    /// "A" or "B".
+    pub(crate) end: &'static str,
+    pub(crate) turns_at_other_end: f64,
+    pub(crate) rate_deg_per_h: f64,
+}
+
+fn end_name(end: End) -> &'static str {
+    match end {
+        End::A => "A",
+        End::B => "B",
+    }
 }
 
 impl TrimJson {
@@ -48,16 +67,19 @@ impl TrimJson {
                 standard_error: trim.standard_error_m,
             },
             cut_m: trim.cut_m,
-            end: match trim.end {
-                End::A => "A",
-                End::B => "B",
-            },
+            end: end_name(trim.end),
             turns_at_other_end: trim.turns_at_other_end,
             turns_at_other_end_standard_error: trim.turns_standard_error,
             is_significant: trim.standard_error_m.is_some_and(|e| trim.cut_m > 2.0 * e),
             present_rate_deg_per_h: deg_per_h_from_rad_per_s(trim.present_rad_per_s),
             predicted_rate_deg_per_h: deg_per_h_from_rad_per_s(trim.predicted_rad_per_s),
             predicted_rate_standard_error_deg_per_h: trim.uncertain_rad_per_s.map(deg_per_h_from_rad_per_s),
+            least: trim.least.map(|least| LeastJson {
+                cut_m: least.cut_m,
+                end: end_name(least.end),
+                turns_at_other_end: least.turns_at_other_end,
+                rate_deg_per_h: deg_per_h_from_rad_per_s(least.rad_per_s),
+            }),
             effect: FindingJson::new(&trim.finding),
             inputs,
         }
