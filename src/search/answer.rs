@@ -1,7 +1,7 @@
 //! What a search answers: the best pattern beside the classics, what is known about it, and what to wind.
 
 use super::anneal::rounds::{State, Stop};
-use super::aside::GridCheck;
+use super::aside::{GridCheck, PointingResolution};
 use super::cost::objective::Objective;
 use super::cutting::Cuts;
 use super::end_turns::WithEnds;
@@ -11,7 +11,6 @@ use super::proof::{Certificate, Status};
 use super::prospect::{Gain, Prospect};
 use super::recommendation::Recommendation;
 use super::validation::Validation;
-use crate::units::deg_per_h_from_rad_per_s;
 
 /// How a search came to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,12 +86,12 @@ impl Proof {
 
     /// To be said after how good the best pattern is under the objective.
     pub(crate) fn words(&self, objective: Objective) -> String {
-        let (what, unit) = (objective.title(), objective.unit());
+        let what = objective.title();
         match self.status {
             Status::Optimal => format!(" Proved: no pattern of the class has a smaller {what} at any time."),
             Status::Gap => format!(
-                " Proved: no pattern of the class has a {what} below {:.4} {unit}.",
-                deg_per_h_from_rad_per_s(self.lower_bound_rad_per_s)
+                " Proved: no pattern of the class has a {what} below {}.",
+                objective.shown(self.lower_bound_rad_per_s)
             ),
             Status::None => String::new(),
         }
@@ -132,6 +131,8 @@ pub struct Answer {
     pub statement: String,
     /// None where the temperature has no grid or the search was interrupted.
     pub(crate) grid_check: Option<GridCheck>,
+    /// None unless the search was for the pointing error.
+    pub(crate) resolution: Option<PointingResolution>,
     /// None where no former pattern was given.
     pub(crate) compared_with: Option<Former>,
     pub(crate) proof: Proof,

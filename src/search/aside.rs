@@ -3,12 +3,23 @@
 use crate::pattern::Pattern;
 use crate::rate::CoilModel;
 use crate::search::cost::grid_margin::GridMargin;
-use crate::search::cost::pointing::{EndlessRamp, worst_pointing};
+use crate::search::cost::objective::{Objective, POINTING_S};
+use crate::search::cost::pointing::{EndlessRamp, largest_change_rad, worst_pointing};
+use crate::search::cost::tolerance::with_middle_moved;
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
-use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
+use crate::units::{mm_from_m, percent_from_fraction};
 
 /// A worst rate that a finer grid changes by more than this is not to be relied upon.
 const GRID_CAUTION: f64 = 0.005;
+
+/// What the grid is checked by: what the search was for, as far as one profile after the other shows it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum GridFigure {
+    WorstRate,
+    GuaranteedRate,
+    /// As the rate that makes it in one hour.
+    Pointing,
+}
 
 /// A rate on the model's grid and on one twice as fine.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,8 +40,7 @@ impl GridChecked {
 /// hides, so its best gains most from the grid's error.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct GridCheck {
-    /// Whether the rates are guaranteed ones, because the search was for them; the worst over the profiles otherwise.
-    pub(crate) is_of_guaranteed: bool,
+    pub(crate) of: GridFigure,
     pub(crate) cells_per_layer: usize,
     pub(crate) finer_cells_per_layer: usize,
     pub(crate) patterns: Vec<GridChecked>,
@@ -40,13 +50,18 @@ impl GridCheck {
     /// What to say where the grid matters.
     pub(crate) fn caution(&self) -> Option<String> {
         let best = self.patterns.first().filter(|best| best.change().abs() > GRID_CAUTION)?;
+        let objective = match self.of {
+            GridFigure::WorstRate => Objective::WorstRate,
+            GridFigure::GuaranteedRate => Objective::GuaranteedRate,
+            GridFigure::Pointing => Objective::Pointing,
+        };
         Some(format!(
-            "Caution: with {} instead of {} cells a layer its {} rate error is {:.4} °/h, {:.1} % {}. \
+            "Caution: with {} instead of {} cells a layer its {} is {}, {:.1} % {}. \
              Set thermal.cells_per_layer = {} and search again.",
             self.finer_cells_per_layer,
             self.cells_per_layer,
-            if self.is_of_guaranteed { "guaranteed worst" } else { "worst" },
-            deg_per_h_from_rad_per_s(best.finer_rad_per_s),
+            objective.title(),
+            objective.shown(best.finer_rad_per_s),
             percent_from_fraction(best.change().abs()),
             if best.change() > 0.0 { "more" } else { "less" },
             self.finer_cells_per_layer,
@@ -61,6 +76,35 @@ pub(crate) struct PointingError {
     pub(crate) worst_rad: f64,
     /// None for models that have no bound over all profiles.
     pub(crate) guaranteed_rad: Option<f64>,
+}
+
+/// By how much pointing errors must differ to be different in a coil that is wound.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PointingResolution {
+    /// Between the middle of the fibre and that of the coil: the fibre's diameter \[m\].
+    pub(crate) offset_m: f64,
+    /// What that adds to the best pattern's ψ at most, over all profiles and times.
+    pub(crate) error_rad: f64,
+}
+
+impl PointingResolution {
+    /// # Errors
+    /// A pattern of another layer count.
+    pub(crate) fn of(model: &CoilModel, solved: &SolvedProfiles, pattern: &Pattern) -> Result<Self, SearchError> {
+        let offset_m = model.coil.fibre().outer_diameter_m;
+        let moved = with_middle_moved(model, offset_m);
+        Ok(Self { offset_m, error_rad: largest_change_rad(model, &moved, solved, pattern)? })
+    }
+
+    /// In words.
+    pub(crate) fn words(self) -> String {
+        format!(
+            "A middle of the fibre that is off by no more than its diameter, {:.3} mm, adds up to {}: pointing errors that are \
+             closer together than that are the same in a coil that is wound.",
+            mm_from_m(self.offset_m),
+            Objective::Pointing.shown(self.error_rad / POINTING_S)
+        )
+    }
 }
 
 /// What is worked out once a model for what stands beside rates.

@@ -8,16 +8,17 @@ use crate::pattern::windability::WindabilityClass;
 use crate::profile::{Profile, ProfileSpec};
 use crate::rate::{CoilModel, RateModel};
 use crate::search::anneal::rounds::Found;
-use crate::search::aside::{Aside, GridCheck, GridChecked, PointingError};
+use crate::search::aside::{Aside, GridCheck, GridChecked, GridFigure, PointingError};
 use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
 use crate::search::cost::objective::{Objective, POINTING_S};
 use crate::search::cost::pointing::pointing_as_rate;
 use crate::search::cost::tolerance::{Coils, ToleranceError, ToleranceSpec};
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles, WorstCase};
+use crate::search::proof::compound::compounded;
 use crate::search::proof::permutation_tree::MOST_LAYERS;
 use crate::search::proof::{Effort, Goal, Improvement, Task, improve};
 use crate::thermal::{Extent, Location};
-use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
+use crate::units::percent_from_fraction;
 
 /// Why patterns cannot be judged.
 #[derive(Debug, Error, Clone, PartialEq)]
@@ -88,6 +89,9 @@ const IMPROVING_NODES: u64 = 1 << 18;
 
 /// Nodes of a level that the last look for something better keeps: a second or a few.
 const BEAM_WIDTH: usize = 1 << 14;
+
+/// Of the moves that are tried many at once: the same for every search, so that what one comes upon no other misses.
+const COMPOUND_SEED: u64 = 1;
 
 /// Patterns that the improvement begins with, besides the best.
 const MOST_STARTS: usize = 6;
@@ -184,14 +188,19 @@ impl Evaluator<'_> {
         let step = (self.objective == Objective::GuaranteedRate)
             .then(|| UnitStep::new(&finer, self.profiles.max_rate_k_per_s).ok())
             .flatten();
+        let of = match self.objective {
+            Objective::Pointing => GridFigure::Pointing,
+            _ if step.is_some() => GridFigure::GuaranteedRate,
+            _ => GridFigure::WorstRate,
+        };
         let checked = |judged: &Judged, rate_rad_per_s: f64, finer_rad_per_s: f64| GridChecked {
             name: judged.name.clone(),
             rate_rad_per_s,
             finer_rad_per_s,
         };
         let asked = std::iter::once(best).chain(qua);
-        let patterns = match &step {
-            Some(step) => asked
+        let patterns = if let Some(step) = &step {
+            asked
                 .map(|judged| match step.guaranteed(&finer, &judged.pattern) {
                     Ok(found) => Ok(checked(judged, judged.objective_rad_per_s, found.rate_rad_per_s)),
                     Err(GuaranteedError::Search(error)) => Err(error),
@@ -199,24 +208,22 @@ impl Evaluator<'_> {
                         Ok(checked(judged, judged.objective_rad_per_s, judged.objective_rad_per_s))
                     }
                 })
-                .collect::<Result<_, SearchError>>()?,
-            None => {
-                let profiles: Vec<Profile> = self.solved.profiles().iter().map(|p| p.profile.clone()).collect();
-                let solved = SolvedProfiles::new(&finer, &profiles)?;
-                asked
-                    .map(|judged| {
-                        let finer_rad_per_s = solved.worst_case(&finer, &judged.pattern)?.rate_rad_per_s.abs();
-                        Ok(checked(judged, judged.worst.rate_rad_per_s.abs(), finer_rad_per_s))
-                    })
-                    .collect::<Result<_, SearchError>>()?
-            }
+                .collect::<Result<_, SearchError>>()?
+        } else {
+            let profiles: Vec<Profile> = self.solved.profiles().iter().map(|p| p.profile.clone()).collect();
+            let solved = SolvedProfiles::new(&finer, &profiles)?;
+            asked
+                .map(|judged| {
+                    let (here, there) = if of == GridFigure::Pointing {
+                        (judged.objective_rad_per_s, pointing_as_rate(&finer, &solved, &judged.pattern)?)
+                    } else {
+                        (judged.worst.rate_rad_per_s.abs(), solved.worst_case(&finer, &judged.pattern)?)
+                    };
+                    Ok(checked(judged, here, there.rate_rad_per_s.abs()))
+                })
+                .collect::<Result<_, SearchError>>()?
         };
-        Ok(Some(GridCheck {
-            is_of_guaranteed: step.is_some(),
-            cells_per_layer: path.cells_per_layer,
-            finer_cells_per_layer,
-            patterns,
-        }))
+        Ok(Some(GridCheck { of, cells_per_layer: path.cells_per_layer, finer_cells_per_layer, patterns }))
     }
 
     /// With what the grid may put its rates off, and with its pointing error.
@@ -281,8 +288,8 @@ impl Evaluator<'_> {
     }
 
     /// What a short search by bounds makes of the best pattern and what else was found, and whether that is proved to be
-    /// the best of the class. Only for classes of permutations and the objectives that proofs are about. The same
-    /// patterns give the same answer.
+    /// the best of the class: for classes of permutations and the objectives that proofs are about. For the pointing error
+    /// many moves at once are tried as well, in every class. The same patterns give the same answer.
     ///
     /// # Errors
     /// None that a model which could be solved would cause.
@@ -293,15 +300,23 @@ impl Evaluator<'_> {
         found: &[Found],
         good_enough_rad_per_s: Option<f64>,
     ) -> Result<(Judged, bool), JudgeError> {
-        let Some(task) = self.task(class).filter(|_| self.can_improve(class)) else { return Ok((best, false)) };
+        let layers = self.model.coil.layers();
+        let Some(task) = self.task(class).filter(|_| layers >= FEWEST_LAYERS) else { return Ok((best, false)) };
         let others = found.iter().take(MOST_STARTS);
         let others = others.map(|f| Pattern::new(f.segments.clone()).expect("a walk visits permutations only"));
         let starts: Vec<Pattern> = std::iter::once(best.pattern.clone()).chain(others).collect();
-        let most_nodes = if self.is_provable(class) { PROVING_NODES } else { IMPROVING_NODES };
-        let beam_width = if self.model.coil.layers() > PROVABLE_LAYERS { BEAM_WIDTH } else { 0 };
         let good_enough_rad_per_s = good_enough_rad_per_s.unwrap_or(0.0);
-        let effort = Effort { most_nodes, beam_width, good_enough_rad_per_s };
-        let Improvement { pattern, is_optimal } = improve(&task, &starts, effort)?;
+        let Improvement { mut pattern, is_optimal } = if self.can_improve(class) {
+            let most_nodes = if self.is_provable(class) { PROVING_NODES } else { IMPROVING_NODES };
+            let beam_width = if layers > PROVABLE_LAYERS { BEAM_WIDTH } else { 0 };
+            improve(&task, &starts, Effort { most_nodes, beam_width, good_enough_rad_per_s })?
+        } else {
+            Improvement { pattern: best.pattern.clone(), is_optimal: false }
+        };
+        if self.objective == Objective::Pointing && !is_optimal {
+            let starts: Vec<Pattern> = std::iter::once(pattern).chain(starts).collect();
+            pattern = compounded(&task, &starts, COMPOUND_SEED)?;
+        }
         if pattern == best.pattern {
             return Ok((best, is_optimal));
         }
@@ -364,8 +379,8 @@ impl Evaluator<'_> {
             Location::Spool => "with the spool's temperature prescribed",
             Location::Flange(_) => "with the temperature of the spool's flange prescribed",
         };
-        let (what, unit) = (self.objective.title(), self.objective.unit());
-        let shown = |judged: &Judged| deg_per_h_from_rad_per_s(judged.objective_rad_per_s);
+        let what = self.objective.title();
+        let shown = |judged: &Judged| self.objective.shown(judged.objective_rad_per_s);
         let count = self.solved.profiles().len();
         let over = match self.objective {
             Objective::GuaranteedRate => "all profiles within the largest rate".to_owned(),
@@ -377,7 +392,7 @@ impl Evaluator<'_> {
         let Some(qua) = baselines.iter().find(|b| b.name == Classic::Qua.key()) else {
             return format!(
                 "There is no QUA to compare with: {} layers are no multiple of 4. The best pattern found has a {what} \
-                 of {:.4} {unit} {scope}.",
+                 of {} {scope}.",
                 best.pattern.layers(),
                 shown(best)
             );
@@ -394,13 +409,13 @@ impl Evaluator<'_> {
                 .collect();
             let also = if others.is_empty() { String::new() } else { format!(" (and so is {})", others.join(", ")) };
             return format!(
-                "QUA is as good as it gets{also}: no pattern with a smaller {what} than its {:.4} {unit} was found {scope}.",
+                "QUA is as good as it gets{also}: no pattern with a smaller {what} than its {} was found {scope}.",
                 shown(qua)
             );
         }
         let factor = qua.objective_rad_per_s / best.objective_rad_per_s;
         format!(
-            "The best pattern found has a {what} of {:.4} {unit}, {} QUA's {:.4} {unit}, {scope}.",
+            "The best pattern found has a {what} of {}, {} QUA's {}, {scope}.",
             shown(best),
             how_much_less(factor),
             shown(qua)
@@ -431,54 +446,4 @@ fn how_much_less(factor: f64) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::coil::LayerLength;
-    use crate::search::cost::samples::tests::{model, profiles};
-
-    #[test]
-    fn a_search_is_checked_on_a_grid_twice_as_fine_and_cautioned_where_that_changes_much() {
-        let declared = CoilModel { cells_per_layer: 1, ..model(8, LayerLength::Actual, &[]) };
-        let profiles = profiles();
-        let spec = ProfileSpec {
-            max_rate_k_per_s: 0.003,
-            count: 0,
-            segments: 1,
-            duration_s: 1.0,
-            seed: 1,
-            listed: profiles.clone(),
-        };
-        let solved = SolvedProfiles::new(&declared, &profiles).unwrap();
-        let objective = Objective::WorstRate;
-        let evaluator = Evaluator {
-            model: &declared,
-            solved: &solved,
-            objective,
-            unit_step: None,
-            profiles: &spec,
-            tolerance: None,
-        };
-        let baselines = evaluator.baselines().unwrap();
-        let of = |name: &str| baselines.iter().find(|b| b.name == name).unwrap();
-        let check = evaluator.grid_check(of("dip"), &baselines).unwrap().unwrap();
-        assert_eq!((check.cells_per_layer, check.finer_cells_per_layer), (1, 2));
-        let finer = CoilModel { cells_per_layer: 2, ..declared.clone() };
-        let finer_solved = SolvedProfiles::new(&finer, &profiles).unwrap();
-        for (checked, name) in check.patterns.iter().zip(["dip", "qua"]) {
-            let expected = finer_solved.worst_case(&finer, &of(name).pattern).unwrap().rate_rad_per_s.abs();
-            assert_eq!((checked.name.as_str(), checked.finer_rad_per_s), (name, expected));
-            assert_eq!(checked.rate_rad_per_s, of(name).worst.rate_rad_per_s.abs());
-        }
-        assert_eq!(check.patterns.len(), 2);
-        let cautioned = |change: f64| {
-            let finer_rad_per_s = 1.0 + change;
-            let best = GridChecked { name: "searched-8".into(), rate_rad_per_s: 1.0, finer_rad_per_s };
-            GridCheck { patterns: vec![best], ..check.clone() }.caution().is_some()
-        };
-        assert_eq!([-0.006, -0.004, 0.004, 0.006].map(cautioned), [true, false, false, true]);
-
-        let half_space = CoilModel { extent: Extent::HalfSpace, ..declared.clone() };
-        let evaluator = Evaluator { model: &half_space, ..evaluator };
-        assert_eq!(evaluator.grid_check(of("dip"), &baselines).unwrap(), None);
-    }
-}
+mod tests;

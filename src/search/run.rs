@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use super::anneal::rounds::{Plan, Rounds, State, Stop};
 use super::answer::{Answer, Ended, Former, FoundBy, Proof};
-use super::aside::Aside;
+use super::aside::{Aside, PointingResolution};
 use super::cost::guaranteed::UnitStep;
 use super::cost::objective::Objective;
 use super::cost::tolerance::ToleranceSpec;
@@ -20,7 +20,6 @@ use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;
-use crate::units::deg_per_h_from_rad_per_s;
 
 /// What is to be searched.
 #[derive(Debug, Clone)]
@@ -188,11 +187,15 @@ pub fn run(request: &Request, observer: &mut dyn Observer) -> Result<Option<Answ
         }
         None => (None, None, None, None),
     };
+    let resolution = (request.objective == Objective::Pointing && !is_over)
+        .then(|| PointingResolution::of(request.model, &solved, &best.pattern))
+        .transpose()?;
     let caution = grid_check.as_ref().and_then(|check| check.caution()).map(|words| format!(" {words}"));
     let on_unseen = validation.as_ref().map(|v| evaluator.words_on_unseen(v, &best, &baselines));
     let statement = evaluator.statement(&best, &baselines, class)
         + &on_unseen.unwrap_or_default()
         + &proof.words(request.objective)
+        + &resolution.map(|r| format!(" {}", r.words())).unwrap_or_default()
         + &caution.unwrap_or_default();
     let aside = Aside::new(request.model, &solved)?;
     let best = evaluator.completed(&aside, best)?;
@@ -204,6 +207,7 @@ pub fn run(request: &Request, observer: &mut dyn Observer) -> Result<Option<Answ
         improvement_over_qua: improvement_over_qua(&best, &baselines),
         statement,
         grid_check,
+        resolution,
         compared_with,
         proof,
         evaluations_when_found: match found_by {
@@ -372,8 +376,7 @@ fn compare_with_former(
     let (new_cost, old_cost) = (best.objective_rad_per_s, old.objective_rad_per_s);
     let best_changed = new_cost < old_cost * (1.0 - EQUALLY_GOOD);
     let what = evaluator.objective.key();
-    let unit = evaluator.objective.unit();
-    let shown = |cost: f64| format!("{:.4} {unit}", deg_per_h_from_rad_per_s(cost));
+    let shown = |cost: f64| evaluator.objective.shown(cost);
     let (old_shown, new_shown) = (shown(old_cost), shown(new_cost));
     let statement = if best_changed {
         format!(

@@ -6,7 +6,7 @@ use super::{PatternJson, ProofJson};
 use crate::profile::Piece;
 use crate::search::Request;
 use crate::search::answer::{Answer, Former, FoundBy, Outlook};
-use crate::search::aside::GridCheck;
+use crate::search::aside::{GridCheck, GridFigure};
 use crate::search::cutting::Cuts;
 use crate::search::end_turns::WithEnds;
 use crate::search::evaluator::Judged;
@@ -14,7 +14,7 @@ use crate::search::outlook::OtherBoundary;
 use crate::search::prospect::{Gain, Prospect};
 use crate::search::recommendation::Recommendation;
 use crate::search::validation::Validation;
-use crate::units::{c_per_h_from_k_per_s, deg_per_h_from_rad_per_s, percent_from_fraction};
+use crate::units::{c_per_h_from_k_per_s, deg_from_rad, deg_per_h_from_rad_per_s, mm_from_m, percent_from_fraction};
 
 impl PatternJson {
     /// Of a pattern that was judged by the reference.
@@ -59,6 +59,9 @@ pub struct OptimiseJson {
     pub(crate) predicted_gain: Option<GainJson>,
     /// Null where the temperature has no grid or the search was interrupted.
     pub(crate) grid_check: Option<GridCheckJson>,
+    /// Absent unless the search was for the pointing error.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) pointing_resolution: Option<PointingResolutionJson>,
     /// Null where no former pattern was stated.
     pub(crate) compared_with: Option<FormerJson>,
     pub(crate) proof: ProofJson,
@@ -236,7 +239,8 @@ impl CutsJson {
     }
 }
 
-/// Rates on a grid twice as fine: the guaranteed ones where the search was for them, the worst ones otherwise.
+/// Rates on a grid twice as fine: the guaranteed ones or the pointing errors where the search was for them, the worst ones
+/// otherwise.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct GridCheckJson {
     pub(crate) cells_per_layer: usize,
@@ -260,6 +264,7 @@ pub(crate) struct GridCheckedJson {
 pub(crate) enum GridRatesJson {
     Worst { worst_rate_deg_per_h: f64, finer_worst_rate_deg_per_h: f64 },
     Guaranteed { guaranteed_worst_rate_deg_per_h: f64, finer_guaranteed_worst_rate_deg_per_h: f64 },
+    Pointing { worst_pointing_error_deg: f64, finer_worst_pointing_error_deg: f64 },
 }
 
 impl GridCheckJson {
@@ -267,13 +272,18 @@ impl GridCheckJson {
         let patterns = check.patterns.iter().map(|checked| {
             let (rate, finer) =
                 (deg_per_h_from_rad_per_s(checked.rate_rad_per_s), deg_per_h_from_rad_per_s(checked.finer_rad_per_s));
-            let rates = if check.is_of_guaranteed {
-                GridRatesJson::Guaranteed {
+            let rates = match check.of {
+                GridFigure::GuaranteedRate => GridRatesJson::Guaranteed {
                     guaranteed_worst_rate_deg_per_h: rate,
                     finer_guaranteed_worst_rate_deg_per_h: finer,
+                },
+                GridFigure::WorstRate => {
+                    GridRatesJson::Worst { worst_rate_deg_per_h: rate, finer_worst_rate_deg_per_h: finer }
                 }
-            } else {
-                GridRatesJson::Worst { worst_rate_deg_per_h: rate, finer_worst_rate_deg_per_h: finer }
+                // A degree an hour for one hour is a degree.
+                GridFigure::Pointing => {
+                    GridRatesJson::Pointing { worst_pointing_error_deg: rate, finer_worst_pointing_error_deg: finer }
+                }
             };
             let change_percent = percent_from_fraction(checked.change());
             GridCheckedJson { name: checked.name.clone(), rates, change_percent }
@@ -285,6 +295,15 @@ impl GridCheckJson {
             caution: check.caution(),
         }
     }
+}
+
+/// Pointing errors that are closer together than this are the same in a coil that is wound.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct PointingResolutionJson {
+    /// Between the middle of the fibre and that of the coil: the fibre's diameter.
+    pub(crate) midpoint_offset_mm: f64,
+    /// What that adds to the best pattern's pointing error at most.
+    pub(crate) pointing_error_deg: f64,
 }
 
 /// When the best pattern was come upon.
@@ -378,6 +397,10 @@ impl OptimiseJson {
             uncertainty: answer.outlook.as_ref().map(UncertaintyJson::of),
             predicted_gain: answer.outlook.as_ref().and_then(|o| o.gain.as_ref()).map(GainJson::of),
             grid_check: answer.grid_check.as_ref().map(GridCheckJson::of),
+            pointing_resolution: answer.resolution.map(|resolution| PointingResolutionJson {
+                midpoint_offset_mm: mm_from_m(resolution.offset_m),
+                pointing_error_deg: deg_from_rad(resolution.error_rad),
+            }),
             compared_with: answer.compared_with.as_ref().map(|former| FormerJson::of(former, &answer.best)),
             proof: ProofJson::of(&answer.proof),
             cutting_planes: answer.cuts.as_ref().map(CutsJson::of),

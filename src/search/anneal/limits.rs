@@ -83,7 +83,7 @@ pub(crate) fn draw(limits: impl Into<Limits>, layers: usize, random: &mut ChaCha
 }
 
 /// A number below `count`, the same on every machine.
-pub(super) fn pick(random: &mut ChaCha8Rng, count: usize) -> usize {
+pub(crate) fn pick(random: &mut ChaCha8Rng, count: usize) -> usize {
     ((u64::from(random.next_u32()) * count as u64) >> 32) as usize
 }
 

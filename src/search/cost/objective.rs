@@ -5,7 +5,7 @@ use crate::search::cost::columns::Norm;
 use crate::search::cost::pointing::pointing_samples;
 use crate::search::cost::samples::SampleMatrix;
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
-use crate::units::SECONDS_PER_HOUR;
+use crate::units::{SECONDS_PER_HOUR, deg_per_h_from_rad_per_s};
 
 /// What a search makes small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -73,6 +73,20 @@ impl Objective {
     /// Of its value as it is shown.
     pub(crate) fn unit(self) -> &'static str {
         if self == Objective::Pointing { "°" } else { "°/h" }
+    }
+
+    /// A value in its unit, with enough digits to be told from its like: pointing errors are small numbers of degrees.
+    pub(crate) fn shown(self, value_rad_per_s: f64) -> String {
+        const USUAL: usize = 4;
+        const MOST: usize = 12;
+        let value = deg_per_h_from_rad_per_s(value_rad_per_s);
+        let mut decimals = USUAL;
+        let mut scaled = value.abs() * 1e4;
+        while self == Objective::Pointing && scaled > 0.0 && scaled < 100.0 && decimals < MOST {
+            decimals += 1;
+            scaled *= 10.0;
+        }
+        format!("{value:.decimals$} {}", self.unit())
     }
 
     /// How the samples of a plain search make one cost; a search over built coils has its own.

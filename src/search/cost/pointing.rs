@@ -180,6 +180,25 @@ pub fn worst_pointing(model: &CoilModel, solved: &SolvedProfiles, pattern: &Patt
     Ok(worst)
 }
 
+/// By how much at most a pattern's ψ \[rad\] is another under another model of the same temperatures, at any instant of the
+/// profiles.
+///
+/// # Errors
+/// A pattern of another layer count.
+pub(in crate::search) fn largest_change_rad(
+    model: &CoilModel,
+    other: &CoilModel,
+    solved: &SolvedProfiles,
+    pattern: &Pattern,
+) -> Result<f64, SearchError> {
+    let (one, two) = (Pointing::new(model, pattern)?, Pointing::new(other, pattern)?);
+    let of_profile = |profile: &SolvedProfile| {
+        let series = one.series_rad(profile);
+        two.series_rad(profile).iter().zip(series).map(|(b, a)| (b - a).abs()).fold(0.0, f64::max)
+    };
+    Ok(solved.profiles().par_iter().map(of_profile).reduce(|| 0.0, f64::max))
+}
+
 /// The same as the rate that makes it in one hour.
 ///
 /// # Errors

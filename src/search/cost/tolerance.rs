@@ -42,6 +42,7 @@ use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
 use crate::search::cost::sampled_coils::quantile;
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
 use built::built;
+pub(in crate::search) use built::with_middle_moved;
 
 /// Spreads of what is built, as standard deviations; zero: exact.
 /// What winding and trimming leave, beside the spreads of numbers.

@@ -225,6 +225,16 @@ impl Matching<'_> {
         }
     }
 
+    /// Visits every match, from the roots on, as [`Matching::search`] does.
+    pub(crate) fn visit_all(
+        &self,
+        target: &Target,
+        nodes: &mut u64,
+        visit: &mut impl FnMut(Step) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        self.search(NodePair { left: 1, right: 1 }, target, nodes, visit)
+    }
+
     /// Visits every match below a pair as the numbers of its points; `visit` answers whether to go on.
     /// Returns false if it was stopped. Counts the pairs looked at.
     pub(crate) fn search(

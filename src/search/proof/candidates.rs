@@ -282,6 +282,16 @@ impl<'a> Judge<'a> {
         self.coefficients(&Pattern::new(segments.to_vec()).expect("a search makes permutations only"))
     }
 
+    /// What a pattern comes to at chosen samples.
+    pub(crate) fn values_at(&self, samples: &[usize], segments: &[usize]) -> Vec<f64> {
+        let coefficients = self.coefficients_of(segments);
+        let columns = &self.matrix.columns;
+        let at = |s: usize| {
+            columns.constant()[s] + coefficients.iter().enumerate().map(|(k, x)| x * columns.column(k)[s]).sum::<f64>()
+        };
+        samples.iter().map(|&s| at(s)).collect()
+    }
+
     fn coefficients(&self, pattern: &Pattern) -> Vec<f64> {
         let weights: Result<LayerWeights, RateError> = LayerWeights::new(&self.coil, pattern);
         self.matrix.coefficients(&weights.expect("a search makes patterns of the coil's layer count"))

@@ -29,6 +29,7 @@
 pub(crate) mod beam;
 pub(crate) mod box_join;
 pub(crate) mod candidates;
+pub(crate) mod compound;
 mod course;
 pub(crate) mod descent;
 pub(crate) mod matrix_game;
@@ -260,6 +261,13 @@ struct Begun<'a> {
 }
 
 fn begin<'a>(task: &Task<'a>, starts: &[Pattern], good_enough_rad_per_s: f64) -> Result<Begun<'a>, SearchError> {
+    let (mut judge, mut best) = first_best(task, starts)?;
+    let proof = Proof::new(task.class, &mut judge, starts, &mut best, good_enough_rad_per_s);
+    Ok(Begun { judge, best, proof })
+}
+
+/// The judge, who knows where the starts are worst, and the best of them.
+fn first_best<'a>(task: &Task<'a>, starts: &[Pattern]) -> Result<(Judge<'a>, Candidate), SearchError> {
     let layers = task.model.coil.layers();
     if layers > permutation_tree::MOST_LAYERS {
         return Err(SearchError::TooManyLayers { found: layers, most: permutation_tree::MOST_LAYERS });
@@ -276,10 +284,9 @@ fn begin<'a>(task: &Task<'a>, starts: &[Pattern], good_enough_rad_per_s: f64) ->
             best = Some(candidate);
         }
     }
-    let mut best = best.ok_or(SearchError::NoStart { class: task.class })?;
+    let best = best.ok_or(SearchError::NoStart { class: task.class })?;
     judge.add_witnesses(&witnesses);
-    let proof = Proof::new(task.class, &mut judge, starts, &mut best, good_enough_rad_per_s);
-    Ok(Begun { judge, best, proof })
+    Ok((judge, best))
 }
 
 /// What a short search by bounds made of its starts.

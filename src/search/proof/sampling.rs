@@ -259,7 +259,7 @@ fn engine(
 }
 
 /// Patterns one step away from given ones: two layers exchanged, or one or two layers at the other end.
-fn neighbours(class: WindabilityClass, starts: &[Pattern]) -> Vec<Vec<usize>> {
+pub(super) fn neighbours(class: WindabilityClass, starts: &[Pattern]) -> Vec<Vec<usize>> {
     let mut found: Vec<Vec<usize>> = starts.iter().map(|p| p.segments().to_vec()).collect();
     for start in starts {
         for a in 0..start.layers() - 1 {

@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 
+use super::compound::compounded;
 use super::*;
 use crate::coil::LayerLength;
 use crate::search::cost::columns::Norm;
@@ -214,6 +215,55 @@ fn the_guaranteed_and_the_rms_rate_are_proved_as_enumeration_finds_them_also_wit
                 assert!((best / smallest - 1.0).abs() < 1e-8, "{context}: {best} {smallest}");
                 assert!(found.lower_bound_rad_per_s <= smallest, "{context}");
             }
+        }
+    }
+}
+
+/// The smallest pointing error of the class, as the rate that makes it in one hour.
+fn smallest_pointing(task: &Task) -> f64 {
+    let cost = |p: &Pattern| worst_pointing(task.model, task.solved, p).unwrap().rate_rad_per_s.abs() / POINTING_S;
+    patterns_of(task.class, task.model.coil.layers()).iter().map(cost).fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn many_moves_at_once_end_on_the_best_of_every_standard_pattern_from_a_poor_one_and_on_any_number_of_threads() {
+    for effects in [&[][..], &["surface_film"], &["surface_film", "midpoint_offset"]] {
+        let model = model(12, LayerLength::Actual, effects);
+        let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
+        let task = Task { model: &model, solved: &solved, class: WindabilityClass::Standard, goal: Goal::Pointing };
+        let start = Pattern::new((1..=12).collect()).unwrap();
+        let on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| compounded(&task, std::slice::from_ref(&start), 1).unwrap())
+        };
+        let found = on(1);
+        assert_eq!(found, on(3));
+        let reached = worst_pointing(&model, &solved, &found).unwrap().rate_rad_per_s.abs() / POINTING_S;
+        // All 2^11 choices of ends are one neighbourhood, where the sums are exact.
+        let smallest = smallest_pointing(&task);
+        assert!((reached / smallest - 1.0).abs() < 1e-8, "{effects:?}: {reached} {smallest}");
+    }
+}
+
+#[test]
+fn many_moves_at_once_stay_in_their_class_and_find_what_few_patterns_beat_also_where_their_sum_is_not_exact() {
+    // Every so many-th pattern of 40 320 is weighed.
+    const MOST_WEIGHED: usize = 400;
+    for class in [WindabilityClass::Captive(1), WindabilityClass::Any, WindabilityClass::Standard] {
+        let layers = if class == WindabilityClass::Standard { 12 } else { 8 };
+        for effects in [&["surface_film"][..], &["surface_film", "strain_mismatch"], &["axial_gradient"]] {
+            let model = model(layers, LayerLength::Actual, effects);
+            let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
+            let task = Task { model: &model, solved: &solved, class, goal: Goal::Pointing };
+            let start = Pattern::new((1..=layers).collect()).unwrap();
+            let found = compounded(&task, std::slice::from_ref(&start), 1).unwrap();
+            assert!(class.admits(&found));
+            let cost = |p: &Pattern| worst_pointing(&model, &solved, p).unwrap().rate_rad_per_s.abs();
+            let reached = cost(&found);
+            let all = patterns_of(class, layers);
+            let some: Vec<&Pattern> = all.iter().step_by(all.len().div_ceil(MOST_WEIGHED)).collect();
+            let better = some.iter().filter(|p| cost(p) < reached * (1.0 - RELATIVE_TOLERANCE)).count();
+            assert!(better <= some.len() / 50, "{class} {effects:?}: {better} of {} are better", some.len());
         }
     }
 }

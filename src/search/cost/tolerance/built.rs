@@ -61,6 +61,13 @@ pub(super) fn built(
     Ok(model)
 }
 
+/// The model with the middle of the fibre further from the coil's.
+pub(in crate::search) fn with_middle_moved(model: &CoilModel, by_m: f64) -> CoilModel {
+    let mut moved = model.clone();
+    change_effect(&mut moved, effect::OFFSET_OF_MIDDLE, |offset_m| offset_m + by_m);
+    moved
+}
+
 /// The smallest count that a Poisson variable of this mean does not exceed with a probability of u.
 fn poisson(mean: f64, u: f64) -> f64 {
     const MOST: u32 = 10_000;
