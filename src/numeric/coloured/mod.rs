@@ -28,7 +28,8 @@
 //! # Source
 //! Wavelet likelihood of long memory: Percival, Walden (2000), chapter 9; Guerrier et al., J. Am. Stat. Assoc. 108 (2013) 1021
 //! (wavelet moments of gyro noises); composite likelihood: Varin, Reid, Firth, Statistica Sinica 21 (2011) 5; restricted
-//! likelihood by majorising steps: Zhou et al., J. Comput. Graph. Stat. 28 (2019) 350; sampled flicker: Hosking, Biometrika 68
+//! likelihood by majorising steps: Zhou et al., J. Comput. Graph. Stat. 28 (2019) 350; leaps along them: Varadhan, Roland, Scand. J.
+//! Stat. 35 (2008) 335; ends by false position: Dowell, Jarratt, BIT 11 (1971) 168; sampled flicker: Hosking, Biometrika 68
 //! (1981) 165; coefficients: IEEE Std 952.
 
 mod likelihood;
@@ -79,6 +80,10 @@ const DOUBTS: usize = 4;
 /// An end of an interval is found to this part of itself.
 const FINE: f64 = 2e-3;
 const MOST_DOUBLINGS: usize = 80;
+/// Of a noise's variance: a lower end that is less than this is none.
+const FAINTEST: f64 = 1e-6;
+/// Of an end's tolerance: no closer to what is known already is anything tried.
+const LEAST_SHARE: f64 = 0.45;
 
 /// Which of the likelihood's components make up each kind: quantisation, white, flicker, random walk.
 const KINDS: [&[usize]; 4] = [&[0], &[1], &[2, 3], &[4, 5]];
@@ -119,34 +124,21 @@ pub fn noise_strengths(levels: &[(usize, Level)], interval_s: f64, groups: &[usi
 /// In variances, of the likelihood's own units.
 fn interval(likelihood: &Likelihood, best: &Point, parts: &[usize]) -> Interval {
     let value: f64 = parts.iter().map(|part| best.variances[*part]).sum();
-    let least = likelihood.least_visible(parts);
-    let above = |from: &Point, variance: f64| {
-        let at = likelihood.maximised(from, Some((parts, variance)));
-        (at.minus_two_log_likelihood - best.minus_two_log_likelihood, at)
-    };
-    let (at_zero, _) = above(best, 0.0);
-    let low = if at_zero <= LIKELIHOOD_RATIO || value <= 0.0 {
+    let within = value.max(likelihood.least_visible(parts));
+    let at_zero = likelihood.maximised(best, Some((parts, 0.0))).minus_two_log_likelihood;
+    let low = if at_zero - best.minus_two_log_likelihood <= LIKELIHOOD_RATIO || value <= 0.0 {
         0.0
     } else {
-        let (mut outside, mut inside, mut from) = (value * 1e-6, value, best.clone());
-        while outside < inside * (1.0 - FINE) {
-            let middle = between(outside, inside);
-            let (height, at) = above(&from, middle);
-            if height > LIKELIHOOD_RATIO {
-                outside = middle;
-            } else {
-                (inside, from) = (middle, at);
-            }
-        }
-        outside
+        // Where only none at all is beyond the quantile, and that by a hair, the noise may be absent.
+        Some(end(likelihood, best, parts, value, 0.5).0).filter(|low| *low > FAINTEST * value).unwrap_or(0.0)
     };
-    let (mut high, mut there) = upper_end(likelihood, best, parts, value.max(least));
+    let (mut high, mut there) = end(likelihood, best, parts, within, 2.0);
     // With so much of this noise the octaves say more in common than with the best fit's: they count less.
     let mut doubtful = likelihood.clone();
     for _ in 0..DOUBTS {
         doubtful.weigh(&there);
         let best = doubtful.maximised(best, None);
-        let (end, at) = upper_end(&doubtful, &best, parts, value.max(least));
+        let (end, at) = end(&doubtful, &best, parts, within, 2.0);
         if end <= high * (1.0 + FINE) {
             break;
         }
@@ -155,37 +147,40 @@ fn interval(likelihood: &Likelihood, best: &Point, parts: &[usize]) -> Interval 
     Interval { value, low, high }
 }
 
-/// The largest variance within the quantile, sought from one that is, and the fit nearest to it.
-fn upper_end(likelihood: &Likelihood, best: &Point, parts: &[usize], within: f64) -> (f64, Point) {
-    let above = |from: &Point, variance: f64| {
-        let at = likelihood.maximised(from, Some((parts, variance)));
-        (at.minus_two_log_likelihood - best.minus_two_log_likelihood, at)
+/// An end of an interval, sought from a variance `within` it by steps of a `factor` and then between the last two: the first
+/// variance beyond the quantile, and the fit nearest to it that is not.
+fn end(likelihood: &Likelihood, best: &Point, parts: &[usize], within: f64, factor: f64) -> (f64, Point) {
+    // Nearly straight over the logarithm of the variance.
+    let above = |from: &Point, logarithm: f64| {
+        let at = likelihood.maximised(from, Some((parts, logarithm.exp())));
+        let height = (at.minus_two_log_likelihood - best.minus_two_log_likelihood).max(0.0);
+        (height.sqrt() - LIKELIHOOD_RATIO.sqrt(), at)
     };
-    let (mut inside, mut from) = (within, best.clone());
-    let mut outside = 2.0 * inside;
+    let step = factor.ln();
+    let (mut inside, mut below, mut from) = (within.ln(), -LIKELIHOOD_RATIO.sqrt(), best.clone());
+    let (mut outside, mut over) = (inside + step, LIKELIHOOD_RATIO.sqrt());
     for _ in 0..MOST_DOUBLINGS {
         let (height, at) = above(&from, outside);
-        if height > LIKELIHOOD_RATIO {
+        over = height;
+        if height > 0.0 {
             break;
         }
-        (inside, from) = (outside, at);
-        outside *= 2.0;
+        (inside, below, from) = (outside, height, at);
+        outside += step;
     }
-    while inside < outside * (1.0 - FINE) {
-        let middle = between(inside, outside);
-        let (height, at) = above(&from, middle);
-        if height > LIKELIHOOD_RATIO {
-            outside = middle;
+    // False position; a side that stays counts half as much each time.
+    while (outside - inside).abs() > FINE {
+        let share = (below / (below - over)).clamp(0.0, 1.0);
+        let least = LEAST_SHARE * FINE / (outside - inside).abs();
+        let between = inside + share.clamp(least, 1.0 - least) * (outside - inside);
+        let (height, at) = above(&from, between);
+        if height > 0.0 {
+            (outside, over, below) = (between, height, 0.5 * below);
         } else {
-            (inside, from) = (middle, at);
+            (inside, below, from, over) = (between, height, at, 0.5 * over);
         }
     }
-    (outside, from)
-}
-
-/// The geometric mean: also of variances whose product is no number, or none but zero.
-fn between(low: f64, high: f64) -> f64 {
-    low.sqrt() * high.sqrt()
+    (outside.exp(), from)
 }
 
 /// The fit with the noises that cannot be absent, where that is as good as the data can tell.
