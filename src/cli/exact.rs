@@ -18,6 +18,7 @@ use crate::io::read::pattern_file::print_pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::search::cost::objective::Objective;
 use crate::task::exact::{Request, run as prove};
+use crate::task::under_fields::{self, FieldFile};
 use crate::text::sink::TomlComment;
 
 /// The best winding of a class with a proof, or a lower bound on what any winding can reach
@@ -26,7 +27,8 @@ use crate::text::sink::TomlComment;
     after_help = "The proof holds for the worst rate over all times of the model's profiles, or for another objective, the model's own or --objective. \"optimal\": no winding of the class is\n\
     better by more than one part in 10^9; \"gap\": none is better than the lower bound.\n\n\
     Examples:\n  coilwright exact examples/paper-200m.toml\n  \
-    coilwright exact examples/paper-200m.toml --windability any --budget 5m -o best.toml"
+    coilwright exact examples/paper-200m.toml --windability any --budget 5m -o best.toml\n  \
+    coilwright exact my-coil.toml --field warm-up.csv      temperatures from a finite-element program"
 )]
 pub(crate) struct Arguments {
     /// The model file
@@ -44,6 +46,10 @@ pub(crate) struct Arguments {
     /// repeated
     #[arg(long, short, value_name = "PATTERN", value_parser = offered::patterns(), hide_possible_values = true)]
     pattern: Vec<String>,
+    /// Temperatures of the layers that were computed elsewhere, as `optimise --field` takes them: the proof is then over the rows
+    /// of these files, for worst-rate, worst-phase or rms; may be repeated, each file is a case
+    #[arg(long, value_name = "FILE")]
+    field: Vec<PathBuf>,
     /// Seed of the short search; without it, the model's own
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -56,11 +62,15 @@ pub(crate) struct Arguments {
     output: Option<PathBuf>,
 }
 
+fn read_besides(arguments: &Arguments) -> impl Iterator<Item = &Path> {
+    arguments.pattern.iter().map(Path::new).chain(arguments.field.iter().map(PathBuf::as_path))
+}
+
 pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliError> {
     let started = Instant::now();
     let file = read_design(&arguments.model)?;
     for written in arguments.output.iter().chain(&arguments.samples) {
-        check_file(written, file.files().chain(arguments.pattern.iter().map(Path::new)))?;
+        check_file(written, file.files().chain(read_besides(arguments)))?;
     }
     let class = arguments.windability.unwrap_or(file.search.windability);
     let request = Request {
@@ -72,13 +82,19 @@ pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliE
     };
     let stop = StopFlag::listen();
     let watching = Watching::new(screen, "proof").stopped_by(&stop).within(started, arguments.budget);
-    let answer = prove(&request, &watching)?;
+    let fields = arguments.field.iter().map(|path| FieldFile::read(path)).collect::<Result<Vec<_>, _>>()?;
+    let answer = if fields.is_empty() {
+        prove(&request, &watching)?
+    } else {
+        let objective = under_fields::objective(&file, arguments.objective)?;
+        under_fields::prove(&Request { objective, ..request.clone() }, &fields, &watching)?
+    };
     watching.finish();
     let body = answer.document(started.elapsed().as_secs_f64());
     if let Some(path) = &arguments.output {
         let named = NamedPattern { name: answer.name.clone(), pattern: answer.certificate.pattern.clone() };
         let comments = [
-            format!("coil: {}; class: {class}; over {} profiles", file.model.name, answer.profiles),
+            format!("coil: {}; class: {class}; over {}", file.model.name, answer.over),
             format!("worst rate {:.6} °/h; proof: {}", body.best.worst_rate_deg_per_h, body.proof.status),
         ];
         write_atomically(path, print_pattern(&named, &comments.map(TomlComment::of)).as_bytes())?;

@@ -79,9 +79,9 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE")]
     diagnosis: Option<PathBuf>,
     /// Temperatures of the layers that were computed elsewhere (CSV: time_s, layer_1_c, …, or time_s, layer, temperature_c), used
-    /// instead of the profiles; may be repeated, each file is a case. Such a search proves nothing and writes pattern, schedule,
-    /// summary.json and checkpoints, but no page
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["compare_with", "cutting_planes", "diagnosis", "prove", "trim_turns", "split_layer"])]
+    /// instead of the profiles; may be repeated, each file is a case. What is found, and what --prove proves, is about the rows
+    /// of these files
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["compare_with", "cutting_planes", "diagnosis", "trim_turns", "split_layer"])]
     pub(super) field: Vec<PathBuf>,
     /// Tries for so long to prove that the best pattern is the best of its class
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]

@@ -49,7 +49,15 @@ pub(super) fn run(
     let started = Instant::now();
     let is_taken_up = folder.is_some_and(|f| arguments.resume && f.join(CHECKPOINT_FILE).exists());
     let mut watch = Watch::new(arguments, &request, budget, started, stop, screen, is_taken_up);
-    let search = Search { model: file, fields: &fields, class, objective, plan: plan.clone(), saved };
+    let search = Search {
+        model: file,
+        fields: &fields,
+        class,
+        objective,
+        plan: plan.clone(),
+        prove: arguments.prove.is_some(),
+        saved,
+    };
     let found = under_fields::search(&search, &Watching::quiet(screen), &mut watch);
     watch.fault.take().map_or(Ok(()), Err)?;
     let found = match found {

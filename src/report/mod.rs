@@ -8,6 +8,7 @@ pub(crate) mod compensation;
 pub mod cross_section;
 pub(crate) mod diagnosis;
 pub(crate) mod explorer;
+pub(crate) mod field_search;
 pub(crate) mod fleet;
 pub(crate) mod improvement;
 pub(crate) mod ladder;

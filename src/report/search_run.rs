@@ -132,7 +132,7 @@ fn guaranteed_words(pattern: &RunPattern) -> String {
         .map_or_else(|| "no bound over all profiles (the model is not linear)".to_owned(), |g| format!("{g:.4} °/h"))
 }
 
-fn all(run: &Run) -> impl Iterator<Item = &RunPattern> {
+pub(super) fn all(run: &Run) -> impl Iterator<Item = &RunPattern> {
     run.summary.baselines.iter().chain(std::iter::once(&run.summary.best))
 }
 
@@ -253,7 +253,7 @@ fn over_time(run: &Run) -> Result<Vec<(String, String)>, ReportError> {
 const SHOWN_BELOW: f64 = 300.0;
 
 /// Sizes of patterns' errors over time, on a scale on which the best of them can be read; what is to be said of the scale.
-fn on_a_readable_scale(profile: &str, times_min: &[f64], series: &[(&str, Vec<f64>)]) -> (Chart, String) {
+pub(super) fn on_a_readable_scale(profile: &str, times_min: &[f64], series: &[(&str, Vec<f64>)]) -> (Chart, String) {
     let largest = |rates: &[f64]| rates.iter().fold(0.0, |most: f64, r| most.max(r.abs()));
     let tops = series.iter().map(|(_, rates)| largest(rates)).filter(|top| *top > 0.0);
     let floor = tops.fold(f64::INFINITY, f64::min).min(f64::MAX) / SHOWN_BELOW;
@@ -430,7 +430,7 @@ fn trade_off(run: &Run) -> (String, String) {
     }
 }
 
-fn convergence(run: &Run) -> String {
+pub(super) fn convergence(run: &Run) -> String {
     let points: Vec<(f64, f64)> = run.history.iter().map(|h| (h.evaluations as f64, h.best_deg_per_h)).collect();
     let mut chart = Chart::new("Convergence of the search")
         .x(Axis::linear("moves judged [1]").reaching(0.0))
@@ -446,7 +446,7 @@ fn convergence(run: &Run) -> String {
     chart.svg_to_read()
 }
 
-fn certificate(run: &Run) -> Markup {
+pub(super) fn certificate(run: &Run) -> Markup {
     let proof = &run.summary.proof;
     let bound = proof.lower_bound_deg_per_h.map_or(String::new(), |b| format!(" Lower bound: {b:.6} °/h."));
     let words = match proof.status.as_str() {

@@ -14,7 +14,7 @@ use thiserror::Error;
 
 use super::anneal::limits::{Limits, draw, neighbour};
 use super::anneal::quantile;
-use super::anneal::rounds::{Found, Optimisation, Plan, Rounds, State};
+use super::anneal::rounds::{Found, Optimisation, Plan, RoundRecord, Rounds, State};
 use super::answer::Ended;
 use super::cost::columns::Work;
 use super::cost::samples::SampleMatrix;
@@ -94,6 +94,7 @@ pub struct CustomAnswer {
     pub rounds: u64,
     /// Why it ended.
     pub ended: Ended,
+    pub(crate) history: Vec<RoundRecord>,
 }
 
 /// Makes a cost small; `None` if the observer ended it before anything was found.
@@ -128,6 +129,7 @@ fn run<C: Cost>(mut search: Optimisation<C>, observer: &mut dyn Observer) -> Opt
     let (state, evaluations) = (search.state(), search.evaluations());
     (!state.found.is_empty()).then(|| CustomAnswer {
         found: state.found.clone(),
+        history: state.history.clone(),
         evaluations,
         rounds: state.round,
         ended,

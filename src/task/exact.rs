@@ -50,8 +50,8 @@ pub struct Answer {
     pub(crate) certificate: Certificate,
     /// A classic winding's own, else one made of the layer count.
     pub(crate) name: String,
-    /// Profiles that the proof is over.
-    pub(crate) profiles: usize,
+    /// What the proof is over: so many profiles, or fields.
+    pub(crate) over: String,
     proof: Proof,
     best: PatternJson,
     model: String,
@@ -60,6 +60,20 @@ pub struct Answer {
 }
 
 impl Answer {
+    /// Of a proof over the rows of so many fields, which no grid stands behind.
+    pub(super) fn under_fields(request: &Request, certificate: Certificate, best: PatternJson, fields: usize) -> Self {
+        Self {
+            proof: Proof::of(&certificate),
+            name: name_of(&certificate.pattern),
+            over: counted(fields, "temperature field"),
+            best,
+            model: request.model.model.name.clone(),
+            class: request.class,
+            objective: request.objective,
+            certificate,
+        }
+    }
+
     /// As the program prints it; `seconds` is how long it took.
     pub fn document(&self, seconds: f64) -> ExactJson {
         let certificate = &self.certificate;
@@ -122,17 +136,7 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
     let mut starts: Vec<Pattern> = own.chain(request.starts.iter().cloned()).collect();
     starts.extend(starting_patterns(&task, request.seed)?);
 
-    let shown = AtomicU64::new(u64::MAX);
-    let watcher = |at: Progress| {
-        let step = (at.share_done * PROGRESS_STEPS as f64) as u64;
-        // Pieces of work report far more often than anything changes.
-        let seen = ((at.pass * PROGRESS_STEPS as f64) as u64) << 32 | step;
-        if shown.swap(seen, Ordering::Relaxed) != seen {
-            observer.at(at.share_done, &words(&at, request.objective.unit()));
-        }
-        if observer.goes_on() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
-    };
-    let certificate = prove(&task, &starts, &watcher)?;
+    let certificate = watched(request.objective, observer, |watcher| prove(&task, &starts, watcher))?;
 
     let pattern = &certificate.pattern;
     let evaluator = Evaluator {
@@ -155,12 +159,34 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
         proof: Proof::of(&certificate).beside_grid(evaluator.margin_of_any(&aside)?),
         best,
         name,
-        profiles: solved.profiles().len(),
+        over: counted(solved.profiles().len(), "profile"),
         model: model.name.clone(),
         class: request.class,
         objective: request.objective,
         certificate,
     })
+}
+
+/// A proof that an observer watches and may end.
+pub(super) fn watched<T>(
+    objective: Objective,
+    observer: &dyn Observer,
+    work: impl FnOnce(&(dyn Fn(Progress) -> ControlFlow<()> + Sync)) -> T,
+) -> T {
+    let shown = AtomicU64::new(u64::MAX);
+    work(&|at: Progress| {
+        let step = (at.share_done * PROGRESS_STEPS as f64) as u64;
+        // Pieces of work report far more often than anything changes.
+        let seen = ((at.pass * PROGRESS_STEPS as f64) as u64) << 32 | step;
+        if shown.swap(seen, Ordering::Relaxed) != seen {
+            observer.at(at.share_done, &words(&at, objective.unit()));
+        }
+        if observer.goes_on() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    })
+}
+
+fn counted(count: usize, what: &str) -> String {
+    if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
 }
 
 fn words(at: &Progress, unit: &str) -> String {
@@ -174,7 +200,7 @@ fn words(at: &Progress, unit: &str) -> String {
 }
 
 /// A classic winding's own name.
-fn name_of(pattern: &Pattern) -> String {
+pub(super) fn name_of(pattern: &Pattern) -> String {
     let layers = pattern.layers();
     let classic = Classic::ALL.into_iter().find(|c| c.pattern(layers).is_ok_and(|p| p == *pattern));
     classic.map_or_else(|| format!("exact-{layers}"), |c| c.key().to_owned())

@@ -40,6 +40,8 @@ pub mod reproduce;
 #[cfg(feature = "report")]
 mod steps;
 #[cfg(feature = "report")]
+mod under_fields_folder;
+#[cfg(feature = "report")]
 pub mod verify;
 
 use thiserror::Error;

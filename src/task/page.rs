@@ -6,8 +6,10 @@ use crate::io::files::{folder_of, write_atomically};
 use crate::io::folder::check_file;
 use crate::io::model::NamedPattern;
 use crate::io::read::run_reader::{Run, read_run};
+use crate::io::write::field_rates::{FieldRates, read_rates};
 use crate::io::write::measurement_folder::{holds_measurements, read_measurements};
 use crate::pattern::Pattern;
+use crate::report::field_search::field_page;
 use crate::report::measurement::measurement_page;
 use crate::report::search_run::{ReportError, search_page};
 
@@ -26,6 +28,14 @@ fn tried(run: &Run) -> Result<Vec<NamedPattern>, ReportError> {
     let recommended = summary.recommendation.iter().filter(|r| !r.segments.is_empty());
     let stated = recommended.map(|r| (&r.pattern, &r.segments)).chain([(&summary.best.name, &summary.best.segments)]);
     stated.map(|(name, segments)| named(name, segments)).collect()
+}
+
+/// What the patterns of a search under fields err by, the best one last: on top of the others.
+fn rates_of(folder: &Path, run: &Run) -> Result<Vec<FieldRates>, TaskError> {
+    let best = &run.summary.best;
+    let others = run.summary.baselines.iter().filter(|shown| shown.segments != best.segments);
+    let names: Vec<&str> = others.chain(std::iter::once(best)).map(|shown| shown.name.as_str()).collect();
+    Ok(read_rates(folder, &names)?)
 }
 
 /// Whether a file stands, or is to stand, in a folder itself.
@@ -52,11 +62,17 @@ pub fn write_report(folder: &Path, path: &Path) -> Result<usize, TaskError> {
         measurement_page(&read_measurements(folder)?)
     } else {
         let run = read_run(folder)?;
-        let beside = is_in(folder, path);
+        let is_under_fields = !run.summary.fields.is_empty();
+        // The explorer tries windings under profiles.
+        let beside = is_in(folder, path) && !is_under_fields;
         if beside {
             explore_page::write(&run.file, &tried(&run)?, &folder.join(EXPLORER_FILE))?;
         }
-        search_page(&run, beside.then_some(EXPLORER_FILE))?
+        if is_under_fields {
+            field_page(&run, &rates_of(folder, &run)?)?
+        } else {
+            search_page(&run, beside.then_some(EXPLORER_FILE))?
+        }
     };
     write_atomically(path, page.as_bytes())?;
     Ok(page.len())

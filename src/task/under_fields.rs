@@ -1,7 +1,7 @@
 //! Windings under temperature fields from files: what they err by, and the search for the best of them.
 //!
 //! A field is a case of its own: it begins at rest, and the worst is taken over all rows of all fields. Nothing is guaranteed or
-//! proved beyond them.
+//! proved beyond them: a proof is that no pattern of the class is better over these rows.
 
 use std::path::Path;
 
@@ -10,24 +10,28 @@ use crate::io::json::inputs::RecordInputJson;
 use crate::io::json::{EvaluateJson, PatternJson, ProofJson};
 use crate::io::model::{ModelFile, NamedPattern};
 use crate::io::read::field_file::read_field;
+use crate::io::write::field_rates::{FieldRates, PatternRates};
 use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
 use crate::pattern::windability::WindabilityClass;
 use crate::rate::RateModel;
-use crate::search::anneal::rounds::{Plan, State};
+use crate::search;
+use crate::search::anneal::rounds::{Plan, RoundRecord, State};
 use crate::search::anneal::sample_cost::SampleCost;
-use crate::search::answer::Ended;
+use crate::search::answer::{Ended, Proof};
 use crate::search::aside::PointingError;
 use crate::search::cost::objective::Objective;
+use crate::search::cost::samples::SampleMatrix;
 use crate::search::cost::worst_case::WorstCase;
+use crate::search::custom::{self, CustomAnswer};
 use crate::search::evaluator::name_of;
+use crate::search::proof::{Certificate, Status, prove_samples, quickly_found};
 use crate::search::run::RunError;
-use crate::search::{self, custom};
 use crate::thermal::{GivenField, ThermalHistory};
 use crate::units::deg_per_h_from_rad_per_s;
 
 use super::field::{check, matrix_of, series_rad_per_s};
-use super::{Observer, TaskError, own_and_classics};
+use super::{Observer, TaskError, exact, own_and_classics};
 
 /// A field with its origin.
 #[derive(Debug, Clone)]
@@ -183,6 +187,8 @@ pub(crate) struct Search<'a> {
     pub(crate) class: WindabilityClass,
     pub(crate) objective: Objective,
     pub(crate) plan: Plan,
+    /// Whether to prove that the best pattern is the best of its class over these rows.
+    pub(crate) prove: bool,
     /// The state to go on from; everything else must be as it was when it was saved.
     pub(crate) saved: Option<State>,
 }
@@ -193,6 +199,9 @@ pub(crate) struct Found {
     pub(crate) document: FieldSearchJson,
     pub(crate) best: NamedPattern,
     pub(crate) ended: Ended,
+    /// What the page shows beside the document.
+    pub(crate) history: Vec<RoundRecord>,
+    pub(crate) rates: Vec<FieldRates>,
 }
 
 /// What a search under fields can make small: of a model that asks for something else, the worst rate.
@@ -228,12 +237,7 @@ pub(crate) fn search(
     let Search { model, fields, class, objective, .. } = *request;
     let cases = cases(model, fields, observer)?;
     let matrix = matrix_of(model, cases.iter().map(|case| &case.states))?;
-    let cost = SampleCost::new(matrix, class, objective.norm());
-    let answer = match request.saved.clone() {
-        None => custom::search(cost, request.plan.clone(), watch),
-        Some(state) => custom::resume(cost, request.plan.clone(), state, watch).ok_or(RunError::Resume)?,
-    };
-    let Some(answer) = answer else { return Ok(None) };
+    let Some(answer) = annealed(request, matrix.clone(), watch)? else { return Ok(None) };
     let judge = |named: &NamedPattern| judged(model, &cases, objective, named);
     let classics = own_and_classics(model).into_iter().filter(|named| Classic::from_key(&named.name).is_ok());
     let mut baselines = Vec::new();
@@ -258,7 +262,18 @@ pub(crate) fn search(
         let (shown, cost) = judge(&named)?;
         consider(&named, &shown, cost);
     }
-    let Some((named, best, cost)) = best else { return Ok(None) };
+    let Some((mut named, mut best, mut cost)) = best else { return Ok(None) };
+    let mut proof = Proof::NONE;
+    if request.prove && answer.ended != Ended::Signal {
+        let others = answer.found.iter().filter_map(|found| Pattern::new(found.segments.clone()).ok());
+        let certificate = proved(request, matrix, &named.pattern, others, watch)?;
+        proof = Proof::of(&certificate);
+        if certificate.pattern != named.pattern {
+            named = NamedPattern { name: name_of(&certificate.pattern), pattern: certificate.pattern };
+            (best, cost) = judge(&named)?;
+        }
+    }
+    let rates = over_time(model, &cases, &baselines, &best)?;
     let document = FieldSearchJson {
         model: model.model.name.clone(),
         fields: fields.iter().map(FieldFile::shown).collect(),
@@ -268,16 +283,101 @@ pub(crate) fn search(
         best,
         baselines,
         improvement_over_qua: qua.filter(|_| cost > 0.0).map(|qua| qua / cost),
-        statement: statement(request, cost, qua),
-        proof: ProofJson::none(),
+        statement: statement(request, cost, qua) + &proof_words(&proof, objective),
+        proof: ProofJson::of(&proof),
         evaluations: answer.evaluations,
         evaluations_per_s: None,
         seconds: None,
         rounds: answer.rounds,
         stopped_by: answer.ended.key().to_owned(),
-        reproducible: matches!(answer.ended, Ended::Rule(_)),
+        reproducible: matches!(answer.ended, Ended::Rule(_)) && !proof.was_cut_short,
     };
-    Ok(Some(Found { document, best: named, ended: answer.ended }))
+    Ok(Some(Found { document, best: named, ended: answer.ended, history: answer.history, rates }))
+}
+
+fn annealed(
+    request: &Search,
+    samples: SampleMatrix,
+    watch: &mut dyn search::Observer,
+) -> Result<Option<CustomAnswer>, RunError> {
+    let (cost, plan) = (SampleCost::new(samples, request.class, request.objective.norm()), request.plan.clone());
+    Ok(match request.saved.clone() {
+        None => custom::search(cost, plan, watch),
+        Some(state) => custom::resume(cost, plan, state, watch).ok_or(RunError::Resume)?,
+    })
+}
+
+/// Begins with the best pattern, classics and what else was found.
+fn proved(
+    request: &Search,
+    samples: SampleMatrix,
+    best: &Pattern,
+    others: impl Iterator<Item = Pattern>,
+    observer: &dyn search::Observer,
+) -> Result<Certificate, TaskError> {
+    let Search { model, class, objective, .. } = *request;
+    let classics = own_and_classics(model).into_iter().map(|named| named.pattern);
+    let starts: Vec<Pattern> = std::iter::once(best.clone()).chain(classics).chain(others).collect();
+    let watcher = |at| observer.proving(at);
+    Ok(prove_samples(&model.model, samples, objective.norm(), class, &starts, &watcher)?)
+}
+
+/// What every pattern errs by in every row.
+fn over_time(
+    model: &ModelFile,
+    cases: &[Case],
+    baselines: &[PatternJson],
+    best: &PatternJson,
+) -> Result<Vec<FieldRates>, TaskError> {
+    let mut fields: Vec<FieldRates> = cases.iter().map(|case| FieldRates::of(&case.states)).collect();
+    let others = baselines.iter().filter(|shown| shown.segments != best.segments);
+    for shown in others.chain(std::iter::once(best)) {
+        let Ok(pattern) = Pattern::new(shown.segments.clone()) else { continue };
+        let rate_model = RateModel::new(&model.model, &pattern, &[])?;
+        for (field, case) in fields.iter_mut().zip(cases) {
+            let rates = series_rad_per_s(&rate_model, &case.states)?.into_iter().map(deg_per_h_from_rad_per_s);
+            field.patterns.push(PatternRates { name: shown.name.clone(), rates_deg_per_h: rates.collect() });
+        }
+    }
+    Ok(fields)
+}
+
+/// What a proof says of a pattern over the rows of its fields.
+fn proof_words(proof: &Proof, objective: Objective) -> String {
+    let (what, unit) = (objective.title(), objective.unit());
+    match proof.status {
+        Status::Optimal => format!(" Proved: no pattern of the class has a smaller {what} over them."),
+        Status::Gap => {
+            let bound = deg_per_h_from_rad_per_s(proof.lower_bound_rad_per_s);
+            format!(" Proved: no pattern of the class has a {what} below {bound:.4} {unit} over them.")
+        }
+        Status::None => String::new(),
+    }
+}
+
+/// The best pattern of a class over the rows of fields, with a proof.
+///
+/// # Errors
+/// As [`search`].
+pub(crate) fn prove(
+    request: &exact::Request,
+    fields: &[FieldFile],
+    observer: &dyn Observer,
+) -> Result<exact::Answer, TaskError> {
+    let (model, class) = (request.model, request.class);
+    let objective = objective(model, Some(request.objective))?;
+    let cases = cases(model, fields, observer)?;
+    let matrix = matrix_of(model, cases.iter().map(|case| &case.states))?;
+    let norm = objective.norm();
+    let own = model.pattern.iter().map(|named| named.pattern.clone());
+    let mut starts: Vec<Pattern> = own.chain(request.starts.iter().cloned()).collect();
+    starts.extend(quickly_found(matrix.clone(), norm, class, request.seed));
+    let certificate = exact::watched(objective, observer, |watcher| {
+        prove_samples(&model.model, matrix, norm, class, &starts, watcher)
+    })?;
+    let named = NamedPattern { name: exact::name_of(&certificate.pattern), pattern: certificate.pattern.clone() };
+    let (best, _) = judged(model, &cases, objective, &named)?;
+    Ok(exact::Answer::under_fields(request, certificate, best, fields.len()))
 }
 
 fn statement(request: &Search, cost: f64, qua: Option<f64>) -> String {
@@ -290,47 +390,4 @@ fn statement(request: &Search, cost: f64, qua: Option<f64>) -> String {
         objective.title(),
         shown(cost)
     )
-}
-
-#[cfg(feature = "report")]
-mod folder {
-    use super::{Found, ModelFile, Path, TaskError};
-    use crate::io::folder::Replacement;
-    use crate::io::json::Document;
-    use crate::io::read::pattern_file::print_pattern;
-    use crate::io::write::checkpoint::CHECKPOINT_FILE;
-    use crate::io::write::run_directory::KINDS;
-    use crate::task::schedule;
-    use crate::text::sink::TomlComment;
-
-    impl Found {
-        /// Writes the pattern, its schedule and the document.
-        ///
-        /// # Errors
-        /// Files that cannot be written.
-        pub(crate) fn write(&self, folder: &Path, model: &ModelFile) -> Result<(), TaskError> {
-            let d = &self.document;
-            let fields: Vec<&str> = d.fields.iter().map(|f| f.file.as_str()).collect();
-            let comments = [
-                format!("coil: {}", d.model),
-                format!("objective: {}, class: {}, seed: {}", d.objective, d.windability, d.seed),
-                format!("temperatures: {}", fields.join(", ")),
-                format!("worst rate error: {:.6} deg/h under {}", d.best.worst_rate_deg_per_h, d.best.worst_profile),
-            ];
-            let comments: Vec<TomlComment> = comments.iter().map(TomlComment::of).collect();
-            let mut files = Replacement::of(folder);
-            files.add("best.toml", print_pattern(&self.best, &comments).as_bytes())?;
-            let schedule = schedule::run(&schedule::Request { model, pattern: Some(&self.best) })?;
-            for (name, text) in schedule.tables()? {
-                files.add(name, text.as_bytes())?;
-            }
-            files.add("model.toml", model.source.as_bytes())?;
-            let summary = serde_json::to_string_pretty(&Document::new(d))? + "\n";
-            files.add("summary.json", summary.as_bytes())?;
-            // What the request was, and how far it came, stays: the search can be taken up again.
-            let kinds = KINDS.into_iter().filter(|kind| ![CHECKPOINT_FILE, "run.toml"].contains(kind));
-            files.commit(&kinds.collect::<Vec<_>>())?;
-            Ok(())
-        }
-    }
 }

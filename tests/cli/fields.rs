@@ -2,8 +2,11 @@
 
 use std::fmt::Write;
 
+use coilwright::io::model::NamedPattern;
 use coilwright::io::read::field_file::read_field;
 use coilwright::io::read::model_file::read_model;
+use coilwright::pattern::Pattern;
+use coilwright::pattern::windability::WindabilityClass;
 use coilwright::task::{Unobserved, field};
 use coilwright::units::deg_per_h_from_rad_per_s;
 use rand::{RngExt, SeedableRng};
@@ -114,6 +117,57 @@ fn a_search_under_fields_finds_the_best_of_all_standard_patterns_under_them() {
     assert!(stderr(&refused).contains("expected worst-rate, worst-phase or rms"), "{}", stderr(&refused));
 }
 
+fn permutations(left: Vec<usize>) -> Vec<Vec<usize>> {
+    if left.is_empty() {
+        return vec![Vec::new()];
+    }
+    let with = |i: usize| {
+        let mut rest = left.clone();
+        let first = rest.remove(i);
+        permutations(rest).into_iter().map(move |tail| [vec![first], tail].concat())
+    };
+    (0..left.len()).flat_map(with).collect()
+}
+
+#[test]
+fn a_proof_under_a_field_is_of_the_best_of_every_pattern_of_its_class() {
+    let (folder, path) = folder_with("six.toml", FLANGED.replace("layers = 8", "layers = 6"));
+    let model = path.display().to_string();
+    let field = folder.path().join("field.csv");
+    std::fs::write(&field, stdout(&run(&["temperatures", &model, "--rows", "61"]))).unwrap();
+    let (file, given) = (read_model(&path).unwrap(), read_field(&field).unwrap().field);
+    let named = |segments: Vec<usize>| NamedPattern { name: "p".into(), pattern: Pattern::new(segments).unwrap() };
+    let all: Vec<NamedPattern> = permutations((1..=6).collect()).into_iter().map(named).collect();
+    let request = field::Request { model: &file, field: &given.states(), patterns: &all };
+    let judged = field::run(&request, &Unobserved).unwrap();
+    let field = field.display().to_string();
+    for class in [WindabilityClass::Standard, WindabilityClass::Captive(1), WindabilityClass::Any] {
+        for objective in ["worst-rate", "rms"] {
+            let cost = |rates: &[f64]| match objective {
+                "rms" => (rates.iter().map(|r| r * r).sum::<f64>() / rates.len() as f64).sqrt(),
+                _ => rates.iter().fold(0.0, |most: f64, r| most.max(r.abs())),
+            };
+            let of_class = judged.iter().filter(|p| class.admits(&p.named.pattern));
+            let least = of_class.map(|p| cost(&p.rate_rad_per_s)).fold(f64::INFINITY, f64::min);
+            let (least, class) = (deg_per_h_from_rad_per_s(least), class.to_string());
+            let under = [&model, "--field", &field, "--windability", &class, "--objective", objective];
+            let found = json(&[&["optimise"], &under[..], &["--patience", "1", "--prove", "60s"]].concat());
+            let exact = json(&[&["exact"], &under[..]].concat());
+            for answer in [&found, &exact] {
+                assert_eq!(answer["proof"]["status"], "optimal", "{class} {objective}");
+                let bound = answer["proof"]["lower_bound_deg_per_h"].as_f64().unwrap();
+                assert!((bound / least - 1.0).abs() < 1e-8, "{class} {objective}: {bound} {least}");
+            }
+            let best = found["best"]["segments"].as_array().unwrap();
+            let best: Vec<usize> = best.iter().map(|s| s.as_u64().unwrap() as usize).collect();
+            let own = judged.iter().find(|p| p.named.pattern.segments() == best).unwrap();
+            let own = deg_per_h_from_rad_per_s(cost(&own.rate_rad_per_s));
+            assert!((own / least - 1.0).abs() < 1e-9, "{class} {objective}: {own} {least}");
+            assert!(found["statement"].as_str().unwrap().contains("Proved"), "{}", found["statement"]);
+        }
+    }
+}
+
 #[test]
 fn a_search_under_a_field_that_was_interrupted_ends_as_if_it_had_not_been() {
     let rows = |shift_c: f64| {
@@ -153,8 +207,18 @@ fn a_search_under_a_field_that_was_interrupted_ends_as_if_it_had_not_been() {
     assert!(code(&profiles) == 2 && stderr(&profiles).contains("fields_sha256 was"), "{}", stderr(&profiles));
     let resumed = search(&broken, &["--resume"]);
     assert!(code(&resumed) == 0 && stderr(&resumed).contains("resuming"), "{}", stderr(&resumed));
-    for name in ["summary.json", "best.toml", "schedule.csv", "schedule.json", "checkpoint.json", "model.toml"] {
-        assert!(read(&whole, name) == read(&broken, name), "{name}");
+    let tables = ["baselines.csv", "history.csv", "rates.csv", "schedule.csv", "schedule.json"];
+    for name in ["summary.json", "best.toml", "checkpoint.json", "model.toml", "report.html"].iter().chain(&tables) {
+        // The page shows run.toml, which says that there was a clock.
+        let of = |folder: &str| read(folder, name).replace("budget = &quot;1ms&quot;\n", "");
+        assert!(of(&whole) == of(&broken), "{name}");
+    }
+    // The page is made of what the folder holds, and shows what only a search under temperatures has.
+    let page = read(&whole, "report.html");
+    assert_eq!(code(&run(&["report", &whole])), 0);
+    assert!(read(&whole, "report.html") == page);
+    for shown in ["under given temperatures", "Layer temperatures of field.csv", "Convergence of the search"] {
+        assert!(page.contains(shown), "{shown}");
     }
 }
 

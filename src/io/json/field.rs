@@ -31,7 +31,7 @@ pub(crate) struct FieldSearchJson {
     /// QUA's objective over the best pattern's; null where QUA does not fit the layer count.
     pub(crate) improvement_over_qua: Option<f64>,
     pub(crate) statement: String,
-    /// Nothing is proved under a field: its status is "none".
+    /// Over the rows of the fields.
     pub(crate) proof: ProofJson,
     pub(crate) evaluations: u64,
     /// On the screen only: files don't depend on the clock.

@@ -210,10 +210,6 @@ pub(crate) struct ProofJson {
 }
 
 impl ProofJson {
-    pub(crate) fn none() -> Self {
-        Self::of(&Proof::NONE)
-    }
-
     pub(crate) fn of(proof: &Proof) -> Self {
         let where_proved = |rad_per_s: f64| (proof.status != Status::None).then(|| deg_per_h_from_rad_per_s(rad_per_s));
         Self {

@@ -34,6 +34,20 @@ pub(crate) struct RunSummary {
     pub(crate) rounds: u64,
     #[serde(default)]
     pub(crate) stopped_by: String,
+    /// Of a search under temperatures from elsewhere.
+    #[serde(default)]
+    pub(crate) fields: Vec<RunField>,
+}
+
+/// A file of temperatures that a search ran under.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub(crate) struct RunField {
+    pub(crate) file: String,
+    pub(crate) sha256: Option<String>,
+    pub(crate) rows: usize,
+    pub(crate) from_s: f64,
+    pub(crate) to_s: f64,
+    pub(crate) rates: String,
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]

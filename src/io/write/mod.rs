@@ -10,6 +10,7 @@ pub(crate) mod comparison_rows;
 pub mod compensation_file;
 pub mod difference_equation;
 pub mod empirical_export;
+pub(crate) mod field_rates;
 pub(crate) mod field_table;
 mod formulas_in_c;
 pub(crate) mod leave_one_out;

@@ -20,6 +20,7 @@ use crate::text::sink::{Cell, TomlComment};
 use crate::units::deg_per_h_from_rad_per_s;
 
 use super::checkpoint::CHECKPOINT_FILE;
+use super::field_rates::RATES_FILE;
 
 /// A request, as far as the search's course depends on it.
 #[derive(Debug, Clone)]
@@ -130,11 +131,12 @@ pub fn write_request(folder: &Path, request: &Request) -> Result<(), WriteError>
 }
 
 /// What a search may leave, over profiles or over fields; the summary first: while it is there, the rest is of its run.
-pub(crate) const KINDS: [&str; 11] = [
+pub(crate) const KINDS: [&str; 12] = [
     "summary.json",
     "best.toml",
     "baselines.csv",
     "history.csv",
+    RATES_FILE,
     "schedule.csv",
     "schedule.json",
     "report.html",
@@ -193,7 +195,7 @@ pub(crate) fn write_results(
     write_atomically(&folder.join("summary.json"), (json + "\n").as_bytes())
 }
 
-fn baselines_csv(baselines: &[PatternJson], best: &PatternJson) -> Vec<u8> {
+pub(crate) fn baselines_csv(baselines: &[PatternJson], best: &PatternJson) -> Vec<u8> {
     // A column only of searches over built coils, so that the others' files stay as they are.
     let p95 = |value: &dyn Fn() -> String| best.p95_rate_deg_per_h.map(|_| value());
     let mut header: Vec<String> = [
@@ -232,7 +234,7 @@ fn baselines_csv(baselines: &[PatternJson], best: &PatternJson) -> Vec<u8> {
     table.into_bytes()
 }
 
-fn history_csv(history: &[RoundRecord]) -> Vec<u8> {
+pub(crate) fn history_csv(history: &[RoundRecord]) -> Vec<u8> {
     let mut table = Table::with_header(["round", "evaluations", "best_deg_per_h", "working_samples"]);
     for record in history {
         let cells = [

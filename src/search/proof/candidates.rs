@@ -9,7 +9,7 @@ use super::support::Support;
 use super::{Goal, Outcome, Task, Watch};
 use crate::coil::Coil;
 use crate::pattern::Pattern;
-use crate::rate::{LayerWeights, RateError, RateModel};
+use crate::rate::{CoilModel, LayerWeights, RateError, RateModel};
 use crate::search::cost::columns::{BLOCK, Norm};
 use crate::search::cost::guaranteed::GuaranteedError;
 use crate::search::cost::objective::rms_rad_per_s;
@@ -62,30 +62,20 @@ const PEAK_OVER_SAMPLES: f64 = 0.9;
 
 /// What the goal is the largest of.
 #[derive(Debug)]
-enum Largest {
+enum Largest<'a> {
     /// What every time of the profiles shows.
-    Course(Course),
-    /// The samples that a norm can be asked for.
-    Norm(Support),
-}
-
-impl Largest {
-    fn new(task: &Task) -> Result<Self, SearchError> {
-        Ok(match task.goal {
-            Goal::WorstRate => Self::Course(Course::of_rate(task)?),
-            Goal::Pointing => Self::Course(Course::of_pointing(task)?),
-            Goal::RootMeanSquare => Self::Norm(Support::of_rms(task.model, task.solved)?),
-            Goal::Guaranteed(step) => Self::Norm(Support::of_guaranteed(task.model, step)?),
-        })
-    }
+    Course(Course, Task<'a>),
+    /// The samples that a norm can be asked for; with what judges it, where the samples are not all there is.
+    Norm(Support, Option<Task<'a>>),
+    /// The samples as they are: there is nothing between them.
+    Samples,
 }
 
 /// Every sample of the solved profiles, or the samples that a norm has been asked for, and the reference behind them.
 #[derive(Debug)]
 pub(crate) struct Judge<'a> {
-    task: Task<'a>,
     coil: Coil,
-    of: Largest,
+    of: Largest<'a>,
     /// What became samples besides those that were there at first, in their order.
     witnesses: Vec<Witness>,
     matrix: SampleMatrix,
@@ -100,21 +90,50 @@ impl<'a> Judge<'a> {
     /// # Errors
     /// Effects that leave a layer no turns; rates that are not finite.
     pub(crate) fn new(task: &Task<'a>) -> Result<Self, SearchError> {
-        let of = Largest::new(task)?;
-        let (matrix, profile_of) = match &of {
-            Largest::Course(course) => course.samples(task)?,
-            Largest::Norm(support) => (support.first_samples(), Vec::new()),
+        let coil = task.model.wound_coil()?;
+        let of_course = |course: Course| -> Result<_, SearchError> {
+            let (samples, profile_of) = course.samples(task)?;
+            Ok((Largest::Course(course, *task), samples, profile_of))
         };
-        Ok(Self {
-            task: *task,
-            coil: task.model.wound_coil()?,
+        let of_norm = |support: Support| {
+            let samples = support.first_samples();
+            (Largest::Norm(support, Some(*task)), samples, Vec::new())
+        };
+        let (of, samples, profile_of) = match task.goal {
+            Goal::WorstRate => of_course(Course::of_rate(task)?)?,
+            Goal::Pointing => of_course(Course::of_pointing(task)?)?,
+            Goal::RootMeanSquare => of_norm(Support::of_rms(task.model, task.solved)?),
+            Goal::Guaranteed(step) => of_norm(Support::of_guaranteed(task.model, step)?),
+        };
+        Ok(Self::of(coil, of, samples, profile_of))
+    }
+
+    /// Of a norm of samples that are all there is.
+    ///
+    /// # Errors
+    /// Effects that leave a layer no turns.
+    pub(crate) fn of_samples(model: &CoilModel, samples: SampleMatrix, norm: Norm) -> Result<Self, SearchError> {
+        let (of, matrix) = match norm {
+            Norm::Largest => (Largest::Samples, samples),
+            Norm::RootMeanSquare | Norm::Sum => {
+                let support = Support::of_samples(samples, norm);
+                let first = support.first_samples();
+                (Largest::Norm(support, None), first)
+            }
+        };
+        Ok(Self::of(model.wound_coil()?, of, matrix, Vec::new()))
+    }
+
+    fn of(coil: Coil, of: Largest<'a>, matrix: SampleMatrix, profile_of: Vec<usize>) -> Self {
+        Self {
+            coil,
             of,
             witnesses: Vec::new(),
             profile_of,
             order: (0..matrix.samples()).collect(),
             ordered: matrix.clone(),
             matrix,
-        })
+        }
     }
 
     /// Every sample of the profiles in order, then those that were added.
@@ -137,8 +156,12 @@ impl<'a> Judge<'a> {
     /// # Errors
     /// A pattern of another layer count.
     pub(crate) fn candidate_and_witness(&self, pattern: &Pattern) -> Result<(Candidate, Witness), SearchError> {
-        let Task { model, solved, goal, .. } = self.task;
         let segments = pattern.segments().to_vec();
+        let (Largest::Course(_, task) | Largest::Norm(_, Some(task))) = &self.of else {
+            let rate_rad_per_s = self.sampled_worst_rad_per_s(&segments);
+            return Ok((Candidate { rate_rad_per_s, segments: segments.clone() }, Witness::Pattern(segments)));
+        };
+        let Task { model, solved, goal, .. } = *task;
         let of_time = |worst: WorstCase| {
             let witness = Witness::Instant { profile: worst.profile_index, time_s: worst.time_s };
             (worst.rate_rad_per_s.abs(), witness)
@@ -167,8 +190,8 @@ impl<'a> Judge<'a> {
     pub(crate) fn sampled_worst_rad_per_s(&self, segments: &[usize]) -> f64 {
         let coefficients = self.coefficients_of(segments);
         match &self.of {
-            Largest::Norm(support) => support.value(&coefficients),
-            Largest::Course(_) => Norm::Largest.of(&self.matrix.columns.values(&coefficients)),
+            Largest::Norm(support, _) => support.value(&coefficients),
+            Largest::Course(..) | Largest::Samples => Norm::Largest.of(&self.matrix.columns.values(&coefficients)),
         }
     }
 
@@ -181,19 +204,19 @@ impl<'a> Judge<'a> {
             }
             self.witnesses.push(witness.clone());
             match (witness, &self.of) {
-                (Witness::Instant { profile, time_s }, Largest::Course(course)) => {
-                    responses.push(course.response_at(&self.task.solved.profiles()[*profile], *time_s));
+                (Witness::Instant { profile, time_s }, Largest::Course(course, task)) => {
+                    responses.push(course.response_at(&task.solved.profiles()[*profile], *time_s));
                 }
-                (Witness::Pattern(segments), Largest::Norm(_)) => attaining.push(self.coefficients_of(segments)),
-                // A goal has witnesses of its own kind only.
-                (Witness::Instant { .. }, Largest::Norm(_)) | (Witness::Pattern(_), Largest::Course(_)) => {}
+                (Witness::Pattern(segments), Largest::Norm(..)) => attaining.push(self.coefficients_of(segments)),
+                // A goal has witnesses of its own kind only; where samples are all there is, none is new.
+                _ => {}
             }
         }
         let from = self.matrix.samples();
         if !responses.is_empty() {
             self.matrix = self.matrix.extended(&responses);
         }
-        if let Largest::Norm(support) = &self.of
+        if let Largest::Norm(support, _) = &self.of
             && !attaining.is_empty()
         {
             self.matrix = self.matrix.joined(&support.attaining(&attaining));
@@ -207,9 +230,13 @@ impl<'a> Judge<'a> {
     }
 
     fn is_same(&self, known: &Witness, other: &Witness) -> bool {
-        match (known, other) {
-            (Witness::Instant { profile, time_s }, Witness::Instant { profile: p, time_s: t }) => {
-                let same_s = SAME_INSTANT * self.task.solved.profiles()[*profile].profile.duration_s();
+        match (known, other, &self.of) {
+            (
+                Witness::Instant { profile, time_s },
+                Witness::Instant { profile: p, time_s: t },
+                Largest::Course(_, task),
+            ) => {
+                let same_s = SAME_INSTANT * task.solved.profiles()[*profile].profile.duration_s();
                 profile == p && (time_s - t).abs() <= same_s
             }
             _ => known == other,
@@ -242,23 +269,24 @@ impl<'a> Judge<'a> {
             }
         }
         match &self.of {
-            Largest::Norm(support) if support.value(&coefficients) >= limit_rad_per_s => {
+            Largest::Norm(support, _) if support.value(&coefficients) >= limit_rad_per_s => {
                 Finding::RefutedBetween(Witness::Pattern(segments.to_vec()))
             }
-            Largest::Norm(_) => match self.candidate_and_witness(&pattern) {
+            // No sample refutes it: with nothing between them it is better.
+            Largest::Norm(..) | Largest::Samples => match self.candidate_and_witness(&pattern) {
                 Ok((candidate, _)) if candidate.rate_rad_per_s < limit_rad_per_s => Finding::Better(candidate),
                 _ => Finding::RefutedBetween(Witness::Pattern(segments.to_vec())),
             },
-            Largest::Course(course) => self.refined(course, &pattern, limit_rad_per_s),
+            Largest::Course(course, task) => self.refined(course, task, &pattern, limit_rad_per_s),
         }
     }
 
     /// What is worst refined in time, over the profiles in the order of their worst samples, until one is not below the
     /// limit or none that is left can be worse.
-    fn refined(&self, course: &Course, pattern: &Pattern, limit_rad_per_s: f64) -> Finding {
-        let of_pattern = course.of(&self.task, pattern).expect("a search makes patterns of the coil's layers");
+    fn refined(&self, course: &Course, task: &Task, pattern: &Pattern, limit_rad_per_s: f64) -> Finding {
+        let of_pattern = course.of(task, pattern).expect("a search makes patterns of the coil's layers");
         let values = self.matrix.columns.values(&self.coefficients(pattern));
-        let mut largest = vec![0.0_f64; self.task.solved.profiles().len()];
+        let mut largest = vec![0.0_f64; task.solved.profiles().len()];
         for (&profile, v) in self.profile_of.iter().zip(&values) {
             largest[profile] = largest[profile].max(v.abs());
         }
@@ -269,7 +297,7 @@ impl<'a> Judge<'a> {
             if largest[profile] < PEAK_OVER_SAMPLES * worst_rad_per_s {
                 break;
             }
-            let (rate_rad_per_s, time_s) = of_pattern.worst(&self.task.solved.profiles()[profile]);
+            let (rate_rad_per_s, time_s) = of_pattern.worst(&task.solved.profiles()[profile]);
             worst_rad_per_s = worst_rad_per_s.max(rate_rad_per_s.abs());
             if worst_rad_per_s >= limit_rad_per_s {
                 return Finding::RefutedBetween(Witness::Instant { profile, time_s });
@@ -299,7 +327,7 @@ impl<'a> Judge<'a> {
 
     /// The samples at which given patterns are worst, the most frequent first, no two next to each other.
     pub(crate) fn binding_samples(&mut self, patterns: &[Vec<usize>], most: usize) -> Vec<usize> {
-        if matches!(self.of, Largest::Norm(_)) {
+        if matches!(self.of, Largest::Norm(..)) {
             // Each pattern's own sample: of the first and then of every so many-th.
             let stride = patterns.len().div_ceil(most).max(1);
             let from = self.matrix.samples();

@@ -26,7 +26,7 @@ use rayon::prelude::*;
 use super::box_join::{Matching, Step, Target, Tree};
 use super::candidates::{Candidate, Judge};
 use super::sampling::neighbours;
-use super::{Outcome, Task, first_best};
+use super::{Outcome, Task, checked_judge, first_best};
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::search::anneal::limits::{Limits, pick};
@@ -67,7 +67,8 @@ const FIRST_STREAM: u64 = u64::MAX / 4;
 /// # Errors
 /// As [`super::prove`].
 pub(crate) fn compounded(task: &Task, starts: &[Pattern], seed: u64) -> Result<Pattern, SearchError> {
-    let (mut judge, best) = first_best(task, starts)?;
+    let mut judge = checked_judge(task)?;
+    let best = first_best(&mut judge, task.class, starts)?;
     let admitted: Vec<Pattern> = starts.iter().filter(|p| task.class.admits(p)).cloned().collect();
     let mut chains = vec![best];
     for start in admitted.iter() {

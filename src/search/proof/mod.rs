@@ -44,6 +44,7 @@ pub(crate) mod surrogates;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use starts::quickly_found;
 pub use starts::starting_patterns;
 
 use std::ops::ControlFlow;
@@ -56,7 +57,9 @@ use sampling::Proof;
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::rate::CoilModel;
+use crate::search::cost::columns::Norm;
 use crate::search::cost::guaranteed::UnitStep;
+use crate::search::cost::samples::SampleMatrix;
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
 
 /// What is to be made small.
@@ -203,7 +206,27 @@ pub(crate) const RELATIVE_TOLERANCE: f64 = 1e-9;
 /// A model that cannot be solved, a start that does not fit it; more than [`permutation_tree::MOST_LAYERS`] layers, or none
 /// of the class among the starts.
 pub fn prove(task: &Task, starts: &[Pattern], watcher: Watcher) -> Result<Certificate, SearchError> {
-    let Begun { mut judge, mut best, mut proof } = begin(task, starts, 0.0)?;
+    proved(begin(task, starts, 0.0)?, watcher)
+}
+
+/// The same of a norm of samples that are all there is: of the rows of temperatures from elsewhere, say.
+///
+/// # Errors
+/// As [`prove`].
+pub(crate) fn prove_samples(
+    model: &CoilModel,
+    samples: SampleMatrix,
+    norm: Norm,
+    class: WindabilityClass,
+    starts: &[Pattern],
+    watcher: Watcher,
+) -> Result<Certificate, SearchError> {
+    check_layers(model)?;
+    proved(begin_with(Judge::of_samples(model, samples, norm)?, class, starts, 0.0)?, watcher)
+}
+
+fn proved(begun: Begun, watcher: Watcher) -> Result<Certificate, SearchError> {
+    let Begun { mut judge, mut best, mut proof } = begun;
     let mut lower_bound_rad_per_s = 0.0;
     let mut closed = best.rate_rad_per_s == 0.0;
     let (mut nodes, mut judged) = (0, 0);
@@ -261,21 +284,36 @@ struct Begun<'a> {
 }
 
 fn begin<'a>(task: &Task<'a>, starts: &[Pattern], good_enough_rad_per_s: f64) -> Result<Begun<'a>, SearchError> {
-    let (mut judge, mut best) = first_best(task, starts)?;
-    let proof = Proof::new(task.class, &mut judge, starts, &mut best, good_enough_rad_per_s);
+    begin_with(checked_judge(task)?, task.class, starts, good_enough_rad_per_s)
+}
+
+/// The judge of a task whose layers are not too many.
+fn checked_judge<'a>(task: &Task<'a>) -> Result<Judge<'a>, SearchError> {
+    check_layers(task.model)?;
+    Judge::new(task)
+}
+
+fn check_layers(model: &CoilModel) -> Result<(), SearchError> {
+    let (found, most) = (model.coil.layers(), permutation_tree::MOST_LAYERS);
+    if found > most { Err(SearchError::TooManyLayers { found, most }) } else { Ok(()) }
+}
+
+fn begin_with<'a>(
+    mut judge: Judge<'a>,
+    class: WindabilityClass,
+    starts: &[Pattern],
+    good_enough_rad_per_s: f64,
+) -> Result<Begun<'a>, SearchError> {
+    let mut best = first_best(&mut judge, class, starts)?;
+    let proof = Proof::new(class, &mut judge, starts, &mut best, good_enough_rad_per_s);
     Ok(Begun { judge, best, proof })
 }
 
-/// The judge, who knows where the starts are worst, and the best of them.
-fn first_best<'a>(task: &Task<'a>, starts: &[Pattern]) -> Result<(Judge<'a>, Candidate), SearchError> {
-    let layers = task.model.coil.layers();
-    if layers > permutation_tree::MOST_LAYERS {
-        return Err(SearchError::TooManyLayers { found: layers, most: permutation_tree::MOST_LAYERS });
-    }
-    let mut judge = Judge::new(task)?;
+/// The best of the starts; the judge then knows where they are worst.
+fn first_best(judge: &mut Judge, class: WindabilityClass, starts: &[Pattern]) -> Result<Candidate, SearchError> {
     let mut best: Option<Candidate> = None;
     let mut witnesses = Vec::new();
-    for start in starts.iter().filter(|p| task.class.admits(p)) {
+    for start in starts.iter().filter(|p| class.admits(p)) {
         let (candidate, witness) = judge.candidate_and_witness(start)?;
         witnesses.push(witness);
         // Of starts that are equally good, the first: it may be one that has a name.
@@ -284,9 +322,9 @@ fn first_best<'a>(task: &Task<'a>, starts: &[Pattern]) -> Result<(Judge<'a>, Can
             best = Some(candidate);
         }
     }
-    let best = best.ok_or(SearchError::NoStart { class: task.class })?;
+    let best = best.ok_or(SearchError::NoStart { class })?;
     judge.add_witnesses(&witnesses);
-    Ok((judge, best))
+    Ok(best)
 }
 
 /// What a short search by bounds made of its starts.

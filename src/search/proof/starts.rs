@@ -3,6 +3,7 @@
 use super::{Goal, Task};
 use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
+use crate::pattern::windability::WindabilityClass;
 use crate::search::anneal::rounds::{
     DEFAULT_RESTARTS_PER_ROUND, Optimisation, Plan, Rounds, Rules, default_moves_per_restart,
 };
@@ -26,18 +27,23 @@ const MOST_FOUND: usize = 6;
 /// # Errors
 /// Effects that leave a layer no turns; rates that are not finite.
 pub fn starting_patterns(task: &Task, seed: u64) -> Result<Vec<Pattern>, SearchError> {
-    let layers = task.model.coil.layers();
-    let classics = Classic::ALL.into_iter().filter_map(|classic| classic.pattern(layers).ok());
-    let classics: Vec<Pattern> = classics.filter(|p| task.class.admits(p)).collect();
-    if layers < 4 {
-        return Ok(classics);
-    }
     let (matrix, norm) = match task.goal {
         Goal::WorstRate => (Objective::WorstRate.of_profiles(task.model, task.solved)?, Norm::Largest),
         Goal::Pointing => (Objective::Pointing.of_profiles(task.model, task.solved)?, Norm::Largest),
         Goal::RootMeanSquare => (Objective::RootMeanSquare.of_profiles(task.model, task.solved)?, Norm::RootMeanSquare),
         Goal::Guaranteed(step) => (SampleMatrix::new(task.model, &step.parts(task.model, 1)?.changes)?, Norm::Sum),
     };
+    Ok(quickly_found(matrix, norm, task.class, seed))
+}
+
+/// The same of a norm of samples.
+pub(crate) fn quickly_found(matrix: SampleMatrix, norm: Norm, class: WindabilityClass, seed: u64) -> Vec<Pattern> {
+    let layers = matrix.layers();
+    let classics = Classic::ALL.into_iter().filter_map(|classic| classic.pattern(layers).ok());
+    let classics: Vec<Pattern> = classics.filter(|p| class.admits(p)).collect();
+    if layers < 4 {
+        return classics;
+    }
     let plan = Plan {
         seed,
         restarts_per_round: DEFAULT_RESTARTS_PER_ROUND,
@@ -45,9 +51,9 @@ pub fn starting_patterns(task: &Task, seed: u64) -> Result<Vec<Pattern>, SearchE
         rules: Rules { rounds: u64::MAX, patience: PATIENCE, moves: None, target: None },
         starts: Vec::new(),
     };
-    let mut search = Optimisation::new(SampleCost::new(matrix, task.class, norm), plan);
+    let mut search = Optimisation::new(SampleCost::new(matrix, class, norm), plan);
     while search.advance() {}
     let found = search.state().found.iter().take(MOST_FOUND);
     let found = found.map(|f| Pattern::new(f.segments.clone()).expect("a walk visits permutations only"));
-    Ok(classics.into_iter().chain(found).collect())
+    classics.into_iter().chain(found).collect()
 }

@@ -70,6 +70,15 @@ impl Support {
         Ok(Self { matrix, kind: Kind::Guaranteed { changes, heated } })
     }
 
+    /// Of samples that are all there is.
+    pub(crate) fn of_samples(matrix: SampleMatrix, norm: Norm) -> Self {
+        let kind = match norm {
+            Norm::RootMeanSquare => Kind::RootMeanSquare,
+            Norm::Largest | Norm::Sum => Kind::Guaranteed { changes: matrix.samples(), heated: false },
+        };
+        Self { matrix, kind }
+    }
+
     pub(crate) fn matrix(&self) -> &SampleMatrix {
         &self.matrix
     }
