@@ -49,7 +49,7 @@ RAMP = 2.0
 TO_STATED = {"white": 1 / 60, "flicker": 1.0, "rate_random_walk": 60.0, "quantisation": 1.0, "ramp": 3600.0}
 
 # The other likelihood is for comparison: as many trials as show its middle and spread.
-WHITTLE_TRIALS = 20
+WHITTLE_TRIALS = 5
 
 
 def flicker(random, n):
