@@ -112,6 +112,11 @@ impl PassedRow {
         parts.join(&separator.to_string())
     }
 
+    /// Whether a number of a row is written with a decimal comma.
+    pub(crate) fn has_decimal_comma<'r>(self, mut cells: impl Iterator<Item = &'r str>) -> bool {
+        cells.any(|cell| cell.contains(',') && self.is_number(cell))
+    }
+
     fn is_number(self, cell: &str) -> bool {
         self.decimal_comma && cell.replacen(',', ".", 1).parse::<f64>().is_ok_and(f64::is_finite)
     }

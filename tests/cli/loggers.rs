@@ -77,6 +77,23 @@ fn variants() -> Vec<(&'static str, String, &'static [&'static str])> {
     vec![
         ("semicolons and decimal commas", semicolons.clone(), &[]),
         ("tabs and decimal commas", semicolons.replace(';', "\t"), &[]),
+        ("bars", plain.replace(',', "|"), &[]),
+        (
+            "bars and quotes",
+            text("\"time_s\"|\"temperature_c\"|\"rate_deg_per_h\"", "|", |row| {
+                row.map(|v| format!("\"{v}\"")).to_vec()
+            }),
+            &[],
+        ),
+        ("a typographer's minus", plain.replace('-', "\u{2212}"), &[]),
+        (
+            "exponents in Fortran's letter",
+            text("time_s,temperature_c,rate_deg_per_h", ",", |row| {
+                row.map(|v| format!("{v:e}").replace('e', "D")).to_vec()
+            }),
+            &[],
+        ),
+        ("a negative zero", plain.replacen("\n0,", "\n-0.0,", 1), &[]),
         ("carriage returns", plain.replace('\n', "\r\n"), &[]),
         ("a mark of the byte order", "\u{feff}".to_owned() + &plain, &[]),
         ("stamps with a zone", stamped("time_iso,temperature_c,rate_deg_per_h", 'T', "Z"), &[]),
@@ -118,6 +135,9 @@ fn variants() -> Vec<(&'static str, String, &'static [&'static str])> {
 }
 
 /// Every number within rounding of units, every word the same.
+/// What keys of noises hold, in their list and where a document repeats them.
+const NOISES: [&str; 5] = ["/noise/", "random_walk", "flicker", "quantisation", "thermal_deg_per_h"];
+
 fn same(a: &Value, b: &Value, place: &str) {
     match (a, b) {
         (Value::Object(a), Value::Object(b)) => {
@@ -131,8 +151,8 @@ fn same(a: &Value, b: &Value, place: &str) {
             a.iter().zip(b).enumerate().for_each(|(i, (x, y))| same(x, y, &format!("{place}/{i}")));
         }
         _ => match (a.as_f64(), b.as_f64()) {
-            // Ends of noise intervals are sought to a part in five hundred: rounding may decide a last step.
-            (Some(x), Some(y)) if place.contains("/noise/") => {
+            // Strengths and ends of noises are sought to a part in five hundred: rounding may decide a last step.
+            (Some(x), Some(y)) if NOISES.iter().any(|noise| place.contains(noise)) => {
                 assert!((x - y).abs() <= 1e-2 * x.abs(), "{place}: {x} {y}")
             }
             (Some(x), Some(y)) => assert!((x - y).abs() <= 2e-6 * x.abs() + 1e-9, "{place}: {x} {y}"),
@@ -153,15 +173,16 @@ fn every_way_to_write_a_record_gives_the_plain_files_answer() {
         serde_json::from_str(stdout(&out)).unwrap()
     };
     // One command holds the record that is fitted and passes rows on.
-    let compensated = |path: &str, fit: &str, more: &[&str]| -> Vec<f64> {
+    let compensated = |path: &str, fit: &str, more: &[&str]| -> (Vec<f64>, bool) {
         let out = run(&[&["compensate", &model, path, "--fit", fit, "--method", "piecewise"], more].concat());
         assert_eq!(code(&out), 0, "{more:?}: {}", stderr(&out));
-        let separator = if stdout(&out).lines().next().unwrap().contains(';') { ';' } else { ',' };
-        let cells =
-            |line: &str| line.split([separator, '\t']).rev().nth(1).and_then(|c| c.replace(',', ".").parse().ok());
-        stdout(&out).lines().skip(1).filter_map(cells).collect()
+        let (before, _) = stdout(&out).split_once("rate_compensated_deg_per_h").unwrap();
+        let separator = before.chars().last().unwrap();
+        let cells = || stdout(&out).lines().skip(1).filter_map(|line| line.split(separator).rev().nth(1));
+        let has_comma = separator != ',' && cells().any(|cell| cell.contains(','));
+        (cells().filter_map(|cell| cell.replace(',', ".").parse().ok()).collect(), has_comma)
     };
-    let (expected, expected_left) = (measured(&plain, &[]), compensated(&plain, &plain, &[]));
+    let (expected, (expected_left, _)) = (measured(&plain, &[]), compensated(&plain, &plain, &[]));
     assert_eq!(expected_left.len(), 600);
     for (name, text, more) in variants() {
         std::fs::write(&other, text).unwrap();
@@ -169,11 +190,45 @@ fn every_way_to_write_a_record_gives_the_plain_files_answer() {
         same(&expected, &measured(&other_path, more), "");
         // A stream passes bad rows on, flagged; a fit leaves them out.
         let passed_on = if more.contains(&"--bad-rows") { &plain } else { &other_path };
-        let left = compensated(passed_on, &other_path, more);
+        let (left, has_comma) = compensated(passed_on, &other_path, more);
+        // What is added is written as the file's own numbers.
+        assert!(has_comma || passed_on == &plain || !name.contains("decimal comma"), "{name}");
         assert_eq!(left.len(), 600, "{name}");
         for (a, b) in expected_left.iter().zip(&left) {
             assert!((a - b).abs() < 2e-6, "{name}: {a} {b}");
         }
+    }
+}
+
+#[test]
+fn what_cannot_be_read_is_refused_with_what_helps() {
+    let plain = numbers("time_s,temperature_c,rate_deg_per_h", |t, c, r| [t, c, r]);
+    let since = |factor: f64| {
+        text("time_s,temperature_c,rate_deg_per_h", ",", |[t, c, r]| {
+            vec![((1.7e9 + t) * factor).to_string(), c.to_string(), r.to_string()]
+        })
+    };
+    let apart = text("time_s,temperature_c,rate_deg_per_h", ",", |[t, c, r]| {
+        vec![format!("\"1,{:03}.0\"", t as u32 % 1000), c.to_string(), r.to_string()]
+    });
+    let unknown = plain.replacen("rate_deg_per_h", "rate [furlongs]", 1);
+    let spaces = plain.replace(',', "   ");
+    let (_, headless) = plain.split_once('\n').unwrap();
+    let trailing = plain.replace('\n', ",\n");
+    let cases: [(&str, &str, &[&str]); 8] = [
+        (&since(1e3), "time=its name:epoch_ms", &[]),
+        (&since(1e6), "time=its name:epoch_us", &[]),
+        (&since(1e9), "time=its name:epoch_ns", &[]),
+        (&apart, "without anything between their thousands", &[]),
+        (&unknown, "furlongs, which is no unit", &["--columns", "rate=rate [furlongs]"]),
+        (&spaces, "found spaces", &[]),
+        (headless, "put a line such as", &[]),
+        (&trailing, "no separator behind the last column", &[]),
+    ];
+    for (text, expected, options) in cases {
+        let (_folder, path) = folder_with("log.csv", text);
+        let output = run(&[&["metrics", &path.display().to_string()], options].concat());
+        assert!(code(&output) == 2 && stderr(&output).contains(expected), "{expected}: {}", stderr(&output));
     }
 }
 

@@ -3,12 +3,14 @@
 //! A name's ending says its unit (`temperature_k`), and so does a unit in brackets (`Omega [deg/s]`, `T1 (°F)`) or in a row below the
 //! names; a mapping (`time=Zeit:min,rate=Omega`, or `[record]` in a model file) says which column is which and overrides all of them.
 
+mod cells;
+
 use crate::io::fault::Fault;
 use crate::io::record_format::{Conversion, Kind, UNITS, Unit, accepted_names};
 pub use crate::io::record_format::{Quantity, RecordFormat, SensorPlace};
 use crate::units::{celsius_from_kelvin, rad_per_s_from_deg_per_h};
 
-use super::stamps::{DATES, STAMPS, is_stamp_pattern, seconds_of_date, seconds_of_stamp};
+use super::stamps::{is_stamp_pattern, seconds_of_date, seconds_of_stamp};
 use super::toml_reader::{Limits, TableReader, TomlReader, nearest};
 
 /// The `[record]` table of a model file: roles as keys, `scale`, `bad_rows`, `average_rows`.
@@ -124,6 +126,11 @@ impl Column {
                     ));
                 }
                 let known = stated.or(own).or(row);
+                if let (None, Some(unknown)) = (known, bracketed) {
+                    return Err(format!(
+                        "column {name} is in {unknown}, which is no unit of it that is known: say which it is with a unit in --columns, as rate=its name:deg_per_h"
+                    ));
+                }
                 if known.is_none() {
                     assumed = Some(quantity.default_unit());
                 }
@@ -146,46 +153,6 @@ impl Column {
             (_, scale) => scale.unwrap_or(1.0),
         };
         Ok(Self { name: name.to_owned(), quantity, conversion, scale, decimal_comma, assumed })
-    }
-
-    /// A field as a number in SI.
-    ///
-    /// # Errors
-    /// What was found instead, in words.
-    pub(crate) fn value(&self, field: &str) -> Result<f64, String> {
-        let found = || match field.is_empty() {
-            true => "nothing".to_owned(),
-            false => format!("\"{}\"", field.chars().take(40).collect::<String>()),
-        };
-        if self.quantity == Quantity::Date {
-            return seconds_of_date(field).ok_or_else(&found);
-        }
-        if self.conversion.is_stamp() || (self.quantity == Quantity::Time && field.contains(':')) {
-            let stated = if self.decimal_comma { field.replace(',', ".") } else { field.to_owned() };
-            return seconds_of_stamp(&stated).ok_or_else(&found);
-        }
-        let number = if self.decimal_comma && field.matches(',').count() == 1 && !field.contains('.') {
-            field.replace(',', ".").parse::<f64>()
-        } else {
-            field.parse::<f64>()
-        };
-        let value = number.ok().filter(|v| v.is_finite()).ok_or_else(found)?;
-        let si = match self.conversion {
-            Conversion::By(to_si) => to_si(value),
-            Conversion::Raw => rad_per_s_from_deg_per_h(value / self.scale),
-            Conversion::Stamp => value,
-        };
-        let (most, words) = self.quantity.bounds();
-        if si.abs() <= most { Ok(si) } else { Err(format!("{value:e}, beyond {words}")) }
-    }
-
-    /// What its cells must be, in words.
-    pub(crate) fn expected(&self) -> &'static str {
-        match self.quantity {
-            Quantity::Date => DATES,
-            _ if self.conversion.is_stamp() => STAMPS,
-            _ => "expected a finite number",
-        }
     }
 
     /// Whether its cells are dates or times.
@@ -289,13 +256,14 @@ pub struct Division {
 }
 
 impl Division {
-    /// As the header shows it: semicolons or tabs where there are any outside of quotes, then decimals may have commas.
+    /// As the header shows it: semicolons, tabs or bars where there are any outside of quotes, then decimals may have commas.
     pub fn of_header(line: &str) -> Self {
         let count =
             |separator: char| -> usize { line.split('"').step_by(2).map(|bare| bare.matches(separator).count()).sum() };
-        let separator: u8 = match (count(';'), count('\t')) {
-            (0, 0) => b',',
-            (0, _) => b'\t',
+        let separator: u8 = match (count(';'), count('\t'), count('|')) {
+            (0, 0, 0) => b',',
+            (0, 0, _) => b'|',
+            (0, _, _) => b'\t',
             _ => b';',
         };
         Self { separator, decimal_comma: separator != b',' }
@@ -312,11 +280,31 @@ pub(crate) fn read_header(
     format: &RecordFormat,
     division: Division,
 ) -> Result<Vec<Column>, Vec<(String, Option<String>)>> {
-    columns_of(fields, units, format, division)
-        .map_err(|faults| if is_toml(fields) { vec![(MODEL_GIVEN.to_owned(), None)] } else { faults })
+    columns_of(fields, units, format, division).map_err(|faults| {
+        let instead = if is_toml(fields) {
+            MODEL_GIVEN
+        } else if are_numbers(fields, division) {
+            NO_NAMES
+        } else if is_divided_by_spaces(fields) {
+            SPACES
+        } else {
+            return faults;
+        };
+        vec![(instead.to_owned(), None)]
+    })
 }
 
 const MODEL_GIVEN: &str = "this is a model file, no record: the model comes first, then the records (CSV)";
+
+const NO_NAMES: &str = "the first line holds numbers where the columns' names are expected: put a line such as time_s,temperature_c,rate_deg_per_h above it";
+const SPACES: &str =
+    "expected commas, semicolons, tabs or bars between columns, found spaces: write one of them between the columns";
+
+/// Whether a head is one cell of several words, such as those of a table that is set in columns by spaces.
+fn is_divided_by_spaces(fields: &[&str]) -> bool {
+    // A time, a temperature and a rate.
+    matches!(fields, [one] if one.split_whitespace().count() >= 3)
+}
 
 /// Whether what stands in a header's place begins a TOML file: a table, or a key with its value.
 fn is_toml(fields: &[&str]) -> bool {
@@ -358,7 +346,13 @@ fn columns_of(
     }
     for (i, column) in columns.iter().enumerate() {
         if column.name.is_empty() {
-            faults.push((format!("column {} has no name: expected one such as supply_v", i + 1), None));
+            faults.push((
+                format!(
+                    "column {} has no name: expected one such as supply_v, or no separator behind the last column",
+                    i + 1
+                ),
+                None,
+            ));
         } else if let Some(fault) = crate::text::name_fault(&column.name) {
             faults.push((format!("column {}: its name {fault}", i + 1), None));
         } else if columns[..i].iter().any(|c| c.name == column.name) {

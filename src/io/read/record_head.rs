@@ -253,7 +253,7 @@ mod tests {
                 "line 2, column time: expected a time of day beside the date",
             ),
             // A row of numbers is never a note.
-            ("0,20,1\ntime_s,temperature_c,rate_deg_per_h\n1,20,1\n", "column time_s is missing"),
+            ("0,20,1\ntime_s,temperature_c,rate_deg_per_h\n1,20,1\n", "the first line holds numbers"),
         ] {
             let said = read("", text).unwrap_err();
             assert!(said.contains(wanted), "{text}: {said}");

@@ -145,7 +145,7 @@ impl<'c> Cells<'c> {
                             column.expected()
                         ),
                         place: Some(place),
-                        note: Some("leave out rows in which a sensor failed, or skip them: --bad-rows skip"),
+                        note: Some(column.remedy(field)),
                     });
                     f64::NAN
                 }
@@ -186,7 +186,11 @@ impl<'c> Cells<'c> {
 pub(super) fn assumptions(columns: &[Column], division: Division) -> Vec<String> {
     let mut said = Vec::new();
     if division.separator != b',' {
-        let name = if division.separator == b';' { "semicolons" } else { "tabs" };
+        let name = match division.separator {
+            b';' => "semicolons",
+            b'|' => "bars",
+            _ => "tabs",
+        };
         said.push(format!("{name} between columns; a comma inside a number is a decimal comma"));
     }
     if let Some(table) = columns.iter().find(|c| c.quantity == Quantity::Table) {

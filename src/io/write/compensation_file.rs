@@ -1,6 +1,5 @@
 //! Compensation as text: CSV lines in, CSV lines out.
 
-use std::fmt::Write as _;
 use std::io::{BufRead, BufReader, Read, Write};
 
 use serde::Serialize;
@@ -78,6 +77,8 @@ struct Passed {
     is_aside: bool,
     time_s: Option<f64>,
     rate_rad_per_s: Option<f64>,
+    /// Whether its numbers have decimal commas.
+    has_commas: bool,
 }
 
 /// The flag of rows that the offset of a start-up is learned from.
@@ -180,7 +181,9 @@ pub(crate) fn compensate_lines_from_turn_on(
             Piece::Row | Piece::Broken(_) => passed_row.one_cell(rows.text(), places.count),
         };
         let time_s = reading.as_ref().map(|r| r.time_s);
-        let passed = Passed { text, is_aside, time_s, rate_rad_per_s: reading.and_then(|r| r.rate_rad_per_s) };
+        let has_commas = passed_row.has_decimal_comma(rows.cells());
+        let rate_rad_per_s = reading.and_then(|r| r.rate_rad_per_s);
+        let passed = Passed { text, is_aside, time_s, rate_rad_per_s, has_commas };
         stream.push(passed, reading, |row| sink.row(row));
         if rows.waits() {
             // Whoever feeds line by line waits for what is ready.
@@ -285,6 +288,7 @@ struct Sink<W: Write> {
     after: RunningDeviation,
     text: String,
     separator: char,
+    has_commas: bool,
     turn_on: Option<TurnOn>,
     failed: Option<std::io::Error>,
 }
@@ -298,6 +302,7 @@ impl<W: Write> Sink<W> {
             after: RunningDeviation::default(),
             text: String::new(),
             separator: ',',
+            has_commas: false,
             turn_on: None,
             failed: None,
         }
@@ -323,6 +328,11 @@ impl<W: Write> Sink<W> {
         self.failed.take().map_or(Ok(()), |error| Err(StreamError::Write(error)))
     }
 
+    /// Between two flags of a row: nothing that divides cells.
+    fn between_flags(&self) -> char {
+        if self.separator == '|' { '+' } else { '|' }
+    }
+
     fn row(&mut self, row: Compensated<Passed>) {
         if row.tag.is_aside {
             self.plain(&row.tag.text);
@@ -340,18 +350,23 @@ impl<W: Write> Sink<W> {
         let rate = turned_on.map(|(rate, _)| rate).or(row.rate_rad_per_s);
         let is_learning = turned_on.is_some_and(|(_, learns)| learns);
         if let Some(rate) = rate {
-            let _ = write!(self.text, "{:.8}", deg_per_h_from_rad_per_s(rate));
+            // A row of whole numbers says nothing: as the rows before it.
+            self.has_commas |= row.tag.has_commas;
+            let shown = format!("{:.8}", deg_per_h_from_rad_per_s(rate));
+            self.text.push_str(&if self.has_commas { shown.replace('.', ",") } else { shown });
         }
         self.text.push(self.separator);
         for (i, flag) in row.flags.iter().enumerate() {
             if i > 0 {
-                self.text.push('|');
+                self.text.push(self.between_flags());
             }
             self.text.push_str(flag.word());
             self.summary.count(*flag);
         }
         if is_learning {
-            self.text.push_str(if is_sound { "" } else { "|" });
+            if !is_sound {
+                self.text.push(self.between_flags());
+            }
             self.text.push_str(TURN_ON);
         }
         if let (true, Some(before), Some(after)) = (is_sound && !is_learning, row.tag.rate_rad_per_s, rate) {
