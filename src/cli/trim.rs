@@ -52,7 +52,7 @@ fn text(body: &TrimJson) -> String {
     };
     let least = body.least.as_ref().map_or_else(String::new, |least| {
         format!(
-            "smallest error     {:.4} °/h with {:.4} m cut at end {}, or {:.3} turns more at the other end: the winding's own error then is balanced\n",
+            "smallest error     {:.4} °/h with {:.4} m cut at end {}, or {:.3} turns more at the other end: as far as one length balances the winding's own\n",
             least.rate_deg_per_h, least.cut_m, least.end, least.turns_at_other_end
         )
     });

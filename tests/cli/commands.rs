@@ -254,9 +254,9 @@ fn trim_says_which_cut_leaves_the_smallest_error_and_where_a_cut_makes_it_larger
     let of = |key: &str| found[key].as_f64().unwrap();
     let least = &found["least"];
     let smallest = least["rate_deg_per_h"].as_f64().unwrap();
-    // A cylindrical winding's own error is of the surplus' sign: without the surplus it is larger.
+    // The surplus balances a part of what the cylindrical winding makes by itself.
     assert!(of("predicted_rate_deg_per_h") > of("present_rate_deg_per_h"));
-    assert!(smallest < 0.7 * of("present_rate_deg_per_h"), "{least}");
+    assert!(smallest < 0.95 * of("present_rate_deg_per_h"), "{least}");
     let words = stdout(&run(&arguments)).to_owned();
     assert!(words.contains("it grows, because") && words.contains("smallest error"), "{words}");
 }
