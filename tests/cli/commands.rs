@@ -225,29 +225,6 @@ fn turns_at_the_ends_and_a_split_layer_are_chosen_scheduled_and_verified() {
 }
 
 #[test]
-fn turns_may_nest_in_the_grooves_of_the_layer_below_and_no_deeper() {
-    let folder = tempfile::tempdir().unwrap();
-    let written = run_in(folder.path(), &["new", "nested"]);
-    assert_eq!(code(&written), 0, "{}", stderr(&written));
-    let path = folder.path().join("nested.toml");
-    let source = std::fs::read_to_string(&path).unwrap();
-    let with = |radial_um: &str| {
-        let changed = source
-            .replace("radial_pitch_um = 165.0 ", &format!("radial_pitch_um = {radial_um} "))
-            .replace("axial_pitch_um = 170.0 ", "axial_pitch_um = 165.0 ");
-        assert_ne!(changed, source);
-        std::fs::write(&path, changed).unwrap();
-        run_in(folder.path(), &["check", "nested.toml"])
-    };
-    // √3/2 of 165 µm is 142.894.
-    let (nested, deeper) = (with("142.9"), with("142.8"));
-    assert_eq!((code(&nested), stdout(&nested)), (0, "nested.toml: no faults\n"));
-    assert_eq!(code(&deeper), 2);
-    let words = format!("{}{}", stdout(&deeper), stderr(&deeper));
-    assert!(words.contains("winding.radial_pitch_um must be at least 142.894, found 142.8"), "{words}");
-}
-
-#[test]
 fn trim_says_which_cut_leaves_the_smallest_error_and_where_a_cut_makes_it_larger() {
     let arguments = ["trim", "examples/chamber-coil.toml", "examples/chamber-day-1.csv"];
     let found = json(&arguments);

@@ -62,7 +62,7 @@ pub fn model_schema() -> Value {
             "turns_per_layer": described("number", "needed for layer_length = \"actual\""),
             "inner_diameter_mm": described("number", "of the spool; or mean_diameter_mm"),
             "mean_diameter_mm": described("number", "of the coil; or inner_diameter_mm"),
-            "radial_pitch_um": described("number", "default: the fibre's outer diameter; 0.866 of it where turns nest in the grooves of the layer below"),
+            "radial_pitch_um": described("number", "default: the fibre's outer diameter, and at least that"),
             "axial_pitch_um": described("number", "default: the fibre's outer diameter"),
             "layer_length": { "enum": ["actual", "equal"] },
             "length_m": described("number", "of the whole fibre"),

@@ -274,24 +274,14 @@ fn read_coil(r: &mut TomlReader, table: &mut TableReader, layers: Option<usize>,
     made_coil(r, table, spec, crossover_turns).map(|coil| coil.with_sagnac(sagnac))
 }
 
-/// Turns that lie in the grooves of the layer below touch two of its turns; every second layer has the same places.
-fn least_radial_pitch_m(spec: &CoilSpec) -> f64 {
-    let diameter_m = spec.fibre.outer_diameter_m;
-    let height_m = (diameter_m.powi(2) - 0.25 * spec.axial_pitch_m.powi(2)).max(0.0).sqrt();
-    height_m.max(0.5 * diameter_m)
-}
-
 /// The coil of what is stated, where it can be one.
 fn made_coil(r: &mut TomlReader, table: &TableReader, spec: CoilSpec, crossover_turns: f64) -> Option<Coil> {
-    let least_m = least_radial_pitch_m(&spec);
-    if spec.radial_pitch_m < least_m * (1.0 - PITCH_ROUNDING) {
+    // Fibre cannot be pressed into less than its own diameter.
+    if spec.radial_pitch_m < spec.fibre.outer_diameter_m * (1.0 - PITCH_ROUNDING) {
         let message = format!(
-            "winding.radial_pitch_um must be at least {:.3}, found {}: a fibre of {:.3} µm cannot lie lower than in the grooves of the layer below it, \
-             whose turns are {:.3} µm apart",
-            um_from_m(least_m),
-            um_from_m(spec.radial_pitch_m),
+            "winding.radial_pitch_um must be at least fibre.outer_diameter_um = {}, found {}: layers cannot lie closer than the fibre is thick",
             um_from_m(spec.fibre.outer_diameter_m),
-            um_from_m(spec.axial_pitch_m)
+            um_from_m(spec.radial_pitch_m)
         );
         r.fault(Fault::new(message, table.span_of("radial_pitch_um")));
         return None;
