@@ -134,10 +134,10 @@ fn variants() -> Vec<(&'static str, String, &'static [&'static str])> {
     ]
 }
 
-/// Every number within rounding of units, every word the same.
 /// What keys of noises hold, in their list and where a document repeats them.
-const NOISES: [&str; 5] = ["/noise/", "random_walk", "flicker", "quantisation", "thermal_deg_per_h"];
+const NOISES: [&str; 6] = ["/noise/", "/allan_noises/", "random_walk", "flicker", "quantisation", "thermal_deg_per_h"];
 
+/// Every number within rounding of units, every word the same.
 fn same(a: &Value, b: &Value, place: &str) {
     match (a, b) {
         (Value::Object(a), Value::Object(b)) => {

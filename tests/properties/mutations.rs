@@ -201,6 +201,8 @@ fn a_damaged_stream_is_compensated_to_a_table_or_its_header_is_refused() {
             for row in reader.records() {
                 let row = row.unwrap_or_else(|e| panic!("{e}\n{text:?}\n{out:?}"));
                 let bias = &row[row.len() - 2];
+                // Where no comma divides, one may stand in a number.
+                let bias = if separator == b',' { bias.to_owned() } else { bias.replace(',', ".") };
                 assert!(bias.is_empty() || bias.parse::<f64>().is_ok_and(f64::is_finite), "{bias} {out}");
                 rows += 1;
             }

@@ -256,13 +256,14 @@ pub struct Division {
 }
 
 impl Division {
-    /// As the header shows it: semicolons, tabs or bars where there are any outside of quotes, then decimals may have commas.
+    /// As the header shows it: semicolons or tabs where there are any outside of quotes, bars where there is nothing else, then
+    /// decimals may have commas.
     pub fn of_header(line: &str) -> Self {
         let count =
             |separator: char| -> usize { line.split('"').step_by(2).map(|bare| bare.matches(separator).count()).sum() };
         let separator: u8 = match (count(';'), count('\t'), count('|')) {
-            (0, 0, 0) => b',',
-            (0, 0, _) => b'|',
+            (0, 0, 1..) if count(',') == 0 => b'|',
+            (0, 0, _) => b',',
             (0, _, _) => b'\t',
             _ => b';',
         };
