@@ -1,6 +1,6 @@
 """Noise strengths with stated intervals: how often the intervals hold the truth, beside allantools and a likelihood of another kind.
 
-    python trials.py PROGRAM [--trials 200] [--trials-1e6 20] [--sizes 1000,10000,100000,1000000] [--kinds …] > trials.csv
+    python trials.py PROGRAM [--first 0] [--trials 200] [--trials-1e6 20] [--sizes 1000,10000,100000,1000000] [--kinds …] > trials.csv
 
 Needs numpy, scipy, pyarrow and allantools. Records are of 1 Hz. White noise is N(0, sigma) a row; flicker is white noise through
 (1 - z^-1)^(-1/2) (Kasdin, Proc. IEEE 83 (1995) 802) after as many rows of burn-in as the record has; the random walk is a sum. Quantisation
@@ -125,6 +125,7 @@ def whittle(time, rate, cycles, course):
 def main():
     arguments = argparse.ArgumentParser()
     arguments.add_argument("program")
+    arguments.add_argument("--first", type=int, default=0, help="the trial to begin with, where others were run before")
     arguments.add_argument("--trials", type=int, default=200)
     arguments.add_argument("--trials-1e6", type=int, default=20, dest="large")
     arguments.add_argument("--sizes", default="1000,10000,100000,1000000")
@@ -140,7 +141,7 @@ def main():
         path = os.path.join(folder, "record.csv")
         sizes = [int(rows) for rows in wish.sizes.split(",")]
         # All kinds and lengths advance together: a run that is broken off is as good as a shorter one.
-        for trial in range(max(wish.trials, wish.large)):
+        for trial in range(wish.first, max(wish.trials, wish.large)):
             for rows, kind, cycles in itertools.product(sizes, wish.kinds.split(","), (0, 1)):
                 if trial >= (wish.large if rows >= 1_000_000 else wish.trials):
                     continue
