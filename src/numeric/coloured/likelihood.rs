@@ -33,6 +33,8 @@ const LOOSE: f64 = 1e6;
 const STILL: f64 = 1e-20;
 /// Variances set out from no less than this part of the largest that an octave allows.
 const FAINT: f64 = 1e-3;
+/// Of a column's variance, beside 1 for as much as the whole signal's.
+const LITTLE: f64 = 1e-8;
 const MOST_ROUNDS: usize = 100;
 const INNER_ROUNDS: usize = 150;
 /// A step that shows less in every octave, in standard errors, ends a climb.
@@ -150,7 +152,16 @@ impl Likelihood {
         Point { variances, group_variances: vec![1.0; self.group_count], minus_two_log_likelihood: f64::INFINITY }
     }
 
-    /// The same, with what columns explain as elsewhere.
+    /// The higher of two ascents: from columns that explain much, and from columns that explain next to nothing. What columns
+    /// take from a walk at first, the walk does not get back.
+    pub(super) fn best(&self) -> Point {
+        let much = self.start();
+        let little = Point { group_variances: vec![LITTLE; self.group_count], ..much.clone() };
+        let (much, little) = (self.maximised(&much, None), self.maximised(&little, None));
+        if little.minus_two_log_likelihood < much.minus_two_log_likelihood { little } else { much }
+    }
+
+    /// Every noise as at the start, with what columns explain as elsewhere.
     pub(super) fn start_in(&self, point: &Point) -> Point {
         Point { group_variances: point.group_variances.clone(), ..self.start() }
     }

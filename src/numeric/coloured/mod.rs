@@ -96,7 +96,7 @@ pub fn noise_strengths(levels: &[(usize, Level)], interval_s: f64, groups: &[usi
         return None;
     }
     let mut likelihood = Likelihood::new(levels, interval_s, groups)?;
-    let mut point = likelihood.maximised(&likelihood.start(), None);
+    let mut point = likelihood.best();
     for _ in 0..WEIGHTINGS {
         likelihood.weigh(&point);
         point = likelihood.maximised(&point, None);
