@@ -143,6 +143,9 @@ pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliE
         summary.rate_held,
         summary.rate_rejected
     ));
+    if let Some(caution) = &summary.caution {
+        screen.note(&format!("caution: {caution}"));
+    }
     if let Some(offset) = summary.turn_on_offset_deg_per_h {
         screen.note(&format!("offset of this start-up, taken off: {offset:.5} °/h"));
     }

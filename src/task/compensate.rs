@@ -10,11 +10,13 @@ use crate::io::files::{WriteError, folder_of};
 use crate::io::folder::Replacement;
 use crate::io::json::Document;
 use crate::io::model::{ModelFile, NamedPattern};
-use crate::io::write::compensation_file::{BiasLineJson, CompensateJson, MeasuresJson, MethodJson, StreamSummary};
+use crate::io::write::compensation_file::{
+    BiasLineJson, CompensateJson, MeasuresJson, MethodJson, StreamSummary, scatters_more,
+};
 use crate::io::write::difference_equation::DifferenceEquation;
 use crate::io::write::empirical_export::EmpiricalExport;
 use crate::metrics::Metrics;
-use crate::numeric::statistics::{RunningDeviation, rms};
+use crate::numeric::statistics::{RunningDeviation, rms, standard_deviation};
 use crate::predict::noise_floor_rad_per_s;
 use crate::record::Record;
 use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s, percent_from_fraction};
@@ -237,8 +239,7 @@ pub fn compensate_record(compensator: &Compensator, record: &Record) -> Result<C
     stream.finish(take);
     found.summary.rows = found.rate_rad_per_s.len();
     found.summary.delay_rows = delay_rows;
-    found.summary.rate_deviation_deg_per_h = before.deviation().map(deg_per_h_from_rad_per_s);
-    found.summary.compensated_deviation_deg_per_h = after.deviation().map(deg_per_h_from_rad_per_s);
+    found.summary.judge(&before, &after);
     Ok(found)
 }
 
@@ -305,7 +306,7 @@ pub fn all_methods(
                         method: method.key(),
                         rms_deg_per_h: Some(deg_per_h_from_rad_per_s(rms(&left))),
                         delay_rows: Some(compensator.delay_rows(record.interval_s())),
-                        reason: worth(&compensator),
+                        reason: worth(&compensator).or_else(|| worse(record.rate_rad_per_s(), &left)),
                         measures: Some(measures(&record, left)?),
                     }
                 }
@@ -329,6 +330,12 @@ pub fn all_methods(
 pub(super) fn measures(record: &Record, rates: Vec<f64>) -> Result<MeasuresJson, TaskError> {
     let left = Record::new("left", record.times_s().to_vec(), record.temperature_k().to_vec(), rates)?;
     Ok(MeasuresJson::new(&Metrics::of(&left, DEFAULT_AVERAGE_S)?))
+}
+
+/// That a method leaves more than there was.
+fn worse(before_rad_per_s: &[f64], after_rad_per_s: &[f64]) -> Option<String> {
+    let [before, after] = [before_rad_per_s, after_rad_per_s].map(standard_deviation).map(deg_per_h_from_rad_per_s);
+    scatters_more(before, after)
 }
 
 /// What a learned compensator leaves of days that it was not shown, where that is not what it leaves of its own.

@@ -163,6 +163,26 @@ fn a_physical_compensator_is_fitted_to_several_records_at_once() {
 }
 
 #[test]
+fn a_compensator_that_makes_a_record_worse_says_so() {
+    let at = |name: &str| format!("examples/{name}");
+    let (coil, first, second) = (at("chamber-coil.toml"), at("chamber-day-1.csv"), at("chamber-day-2.csv"));
+    // The model as its designer believes it to be: heat goes into a half space, where a bore ends the pack.
+    let ran = run(&["compensate", &coil, &second, "--fit", &first]);
+    let said = String::from_utf8_lossy(&ran.stderr).into_owned();
+    assert!(said.contains("caution: the compensated rate scatters by 4.89") && said.contains("own by 1.28"), "{said}");
+    let answer = json(&["compensate", &coil, &second, "--fit", &first]);
+    assert!(answer["summary"]["caution"].as_str().unwrap().contains("worse"), "{}", answer["summary"]);
+    let all = json(&["compensate", &coil, &second, "--fit", &first, "--all-methods"]);
+    let reason =
+        |name: &str| all["methods"].as_array().unwrap().iter().find(|m| m["method"] == name).unwrap()["reason"].clone();
+    assert!(reason("physical").as_str().unwrap().contains("worse"), "{all}");
+    assert!(reason("regression").is_null(), "{all}");
+    // One that helps has none.
+    let helped = json(&["compensate", COIL, "tests/data/records/a-control/validation.csv", "--fit", RECORD]);
+    assert!(helped["summary"].get("caution").is_none(), "{}", helped["summary"]);
+}
+
+#[test]
 fn a_model_with_a_scale_factors_error_is_not_exported_as_a_physical_compensator() {
     let text = std::fs::read_to_string(root().join(COIL)).unwrap();
     let text = text + "\n[[effect]]\nkind = \"scale_factor_error\"\nerror_ppm = 300.0\n";

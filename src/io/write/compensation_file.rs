@@ -42,9 +42,19 @@ pub struct StreamSummary {
     /// What this start-up added to the bias; null where nobody asked.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) turn_on_offset_deg_per_h: Option<f64>,
+    /// That the compensated rate scatters more than the gyro's own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) caution: Option<String>,
 }
 
 impl StreamSummary {
+    /// Sets both standard deviations, of rates in rad/s, and what they say.
+    pub(crate) fn judge(&mut self, before: &RunningDeviation, after: &RunningDeviation) {
+        let [before, after] = [before, after].map(|rates| rates.deviation().map(deg_per_h_from_rad_per_s));
+        (self.rate_deviation_deg_per_h, self.compensated_deviation_deg_per_h) = (before, after);
+        self.caution = before.zip(after).and_then(|(before, after)| scatters_more(before, after));
+    }
+
     /// Counts what happened to a row.
     pub(crate) fn count(&mut self, flag: Flag) {
         *match flag {
@@ -57,6 +67,16 @@ impl StreamSummary {
             Flag::RateRejected => &mut self.rate_rejected,
         } += 1;
     }
+}
+
+/// A caution about standard deviations in °/h, where there is more after compensation than before.
+pub(crate) fn scatters_more(before_deg_per_h: f64, after_deg_per_h: f64) -> Option<String> {
+    (after_deg_per_h > before_deg_per_h).then(|| {
+        format!(
+            "the compensated rate scatters by {after_deg_per_h:.5} °/h, the gyro's own by {before_deg_per_h:.5}: this compensator makes \
+             this record worse; `compare` says where its model fails, `compensate --all-methods` judges the other methods"
+        )
+    })
 }
 
 /// Why a stream ended before its input did.
@@ -196,9 +216,8 @@ pub(crate) fn compensate_lines_from_turn_on(
     sink.flush();
     sink.check()?;
     let mut summary = sink.summary;
-    summary.rate_deviation_deg_per_h = sink.before.deviation().map(deg_per_h_from_rad_per_s);
+    summary.judge(&sink.before, &sink.after);
     summary.turn_on_offset_deg_per_h = sink.turn_on.map(|t| deg_per_h_from_rad_per_s(t.offset_rad_per_s()));
-    summary.compensated_deviation_deg_per_h = sink.after.deviation().map(deg_per_h_from_rad_per_s);
     Ok(summary)
 }
 
