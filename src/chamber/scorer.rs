@@ -67,6 +67,11 @@ impl Scored {
         (0.5 * self.score * amplitude, amplitude)
     }
 
+    /// By how much a fitted coordinate falls with each unit of the column's amplitude.
+    pub(crate) fn weight(&self, coordinate: usize) -> f64 {
+        self.weights[coordinate]
+    }
+
     /// J̃ between two columns.
     pub(crate) fn information_with(&self, other: &Self) -> f64 {
         self.response.iter().zip(&other.response).map(|(a, b)| a * b).sum::<f64>() - self.cross.dot(&other.weights)

@@ -45,3 +45,10 @@ fn a_rate_times_a_temperature_is_told_from_a_gradient_times_a_temperature() {
     // 0.016 per K/min and K, per K/s.
     assert_found("b3-product", "product", &[("a", 0.96)], 0.03794733192202055);
 }
+
+#[test]
+fn a_terms_numbers_are_those_of_the_pack_that_it_is_found_in() {
+    // A spool stood in the place of the term at first, and its layers' mean in the term: a was −0.0743.
+    let numbers = [("a", -0.0652), ("tau_s", 289.0)];
+    assert_found("one-sided-relaxation", "one_sided_relaxation", &numbers, 0.024);
+}

@@ -92,6 +92,19 @@ impl Courses {
         (low.is_finite() && high.is_finite()).then_some((low, high))
     }
 
+    /// The largest difference from others of the same records, as a share of its variable's range over the fitted ones.
+    pub(crate) fn apart(&self, others: &Self) -> f64 {
+        let mut largest: f64 = 0.0;
+        for (record, course) in self.records.iter().enumerate() {
+            for (name, values) in &course.of {
+                let Some((low, high)) = self.range(name).filter(|(low, high)| high > low) else { continue };
+                let differences = values.iter().zip(others.of(name, record)).map(|(a, b)| (a - b).abs());
+                largest = differences.fold(largest, |most, apart| most.max(apart / (high - low)));
+            }
+        }
+        largest
+    }
+
     /// The longest fitted record [s].
     pub(crate) fn longest_s(&self) -> f64 {
         let span = |r: &usize| {

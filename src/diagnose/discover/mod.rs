@@ -12,6 +12,7 @@ mod courses;
 mod exchange;
 mod forms;
 mod grammar;
+mod own_courses;
 mod proposal;
 mod search;
 
@@ -31,8 +32,8 @@ pub(in crate::diagnose) struct Discovered {
     pub(crate) best: Set,
     /// The best set, refitted to all records.
     pub(crate) settled: Set,
-    /// Standard errors of inner numbers, a list a term.
-    pub(crate) inner_errors: Vec<Vec<f64>>,
+    /// Standard errors of amplitude and inner numbers, a list a term.
+    pub(crate) errors: Vec<Vec<f64>>,
     /// Of the best set, and of the sets that do nearly as well.
     pub(crate) probability: f64,
     pub(crate) alternatives: Vec<(Set, f64)>,
@@ -99,6 +100,8 @@ pub(in crate::diagnose) fn discover<'a>(
     let exchanged = sets.first().map(|best| tools.exchanged(best)).unwrap_or_default();
     sets.extend(exchanged.into_iter().filter(|s| s.total().is_finite()));
     sets.sort_by(|a, b| b.total().total_cmp(&a.total()));
+    let (sets, own) = own_courses::with_own_courses(&tools, sets, allowed)?;
+    let tools = own.unwrap_or(tools);
     let listed: Vec<f64> = found.explanations.iter().map(Explanation::total).collect();
     let contender = sets.iter().max_by(|a, b| a.merit.total_cmp(&b.merit)).cloned();
     if let Some(discovered) = concluded(&tools, sets, &listed, BEATS)? {
@@ -137,13 +140,13 @@ fn concluded(tools: &Tools, sets: Vec<Set>, listed: &[f64], least: f64) -> Resul
     let probability = 1.0 / sum;
     let alternatives =
         near.into_iter().skip(1).map(|s| ((s.total() - best.total()).exp() / sum, s)).map(|(p, s)| (s, p)).collect();
-    let (settled, inner_errors) = settled(tools, &best);
+    let (settled, errors) = settled(tools, &best);
     let mut frozen = best.explanation.fit.clone();
     frozen.assumed.inputs.iter_mut().for_each(|i| i.deviation = 0.0);
     let days: Result<Vec<Fit>, ChamberError> =
         question.held_out.iter().map(|&r| question.chamber.held_out(&frozen, r)).collect();
     let courses = tools.courses.clone();
-    Ok(Some(Discovered { best, settled, inner_errors, probability, alternatives, days: days?, courses }))
+    Ok(Some(Discovered { best, settled, errors, probability, alternatives, days: days?, courses }))
 }
 
 /// The variables are those of a fit; None where no term can be made of these records.
@@ -180,7 +183,7 @@ fn umbrella(tools: &Tools, found: &Found, declared: &Explanation) -> Set {
     set
 }
 
-/// The set fitted to all records, and the errors of its inner numbers there.
+/// The set fitted to all records, and the errors of its numbers there.
 fn settled(tools: &Tools, best: &Set) -> (Set, Vec<Vec<f64>>) {
     let everything = Question {
         fitted: tools.question.fitted.iter().chain(&tools.question.held_out).copied().collect(),
@@ -203,7 +206,7 @@ fn settled(tools: &Tools, best: &Set) -> (Set, Vec<Vec<f64>>) {
         }
         None => best.clone(),
     };
-    let errors = all.inner_errors(&set);
+    let errors = all.errors(&set);
     (set, errors)
 }
 

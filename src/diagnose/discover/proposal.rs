@@ -3,7 +3,7 @@
 use super::grammar::{Class, Family, Term};
 use super::search::Set;
 use super::{Discovered, Question};
-use crate::chamber::{Fit, Place};
+use crate::chamber::Fit;
 use crate::diagnose::answer::{Settled, names, noises};
 use crate::diagnose::describe::{findings, unexplained};
 use crate::diagnose::joint::{Explanation, Found};
@@ -228,7 +228,7 @@ fn proposal(
             text: term.formula_text(),
             form: term.family.form.key,
             variables: term.family.variables(),
-            parameters: parameters(settled, place, &discovered.inner_errors[place]),
+            parameters: parameters(settled, place, &discovered.errors[place]),
             reading: term.reading(),
             shown: shown(question, discovered, place)?,
             effect,
@@ -274,14 +274,13 @@ fn only_describes(question: &Question, best: &Set) -> Option<String> {
     None
 }
 
-fn parameters(set: &Set, place: usize, inner_errors: &[f64]) -> Vec<TermParameter> {
+fn parameters(set: &Set, place: usize, errors: &[f64]) -> Vec<TermParameter> {
     let term = &set.terms[place];
-    let input = Place::Input { input: set.first_input() + place };
-    let error = set.explanation.fit.value(input).map(|(_, error)| error).filter(|e| e.is_finite());
+    let error = |i: usize| errors.get(i).copied().filter(|e| e.is_finite());
     let amplitude = TermParameter {
         key: "a".to_owned(),
         value: set.amplitude(place),
-        standard_error: error,
+        standard_error: error(0),
         unit: match term.family.unit().as_str() {
             "1" => "°/h".to_owned(),
             unit => format!("°/h per {unit}"),
@@ -290,7 +289,7 @@ fn parameters(set: &Set, place: usize, inner_errors: &[f64]) -> Vec<TermParamete
     let inner = term.inner.iter().enumerate().map(|(i, &value)| TermParameter {
         key: term.family.form.inner[i].key().to_owned(),
         value,
-        standard_error: inner_errors.get(i).copied().filter(|e| e.is_finite()),
+        standard_error: error(1 + i),
         unit: term.family.inner_unit(i),
     });
     std::iter::once(amplitude).chain(inner).collect()

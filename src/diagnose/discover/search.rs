@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use super::NEAR;
 use super::courses::Courses;
 use super::grammar::{Family, Term};
-use crate::chamber::{Assumption, Column, Effort, Fit, Input, Scored, Scorer};
+use crate::chamber::{Assumption, Column, Effort, Fit, Input, Place, Scored, Scorer};
 use crate::diagnose::joint::{
     EFFECT, Explanation, Member, Proposal, Question, Winding, fitted, proposals, rates, with, without,
 };
@@ -313,19 +313,31 @@ impl Tools<'_, '_> {
         }
     }
 
-    /// Standard errors of the inner numbers, a list a term, cleared of everything that was fitted.
-    pub(crate) fn inner_errors(&self, set: &Set) -> Vec<Vec<f64>> {
-        let mut errors: Vec<Vec<f64>> = set.terms.iter().map(|t| vec![f64::NAN; t.inner.len()]).collect();
-        let Ok(scorer) = self.question.chamber.scorer(&set.explanation.fit) else { return errors };
+    /// Standard errors of each term's amplitude and then of its inner numbers, cleared of all else that was fitted. Amplitude and
+    /// inner numbers of a term go together: an amplitude is known as well as they are.
+    pub(crate) fn errors(&self, set: &Set) -> Vec<Vec<f64>> {
+        let fit = &set.explanation.fit;
+        let first = set.first_input();
+        let coordinate =
+            |term: usize| fit.parameters.iter().position(|p| p.place == Place::Input { input: first + term });
+        let mut errors: Vec<Vec<f64>> = set.terms.iter().map(|t| vec![f64::NAN; 1 + t.inner.len()]).collect();
+        for (term, errors) in errors.iter_mut().enumerate() {
+            errors[0] = coordinate(term).map_or(f64::NAN, |k| fit.standard_errors[k]);
+        }
+        let Ok(scorer) = self.question.chamber.scorer(fit) else { return errors };
         let columns = self.inner_columns(set);
         let scored: Vec<Scored> = columns.iter().map(|(_, _, c)| scorer.score(c)).collect();
         let count = scored.len();
         let information = nalgebra::DMatrix::from_fn(count, count, |i, k| scored[i].information_with(&scored[k]));
-        if let Some(factor) = information.cholesky() {
-            let covariance = factor.inverse();
-            for (i, (term, inner, _)) in columns.iter().enumerate() {
-                errors[*term][*inner] = covariance[(i, i)].sqrt();
-            }
+        let Some(factor) = information.cholesky() else { return errors };
+        let covariance = factor.inverse();
+        for (i, (term, inner, _)) in columns.iter().enumerate() {
+            errors[*term][1 + inner] = covariance[(i, i)].sqrt();
+        }
+        for (term, errors) in errors.iter_mut().enumerate() {
+            let Some(k) = coordinate(term) else { continue };
+            let weights = nalgebra::DVector::from_iterator(count, scored.iter().map(|s| s.weight(k)));
+            errors[0] = errors[0].hypot(weights.dot(&(&covariance * &weights)).max(0.0).sqrt());
         }
         errors
     }

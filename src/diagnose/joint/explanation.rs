@@ -1,8 +1,8 @@
 //! One set of explanations, fitted.
 
-use super::odds::{EFFECT, EXCHANGE, OUTSIDE, PHYSICAL, REFITTED, STATED_WITHIN, STEP, WINDING};
+use super::odds::{EFFECT, EXCHANGE, KNOWN_WITHIN, OUTSIDE, PHYSICAL, REFITTED, STATED_WITHIN, STEP, WINDING};
 use super::{Question, Winding, rates};
-use crate::chamber::{Assumption, Effort, Fit, Free, Input, Place, Scale};
+use crate::chamber::{Assumption, Effort, Fit, Free, Input, Parameter, Place, Scale, is_factor};
 use crate::effect::DeclaredEffect;
 
 /// One thing that a set assumes beside the declared model.
@@ -98,6 +98,31 @@ impl Explanation {
                 || (p.scale == Scale::Linear && p.lower < 0.0 && x - p.lower < 1e-3 * p.deviation);
             at_bound || (x - p.mean).abs() > PHYSICAL * p.deviation
         })
+    }
+
+    /// Whether a member corrects declared numbers, all of them by less than they are known to.
+    pub(super) fn is_no_news(&self, question: &Question, member: Member) -> bool {
+        let effect = match member {
+            Member::Effect(_) => {
+                let effects = self.members.iter().filter(|m| matches!(m, Member::Effect(_)));
+                question.model.effects.len() + effects.take_while(|m| **m != member).count()
+            }
+            Member::Refitted(effect) => effect,
+            _ => return false,
+        };
+        let is_of_factor = |parameter: usize| {
+            let spec = self.fit.assumed.model.effects[effect].spec().parameters.get(parameter);
+            matches!(member, Member::Refitted(_)) || spec.is_some_and(is_factor)
+        };
+        let mut own = self.fit.parameters.iter().zip(&self.fit.coordinates).filter_map(|(p, x)| match p.place {
+            Place::Effect { effect: of, parameter } if of == effect => Some((p, parameter, x)),
+            _ => None,
+        });
+        let is_known = |(p, parameter, x): (&Parameter, usize, &f64)| {
+            p.scale == Scale::Logarithm && is_of_factor(parameter) && (x - p.mean).abs() < (1.0 + KNOWN_WITHIN).ln()
+        };
+        // What has no number of its own is there or not.
+        own.next().is_some_and(is_known) && own.all(is_known)
     }
 
     /// The effects that it adds to the declared model, each with its candidate.

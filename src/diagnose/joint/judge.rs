@@ -73,7 +73,7 @@ pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mu
     for (e, mass) in explanations.iter_mut().zip(masses) {
         e.probability = mass / sum;
     }
-    // From the largest set on: its mass goes to the best set within it that is as good.
+    // From the largest set on: its mass goes to the best set within it that is as good, or that lacks no news.
     let mut places: Vec<usize> = (0..explanations.len()).collect();
     places.sort_by_key(|&i| std::cmp::Reverse(explanations[i].members.len()));
     for &large in &places {
@@ -82,9 +82,13 @@ pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mu
             .copied()
             .filter(|&small| {
                 let (a, b) = (&explanations[small], &explanations[large]);
+                let no_news = || {
+                    let mut more = b.members.iter().filter(|m| !a.members.contains(m));
+                    more.all(|m| b.is_no_news(question, *m))
+                };
                 a.members.len() < b.members.len()
                     && a.members.iter().all(|m| b.members.contains(m))
-                    && a.total() > b.total() - CERTAIN.log
+                    && (a.total() > b.total() - CERTAIN.log || no_news())
             })
             .max_by(|&a, &b| explanations[a].total().total_cmp(&explanations[b].total()));
         if let Some(small) = within {
