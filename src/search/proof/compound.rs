@@ -10,9 +10,22 @@
 //! ```
 //!
 //! The subsets whose values stay under the limit at chosen samples are found by two sets of sums ([`box_join`](super::box_join)), the
-//! most promising are judged in full, and what refutes them joins the samples. For the ends of the class `standard` the sum is exact
-//! where the halves respond alike; for swaps of layers it leaves out that layers of different lengths shift what lies between
-//! them, so the judging decides.
+//! most promising are judged in full, and what refutes them joins the samples.
+//!
+//! | class | a move | where the sum is exact |
+//! |---|---|---|
+//! | `standard` | a layer goes to the other end of what lies inside it | where the halves respond alike |
+//! | `captive:K`, `any` | two neighbouring runs of segments change places whole | for layers of any lengths, but for a run across the middle where the halves differ |
+//!
+//! That runs of different lengths shift nothing that another move touches is because they are drawn as a tree: the fibre is cut in two at
+//! random, each part again, down to single segments, and every cut can have its two parts exchanged or not. Where the halves respond alike
+//! what two layers contribute depends on which of them comes first on the fibre and on nothing else,
+//!
+//! ```text
+//! Σ_j T_j ∫_j (L − 2z) dz = Σ over pairs, j before k, of l_j l_k (T_j − T_k)
+//! ```
+//!
+//! and each pair is parted by one cut.
 //!
 //! # Source
 //! Sets of sums: Horowitz and Sahni, J. ACM 21, 277 (1974). Large neighbourhoods: Ahuja, Ergun, Orlin, Punnen, Discrete Appl.
@@ -138,11 +151,11 @@ fn join(judge: &mut Judge, samples: &mut Vec<usize>, outcome: &Outcome) {
 enum Move {
     /// The layer outside the numbered one goes to the other end of what lies inside it.
     End(usize),
-    /// Two layers change places.
-    Swap(usize, usize),
+    /// The segments after the first `from` up to the first `middle` change places with those up to the first `to`.
+    Exchange { from: usize, middle: usize, to: usize },
 }
 
-/// A pattern, and moves that do not touch each other.
+/// A pattern, and moves that do not touch each other; what lies inside another one comes before it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Neighbourhood {
     segments: Vec<usize>,
@@ -156,37 +169,39 @@ impl Neighbourhood {
         let mut all: Vec<Move> = if class == WindabilityClass::Standard {
             (0..layers - 1).map(Move::End).collect()
         } else {
-            (0..layers).flat_map(|a| (0..a).map(move |b| Move::Swap(a, b))).collect()
+            cuts(layers, random)
         };
         for i in (1..all.len()).rev() {
             all.swap(i, pick(random, i + 1));
         }
+        // Those that change least first: their sums lie closest together.
+        all.sort_by_key(|made| match *made {
+            Move::End(_) => 0,
+            Move::Exchange { from, middle, to } => (middle - from) * (to - middle),
+        });
         let limits = Limits::from(class);
         let mut drawn = Self { segments: segments.to_vec(), moves: Vec::new() };
-        let mut is_touched = vec![false; layers];
         for made in all {
-            let is_free = match made {
-                Move::End(_) => true,
-                Move::Swap(a, b) => !is_touched[a] && !is_touched[b],
-            };
-            if drawn.moves.len() == MOST_MOVES || !is_free || !limits.admits(&drawn.with(&[made])) {
-                continue;
+            if drawn.moves.len() < MOST_MOVES && limits.admits(&drawn.with(&[made])) {
+                drawn.moves.push(made);
             }
-            if let Move::Swap(a, b) = made {
-                is_touched[a] = true;
-                is_touched[b] = true;
-            }
-            drawn.moves.push(made);
         }
+        drawn.moves.sort_by_key(|made| match *made {
+            Move::End(_) => 0,
+            Move::Exchange { from, to, .. } => to - from,
+        });
         drawn
     }
 
     fn with(&self, moves: &[Move]) -> Vec<usize> {
-        let mut segments = self.segments.clone();
         let mut high = None;
+        let mut order = vec![0; self.segments.len()];
+        for (layer, &segment) in self.segments.iter().enumerate() {
+            order[segment - 1] = layer;
+        }
         for made in moves {
             match *made {
-                Move::Swap(a, b) => segments.swap(a, b),
+                Move::Exchange { from, middle, to } => order[from..to].rotate_left(middle - from),
                 Move::End(layer) => {
                     let high = high.get_or_insert_with(|| signs_of_segments(&self.segments).unwrap_or_default());
                     if let Some(end) = high.get_mut(layer) {
@@ -195,7 +210,14 @@ impl Neighbourhood {
                 }
             }
         }
-        high.map_or(segments, |high| segments_of_signs(&high))
+        if let Some(high) = high {
+            return segments_of_signs(&high);
+        }
+        let mut segments = vec![0; order.len()];
+        for (at, &layer) in order.iter().enumerate() {
+            segments[layer] = at + 1;
+        }
+        segments
     }
 
     /// The best of the patterns below the limit that were judged, and what refuted others.
@@ -257,5 +279,56 @@ impl Neighbourhood {
             }
         }
         outcome
+    }
+}
+
+/// Every cut of a fibre that is cut at random down to single segments.
+fn cuts(segments: usize, random: &mut ChaCha8Rng) -> Vec<Move> {
+    let mut cuts = Vec::new();
+    let mut parts = vec![(0, segments)];
+    while let Some((from, to)) = parts.pop() {
+        if to - from < 2 {
+            continue;
+        }
+        let middle = from + 1 + pick(random, to - from - 1);
+        cuts.push(Move::Exchange { from, middle, to });
+        parts.extend([(from, middle), (middle, to)]);
+    }
+    cuts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coil::LayerLength;
+    use crate::search::cost::samples::tests::{model, profiles};
+    use crate::search::cost::worst_case::SolvedProfiles;
+    use crate::search::proof::Goal;
+
+    #[test]
+    fn exchanges_of_runs_add_up_exactly_for_layers_of_different_lengths() {
+        let model = model(12, LayerLength::Actual, &["surface_film"]);
+        let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
+        let class = WindabilityClass::Any;
+        let judge = checked_judge(&Task { model: &model, solved: &solved, class, goal: Goal::Pointing }).unwrap();
+        let samples: Vec<usize> = (0..judge.matrix().samples()).collect();
+        for stream in 0..20 {
+            let mut random = generator(1, stream);
+            let start = crate::search::anneal::limits::draw(class, 12, &mut random);
+            let drawn = Neighbourhood::draw(class, &start, &mut random);
+            assert_eq!(drawn.moves.len(), 11, "a fibre of twelve segments has eleven cuts");
+            let here = judge.values_at(&samples, &start);
+            let made: Vec<Move> = drawn.moves.iter().copied().filter(|_| pick(&mut random, 2) == 1).collect();
+            let mut expected = here.clone();
+            for a_move in &made {
+                let there = judge.values_at(&samples, &drawn.with(&[*a_move]));
+                expected.iter_mut().zip(there.iter().zip(&here)).for_each(|(e, (t, h))| *e += t - h);
+            }
+            let found = judge.values_at(&samples, &drawn.with(&made));
+            let scale = expected.iter().chain(&here).fold(0.0_f64, |most, v| most.max(v.abs()));
+            for (e, f) in expected.iter().zip(&found) {
+                assert!((e - f).abs() < 1e-10 * scale, "{e} {f} of {scale}");
+            }
+        }
     }
 }
