@@ -117,6 +117,7 @@ class Recommendation(Result):
     pattern: str
     segments: list[int]
     sentence: str
+    weighed_by: str
     reasons: list[str]
 
 

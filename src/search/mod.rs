@@ -19,6 +19,7 @@ mod rehearsal;
 pub mod run;
 pub(crate) mod swap;
 pub(crate) mod validation;
+mod weighed_pointing;
 mod weighing;
 
 pub use answer::{Answer, Ended};

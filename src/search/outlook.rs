@@ -5,10 +5,11 @@ use super::cost::guaranteed::UnitStep;
 use super::cost::objective::Objective;
 use super::cost::tolerance::{Measure, ToleranceSpec, measure, study};
 use super::cost::worst_case::{SearchError, SolvedProfiles};
-use super::evaluator::{Evaluator, JudgeError, name_of};
+use super::evaluator::{Evaluator, JudgeError, Judged, name_of};
 use super::proof::permutation_tree::MOST_LAYERS;
 use super::proof::{Effort, Goal, Task, improve};
 use super::prospect::worst_rates_rad_per_s;
+use super::weighed_pointing::PointingFigures;
 use super::weighing::{TIE, Weighed};
 use crate::effect::DeclaredEffect;
 use crate::pattern::Pattern;
@@ -44,28 +45,37 @@ impl Evaluator<'_> {
         if class != WindabilityClass::Standard || !(4..=MOST_LAYERS).contains(&layers) {
             return Ok(None);
         }
+        let is_for_pointing = self.objective == Objective::Pointing;
         let (goal, what) = match self.unit_step {
+            _ if is_for_pointing => (Goal::Pointing, "worst pointing error over the searched profiles"),
             Some(step) => (Goal::Guaranteed(step), "guaranteed worst rate error"),
             None => (Goal::WorstRate, "worst rate error"),
         };
         let task = Task { model: self.model, solved: self.solved, class: WindabilityClass::Captive(1), goal };
         let effort = Effort { most_nodes: 0, beam_width: 0, good_enough_rad_per_s: 0.0 };
         let pattern = improve(&task, std::slice::from_ref(&recommended.judged.pattern), effort)?.pattern;
-        let judged = self.under(Objective::WorstRate).judge("captive-1", &pattern)?;
-        let now = recommended.judged.guaranteed_rad_per_s.unwrap_or(recommended.judged.worst.rate_rad_per_s.abs());
-        let then = judged.guaranteed_rad_per_s.unwrap_or(judged.worst.rate_rad_per_s.abs());
-        let shown = deg_per_h_from_rad_per_s;
-        Ok((then < WORTH_A_REEL * now).then(|| {
-            format!(
-                "one captive reel (--windability captive:1) would bring the {what} from {:.4} to {:.4} °/h or less",
-                shown(now),
-                shown(then)
-            )
+        let under = if is_for_pointing { Objective::Pointing } else { Objective::WorstRate };
+        let judged = self.under(under).judge("captive-1", &pattern)?;
+        let of = |judged: &Judged| match judged.guaranteed_rad_per_s {
+            _ if is_for_pointing => judged.objective_rad_per_s,
+            Some(guaranteed) => guaranteed,
+            None => judged.worst.rate_rad_per_s.abs(),
+        };
+        let (now, then) = (of(&recommended.judged), of(&judged));
+        let is_worth_it = then < WORTH_A_REEL * now - recommended.same_rad_per_s();
+        Ok(is_worth_it.then(|| {
+            let value = deg_per_h_from_rad_per_s(now);
+            let now = if is_for_pointing { under.shown(now) } else { format!("{value:.4}") };
+            let then = under.shown(then);
+            format!("one captive reel (--windability captive:1) would bring the {what} from {now} to {then} or less")
         }))
     }
 
     /// That a spread and not the pattern is what to work on next.
     pub(super) fn spread_reason(&self, recommended: &Weighed) -> Result<Option<String>, JudgeError> {
+        if let Some(pointing) = recommended.pointing {
+            return Ok(spread_of_pointing(&pointing));
+        }
         let (Some(declared), Some(p95)) = (self.tolerance, recommended.p95_rad_per_s) else { return Ok(None) };
         let spec = ToleranceSpec { samples: declared.samples.min(COILS_FOR_SHARES), ..declared.clone() };
         let pattern = recommended.judged.pattern.clone();
@@ -155,6 +165,18 @@ impl Evaluator<'_> {
         }
         Ok(Some(OtherBoundary::of(&model, words, self.profiles, &named)?))
     }
+}
+
+/// That a spread and not the pattern makes the pointing error.
+fn spread_of_pointing(pointing: &PointingFigures) -> Option<String> {
+    let (p95, coils) = pointing.built.filter(|(p95, _)| *p95 > MOSTLY_SPREAD * pointing.searched_rad_per_s)?;
+    let shown = |value: f64| Objective::Pointing.shown(value);
+    Some(format!(
+        "a spread and not the pattern is what to work on next: as built 95 % of {coils} coils stay below {}, as declared the \
+         worst is {}",
+        shown(p95),
+        shown(pointing.searched_rad_per_s)
+    ))
 }
 
 /// The worst rates of patterns with the boundary that the model has not.

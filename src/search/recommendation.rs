@@ -10,6 +10,9 @@
 //! | guaranteed worst rate | holds for every profile within the largest rate, searched or not |
 //! | worst rate on unseen profiles | what is left of a gain on the searched ones |
 //!
+//! A search for the pointing error is weighed by the same figures of the pointing error
+//! ([`weighed_pointing`](super::weighed_pointing)), and what is closer together than a coil can be wound to is equal.
+//!
 //! How far a pattern is behind the best classic where it is furthest behind, in any of these figures or on any set of
 //! unseen profiles, is its regret. The classic with the least regret stays unless a pattern that was found is better by
 //! more than `TIE` in the figure and has no more regret than that classic or none at all; or unless every classic is
@@ -25,7 +28,8 @@ use super::evaluator::{Evaluator, JudgeError, Judged, name_of};
 use super::outlook::OtherBoundary;
 use super::proof::Status;
 use super::prospect::{Prospect, predicted_gain, prospects};
-use super::validation::{Unseen, Validation};
+use super::validation::{Unseen, UnseenPointing, Validation};
+use super::weighed_pointing::PointingFigures;
 use super::weighing::{TIE, Weighed, chosen, over_least};
 use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
@@ -46,6 +50,8 @@ pub(crate) struct Recommendation {
     pub(crate) name: String,
     pub(crate) pattern: Pattern,
     pub(crate) sentence: String,
+    /// What decided.
+    pub(crate) weighed_by: &'static str,
     pub(crate) reasons: Vec<String>,
 }
 
@@ -85,6 +91,7 @@ impl Evaluator<'_> {
     ) -> Result<Advised, JudgeError> {
         let candidates = self.candidates(context, found, shared)?;
         let (weighed, unseen) = self.weighed(context, candidates)?;
+        let pointing_of = |w: &Weighed| w.pointing.map(|pointing| pointing.unseen_rad_per_s);
         let (choice, best_classic) = chosen(&weighed);
         let of = |pattern: &Pattern| weighed.iter().find(|w| w.judged.pattern == *pattern);
         let qua = context.baselines.iter().find(|b| b.name == Classic::Qua.key());
@@ -93,6 +100,10 @@ impl Evaluator<'_> {
             seed: unseen.seed,
             best_rad_per_s: of(&context.best.pattern).map_or(f64::INFINITY, |w| w.unseen_rad_per_s),
             qua_rad_per_s: qua.and_then(|qua| of(&qua.pattern)).map(|w| w.unseen_rad_per_s),
+            pointing: of(&context.best.pattern).and_then(pointing_of).map(|best_rad_per_s| UnseenPointing {
+                best_rad_per_s,
+                qua_rad_per_s: qua.and_then(|qua| of(&qua.pattern)).and_then(pointing_of),
+            }),
         };
         let recommended = &weighed[choice];
         let classic = best_classic.map(|i| &weighed[i]);
@@ -101,6 +112,7 @@ impl Evaluator<'_> {
             name: recommended.judged.name.clone(),
             pattern: recommended.judged.pattern.clone(),
             sentence: sentence(recommended, classic, unseen.profiles),
+            weighed_by: recommended.figure_words(),
             reasons: self.reasons(context, recommended, &weighed, &validation, boundary.as_ref())?,
         };
         let outlook = self.outlook(context, recommended, &weighed)?;
@@ -129,7 +141,8 @@ impl Evaluator<'_> {
 
     /// The classics, the best pattern, and of what was found the best in each figure.
     fn candidates(&self, context: &Context, found: &[Found], shared: &[Pattern]) -> Result<Vec<Judged>, JudgeError> {
-        let plain = self.under(Objective::WorstRate);
+        let is_for_pointing = self.objective == Objective::Pointing;
+        let plain = if is_for_pointing { *self } else { self.under(Objective::WorstRate) };
         let mut candidates: Vec<Judged> = context.baselines.to_vec();
         let is_new = |pattern: &Pattern, among: &[Judged]| !among.iter().any(|j| j.pattern == *pattern);
         if is_new(&context.best.pattern, &candidates) {
@@ -142,7 +155,9 @@ impl Evaluator<'_> {
                 others.push(plain.judge(&name_of(&pattern), &pattern)?);
             }
         }
-        let bound = |j: &Judged| j.guaranteed_rad_per_s.unwrap_or(f64::INFINITY);
+        let bound = |j: &Judged| {
+            if is_for_pointing { j.objective_rad_per_s } else { j.guaranteed_rad_per_s.unwrap_or(f64::INFINITY) }
+        };
         others
             .sort_by(|a, b| bound(a).total_cmp(&bound(b)).then_with(|| a.pattern.segments().cmp(b.pattern.segments())));
         let rest = others.split_off(others.len().min(MOST_FOUND));
@@ -151,7 +166,9 @@ impl Evaluator<'_> {
         candidates.extend(others.into_iter().chain(least));
         let classics = self.classics_of(context.class);
         let starts: Vec<Pattern> = candidates.iter().map(|j| j.pattern.clone()).collect();
-        let rehearsed = self.rehearsed(context.class, &classics, &starts, context.seed)?;
+        // It is about rates.
+        let rehearsed =
+            if is_for_pointing { Vec::new() } else { self.rehearsed(context.class, &classics, &starts, context.seed)? };
         let hedged = self.hedged(context.class, context.uncertain, &starts, context.seed)?;
         for pattern in rehearsed.into_iter().take(MOST_FOUND).chain(hedged) {
             if is_new(&pattern, &candidates) {
@@ -173,7 +190,14 @@ impl Evaluator<'_> {
     fn weighed(&self, context: &Context, candidates: Vec<Judged>) -> Result<(Vec<Weighed>, Unseen), JudgeError> {
         let class = context.class;
         let patterns: Vec<Pattern> = candidates.iter().map(|j| j.pattern.clone()).collect();
-        let unseen = self.unseen(&patterns)?;
+        let (unseen, unseen_pointing) = self.unseen(&patterns)?;
+        let pointing = match &unseen_pointing {
+            Some(unseen) => {
+                let worst: Vec<f64> = (0..patterns.len()).map(|i| unseen.worst_rad_per_s(i)).collect();
+                self.pointing_figures(&patterns, &worst, context.uncertain)?
+            }
+            None => Vec::new(),
+        };
         let classics = self.classics_of(class);
         let in_class: Vec<usize> = (0..patterns.len()).filter(|&i| classics.contains(&patterns[i])).collect();
         type Built = Option<(f64, Option<f64>)>;
@@ -189,10 +213,19 @@ impl Evaluator<'_> {
             (0..patterns.len()).map(|i| prospects.get(i).map(|p| p.expected_rad_per_s)).collect();
         let likely: Vec<Option<f64>> = (0..patterns.len()).map(|i| prospects.get(i).map(|p| p.p95_rad_per_s)).collect();
         let scrap: Vec<Option<f64>> = built.iter().map(|b| b.and_then(|(_, share)| share).map(|y| 2.0 - y)).collect();
+        let of_pointing =
+            |figure: fn(&PointingFigures) -> Option<f64>| -> Vec<Option<f64>> { pointing.iter().map(figure).collect() };
+        let figures = if pointing.is_empty() {
+            vec![guaranteed, p95, scrap, expected, likely]
+        } else {
+            let built = of_pointing(|p| p.built.map(|(p95, _)| p95));
+            vec![of_pointing(|p| p.guaranteed_rad_per_s), built, of_pointing(|p| p.likely_rad_per_s)]
+        };
+        let weighed_unseen = unseen_pointing.as_ref().unwrap_or(&unseen);
         let regret = |i: usize| {
-            let ratios =
-                [&guaranteed, &p95, &scrap, &expected, &likely].map(|figures| over_least(figures, i, &in_class));
-            ratios.into_iter().chain([unseen.largest_ratio(i, &in_class)]).flatten().fold(0.0, f64::max)
+            let same = pointing.get(i).map_or(0.0, |p| p.resolution_rad_per_s);
+            let ratios = figures.iter().map(|figures| over_least(figures, i, &in_class, same));
+            ratios.chain([weighed_unseen.largest_ratio(i, &in_class, same)]).flatten().fold(0.0, f64::max)
         };
         let regrets: Vec<f64> = (0..patterns.len()).map(regret).collect();
         let weigh = |(i, (judged, built)): (usize, (Judged, Built))| Weighed {
@@ -202,6 +235,7 @@ impl Evaluator<'_> {
             p95_rad_per_s: built.map(|(p95, _)| p95),
             yield_share: built.and_then(|(_, share)| share),
             prospect: prospects.get(i).copied(),
+            pointing: pointing.get(i).copied(),
             regret: regrets[i],
             judged,
         };
@@ -214,6 +248,22 @@ impl Evaluator<'_> {
 
     /// What to say on unseen profiles after how good the best pattern is on the searched ones.
     pub(super) fn words_on_unseen(&self, validation: &Validation, best: &Judged, baselines: &[Judged]) -> String {
+        if let Some(UnseenPointing { best_rad_per_s, qua_rad_per_s }) = validation.pointing {
+            let shown = |value: f64| self.objective.shown(value);
+            let is_qua = baselines.iter().any(|b| b.name == Classic::Qua.key() && b.pattern == best.pattern);
+            let against = match qua_rad_per_s.filter(|_| !is_qua) {
+                Some(qua) if best_rad_per_s > qua => {
+                    format!(" against QUA's {}: it wins only on what it was searched on", shown(qua))
+                }
+                Some(qua) => format!(" against QUA's {}", shown(qua)),
+                None => String::new(),
+            };
+            let profiles = validation.profiles;
+            return format!(
+                " On {profiles} unseen profiles its worst pointing error is {}{against}.",
+                shown(best_rad_per_s)
+            );
+        }
         let Validation { profiles, best_rad_per_s, qua_rad_per_s, .. } = *validation;
         let shown = deg_per_h_from_rad_per_s;
         let Some(qua_rad_per_s) = qua_rad_per_s else {
@@ -249,7 +299,6 @@ impl Evaluator<'_> {
         validation: &Validation,
         boundary: Option<&OtherBoundary>,
     ) -> Result<Vec<String>, JudgeError> {
-        let shown = deg_per_h_from_rad_per_s;
         let mut reasons = vec![facts(recommended, validation.profiles)];
         let named = |name: &str| weighed.iter().find(|w| w.judged.name == name);
         for other in [named(Classic::Qua.key()), named(&context.best.name)].into_iter().flatten() {
@@ -269,26 +318,28 @@ impl Evaluator<'_> {
         let ties: Vec<&str> = weighed
             .iter()
             .filter(|w| w.is_classic && w.judged.pattern != recommended.judged.pattern)
-            .filter(|w| (w.figure() / recommended.figure() - 1.0).abs() <= TIE)
+            .filter(|w| w.ties_with(recommended))
             .map(|w| w.judged.name.as_str())
             .collect();
         if !ties.is_empty() {
             reasons.push(format!(
-                "{} is as good to {:.0} %; of equals the one is taken that is easiest to wind{}",
+                "{} is as good to {}; of equals the one is taken that is easiest to wind{}",
                 ties.join(", "),
-                percent_from_fraction(TIE),
+                tie_words(recommended),
                 if self.model.prescribes_outermost_layer() { TIED_BY_THE_BOUNDARY } else { "" }
             ));
         }
         reasons.extend(self.captive_reason(context.class, recommended)?);
         reasons.extend(self.spread_reason(recommended)?);
         reasons.extend(self.beside_coil_reason(recommended, named(Classic::Qua.key()))?);
+        // It compares rates.
+        let boundary = boundary.filter(|_| recommended.pointing.is_none());
         reasons.extend(boundary.and_then(|b| b.sentence(&recommended.judged.name)));
         if context.proof.status != Status::Optimal && !recommended.is_classic {
             reasons.push(match context.proof.status {
                 Status::Gap => format!(
-                    "best found, not proved: nothing of the class is below {:.4} °/h",
-                    shown(context.proof.lower_bound_rad_per_s)
+                    "best found, not proved: nothing of the class is below {}",
+                    self.objective.shown(context.proof.lower_bound_rad_per_s)
                 ),
                 _ => "best found, not proved to be the best".to_owned(),
             });
@@ -297,8 +348,20 @@ impl Evaluator<'_> {
     }
 }
 
+/// To what figures count as equal.
+fn tie_words(weighed: &Weighed) -> String {
+    let share = format!("{:.0} %", percent_from_fraction(TIE));
+    match weighed.pointing {
+        Some(pointing) => {
+            let same = Objective::Pointing.shown(pointing.resolution_rad_per_s);
+            format!("{share} and the {same} that a middle off by the fibre's diameter adds")
+        }
+        None => share,
+    }
+}
+
 fn sentence(recommended: &Weighed, classic: Option<&Weighed>, profiles: usize) -> String {
-    let shown = |w: &Weighed| deg_per_h_from_rad_per_s(w.figure());
+    let shown = Weighed::shown;
     let name = &recommended.judged.name;
     let what = recommended.figure_words();
     let behind = |w: &Weighed| format!("{:.1} %", percent_from_fraction(w.regret - 1.0));
@@ -317,7 +380,7 @@ fn sentence(recommended: &Weighed, classic: Option<&Weighed>, profiles: usize) -
                 )
             };
             format!(
-                "Wind {name}: its {what} of {:.4} °/h is {change:.0} % {than} than that of the best classic, {} with {:.4} °/h, \
+                "Wind {name}: its {what} of {} is {change:.0} % {than} than that of the best classic, {} with {}, \
                  and {nowhere}.",
                 shown(recommended),
                 classic.judged.name,
@@ -325,27 +388,27 @@ fn sentence(recommended: &Weighed, classic: Option<&Weighed>, profiles: usize) -
             )
         }
         Some(_) if recommended.regret > 1.0 + TIE => format!(
-            "Wind {name}: its {what} is {:.4} °/h; the classics change places by up to {} between sets of unseen profiles, \
+            "Wind {name}: its {what} is {}; the classics change places by up to {} between sets of unseen profiles, \
              and nothing that was found is ahead everywhere.",
             shown(recommended),
             behind(recommended),
         ),
         Some(_) => format!(
-            "Wind {name}: with a {what} of {:.4} °/h nothing that was found beats it by more than {:.0} % on what it was not \
-             searched on.",
+            "Wind {name}: with a {what} of {} nothing that was found beats it by more than {} on what it was not searched on.",
             shown(recommended),
-            percent_from_fraction(TIE),
+            tie_words(recommended),
         ),
-        None => format!("Wind {name}: its {what} of {:.4} °/h is the smallest found.", shown(recommended)),
+        None => format!("Wind {name}: its {what} of {} is the smallest found.", shown(recommended)),
     }
 }
 
 fn facts(weighed: &Weighed, profiles: usize) -> String {
     let shown = deg_per_h_from_rad_per_s;
-    let mut parts = vec![
+    let mut parts = weighed.pointing.map_or_else(Vec::new, |pointing| pointing.facts(profiles));
+    parts.extend([
         format!("{:.4} °/h on the searched profiles", shown(weighed.judged.worst.rate_rad_per_s.abs())),
         format!("{:.4} on {profiles} unseen ones", shown(weighed.unseen_rad_per_s)),
-    ];
+    ]);
     parts.extend(weighed.judged.guaranteed_rad_per_s.map(|g| format!("{:.4} guaranteed", shown(g))));
     parts.extend(weighed.p95_rad_per_s.map(|p| format!("{:.4} for 95 % of built coils", shown(p))));
     parts.extend(weighed.yield_share.map(|y| format!("yield {:.1} %", percent_from_fraction(y))));

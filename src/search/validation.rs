@@ -4,10 +4,13 @@
 //! profiles drawn with another seed, each as large as the searched one, so that what is left of a gain shows, and how
 //! much it depends on the draw.
 
+use super::cost::objective::Objective;
+use super::cost::pointing::pointing_as_rate;
 use super::cost::worst_case::{SearchError, SolvedProfiles};
 use super::evaluator::Evaluator;
+use super::weighing::ratio_over;
 use crate::pattern::Pattern;
-use crate::profile::ProfileSpec;
+use crate::profile::{Profile, ProfileSpec};
 
 /// Sets that are drawn.
 const SETS: usize = 8;
@@ -37,9 +40,19 @@ pub(crate) struct Validation {
     pub(crate) best_rad_per_s: f64,
     /// None where QUA does not fit the layer count.
     pub(crate) qua_rad_per_s: Option<f64>,
+    /// None unless the search was for the pointing error.
+    pub(crate) pointing: Option<UnseenPointing>,
 }
 
-/// The worst rate of patterns on each set of unseen profiles and the listed ones.
+/// The pointing errors of the best pattern and of QUA on the same profiles, as the rates that make them in one hour.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct UnseenPointing {
+    pub(crate) best_rad_per_s: f64,
+    /// None where QUA does not fit the layer count.
+    pub(crate) qua_rad_per_s: Option<f64>,
+}
+
+/// The worst rate of patterns, or their worst pointing error, on each set of unseen profiles and the listed ones.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Unseen {
     pub(crate) profiles: usize,
@@ -55,12 +68,13 @@ impl Unseen {
         self.worst_rad_per_s[pattern].iter().copied().fold(0.0, f64::max)
     }
 
-    /// The largest worst rate of a pattern over that of the best of others on the same set.
-    pub(crate) fn largest_ratio(&self, pattern: usize, others: &[usize]) -> Option<f64> {
+    /// The largest worst rate of a pattern over that of the best of others on the same set; what exceeds that by no more
+    /// than `same_rad_per_s` is the same.
+    pub(crate) fn largest_ratio(&self, pattern: usize, others: &[usize], same_rad_per_s: f64) -> Option<f64> {
         let sets = 0..self.worst_rad_per_s[pattern].len();
         let ratio = |set: usize| {
             let least = others.iter().map(|&o| self.worst_rad_per_s[o][set]).reduce(f64::min)?;
-            Some(if least > 0.0 { self.worst_rad_per_s[pattern][set] / least } else { f64::INFINITY })
+            Some(ratio_over(self.worst_rad_per_s[pattern][set], least, same_rad_per_s).unwrap_or(f64::INFINITY))
         };
         sets.filter_map(ratio).reduce(f64::max)
     }
@@ -79,24 +93,37 @@ impl Evaluator<'_> {
         ProfileSpec { count: sets * of_set, seed, ..self.profiles.clone() }
     }
 
+    /// The worst rates, and where the pointing error is the objective those.
+    ///
     /// # Errors
     /// None that a model which could be solved would cause.
-    pub(crate) fn unseen(&self, patterns: &[Pattern]) -> Result<Unseen, SearchError> {
+    pub(crate) fn unseen(&self, patterns: &[Pattern]) -> Result<(Unseen, Option<Unseen>), SearchError> {
         let spec = self.drawn_spec(SETS, Draw::Validation);
         let profiles = spec.profiles();
         let (listed, drawn) = profiles.split_at(spec.listed.len());
-        let worst_of = |profiles: &[crate::profile::Profile]| -> Result<Vec<f64>, SearchError> {
+        let is_for_pointing = self.objective == Objective::Pointing;
+        // Of each pattern the rate, and the pointing error where that is asked for.
+        let worst_of = |profiles: &[Profile]| -> Result<Vec<[f64; 2]>, SearchError> {
             if profiles.is_empty() {
-                return Ok(vec![0.0; patterns.len()]);
+                return Ok(vec![[0.0; 2]; patterns.len()]);
             }
             let solved = SolvedProfiles::new(self.model, profiles)?;
-            let worst = |pattern: &Pattern| Ok(solved.worst_case(self.model, pattern)?.rate_rad_per_s.abs());
+            let worst = |pattern: &Pattern| {
+                let rate_rad_per_s = solved.worst_case(self.model, pattern)?.rate_rad_per_s.abs();
+                let pointing = is_for_pointing.then(|| pointing_as_rate(self.model, &solved, pattern)).transpose()?;
+                Ok([rate_rad_per_s, pointing.map_or(0.0, |worst| worst.rate_rad_per_s.abs())])
+            };
             patterns.iter().map(worst).collect()
         };
         let on_listed = worst_of(listed)?;
-        let sets: Vec<Vec<f64>> = drawn.chunks(drawn.len() / SETS).map(worst_of).collect::<Result<_, _>>()?;
-        let worst_rad_per_s =
-            (0..patterns.len()).map(|p| sets.iter().map(|set| set[p].max(on_listed[p])).collect()).collect();
-        Ok(Unseen { profiles: spec.count, seed: spec.seed, worst_rad_per_s })
+        let sets: Vec<Vec<[f64; 2]>> = drawn.chunks(drawn.len() / SETS).map(worst_of).collect::<Result<_, _>>()?;
+        let of = |figure: usize| Unseen {
+            profiles: spec.count,
+            seed: spec.seed,
+            worst_rad_per_s: (0..patterns.len())
+                .map(|p| sets.iter().map(|set| set[p][figure].max(on_listed[p][figure])).collect())
+                .collect(),
+        };
+        Ok((of(0), is_for_pointing.then(|| of(1))))
     }
 }

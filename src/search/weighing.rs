@@ -3,8 +3,10 @@
 
 use std::cmp::Ordering;
 
+use super::cost::objective::Objective;
 use super::evaluator::Judged;
 use super::prospect::Prospect;
+use super::weighed_pointing::PointingFigures;
 use crate::pattern::windability::Windability;
 
 /// Two figures closer than this count as equal: less than what a coil's own material values are known to.
@@ -21,17 +23,41 @@ pub(super) struct Weighed {
     pub(crate) yield_share: Option<f64>,
     /// Where the model is not known for certain.
     pub(crate) prospect: Option<Prospect>,
+    /// Where the pointing error is what is made small: it is weighed then, and not the rates.
+    pub(crate) pointing: Option<PointingFigures>,
     /// Over the best classic of the class, the worst of all figures and sets of unseen profiles; 1: nowhere behind.
     pub(crate) regret: f64,
 }
 
 impl Weighed {
     pub(super) fn figure(&self) -> f64 {
+        if let Some(pointing) = &self.pointing {
+            return pointing.figure();
+        }
         let prospect = self.prospect.map(|p| p.p95_rad_per_s);
         prospect.or(self.p95_rad_per_s).or(self.judged.guaranteed_rad_per_s).unwrap_or(self.unseen_rad_per_s)
     }
 
+    /// The figure with its unit.
+    pub(super) fn shown(&self) -> String {
+        let of = if self.pointing.is_some() { Objective::Pointing } else { Objective::WorstRate };
+        of.shown(self.figure())
+    }
+
+    /// Figures that differ by no more are the same in a coil that is wound.
+    pub(super) fn same_rad_per_s(&self) -> f64 {
+        self.pointing.map_or(0.0, |pointing| pointing.resolution_rad_per_s)
+    }
+
+    /// Whether the figure is that of another one, but for less than what a coil is known and wound to.
+    pub(super) fn ties_with(&self, other: &Self) -> bool {
+        (self.figure() - other.figure()).abs() <= TIE * other.figure() + other.same_rad_per_s()
+    }
+
     pub(super) fn figure_words(&self) -> &'static str {
+        if let Some(pointing) = &self.pointing {
+            return pointing.figure_words();
+        }
         match (self.p95_rad_per_s, self.judged.guaranteed_rad_per_s) {
             _ if self.prospect.is_some() => "95 % quantile over the models that the records allow",
             (Some(_), _) => "95 % quantile over built coils",
@@ -67,28 +93,29 @@ pub(super) fn chosen(weighed: &[Weighed]) -> (usize, Option<usize>) {
                 ahead
             } else {
                 let is_level = |&i: &usize| i == classic || weighed[i].regret <= its.regret * (1.0 + TIE);
-                let better = found.into_iter().filter(|&i| weighed[i].figure() < its.figure() * (1.0 - TIE));
+                let better =
+                    found.into_iter().filter(|&i| weighed[i].figure() < its.figure() && !weighed[i].ties_with(its));
                 classics().filter(is_level).chain(better).collect()
             }
         }
     };
-    let least = eligible.iter().map(|&i| weighed[i].figure()).fold(f64::INFINITY, f64::min);
-    let equal = eligible.iter().copied().filter(|&i| weighed[i].figure() <= least * (1.0 + TIE));
+    let least = eligible.iter().copied().min_by(|&a, &b| weighed[a].figure().total_cmp(&weighed[b].figure()));
+    let equal = eligible.iter().copied().filter(|&i| least.is_some_and(|least| weighed[i].ties_with(&weighed[least])));
     let easiest = equal.min_by(|&a, &b| weighed[a].easier(&weighed[b]));
     (easiest.or(best_classic).unwrap_or(0), best_classic)
 }
 
-/// A figure over the least among others; none where any of them lacks it.
-pub(super) fn over_least(figures: &[Option<f64>], of: usize, among: &[usize]) -> Option<f64> {
+/// A figure over the least among others, as [`ratio_over`]; none where any of them lacks it.
+pub(super) fn over_least(figures: &[Option<f64>], of: usize, among: &[usize], same_rad_per_s: f64) -> Option<f64> {
     let least = among.iter().map(|&i| figures[i]).collect::<Option<Vec<f64>>>()?.into_iter().reduce(f64::min)?;
     let mine = figures[of]?;
-    Some(if least > 0.0 {
-        mine / least
-    } else if mine > 0.0 {
-        f64::INFINITY
-    } else {
-        1.0
-    })
+    Some(ratio_over(mine, least, same_rad_per_s).unwrap_or(if mine > 0.0 { f64::INFINITY } else { 1.0 }))
+}
+
+/// A figure over another one; what exceeds that by no more than `same` is the same. None over nothing.
+pub(super) fn ratio_over(mine: f64, least: f64, same: f64) -> Option<f64> {
+    let beyond = if mine > least { (mine - same).max(least) } else { mine };
+    (least > 0.0).then(|| beyond / least)
 }
 
 #[cfg(test)]
@@ -121,6 +148,7 @@ mod tests {
             p95_rad_per_s: None,
             yield_share: None,
             prospect: None,
+            pointing: None,
             regret,
         }
     }

@@ -339,6 +339,8 @@ pub(crate) struct RecommendationJson {
     pub(crate) pattern: String,
     pub(crate) segments: Vec<usize>,
     pub(crate) sentence: String,
+    /// The figure that decided, in words.
+    pub(crate) weighed_by: String,
     pub(crate) reasons: Vec<String>,
 }
 
@@ -348,6 +350,7 @@ impl RecommendationJson {
             pattern: recommendation.name.clone(),
             segments: recommendation.pattern.segments().to_vec(),
             sentence: recommendation.sentence.clone(),
+            weighed_by: recommendation.weighed_by.to_owned(),
             reasons: recommendation.reasons.clone(),
         }
     }
@@ -361,6 +364,9 @@ pub(crate) struct ValidationJson {
     pub(crate) best_worst_rate_deg_per_h: f64,
     /// Null where QUA does not fit the layer count.
     pub(crate) qua_worst_rate_deg_per_h: Option<f64>,
+    /// Null unless the search was for the pointing error, which is held as the rate that makes it in one hour.
+    pub(crate) best_pointing_error_deg: Option<f64>,
+    pub(crate) qua_pointing_error_deg: Option<f64>,
 }
 
 impl ValidationJson {
@@ -370,6 +376,8 @@ impl ValidationJson {
             seed: validation.seed,
             best_worst_rate_deg_per_h: deg_per_h_from_rad_per_s(validation.best_rad_per_s),
             qua_worst_rate_deg_per_h: validation.qua_rad_per_s.map(deg_per_h_from_rad_per_s),
+            best_pointing_error_deg: validation.pointing.map(|p| deg_per_h_from_rad_per_s(p.best_rad_per_s)),
+            qua_pointing_error_deg: validation.pointing.and_then(|p| p.qua_rad_per_s).map(deg_per_h_from_rad_per_s),
         }
     }
 }
