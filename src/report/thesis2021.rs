@@ -8,6 +8,7 @@ use crate::reproduce::thesis2021::{BAND_DEG_PER_S, LINES, Reproduction, TITLE};
 
 /// The answer of `reproduce thesis2021`.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct ReproductionJson {
     pub(crate) publication: &'static str,
     pub(crate) record: &'static str,
@@ -17,6 +18,7 @@ pub struct ReproductionJson {
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct ComparisonJson {
     pub(crate) place: &'static str,
     pub(crate) what: &'static str,
@@ -28,6 +30,7 @@ pub(crate) struct ComparisonJson {
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct ErratumJson {
     pub(crate) place: &'static str,
     pub(crate) printed: &'static str,

@@ -18,6 +18,7 @@ pub struct ReproductionFile {
 
 /// The answer of `reproduce yan1998`.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct ReproductionJson {
     pub(crate) publication: &'static str,
     pub(crate) table_2: Vec<PeakJson>,
@@ -27,6 +28,7 @@ pub struct ReproductionJson {
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct PeakJson {
     pub(crate) length_m: f64,
     pub(crate) winding: &'static str,
@@ -38,6 +40,7 @@ pub(crate) struct PeakJson {
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct ErratumJson {
     pub(crate) place: &'static str,
     pub(crate) printed: &'static str,

@@ -1,5 +1,6 @@
 //! The program as its users meet it: exact output, exit codes, every kind of wrong request.
 
+mod answers;
 mod bad_input;
 mod browser;
 mod campaign;
@@ -44,14 +45,16 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Runs the program in a folder.
+/// Runs the program in a folder. Whatever it answers as JSON is held against the schema of its answer.
 fn run_in(folder: &Path, arguments: &[&str]) -> Output {
-    assert_cmd::Command::cargo_bin("coilwright")
+    let output = assert_cmd::Command::cargo_bin("coilwright")
         .expect("cargo builds the program before its tests")
         .current_dir(folder)
         .args(arguments)
         .output()
-        .expect("the program can be started")
+        .expect("the program can be started");
+    answers::assert_as_promised(arguments, &output);
+    output
 }
 
 fn run(arguments: &[&str]) -> Output {

@@ -12,6 +12,7 @@ use super::schema::{described, table};
 
 /// A number with its standard error; null where that is not known.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct EstimateJson {
     pub(crate) value: f64,
     pub(crate) standard_error: Option<f64>,
@@ -19,6 +20,7 @@ pub(crate) struct EstimateJson {
 
 /// What is written into the `[boundary]` table of a model file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct BoundaryJson {
     /// Null where the model states the film or the records do not determine it.
     pub(crate) surface_film_w_per_m2_k: Option<EstimateJson>,

@@ -8,6 +8,7 @@ use crate::units::deg_per_h_from_rad_per_s;
 
 /// Of one model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct BuiltCoilsJson {
     pub(crate) model: String,
     pub(crate) layers: usize,
@@ -20,6 +21,7 @@ pub(crate) struct BuiltCoilsJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct BuiltPatternJson {
     pub(crate) name: String,
     pub(crate) segments: Vec<usize>,
@@ -35,6 +37,7 @@ pub(crate) struct BuiltPatternJson {
 
 /// A quantile with the interval that holds it with 95 %, whatever the distribution.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct QuantileJson {
     pub(crate) share: f64,
     pub(crate) value_deg_per_h: f64,

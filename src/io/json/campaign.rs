@@ -13,6 +13,7 @@ pub(crate) const KINDS: [&str; 4] = ["search", "tolerance", "metrics", "diagnose
 
 /// A cell of a campaign, as a list shows it; what its kind does not have is null.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct CellStateJson {
     /// Changes with everything that the cell's result depends on, and with nothing else.
     pub(crate) id: String,
@@ -43,6 +44,7 @@ pub(crate) trait CellDocument: Serialize + DeserializeOwned {
 
 /// What a search found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct CellJson {
     pub(crate) id: String,
@@ -127,6 +129,7 @@ cell_documents!(CellJson, BlockJson, GyroJson);
 
 /// The answer of `campaign`.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct CampaignJson {
     pub(crate) campaign: String,
     /// Those that were asked for: all, or those of a part.
@@ -149,6 +152,7 @@ pub struct CampaignJson {
 
 /// The answer of `campaign --emit`.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct WorkflowJson {
     /// What is run.
     #[serde(flatten)]

@@ -13,6 +13,7 @@ use super::inputs::InputsJson;
 use super::metrics::GrossErrorJson;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct CompareJson {
     pub(crate) model: String,
     pub(crate) pattern: String,
@@ -24,6 +25,7 @@ pub struct CompareJson {
 
 /// One record beside its prediction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct RecordComparisonJson {
     pub(crate) file: String,
     /// Where the layers' temperatures come from, if not from the record's own sensor.
@@ -69,6 +71,7 @@ pub(crate) struct RecordComparisonJson {
 
 /// Reading less model of one thermometer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct SensorJson {
     pub(crate) column: String,
     pub(crate) layer: usize,
@@ -95,6 +98,7 @@ impl SensorJson {
 
 /// What a record's rate consists of beside the coil.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct NoisePartsJson {
     /// Of one logged rate.
     pub(crate) white_deg_per_h: f64,
@@ -121,6 +125,7 @@ impl NoisePartsJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct LjungBoxJson {
     pub(crate) statistic: f64,
     pub(crate) lags: usize,
@@ -128,12 +133,14 @@ pub(crate) struct LjungBoxJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct CorrelationJson {
     pub(crate) with: String,
     pub(crate) correlation: Option<f64>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct PartJson {
     pub(crate) name: String,
     pub(crate) share_of_squared_error: f64,

@@ -22,6 +22,7 @@ use super::proposals::ProposalJson;
 
 /// The answer of `diagnose`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct DiagnosisJson {
     pub(crate) model: String,
     pub(crate) verdict: String,
@@ -61,6 +62,7 @@ pub struct DiagnosisJson {
 
 /// One set of effects and its probability.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct ShareJson {
     pub(crate) effects: Vec<String>,
     pub(crate) probability: f64,
@@ -76,6 +78,7 @@ pub struct ShareJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct MemberJson {
     pub(crate) kind: String,
     pub(crate) choices: BTreeMap<String, String>,
@@ -83,6 +86,7 @@ pub(crate) struct MemberJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct EstimateJson {
     /// Place among the members, counted from 0.
     pub(crate) member: usize,
@@ -96,6 +100,7 @@ pub(crate) struct EstimateJson {
 
 /// A declared number that was fitted anew.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct RefittedJson {
     pub(crate) kind: String,
     pub(crate) parameter: String,
@@ -106,6 +111,7 @@ pub struct RefittedJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct HypothesisJson {
     /// The classic that the coil seems to be wound as.
     pub(crate) winding: Option<String>,
@@ -116,6 +122,7 @@ pub(crate) struct HypothesisJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct OffsetStepJson {
     pub(crate) record: String,
     pub(crate) time_s: f64,
@@ -131,6 +138,7 @@ pub(crate) struct DiagnosisRow {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct FindingJson {
     pub(crate) kind: String,
     pub(crate) parameters: BTreeMap<String, ParameterJson>,
@@ -151,6 +159,7 @@ pub(crate) struct FindingJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct ParameterJson {
     pub(crate) value: f64,
     /// Null where the records do not determine it, at a bound, or where it was held.
@@ -161,6 +170,7 @@ pub(crate) struct ParameterJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct EquivalentJson {
     pub(crate) kind: String,
     pub(crate) choices: BTreeMap<String, String>,
@@ -175,6 +185,7 @@ pub(crate) struct EquivalentJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct RungJson {
     pub(crate) effects: Vec<String>,
     pub(crate) rmse_deg_per_h: f64,
@@ -185,6 +196,7 @@ pub(crate) struct RungJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct ContenderJson {
     pub(crate) kind: String,
     pub(crate) choices: BTreeMap<String, String>,
@@ -194,6 +206,7 @@ pub(crate) struct ContenderJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct UnexplainedJson {
     pub(crate) excess_deg_per_h: f64,
     pub(crate) share_of_excess: f64,
@@ -202,12 +215,14 @@ pub(crate) struct UnexplainedJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct CorrelationJson {
     pub(crate) with: String,
     pub(crate) correlation: f64,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct PlainJson {
     pub(crate) shape: String,
     pub(crate) period_s: Option<f64>,
@@ -471,6 +486,7 @@ impl PlainJson {
 
 /// The answer of `extend`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct ExtendJson {
     /// The new model file.
     pub(crate) written: String,

@@ -6,6 +6,7 @@ use crate::effect::{Acts, EffectSpec};
 
 /// The answer of `effects`.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct EffectsJson {
     /// In the catalogue's order.
     pub effects: Vec<EffectJson>,
@@ -13,6 +14,7 @@ pub struct EffectsJson {
 
 /// One description of the catalogue.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct EffectJson {
     pub(crate) kind: &'static str,
     pub(crate) summary: &'static str,
@@ -29,6 +31,7 @@ pub struct EffectJson {
 
 /// Bounds, start and default in the parameter's own unit.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct ParameterJson {
     pub(crate) key: &'static str,
     pub(crate) unit: &'static str,
@@ -41,6 +44,7 @@ pub(crate) struct ParameterJson {
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct ChoiceJson {
     pub(crate) key: &'static str,
     pub(crate) options: &'static [&'static str],

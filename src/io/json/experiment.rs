@@ -7,6 +7,7 @@ use crate::units::{c_per_h_from_k_per_s, deg_per_h_from_rad_per_s, h_from_s, per
 
 /// A profile of the chamber's air, and how surely it tells the candidates apart.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct ExperimentJson {
     pub(crate) profile: String,
     pub(crate) pieces: Vec<PieceJson>,
@@ -20,12 +21,14 @@ pub(crate) struct ExperimentJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct PieceJson {
     pub(crate) rate_c_per_h: f64,
     pub(crate) duration_s: f64,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct SeparationJson {
     pub(crate) first: String,
     pub(crate) second: String,
@@ -47,6 +50,7 @@ pub(crate) struct SeparationJson {
 
 /// What is expected if one of two candidates is true.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct DirectionJson {
     pub(crate) truth: String,
     pub(crate) refused: String,

@@ -6,6 +6,7 @@ use super::{PatternJson, WindabilityJson};
 
 /// The answer of `explore`.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct ExploreJson {
     pub(crate) page: String,
     pub(crate) bytes: usize,

@@ -8,11 +8,13 @@ use crate::stress::fibres::{FIBRES, FibreEntry};
 use crate::units::REFERENCE_TEMPERATURE_K;
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct FibresJson {
     pub(crate) fibres: Vec<FibreJson>,
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct FibreJson {
     pub(crate) name: &'static str,
     /// "solid", "polarisation-maintaining", "thin" or "hollow-core".
@@ -34,6 +36,7 @@ pub(crate) struct FibreJson {
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct CoatingJson {
     pub(crate) material: &'static str,
     pub(crate) outer_diameter_um: f64,

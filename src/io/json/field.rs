@@ -6,6 +6,7 @@ use super::{PatternJson, ProofJson};
 
 /// A field that was read.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct FieldJson {
     pub(crate) file: String,
     /// Null for a pipe, which cannot be read twice.
@@ -20,6 +21,7 @@ pub(crate) struct FieldJson {
 
 /// The answer of `optimise --field`.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct FieldSearchJson {
     pub(crate) model: String,
     pub(crate) fields: Vec<FieldJson>,

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct FleetJson {
     /// "metrics" or "diagnose".
     pub(crate) kind: String,
@@ -26,6 +27,7 @@ pub(crate) struct FleetJson {
 
 /// One number over the fleet.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct MeasureJson {
     pub(crate) key: String,
     pub(crate) unit: String,
@@ -39,6 +41,7 @@ pub(crate) struct MeasureJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct GyroValueJson {
     pub(crate) gyro: String,
     pub(crate) value: f64,
@@ -50,6 +53,7 @@ pub(crate) struct GyroValueJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct ThermalCurveJson {
     /// Bias about each gyro's own mean.
     pub(crate) points: Vec<ThermalPointJson>,
@@ -58,6 +62,7 @@ pub(crate) struct ThermalCurveJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct ThermalPointJson {
     pub(crate) temperature_c: f64,
     pub(crate) bias_deg_per_h: f64,
@@ -65,6 +70,7 @@ pub(crate) struct ThermalPointJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct VerdictJson {
     pub(crate) gyro: String,
     pub(crate) verdict: String,
@@ -74,6 +80,7 @@ pub(crate) struct VerdictJson {
 
 /// An effect over the fleet.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct FleetEffectJson {
     pub(crate) kind: String,
     /// Gyros whose diagnosis found it.
@@ -87,6 +94,7 @@ pub(crate) struct FleetEffectJson {
 
 /// A fitted parameter of an effect over the gyros that have it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct FleetParameterJson {
     pub(crate) parameter: String,
     pub(crate) unit: String,

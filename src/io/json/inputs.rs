@@ -11,6 +11,7 @@ use crate::io::files::sha256_hex;
 use crate::io::model::ModelFile;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct InputsJson {
     pub(crate) program: String,
     /// Null for documents that no model was asked about.
@@ -21,6 +22,7 @@ pub(crate) struct InputsJson {
 
 /// A record that a document was made from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct RecordInputJson {
     pub(crate) file: String,
     /// Null for a pipe, which cannot be read twice.

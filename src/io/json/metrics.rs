@@ -15,6 +15,7 @@ use super::scale_factor::{PositionsJson, ScaleFactorJson};
 
 /// The measures under the keys that scripts read. Over several records: the mean bias and the worst of the others.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct MetricsJson {
     pub(crate) bias_deg_per_h: f64,
     pub(crate) bias_stability_deg_per_h: Option<f64>,
@@ -40,6 +41,7 @@ pub struct MetricsJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct RecordMetricsJson {
     pub(crate) file: String,
     pub(crate) rows: usize,
@@ -111,6 +113,7 @@ impl GrossErrors {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct TemperaturePointJson {
     pub(crate) temperature_c: f64,
     pub(crate) bias_deg_per_h: f64,
@@ -118,6 +121,7 @@ pub(crate) struct TemperaturePointJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct AllanPointJson {
     pub(crate) tau_s: f64,
     pub(crate) deviation_deg_per_h: f64,
@@ -126,6 +130,7 @@ pub(crate) struct AllanPointJson {
 
 /// One noise in the Allan deviation: a straight line in the picture of logarithms.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct AllanNoiseJson {
     /// "quantisation", "angle random walk", "bias instability", "rate random walk" or "rate ramp".
     pub(crate) noise: String,
@@ -137,6 +142,7 @@ pub(crate) struct AllanNoiseJson {
 
 /// The strength of one noise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct NoiseJson {
     /// "white", "flicker", "rate_random_walk", "quantisation" or "ramp".
     pub(crate) kind: String,
@@ -148,6 +154,7 @@ pub(crate) struct NoiseJson {
 
 /// A value that stands alone.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct GrossErrorJson {
     pub(crate) time_s: f64,
     pub(crate) column: String,

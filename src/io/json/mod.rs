@@ -43,6 +43,7 @@ pub(crate) const SCHEMA_VERSION: u32 = 1;
 
 /// A document with its schema version in front.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct Document<T: Serialize> {
     pub(crate) schema_version: u32,
     #[serde(flatten)]
@@ -58,6 +59,7 @@ impl<T: Serialize> Document<T> {
 
 /// What it takes to wind a pattern.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct WindabilityJson {
     pub(crate) class: String,
     pub(crate) reels: usize,
@@ -80,6 +82,7 @@ impl WindabilityJson {
 
 /// A pattern with its worst case.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct PatternJson {
     pub(crate) name: String,
     pub(crate) segments: Vec<usize>,
@@ -152,6 +155,7 @@ impl PatternJson {
 
 /// The answer of `evaluate`.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct EvaluateJson {
     pub(crate) model: String,
     pub(crate) patterns: Vec<PatternJson>,
@@ -167,6 +171,7 @@ pub struct EvaluateJson {
 
 /// A formula that no guaranteed worst case holds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct GuaranteedBesideJson {
     pub(crate) formula: String,
     /// By how much it can change the rate beside the guaranteed one; null where nothing bounds it.
@@ -199,6 +204,7 @@ impl GuaranteedBesideJson {
 
 /// What was proved about the best pattern.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct ProofJson {
     /// "optimal", "gap" or "none".
     pub(crate) status: String,
@@ -222,6 +228,7 @@ impl ProofJson {
 
 /// The answer of `exact`.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct ExactJson {
     pub(crate) model: String,
     pub(crate) windability: String,
@@ -242,6 +249,7 @@ pub struct ExactJson {
 
 /// One fault of a file.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct FaultJson {
     pub(crate) message: String,
     /// Counted from 1; null for a fault of the file as a whole.
@@ -263,6 +271,7 @@ impl FaultJson {
 
 /// The answer of `check`.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct CheckJson {
     /// Its path, as the user gave it.
     pub file: String,
@@ -274,6 +283,7 @@ pub struct CheckJson {
 
 /// One classic winding.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct ClassicJson {
     /// Its short name: QUA.
     pub name: String,
@@ -289,12 +299,14 @@ pub struct ClassicJson {
 
 /// The answer of `patterns`.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct PatternsJson {
     /// Those that exist for the layer count.
     pub patterns: Vec<ClassicJson>,
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct ViolationJson {
     /// Counted from 1; null for the file as a whole.
     pub(crate) row: Option<usize>,
@@ -307,6 +319,7 @@ pub(crate) struct ViolationJson {
 
 /// The answer of `verify`.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct VerifyJson {
     pub(crate) model: String,
     pub(crate) schedule: String,
@@ -324,12 +337,14 @@ pub struct VerifyJson {
 
 /// What a command wrote.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct WrittenJson {
     pub(crate) files: Vec<String>,
 }
 
 /// A script for a shell.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct CompletionsJson {
     pub(crate) shell: String,
     pub(crate) script: String,
@@ -337,6 +352,7 @@ pub(crate) struct CompletionsJson {
 
 /// A JSON Schema with what it is of.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct SchemaJson {
     /// Of which file or document.
     pub kind: String,
@@ -346,6 +362,7 @@ pub struct SchemaJson {
 
 /// The answer of `report`.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct ReportJson {
     /// The page's path.
     pub report: String,

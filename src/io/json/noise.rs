@@ -7,6 +7,7 @@ use crate::diagnose::RecordNoise;
 use crate::units::deg_per_h_from_rad_per_s;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct NoiseJson {
     pub(crate) record: String,
     /// Of one logged rate.
@@ -24,6 +25,7 @@ pub(crate) struct NoiseJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct RemedyJson {
     pub(crate) change: String,
     pub(crate) unresolved_air_deg_per_h: f64,

@@ -9,6 +9,7 @@ use crate::text::sink::Cell;
 use super::PatternJson;
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct PointJson {
     #[serde(flatten)]
     pub(crate) pattern: PatternJson,
@@ -21,6 +22,7 @@ pub(crate) struct PointJson {
 
 /// The answer of `pareto`.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct ParetoJson {
     pub(crate) model: String,
     pub(crate) seed: u64,

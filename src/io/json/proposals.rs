@@ -11,6 +11,7 @@ use crate::units::deg_per_h_from_rad_per_s;
 
 /// One proposal; the formula's values are in °/h.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct ProposalJson {
     pub(crate) formula: String,
     pub(crate) terms: Vec<TermJson>,
@@ -32,6 +33,7 @@ pub(crate) struct ProposalJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct TermJson {
     /// As the formula of a custom effect.
     pub(crate) text: String,
@@ -45,6 +47,7 @@ pub(crate) struct TermJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct TermParameterJson {
     pub(crate) value: f64,
     pub(crate) standard_error: Option<f64>,
@@ -52,6 +55,7 @@ pub(crate) struct TermParameterJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct AlternativeJson {
     pub(crate) formula: String,
     pub(crate) probability: f64,
@@ -59,6 +63,7 @@ pub(crate) struct AlternativeJson {
 
 /// Points of a picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct ShownJson {
     pub(crate) record: String,
     pub(crate) variable: String,
@@ -136,6 +141,7 @@ fn short(value: f64) -> f64 {
 
 /// As [`super::diagnosis::ExtendJson`], of a proposal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct ProposalExtendJson {
     /// The new model file.
     pub(crate) written: String,

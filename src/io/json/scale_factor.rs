@@ -10,6 +10,7 @@ use crate::units::{
 
 /// A value with its standard error; null where the record determines it just so.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct EstimateJson {
     pub(crate) value: f64,
     pub(crate) standard_error: Option<f64>,
@@ -24,6 +25,7 @@ impl EstimateJson {
 
 /// Of one record on a rate table; of several the mean error, its deviation as repeatability, and the worst of the others.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct ScaleFactorJson {
     /// By how much the gyro shows more than it turns.
     pub(crate) error_ppm: EstimateJson,
@@ -50,6 +52,7 @@ pub(crate) struct ScaleFactorJson {
 
 /// A stretch in which the table turned evenly.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct StretchJson {
     pub(crate) table_rate_deg_per_s: f64,
     /// What the gyro showed beside it.
@@ -117,6 +120,7 @@ impl ScaleFactorJson {
 
 /// What the offset's steps between attitudes show.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct PositionsJson {
     pub(crate) scale_error_ppm: EstimateJson,
     /// Of the gyro itself, without the earth's rate.

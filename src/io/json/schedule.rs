@@ -48,6 +48,7 @@ pub(in crate::io) const STEP_COLUMNS: [&str; 13] = [
 
 /// A schedule, a traveller's data or a machine program.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ScheduleJson {
     pub(crate) schema_version: u32,
@@ -97,6 +98,7 @@ pub struct ScheduleJson {
 
 /// What a document says it takes to wind the pattern.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ClaimedWindability {
     /// "standard", "captive:N" or "any".
@@ -107,6 +109,7 @@ pub struct ClaimedWindability {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ReelJson {
     pub(crate) name: String,
@@ -121,6 +124,7 @@ pub(crate) struct ReelJson {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ProductionJson {
     pub(crate) part_number: String,
@@ -138,6 +142,7 @@ pub(crate) struct ProductionJson {
 
 /// One layer's winding.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct StepJson {
     /// Counted from 1.

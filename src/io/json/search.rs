@@ -37,6 +37,7 @@ impl PatternJson {
 
 /// The answer of `optimise`.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct OptimiseJson {
     pub(crate) model: String,
     pub(crate) objective: String,
@@ -87,6 +88,7 @@ pub struct OptimiseJson {
 
 /// The best with turns of its own at the ends of the fibre.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct EndsJson {
     /// What might be chosen.
     pub(crate) most_left_off_turns: u32,
@@ -117,6 +119,7 @@ impl EndsJson {
 
 /// What windings would cost with the boundary that the model has not.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct OtherBoundaryJson {
     pub(crate) boundary: String,
     /// The winding that would be best there.
@@ -125,6 +128,7 @@ pub(crate) struct OtherBoundaryJson {
 }
 
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct BoundaryCostJson {
     pub(crate) name: String,
     /// Guaranteed where the model has that, else over the profiles.
@@ -147,6 +151,7 @@ impl OtherBoundaryJson {
 
 /// What windings promise over the models that the records allow.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct UncertaintyJson {
     pub(crate) models: usize,
     /// The best first.
@@ -154,6 +159,7 @@ pub(crate) struct UncertaintyJson {
 }
 
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct ProspectJson {
     pub(crate) name: String,
     pub(crate) expected_worst_rate_deg_per_h: f64,
@@ -173,6 +179,7 @@ impl UncertaintyJson {
 
 /// How many times smaller the recommended winding's error is than that of the winding that it replaces.
 #[derive(Debug, Clone, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct GainJson {
     pub(crate) value: f64,
     /// 5 and 95 % of the models that the records allow lie below.
@@ -197,6 +204,7 @@ impl GainJson {
 
 /// Worst admissible profiles that joined the searched ones.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct CutsJson {
     /// The best pattern's worst rate over all searched profiles, and over all admissible ones.
     pub(crate) sampled_worst_rate_deg_per_h: f64,
@@ -208,12 +216,14 @@ pub(crate) struct CutsJson {
 }
 
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct JoinedProfileJson {
     pub(crate) name: String,
     pub(crate) pieces: Vec<JoinedPieceJson>,
 }
 
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct JoinedPieceJson {
     pub(crate) rate_c_per_h: f64,
     pub(crate) duration_s: f64,
@@ -242,6 +252,7 @@ impl CutsJson {
 /// Rates on a grid twice as fine: the guaranteed ones or the pointing errors where the search was for them, the worst ones
 /// otherwise.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct GridCheckJson {
     pub(crate) cells_per_layer: usize,
     pub(crate) finer_cells_per_layer: usize,
@@ -252,6 +263,7 @@ pub(crate) struct GridCheckJson {
 }
 
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct GridCheckedJson {
     pub(crate) name: String,
     #[serde(flatten)]
@@ -260,6 +272,7 @@ pub(crate) struct GridCheckedJson {
 }
 
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(untagged)]
 pub(crate) enum GridRatesJson {
     Worst { worst_rate_deg_per_h: f64, finer_worst_rate_deg_per_h: f64 },
@@ -299,6 +312,7 @@ impl GridCheckJson {
 
 /// Pointing errors that are closer together than this are the same in a coil that is wound.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct PointingResolutionJson {
     /// Between the middle of the fibre and that of the coil: the fibre's diameter.
     pub(crate) midpoint_offset_mm: f64,
@@ -308,6 +322,7 @@ pub(crate) struct PointingResolutionJson {
 
 /// When the best pattern was come upon.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct BestFoundJson {
     /// "classic", "annealing", "shared" where a search for another objective found it, or "bounds" where the search by
     /// bounds at the end found better.
@@ -321,6 +336,7 @@ pub(crate) struct BestFoundJson {
 
 /// A former pattern under the model of this search.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct FormerJson {
     #[serde(flatten)]
     pub(crate) pattern: PatternJson,
@@ -334,6 +350,7 @@ pub(crate) struct FormerJson {
 
 /// What to wind, in one sentence with its reasons.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct RecommendationJson {
     /// Its name.
     pub(crate) pattern: String,
@@ -358,6 +375,7 @@ impl RecommendationJson {
 
 /// Worst rates on profiles that were not searched.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct ValidationJson {
     pub(crate) profiles: usize,
     pub(crate) seed: u64,

@@ -9,11 +9,13 @@ use crate::stress::material::Material;
 use crate::units::{celsius_from_kelvin, mpa_from_pa};
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct MaterialsJson {
     pub(crate) materials: Vec<MaterialJson>,
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct MaterialJson {
     pub(crate) name: String,
     /// "glass", "coating", "adhesive" or "spool"; null for what a model file defines.
@@ -25,6 +27,7 @@ pub(crate) struct MaterialJson {
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct ElasticJson {
     pub(crate) temperature_c: f64,
     pub(crate) youngs_modulus_mpa: f64,
@@ -59,6 +62,7 @@ impl MaterialJson {
 
 /// What a uniform change of temperature does to a coil, per kelvin.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct StressJson {
     pub(crate) model: String,
     /// Whether nothing depends on temperature, so that a guaranteed worst case exists.
@@ -67,6 +71,7 @@ pub(crate) struct StressJson {
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct StressAtJson {
     pub(crate) temperature_c: f64,
     /// The coated fibre by itself, nothing holding it.
@@ -81,12 +86,14 @@ pub(crate) struct StressAtJson {
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct FreeFibreJson {
     pub(crate) expansion_per_k: f64,
     pub(crate) path_per_k: f64,
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct LayerStressJson {
     /// Counted from 1 innermost.
     pub(crate) layer: usize,
@@ -100,6 +107,7 @@ pub(crate) struct LayerStressJson {
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct PatternStressJson {
     pub(crate) name: String,
     /// `mismatch` of the free effect `strain_mismatch` that makes the same error in a steady ramp.
@@ -110,12 +118,14 @@ pub(crate) struct PatternStressJson {
 
 /// Pottings and spools by their effect on the worst case, best first.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct PottingJson {
     pub(crate) model: String,
     pub(crate) choices: Vec<ChoiceJson>,
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct ChoiceJson {
     pub(crate) adhesive: String,
     /// Null for a pack that stands by itself.

@@ -8,6 +8,7 @@ use crate::units::{c_per_h_from_k_per_s, celsius_from_kelvin};
 /// # Shapes
 /// One row a time, one column a layer, innermost first; moments are empty where nothing varies along the axis.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct TemperaturesJson {
     pub(crate) model: String,
     /// The profile's or the record's name.

@@ -6,6 +6,7 @@ use crate::search::cost::tolerance::{Distribution, Measure, ToleranceSpec};
 use crate::units::deg_per_h_from_rad_per_s;
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct ToleranceJson {
     pub(crate) model: String,
     pub(crate) samples: usize,
@@ -17,6 +18,7 @@ pub struct ToleranceJson {
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct DistributionJson {
     pub(crate) name: String,
     pub(crate) nominal_deg_per_h: f64,
@@ -31,6 +33,7 @@ pub(crate) struct DistributionJson {
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct ShareJson {
     pub(crate) spread: &'static str,
     pub(crate) share: f64,

@@ -8,6 +8,7 @@ use crate::diagnose::trim::{End, Trim};
 use crate::units::deg_per_h_from_rad_per_s;
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct TrimJson {
     pub(crate) model: String,
     pub(crate) pattern: String,
@@ -35,6 +36,7 @@ pub struct TrimJson {
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct EstimateJson {
     pub(crate) value: f64,
     pub(crate) standard_error: Option<f64>,
@@ -42,6 +44,7 @@ pub(crate) struct EstimateJson {
 
 /// Where what the winding itself makes is balanced as far as one length can.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct LeastJson {
     pub(crate) cut_m: f64,
     /// "A" or "B".

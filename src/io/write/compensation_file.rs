@@ -21,6 +21,7 @@ use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s};
 
 /// What a stream did.
 #[derive(Debug, Clone, Default, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct StreamSummary {
     /// Rows read.
     pub rows: usize,
@@ -400,6 +401,7 @@ impl<W: Write> Sink<W> {
 
 /// One method on a hold-out.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct MethodJson {
     pub(crate) method: &'static str,
     /// Null where the method cannot be used; `reason` then says why.
@@ -412,6 +414,7 @@ pub(crate) struct MethodJson {
 
 /// The measures of a rate, before or after.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct MeasuresJson {
     pub(crate) bias_deg_per_h: f64,
     pub(crate) bias_stability_deg_per_h: Option<f64>,
@@ -455,6 +458,7 @@ impl MeasuresJson {
 
 /// The answer of `compensate --fit`.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct CompensateJson {
     pub(crate) model: String,
     pub(crate) method: &'static str,
@@ -472,6 +476,7 @@ pub struct CompensateJson {
 
 /// A straight piece of the bias over temperature.
 #[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct BiasLineJson {
     /// Null: to the end.
     pub(crate) until_c: Option<f64>,

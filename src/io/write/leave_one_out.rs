@@ -6,6 +6,7 @@ use super::compensation_file::MeasuresJson;
 
 /// Each record in turn, compensated by what was fitted to the others.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct LeaveOneOutJson {
     /// What is left of all records where only the mean rate of the others is taken off.
     pub by_offset_rms_deg_per_h: f64,
@@ -15,6 +16,7 @@ pub(crate) struct LeaveOneOutJson {
 
 /// A record as it is.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct LeftOutRecordJson {
     pub file: String,
     pub before: MeasuresJson,
@@ -23,6 +25,7 @@ pub(crate) struct LeftOutRecordJson {
 
 /// One method on all records.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct LeftOutMethodJson {
     pub method: &'static str,
     /// Of all records, by what was fitted to all of them; null where the method cannot be used.
@@ -38,6 +41,7 @@ pub(crate) struct LeftOutMethodJson {
 
 /// One method on one record, fitted to the others.
 #[derive(Debug, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct LeftOutJson {
     pub file: String,
     pub rms_deg_per_h: Option<f64>,
