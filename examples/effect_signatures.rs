@@ -15,7 +15,7 @@ use coilwright::pattern::classic::Classic;
 use coilwright::profile::{Piece, Profile};
 use coilwright::rate::{CoilModel, Past, RateModel};
 use coilwright::record::TABLE_RATE;
-use coilwright::report::plot::{Axis, Band, Chart, Series};
+use coilwright::report::plot::{Axis, Band, Chart, ChartSeries};
 use coilwright::thermal::{Drive, Extent, Instant, solve};
 use coilwright::units::{
     REFERENCE_TEMPERATURE_K, deg_per_h_from_rad_per_s, k_per_s_from_c_per_min, min_from_s, rad_per_s_from_deg_per_s,
@@ -104,7 +104,7 @@ fn signature(model: &CoilModel, spec: &'static EffectSpec) -> Result<String, Box
         .size(720, 300)
         .x(Axis::linear("time [min]").reaching(0.0))
         .y(Axis::linear("added rate error [°/h]").reaching(0.0))
-        .with(Series::line("", points.collect()));
+        .with(ChartSeries::line("", points.collect()));
     let mut start_min = 0.0;
     for (rate, duration_min) in PIECES {
         let end_min = start_min + duration_min;

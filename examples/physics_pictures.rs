@@ -11,7 +11,7 @@ use coilwright::pattern::classic::Classic;
 use coilwright::profile::{Piece, Profile};
 use coilwright::rate::{CoilModel, RateModel};
 use coilwright::report::cross_section::cross_section;
-use coilwright::report::plot::{Axis, Chart, Series};
+use coilwright::report::plot::{Axis, Chart, ChartSeries};
 use coilwright::thermal::{Drive, Extent, Instant, ThermalHistory, solve};
 use coilwright::units::{REFERENCE_TEMPERATURE_K, deg_per_h_from_rad_per_s, k_per_s_from_c_per_min, s_from_min};
 
@@ -54,7 +54,7 @@ fn weights() -> Result<String, Box<dyn Error>> {
         let pattern = classic.pattern(LAYERS)?;
         let weight = |segment: usize| 2.0 * segment as f64 - 1.0 - LAYERS as f64;
         let points = pattern.segments().iter().enumerate().map(|(j, s)| (j as f64 + 1.0, weight(*s))).collect();
-        chart = chart.with(Series::line(classic.key(), points));
+        chart = chart.with(ChartSeries::line(classic.key(), points));
     }
     Ok(chart.svg())
 }
@@ -80,9 +80,9 @@ fn warming(pack: &CoilModel) -> Result<String, Box<dyn Error>> {
         (0..history.len()).map(|i| (history.times_s[i], history.rates_k_per_s(i)[layer] / ramp)).collect()
     };
     for layer in [LAYERS - 1, LAYERS - 2, LAYERS / 2, 0] {
-        chart = chart.with(Series::line(format!("layer {}", layer + 1), series(&inside, layer)));
+        chart = chart.with(ChartSeries::line(format!("layer {}", layer + 1), series(&inside, layer)));
     }
-    Ok(chart.with(Series::dashed("layer 1 in a half space", series(&behind, 0))).svg())
+    Ok(chart.with(ChartSeries::dashed("layer 1 in a half space", series(&behind, 0))).svg())
 }
 
 fn error(model: &CoilModel) -> Result<String, Box<dyn Error>> {
@@ -94,7 +94,7 @@ fn error(model: &CoilModel) -> Result<String, Box<dyn Error>> {
     for classic in [Classic::Zyl, Classic::Dip, Classic::Qua] {
         let rates = RateModel::new(model, &classic.pattern(LAYERS)?, &[])?.series_rad_per_s(&history);
         let points = history.times_s.iter().zip(rates).map(|(t, r)| (*t, deg_per_h_from_rad_per_s(r)));
-        chart = chart.with(Series::line(classic.key(), points.collect()));
+        chart = chart.with(ChartSeries::line(classic.key(), points.collect()));
     }
     Ok(chart.svg())
 }

@@ -29,7 +29,7 @@ use crate::thermal::{GivenField, ThermalError, ThermalHistory};
 /// # Shapes
 /// One entry a row of the record.
 #[derive(Debug, Clone)]
-pub struct Prediction {
+pub struct RecordPrediction {
     /// With the offset.
     pub rate_rad_per_s: Vec<f64>,
     /// The record's bias, as estimated; contained in the rates.
@@ -224,7 +224,7 @@ pub fn estimate_boundary(model: &CoilModel, pattern: &Pattern, record: &Record) 
 ///
 /// # Errors
 /// As [`read`].
-pub fn predict(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<Prediction, PredictError> {
+pub fn predict(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<RecordPrediction, PredictError> {
     predict_from(model, pattern, record, &estimate_boundary(model, pattern, record)?)
 }
 
@@ -237,7 +237,7 @@ pub fn predict_from(
     pattern: &Pattern,
     record: &Record,
     boundary: &Boundary,
-) -> Result<Prediction, PredictError> {
+) -> Result<RecordPrediction, PredictError> {
     let rows = record.rows();
     let names: Vec<String> = record.channels().iter().map(|c| c.name.clone()).collect();
     let rate = RateModel::new(model, pattern, &names)?;
@@ -276,7 +276,7 @@ pub fn predict_from(
         sum += weight * (measured - predicted);
     }
     let offset_rad_per_s = sum / weights;
-    Ok(Prediction {
+    Ok(RecordPrediction {
         rate_rad_per_s: coil_rad_per_s.iter().map(|r| r + offset_rad_per_s).collect(),
         offset_rad_per_s,
         boundary_variance_rad2_per_s2: boundary_variance,

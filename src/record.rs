@@ -28,7 +28,7 @@ pub(crate) fn layer_channel(layer: usize) -> String {
 
 /// One row of what every record has.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Row {
+pub struct RecordRow {
     pub(crate) time_s: f64,
     pub(crate) temperature_k: f64,
     /// Beside the table's, where the gyro stood on one.
@@ -252,9 +252,9 @@ impl Record {
     }
 
     /// Row by row what every record has.
-    pub(crate) fn each_row(&self) -> impl Iterator<Item = Row> {
+    pub(crate) fn each_row(&self) -> impl Iterator<Item = RecordRow> {
         let table = self.channels.iter().find(|c| c.name == TABLE_RATE).map(|c| c.values.as_slice());
-        (0..self.rows()).map(move |i| Row {
+        (0..self.rows()).map(move |i| RecordRow {
             time_s: self.times_s[i],
             temperature_k: self.temperature_k[i],
             rate_rad_per_s: self.rate_rad_per_s[i],

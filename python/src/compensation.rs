@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
-use coilwright::compensate::formulas::Columns;
+use coilwright::compensate::formulas::FormulaColumns;
 use coilwright::compensate::stream::{Compensated, Reading, Stream};
 use coilwright::compensate::{Compensator, Method};
 use coilwright::io::files::NewFile;
@@ -199,7 +199,7 @@ impl StreamHandle {
         channels: Vec<Option<f64>>,
     ) -> PyResult<Vec<Out>> {
         let finite = |value: Option<f64>| value.filter(|v| v.is_finite());
-        let mut columns = Columns::default();
+        let mut columns = FormulaColumns::default();
         let channel_rad_per_s = match self.compensator.as_ref() {
             Compensator::Physical(physical) => {
                 // The columns of formulas stand behind those of the channels' own effects.

@@ -57,7 +57,8 @@ fn class(py: Python, options: &SearchOptions, usual: WindabilityClass) -> PyResu
 
 /// What was found, in the shape of the other searches' documents.
 fn told(answer: &CustomAnswer, shown: fn(f64) -> f64, class: WindabilityClass, seed: u64, seconds: f64) -> Value {
-    let found = |f: &coilwright::search::anneal::rounds::Found| json!({"cost": shown(f.cost), "segments": f.segments});
+    let found =
+        |f: &coilwright::search::anneal::rounds::FoundPattern| json!({"cost": shown(f.cost), "segments": f.segments});
     json!({
         "windability": class.to_string(),
         "seed": seed,

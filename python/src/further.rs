@@ -18,7 +18,7 @@ use coilwright::report::yan1998::ReproductionFile;
 use coilwright::report::{thesis2021 as thesis_page, yan1998 as paper_page};
 use coilwright::reproduce::thesis2021::ThesisError;
 use coilwright::reproduce::{thesis2021, yan1998};
-use coilwright::task::campaign::Part;
+use coilwright::task::campaign::CampaignPart;
 use coilwright::task::campaign::carrying_out::{Face, compute, merge};
 use coilwright::task::page::{REPORT_FILE, is_in, write_report};
 use coilwright::task::{self, Observer, TaskError};
@@ -89,7 +89,7 @@ pub fn campaign(
     let worked = work(py, progress, move |watcher| {
         let read = read_campaign(&campaign)?;
         let all = read.cells()?;
-        let whole = Part::whole(&read, &all);
+        let whole = CampaignPart::whole(&read, &all);
         let folder = match &output {
             Some(folder) if !lists => folder,
             folder => return Ok(document(whole.answer(folder.as_deref(), 0))?),
@@ -99,8 +99,8 @@ pub fn campaign(
             return Ok(document(merge(&whole, folder, 0, &watcher)?)?);
         }
         let part = match shard {
-            Some((index, count)) => Part::dealt(&read, &all, index, count),
-            None if !cells.is_empty() => Part::of_ids(&read, &all, &cells)?,
+            Some((index, count)) => CampaignPart::dealt(&read, &all, index, count),
+            None if !cells.is_empty() => CampaignPart::of_ids(&read, &all, &cells)?,
             None => whole,
         };
         let is_whole = shard.is_none() && cells.is_empty();
@@ -138,7 +138,7 @@ pub fn campaign_workflow(
     let worked = work(py, None, move |_| {
         let read = read_campaign(&campaign)?;
         let all = read.cells()?;
-        let whole = Part::whole(&read, &all);
+        let whole = CampaignPart::whole(&read, &all);
         let workflow = Workflow {
             engine,
             program: &program,
@@ -182,12 +182,12 @@ pub fn reproduce(py: Python, publication: String, output: Option<PathBuf>) -> Py
             "yan1998" => {
                 let found = yan1998::reproduce()?;
                 let files = written(output.as_ref(), &paper_page::files(&found, &command))?;
-                Ok(document(paper_page::ReproductionJson::new(&found, files))?)
+                Ok(document(paper_page::PaperReproductionJson::new(&found, files))?)
             }
             "thesis2021" => {
                 let found = thesis2021::reproduce().map_err(of_thesis)?;
                 let files = written(output.as_ref(), &thesis_page::files(&found, &command))?;
-                Ok(document(thesis_page::ReproductionJson::new(&found, files))?)
+                Ok(document(thesis_page::ThesisReproductionJson::new(&found, files))?)
             }
             found => {
                 let message = format!("expected yan1998 or thesis2021, found \"{found}\"");

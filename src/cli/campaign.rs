@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use clap::ValueEnum;
 
 use super::budget::parse_duration;
-use super::progress::{Progress, StopFlag};
+use super::progress::{StopFlag, TaskProgress};
 use super::screen::{Screen, held, table};
 use super::watching::Watching;
 use super::{CliError, Ending};
@@ -17,7 +17,7 @@ use crate::io::write::workflow::{self, Workflow};
 use crate::report::built_coils::built_coils_table;
 use crate::report::campaign::recommendations;
 use crate::task::Observer;
-use crate::task::campaign::Part;
+use crate::task::campaign::CampaignPart;
 use crate::task::campaign::carrying_out::{Face, compute, merge, missing_words};
 
 /// A grid of searches, a million built coils, or the gyros of a fleet, on one machine or many
@@ -100,7 +100,7 @@ pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliE
     }
     let campaign = read_campaign(&arguments.campaign)?;
     let cells = campaign.cells()?;
-    let whole = Part::whole(&campaign, &cells);
+    let whole = CampaignPart::whole(&campaign, &cells);
     let folder = match &arguments.output {
         Some(folder) if !arguments.list => folder,
         folder => return list(&whole, folder.as_deref(), screen),
@@ -113,8 +113,8 @@ pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliE
         return merged(&whole, folder, 0, screen);
     }
     let part = match arguments.shard {
-        Some(Shard { index, count }) => Part::dealt(&campaign, &cells, index, count),
-        None if !arguments.cell.is_empty() => Part::of_ids(&campaign, &cells, &arguments.cell)?,
+        Some(Shard { index, count }) => CampaignPart::dealt(&campaign, &cells, index, count),
+        None if !arguments.cell.is_empty() => CampaignPart::of_ids(&campaign, &cells, &arguments.cell)?,
         None => whole,
     };
     let is_whole = arguments.shard.is_none() && arguments.cell.is_empty();
@@ -144,7 +144,7 @@ pub(crate) fn run(arguments: &Arguments, screen: &Screen) -> Result<Ending, CliE
     Ok(if is_complete { Ending::Done } else { Ending::No })
 }
 
-fn list(whole: &Part, folder: Option<&Path>, screen: &Screen) -> Result<Ending, CliError> {
+fn list(whole: &CampaignPart, folder: Option<&Path>, screen: &Screen) -> Result<Ending, CliError> {
     screen.answer(whole.answer(folder, 0), listed)?;
     Ok(Ending::Done)
 }
@@ -160,7 +160,7 @@ fn program_of(screen: &Screen) -> Result<PathBuf, CliError> {
 fn emit(
     arguments: &Arguments,
     engine: Engine,
-    whole: &Part,
+    whole: &CampaignPart,
     folder: &Path,
     screen: &Screen,
 ) -> Result<Ending, CliError> {
@@ -198,7 +198,7 @@ fn emit(
 }
 
 /// The table of a whole campaign, unless something is missing.
-fn merged(whole: &Part, folder: &Path, searched: usize, screen: &Screen) -> Result<Ending, CliError> {
+fn merged(whole: &CampaignPart, folder: &Path, searched: usize, screen: &Screen) -> Result<Ending, CliError> {
     let answer = merge(whole, folder, searched, &Watching::quiet(screen))?;
     let is_complete = answer.missing.is_empty();
     screen.answer(answer, |answer| text(answer, true))?;
@@ -208,7 +208,7 @@ fn merged(whole: &Part, folder: &Path, searched: usize, screen: &Screen) -> Resu
 /// Shows how many cells are done, and lets the state of a long one be kept from time to time.
 struct Carrying<'a> {
     screen: &'a Screen,
-    progress: Progress,
+    progress: TaskProgress,
     cells: usize,
     stop: &'a StopFlag,
     every: Duration,

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::pattern_asked::pattern_asked;
-use super::records::{GrossErrors, RecordArguments};
+use super::records::{GrossErrorChoice, RecordArguments};
 use super::screen::{Screen, held, table};
 use super::watching::Watching;
 use super::{CliError, Ending, offered};
@@ -34,8 +34,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE")]
     field: Vec<PathBuf>,
     /// What to do with values that stand alone
-    #[arg(long, value_enum, default_value_t = GrossErrors::Keep)]
-    gross_errors: GrossErrors,
+    #[arg(long, value_enum, default_value_t = GrossErrorChoice::Keep)]
+    gross_errors: GrossErrorChoice,
     /// Exit code 1 when the model is not adequate
     #[arg(long)]
     strict: bool,

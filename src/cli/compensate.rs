@@ -40,8 +40,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "RECORD")]
     fit: Vec<PathBuf>,
     /// How to compensate
-    #[arg(long, value_enum, default_value_t = Way::Physical)]
-    method: Way,
+    #[arg(long, value_enum, default_value_t = MethodChoice::Physical)]
+    method: MethodChoice,
     /// Fits every method and shows how well each does on the record; with several --fit, also on each of those, fitted to the
     /// others
     #[arg(long, requires = "fit")]
@@ -73,7 +73,7 @@ pub(crate) struct Arguments {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Way {
+enum MethodChoice {
     /// The model's own physics
     Physical,
     /// Straight lines over temperature
@@ -84,13 +84,13 @@ enum Way {
     Learned,
 }
 
-impl From<Way> for Method {
-    fn from(way: Way) -> Self {
+impl From<MethodChoice> for Method {
+    fn from(way: MethodChoice) -> Self {
         match way {
-            Way::Physical => Method::Physical,
-            Way::Piecewise => Method::Piecewise,
-            Way::Regression => Method::Regression,
-            Way::Learned => Method::Learned,
+            MethodChoice::Physical => Method::Physical,
+            MethodChoice::Piecewise => Method::Piecewise,
+            MethodChoice::Regression => Method::Regression,
+            MethodChoice::Learned => Method::Learned,
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::screen::Screen;
 use super::{CliError, Ending, offered};
 use crate::effect::{CATALOGUE, CHANNEL, CUSTOM, THERMAL_STRESS};
-use crate::io::json::effects::{EffectJson, EffectsJson, ParameterJson};
+use crate::io::json::effects::{EffectJson, EffectParameterJson, EffectsJson};
 use crate::task::extend::unknown_effect;
 
 /// The effects that a model file can declare, with equations, parameters and sources
@@ -48,7 +48,7 @@ fn describe(effect: &EffectJson) -> String {
     text
 }
 
-fn parameter_line(parameter: &ParameterJson) -> String {
+fn parameter_line(parameter: &EffectParameterJson) -> String {
     let default = parameter.default.map_or(String::new(), |value| format!(", default {value}"));
     format!(
         "{} [{}]: {}; {} … {}, a fit starts at {}{default}",

@@ -9,7 +9,7 @@ use super::watching::Watching;
 use super::{CliError, Ending, offered};
 use crate::io::folder::check_file;
 use crate::io::json::comparison::{PartJson, RecordComparisonJson};
-use crate::io::json::diagnosis::ExtendJson;
+use crate::io::json::extend::ExtendJson;
 use crate::io::json::proposals::ProposalExtendJson;
 use crate::io::read::model_file::read_model;
 use crate::report::diagnosis::value_in_words;

@@ -3,13 +3,14 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::records::{GrossErrors, RecordArguments};
+use super::records::{GrossErrorChoice, RecordArguments};
 use super::screen::{Screen, held, table};
 use super::watching::Watching;
 use super::{CliError, Ending};
+use crate::io::json::EstimateJson;
 use crate::io::json::inputs::RecordInputJson;
 use crate::io::json::metrics::{MetricsJson, NoiseJson, RecordMetricsJson};
-use crate::io::json::scale_factor::{EstimateJson, PositionsJson, ScaleFactorJson};
+use crate::io::json::scale_factor::{PositionsJson, ScaleFactorJson};
 use crate::io::read::record_columns::RecordFormat;
 use crate::io::read::table_file::Source;
 use crate::io::write::measurement_folder::{METRICS_FILE, check_free, check_kept};
@@ -42,8 +43,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "DEG,…", allow_hyphen_values = true, value_delimiter = ',', requires = "elevation")]
     azimuth: Vec<f64>,
     /// What to do with values that stand alone
-    #[arg(long, value_enum, default_value_t = GrossErrors::Keep)]
-    gross_errors: GrossErrors,
+    #[arg(long, value_enum, default_value_t = GrossErrorChoice::Keep)]
+    gross_errors: GrossErrorChoice,
     /// Writes metrics.json, the pictures of the Allan deviation and report.html into this folder
     #[arg(long, short, value_name = "DIR")]
     output: Option<PathBuf>,

@@ -17,7 +17,7 @@ use crate::search::run::RunError;
 use crate::task::TaskError;
 use crate::task::evaluate::{COLUMNS, cells};
 use crate::task::optimise::Wishes;
-use crate::task::under_fields::{self, FieldFile, Search};
+use crate::task::under_fields::{self, FieldFile, FieldSearch};
 
 pub(super) fn run(
     arguments: &Arguments,
@@ -49,7 +49,7 @@ pub(super) fn run(
     let started = Instant::now();
     let is_taken_up = folder.is_some_and(|f| arguments.resume && f.join(CHECKPOINT_FILE).exists());
     let mut watch = Watch::new(arguments, &request, budget, started, stop, screen, is_taken_up);
-    let search = Search {
+    let search = FieldSearch {
         model: file,
         fields: &fields,
         class,

@@ -40,7 +40,7 @@ struct ProgressLine<'a> {
 
 /// Shows how far a task is. Safe to call from several threads.
 #[derive(Debug)]
-pub(crate) struct Progress {
+pub(crate) struct TaskProgress {
     task: String,
     total: Option<u64>,
     shown: Shown,
@@ -56,7 +56,7 @@ enum Shown {
     Nothing,
 }
 
-impl Progress {
+impl TaskProgress {
     /// `total` counts whatever `at` will count; none where the end is not known.
     pub(crate) fn new(mode: ProgressMode, quiet: bool, task: &str, total: Option<u64>) -> Self {
         let shown = match mode {
@@ -115,7 +115,7 @@ impl Progress {
     }
 }
 
-impl Drop for Progress {
+impl Drop for TaskProgress {
     fn drop(&mut self) {
         self.finish();
     }

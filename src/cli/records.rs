@@ -11,18 +11,18 @@ use crate::task::measurement::{self, Measurement};
 
 /// What to do with values that stand alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum GrossErrors {
+pub(crate) enum GrossErrorChoice {
     /// Report them and use them
     Keep,
     /// Report them and leave their rows out
     Drop,
 }
 
-impl From<GrossErrors> for measurement::GrossErrors {
-    fn from(wish: GrossErrors) -> Self {
+impl From<GrossErrorChoice> for measurement::GrossErrors {
+    fn from(wish: GrossErrorChoice) -> Self {
         match wish {
-            GrossErrors::Keep => Self::Keep,
-            GrossErrors::Drop => Self::Drop,
+            GrossErrorChoice::Keep => Self::Keep,
+            GrossErrorChoice::Drop => Self::Drop,
         }
     }
 }

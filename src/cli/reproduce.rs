@@ -7,7 +7,7 @@ use clap::ValueEnum;
 use super::screen::{Screen, held, table};
 use super::{CliError, Ending};
 use crate::report::thesis2021 as thesis;
-use crate::report::yan1998::{ReproductionFile, ReproductionJson, TABLE_HEAD, files, table_rows};
+use crate::report::yan1998::{PaperReproductionJson, ReproductionFile, TABLE_HEAD, files, table_rows};
 use crate::reproduce::{thesis2021, yan1998};
 use crate::task;
 use crate::text::sink::Line;
@@ -49,7 +49,7 @@ fn write(folder: &Path, files: &[ReproductionFile]) -> Result<Vec<String>, CliEr
 fn of_thesis(folder: &Path, screen: &Screen) -> Result<Ending, CliError> {
     let reproduction = thesis2021::reproduce()?;
     let written = write(folder, &thesis::files(&reproduction, "coilwright reproduce thesis2021"))?;
-    screen.answer(thesis::ReproductionJson::new(&reproduction, written), |body| {
+    screen.answer(thesis::ThesisReproductionJson::new(&reproduction, written), |body| {
         let mut text = format!("{}\n\nThe record is {}.\n\n", thesis2021::TITLE, body.record);
         text += &table(&thesis::TABLE_HEAD, thesis::table_rows(&reproduction));
         text += "\nErrata: what is printed and what is used\n";
@@ -64,7 +64,7 @@ fn of_thesis(folder: &Path, screen: &Screen) -> Result<Ending, CliError> {
 fn of_paper(folder: &Path, screen: &Screen) -> Result<Ending, CliError> {
     let reproduction = yan1998::reproduce()?;
     let written = write(folder, &files(&reproduction, "coilwright reproduce yan1998"))?;
-    screen.answer(ReproductionJson::new(&reproduction, written), |body| {
+    screen.answer(PaperReproductionJson::new(&reproduction, written), |body| {
         let mut text = format!("{}\n\nTable 2, published beside computed\n", yan1998::TITLE);
         text += &table(&TABLE_HEAD, table_rows(&reproduction));
         text += "\nsym is Eq. (14), sym-text the winding that the text describes\n\nTable and equations\n";

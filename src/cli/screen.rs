@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 use serde::Serialize;
 
-use super::progress::{Progress, ProgressMode};
+use super::progress::{ProgressMode, TaskProgress};
 use super::{CliError, Format, OutputOptions};
 use crate::io::folder::HeldFolder;
 use crate::io::json::Document;
@@ -95,9 +95,9 @@ impl Screen {
         stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()).map_err(CliError::Stdout)
     }
 
-    /// Shows the progress of a task; see [`Progress::new`].
-    pub(crate) fn progress(&self, task: &str, total: Option<u64>) -> Progress {
-        Progress::new(self.progress, self.quiet, task, total)
+    /// Shows the progress of a task; see [`TaskProgress::new`].
+    pub(crate) fn progress(&self, task: &str, total: Option<u64>) -> TaskProgress {
+        TaskProgress::new(self.progress, self.quiet, task, total)
     }
 
     /// A note to the person at the terminal: one line, which a terminal gets broken between words.

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::CliError;
 use super::optimise::Arguments;
-use super::progress::{Progress, StopFlag};
+use super::progress::{StopFlag, TaskProgress};
 use super::screen::Screen;
 use crate::io::files::WriteError;
 use crate::io::write::checkpoint::write_checkpoint;
@@ -42,8 +42,8 @@ pub(super) struct Watch<'a> {
     stop: &'a StopFlag,
     screen: &'a Screen,
     checkpoints: Option<Checkpoints<'a>>,
-    progress: Option<Progress>,
-    proof_progress: OnceLock<(Progress, Instant)>,
+    progress: Option<TaskProgress>,
+    proof_progress: OnceLock<(TaskProgress, Instant)>,
     best_cost: f64,
     /// Seconds until the best pattern was found.
     pub(crate) found_s: f64,

@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use super::progress::{Progress, StopFlag};
+use super::progress::{StopFlag, TaskProgress};
 use super::screen::Screen;
 use crate::task::Observer;
 
@@ -15,7 +15,7 @@ pub(super) struct Watching<'a> {
     screen: &'a Screen,
     /// None where no progress is shown.
     task: Option<&'static str>,
-    progress: OnceLock<Progress>,
+    progress: OnceLock<TaskProgress>,
     stop: Option<&'a StopFlag>,
     until: Option<Instant>,
 }

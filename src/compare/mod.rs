@@ -32,14 +32,14 @@ pub mod verdict;
 use crate::diagnose::{Standing, standing};
 use crate::numeric::statistics::{LjungBox, autocorrelation, autocorrelation_band_99, correlation, rms};
 use crate::pattern::Pattern;
-use crate::predict::{self, Boundary, PredictError, Prediction};
+use crate::predict::{self, Boundary, PredictError, RecordPrediction};
 use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::thermal::GivenField;
 use crate::units::percent_from_fraction;
-use regimes::{Part, Regime, Regimes};
+use regimes::{RecordPart, Regime, Regimes};
 use sensors::SensorMisfit;
-use verdict::{Finding, Verdict};
+use verdict::{Adequacy, ResidualFinding};
 
 /// Everything that was found out about one record and one model.
 #[derive(Debug, Clone)]
@@ -67,17 +67,17 @@ pub struct Comparison {
     pub(crate) ljung_box: LjungBox,
     pub(crate) correlations: Vec<Correlation>,
     /// The record by what the drive does; see [`Regime`].
-    pub regimes: Vec<Part>,
+    pub regimes: Vec<RecordPart>,
     /// One entry a row.
     pub(crate) regime_of_row: Vec<Regime>,
-    pub(crate) temperature_bands: Vec<Part>,
-    pub(crate) rate_bands: Vec<Part>,
+    pub(crate) temperature_bands: Vec<RecordPart>,
+    pub(crate) rate_bands: Vec<RecordPart>,
     /// Where the error lies, what matters most first.
-    pub findings: Vec<Finding>,
+    pub findings: Vec<ResidualFinding>,
     /// Whether the model is adequate for the record.
-    pub verdict: Verdict,
+    pub verdict: Adequacy,
     /// One entry a row.
-    pub prediction: Prediction,
+    pub prediction: RecordPrediction,
     pub(crate) residual_rad_per_s: Vec<f64>,
     /// With its standard error; None where the model's own film counts.
     pub(crate) film_w_per_m2_k: Option<(f64, f64)>,
@@ -98,7 +98,7 @@ pub(crate) struct LargestError {
 /// What the residual may go along with.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Quantity {
+pub enum Covariate {
     /// T of the pack's mean.
     Temperature,
     /// dT/dt of the pack's mean.
@@ -115,23 +115,23 @@ pub enum Quantity {
     Channel(String),
 }
 
-impl std::fmt::Display for Quantity {
+impl std::fmt::Display for Covariate {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Quantity::Temperature => f.write_str("T"),
-            Quantity::TemperatureRate => f.write_str("dT/dt"),
-            Quantity::Gradient => f.write_str("T_out - T_in"),
-            Quantity::GradientRate => f.write_str("d(T_out - T_in)/dt"),
-            Quantity::Prediction => f.write_str("the prediction"),
-            Quantity::PredictionByDirection => f.write_str("the prediction times the sign of dT/dt"),
-            Quantity::Channel(name) => f.write_str(name),
+            Covariate::Temperature => f.write_str("T"),
+            Covariate::TemperatureRate => f.write_str("dT/dt"),
+            Covariate::Gradient => f.write_str("T_out - T_in"),
+            Covariate::GradientRate => f.write_str("d(T_out - T_in)/dt"),
+            Covariate::Prediction => f.write_str("the prediction"),
+            Covariate::PredictionByDirection => f.write_str("the prediction times the sign of dT/dt"),
+            Covariate::Channel(name) => f.write_str(name),
         }
     }
 }
 
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Correlation {
-    pub(crate) with: Quantity,
+    pub(crate) with: Covariate,
     /// None where the quantity does not vary.
     pub(crate) value: Option<f64>,
 }
@@ -219,7 +219,7 @@ fn judged(
         temperature_bands: cut.temperature_bands(&residual, &scaled),
         rate_bands: cut.rate_bands(&residual, &scaled),
         findings: Vec::new(),
-        verdict: Verdict::Adequate,
+        verdict: Adequacy::Adequate,
         residual_rad_per_s: residual,
         film_w_per_m2_k,
         bends_s: bends.iter().map(|b| b.time_s).collect(),
@@ -231,22 +231,22 @@ fn judged(
     Ok(found)
 }
 
-fn correlations(residual: &[f64], record: &Record, prediction: &Prediction) -> Vec<Correlation> {
+fn correlations(residual: &[f64], record: &Record, prediction: &RecordPrediction) -> Vec<Correlation> {
     let of = |f: fn(&predict::PackRow) -> f64| prediction.pack.iter().map(f).collect::<Vec<f64>>();
     let coil: Vec<f64> = prediction.rate_rad_per_s.iter().map(|r| r - prediction.offset_rad_per_s).collect();
     let directed: Vec<f64> = coil.iter().zip(&prediction.pack).map(|(c, p)| c * p.mean_rate_k_per_s.signum()).collect();
     let own = [
-        (Quantity::Temperature, of(|p| p.mean_k)),
-        (Quantity::TemperatureRate, of(|p| p.mean_rate_k_per_s)),
-        (Quantity::Gradient, of(|p| p.gradient_k)),
-        (Quantity::GradientRate, of(|p| p.gradient_rate_k_per_s)),
-        (Quantity::Prediction, coil),
-        (Quantity::PredictionByDirection, directed),
+        (Covariate::Temperature, of(|p| p.mean_k)),
+        (Covariate::TemperatureRate, of(|p| p.mean_rate_k_per_s)),
+        (Covariate::Gradient, of(|p| p.gradient_k)),
+        (Covariate::GradientRate, of(|p| p.gradient_rate_k_per_s)),
+        (Covariate::Prediction, coil),
+        (Covariate::PredictionByDirection, directed),
     ];
     let own = own.into_iter().map(|(with, values)| Correlation { with, value: correlation(residual, &values) });
     let channels = record
         .channels()
         .iter()
-        .map(|c| Correlation { with: Quantity::Channel(c.name.clone()), value: correlation(residual, &c.values) });
+        .map(|c| Correlation { with: Covariate::Channel(c.name.clone()), value: correlation(residual, &c.values) });
     own.chain(channels).collect()
 }

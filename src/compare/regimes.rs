@@ -5,7 +5,7 @@
 //! time constant behind the film); **soak**, the outer layer's rate within 5 % of the record's usual largest;
 //! **heating ramp** or **cooling ramp**.
 
-use crate::predict::{Boundary, PredictError, Prediction};
+use crate::predict::{Boundary, PredictError, RecordPrediction};
 use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::thermal::pack::Pack;
@@ -55,7 +55,7 @@ impl Regime {
 
 /// One part of a record.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Part {
+pub struct RecordPart {
     pub(crate) name: String,
     pub(crate) rows: usize,
     pub(crate) share_of_rows: f64,
@@ -82,7 +82,7 @@ impl Regimes {
         model: &CoilModel,
         record: &Record,
         boundary: &Boundary,
-        prediction: &Prediction,
+        prediction: &RecordPrediction,
     ) -> Result<Self, PredictError> {
         let outer: Vec<f64> = prediction.pack.iter().map(|p| p.outer_rate_k_per_s).collect();
         let mut sizes: Vec<f64> = outer.iter().map(|r| r.abs()).collect();
@@ -125,16 +125,16 @@ impl Regimes {
         self.of_row.iter().map(|&place| Regime::ALL[place]).collect()
     }
 
-    pub(super) fn regimes(&self, residual: &[f64], scaled: &[f64]) -> Vec<Part> {
+    pub(super) fn regimes(&self, residual: &[f64], scaled: &[f64]) -> Vec<RecordPart> {
         let names: Vec<String> = Regime::ALL.iter().map(|r| r.key().to_owned()).collect();
         parts(&names, &self.of_row, residual, scaled)
     }
 
-    pub(super) fn temperature_bands(&self, residual: &[f64], scaled: &[f64]) -> Vec<Part> {
+    pub(super) fn temperature_bands(&self, residual: &[f64], scaled: &[f64]) -> Vec<RecordPart> {
         parts(&self.temperature_names, &self.temperature_band, residual, scaled)
     }
 
-    pub(super) fn rate_bands(&self, residual: &[f64], scaled: &[f64]) -> Vec<Part> {
+    pub(super) fn rate_bands(&self, residual: &[f64], scaled: &[f64]) -> Vec<RecordPart> {
         parts(&self.rate_names, &self.rate_band, residual, scaled)
     }
 }
@@ -182,7 +182,7 @@ fn rate_bands(rate_k_per_s: &[f64], usual_largest: f64) -> (Vec<usize>, Vec<Stri
 }
 
 /// Parts without rows are left out.
-fn parts(names: &[String], places: &[usize], residual: &[f64], scaled: &[f64]) -> Vec<Part> {
+fn parts(names: &[String], places: &[usize], residual: &[f64], scaled: &[f64]) -> Vec<RecordPart> {
     let whole: f64 = residual.iter().map(|r| r * r).sum();
     let mut sums = vec![(0usize, 0.0, 0.0); names.len()];
     for ((place, r), s) in places.iter().zip(residual).zip(scaled) {
@@ -193,7 +193,7 @@ fn parts(names: &[String], places: &[usize], residual: &[f64], scaled: &[f64]) -
         .iter()
         .zip(sums)
         .filter(|(_, (rows, _, _))| *rows > 0)
-        .map(|(name, (rows, square, chi))| Part {
+        .map(|(name, (rows, square, chi))| RecordPart {
             name: name.clone(),
             rows,
             share_of_rows: rows as f64 / residual.len() as f64,

@@ -3,13 +3,13 @@
 //! A part of the record stands out where its χ² per row exceeds what chance and a little allow; the residual follows a
 //! quantity where taking that quantity out would lower χ² by more than chance and a little allow.
 
-use super::regimes::{Part, Regime};
-use super::{Comparison, Quantity};
+use super::regimes::{RecordPart, Regime};
+use super::{Comparison, Covariate};
 use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
 
 /// Whether a model is adequate for a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
+pub enum Adequacy {
     /// What is left is the record's noise.
     Adequate,
     /// The model lacks something.
@@ -19,7 +19,7 @@ pub enum Verdict {
 /// One statement about where the error lies.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub enum Finding {
+pub enum ResidualFinding {
     /// The whole χ² is too large.
     Excess {
         /// Reduced χ² against noise and boundary.
@@ -57,7 +57,7 @@ pub enum Finding {
     /// The residual follows a quantity.
     Follows {
         /// Which one.
-        quantity: Quantity,
+        quantity: Covariate,
         /// From −1 to 1.
         correlation: f64,
     },
@@ -96,17 +96,17 @@ pub enum Finding {
     },
 }
 
-impl std::fmt::Display for Finding {
+impl std::fmt::Display for ResidualFinding {
     #[expect(clippy::too_many_lines, reason = "a sentence for each finding")]
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let percent = |share: &f64| format!("{:.0} %", percent_from_fraction(*share));
         match self {
-            Finding::Excess { whitened_chi_square } => write!(
+            ResidualFinding::Excess { whitened_chi_square } => write!(
                 f,
                 "the residual is {:.2} times what the record's noise and the boundary's uncertainty explain (reduced chi-square {whitened_chi_square:.3})",
                 whitened_chi_square.max(0.0).sqrt()
             ),
-            Finding::Regime { regime, share, share_of_rows, transient_s } => {
+            ResidualFinding::Regime { regime, share, share_of_rows, transient_s } => {
                 let place = match regime {
                     Regime::WarmUp => "in the warm-up at the start".to_owned(),
                     Regime::Transient => format!("in the {transient_s:.0} s after each change of ramp"),
@@ -121,41 +121,41 @@ impl std::fmt::Display for Finding {
                     percent(share_of_rows)
                 )
             }
-            Finding::TemperatureBand { band, share, share_of_rows } => write!(
+            ResidualFinding::TemperatureBand { band, share, share_of_rows } => write!(
                 f,
                 "{} of the squared error lies at {band}, in {} of the rows",
                 percent(share),
                 percent(share_of_rows)
             ),
-            Finding::RateBand { band, share, share_of_rows } => write!(
+            ResidualFinding::RateBand { band, share, share_of_rows } => write!(
                 f,
                 "{} of the squared error lies where dT/dt is {band}, in {} of the rows",
                 percent(share),
                 percent(share_of_rows)
             ),
-            Finding::Follows { quantity, correlation } => {
+            ResidualFinding::Follows { quantity, correlation } => {
                 write!(f, "the residual follows {quantity} (correlation {correlation:.2})")
             }
-            Finding::Wanted { gain } => write!(
+            ResidualFinding::Wanted { gain } => write!(
                 f,
                 "readings and rates together become e^{gain:.0} times as likely with an effect that the model lacks: diagnose tells which"
             ),
-            Finding::Wanders => {
+            ResidualFinding::Wanders => {
                 f.write_str("the rate wanders more than a gyro of this noise does: diagnose asks what it follows")
             }
-            Finding::Coloured { lag_one, band } => write!(
+            ResidualFinding::Coloured { lag_one, band } => write!(
                 f,
                 "neighbouring residuals hang together (autocorrelation {lag_one:.2} at lag 1, white within {band:.2})"
             ),
-            Finding::NothingStandsOut { reduced_chi_square } => write!(
+            ResidualFinding::NothingStandsOut { reduced_chi_square } => write!(
                 f,
                 "nothing stands out: the residual is the record's noise (reduced chi-square {reduced_chi_square:.3})"
             ),
-            Finding::Boundary { reduced_chi_square, boundary_chi_square } => write!(
+            ResidualFinding::Boundary { reduced_chi_square, boundary_chi_square } => write!(
                 f,
                 "of the reduced chi-square of {reduced_chi_square:.3}, {boundary_chi_square:.3} is expected from the uncertainty of the estimated boundary"
             ),
-            Finding::Largest { residual_rad_per_s, time_s } => write!(
+            ResidualFinding::Largest { residual_rad_per_s, time_s } => write!(
                 f,
                 "the largest error is {:.4} °/h at {time_s:.1} s",
                 deg_per_h_from_rad_per_s(*residual_rad_per_s)
@@ -177,75 +177,75 @@ const CONCENTRATION: f64 = 1.25;
 /// Dependences that are named at most: the rest follows from the strongest.
 const MOST_DEPENDENCES: usize = 3;
 
-fn stands_out(part: &Part) -> bool {
+fn stands_out(part: &RecordPart) -> bool {
     let chance = CHANCE * (2.0 / part.rows as f64).sqrt();
     part.chi_square_per_row > 1.0 + TOLERATED_PART_EXCESS + chance
 }
 
 /// The parts that stand out and hold more than their rows, the largest share first.
-fn concentrated(parts: &[Part]) -> Vec<&Part> {
-    let holds_more = |p: &Part| p.share_of_squared_error > CONCENTRATION * p.share_of_rows;
-    let mut found: Vec<&Part> = parts.iter().filter(|p| stands_out(p) && holds_more(p)).collect();
+fn concentrated(parts: &[RecordPart]) -> Vec<&RecordPart> {
+    let holds_more = |p: &RecordPart| p.share_of_squared_error > CONCENTRATION * p.share_of_rows;
+    let mut found: Vec<&RecordPart> = parts.iter().filter(|p| stands_out(p) && holds_more(p)).collect();
     found.sort_by(|a, b| b.share_of_squared_error.total_cmp(&a.share_of_squared_error));
     found
 }
 
-pub(super) fn judge(found: &Comparison, transient_s: f64) -> (Verdict, Vec<Finding>) {
+pub(super) fn judge(found: &Comparison, transient_s: f64) -> (Adequacy, Vec<ResidualFinding>) {
     let mut findings = Vec::new();
     let rows = found.rows as f64;
     if found.whitened_chi_square > 1.0 + TOLERATED_EXCESS + 3.0 * (2.0 / rows).sqrt() {
-        findings.push(Finding::Excess { whitened_chi_square: found.whitened_chi_square });
+        findings.push(ResidualFinding::Excess { whitened_chi_square: found.whitened_chi_square });
     }
     for part in concentrated(&found.regimes) {
         if let Some(regime) = Regime::ALL.into_iter().find(|r| r.key() == part.name) {
             let (share, share_of_rows) = (part.share_of_squared_error, part.share_of_rows);
-            findings.push(Finding::Regime { regime, share, share_of_rows, transient_s });
+            findings.push(ResidualFinding::Regime { regime, share, share_of_rows, transient_s });
         }
     }
     let follows = |value: f64| {
         let explained = value * value;
         explained > TOLD_SHARE && explained * rows * found.reduced_chi_square > CHANCE * CHANCE
     };
-    let mut followed: Vec<(&Quantity, f64)> =
+    let mut followed: Vec<(&Covariate, f64)> =
         found.correlations.iter().filter_map(|c| Some((&c.with, c.value?))).filter(|(_, v)| follows(*v)).collect();
     followed.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
     for (quantity, correlation) in followed.into_iter().take(MOST_DEPENDENCES) {
-        findings.push(Finding::Follows { quantity: quantity.clone(), correlation });
+        findings.push(ResidualFinding::Follows { quantity: quantity.clone(), correlation });
     }
     if let Some(part) = concentrated(&found.temperature_bands).first() {
         let (band, share, share_of_rows) = (part.name.clone(), part.share_of_squared_error, part.share_of_rows);
-        findings.push(Finding::TemperatureBand { band, share, share_of_rows });
+        findings.push(ResidualFinding::TemperatureBand { band, share, share_of_rows });
     }
     if let Some(part) = concentrated(&found.rate_bands).first() {
         let (band, share, share_of_rows) = (part.name.clone(), part.share_of_squared_error, part.share_of_rows);
-        findings.push(Finding::RateBand { band, share, share_of_rows });
+        findings.push(ResidualFinding::RateBand { band, share, share_of_rows });
     }
     let verdict = match &found.standing {
-        Some(standing) if standing.adequate => Verdict::Adequate,
+        Some(standing) if standing.adequate => Adequacy::Adequate,
         Some(standing) => {
             if standing.wanders {
-                findings.push(Finding::Wanders);
+                findings.push(ResidualFinding::Wanders);
             }
-            findings.extend(standing.wanted.map(|gain| Finding::Wanted { gain }));
-            Verdict::Missing
+            findings.extend(standing.wanted.map(|gain| ResidualFinding::Wanted { gain }));
+            Adequacy::Missing
         }
-        None if findings.is_empty() => Verdict::Adequate,
-        None => Verdict::Missing,
+        None if findings.is_empty() => Adequacy::Adequate,
+        None => Adequacy::Missing,
     };
-    if verdict == Verdict::Adequate {
+    if verdict == Adequacy::Adequate {
         findings.clear();
     }
     let lag_one = found.autocorrelation.get(1).copied().unwrap_or(0.0);
-    if verdict == Verdict::Adequate {
-        findings.push(Finding::NothingStandsOut { reduced_chi_square: found.reduced_chi_square });
+    if verdict == Adequacy::Adequate {
+        findings.push(ResidualFinding::NothingStandsOut { reduced_chi_square: found.reduced_chi_square });
     } else if lag_one.abs() > found.autocorrelation_band {
-        findings.push(Finding::Coloured { lag_one, band: found.autocorrelation_band });
+        findings.push(ResidualFinding::Coloured { lag_one, band: found.autocorrelation_band });
     }
-    findings.push(Finding::Boundary {
+    findings.push(ResidualFinding::Boundary {
         reduced_chi_square: found.reduced_chi_square,
         boundary_chi_square: found.boundary_chi_square,
     });
     let largest = found.largest;
-    findings.push(Finding::Largest { residual_rad_per_s: largest.residual_rad_per_s, time_s: largest.time_s });
+    findings.push(ResidualFinding::Largest { residual_rad_per_s: largest.residual_rad_per_s, time_s: largest.time_s });
     (verdict, findings)
 }

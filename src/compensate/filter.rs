@@ -115,7 +115,7 @@ pub(crate) struct Tuning {
 
 /// Gains so many rows after a break.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Gains {
+pub(crate) struct FilterGains {
     /// k, then κ: states, then the row itself and the rows of delay.
     pub(crate) gain: Vec<f64>,
     /// f.
@@ -181,7 +181,7 @@ pub struct Filter {
     /// Logarithms of no break in a row and of a break.
     log_priors: (f64, f64),
     /// By age; the last one is for long ago.
-    pub(crate) gains: Vec<Gains>,
+    pub(crate) gains: Vec<FilterGains>,
     /// −½ ln f by age.
     log_factors: Vec<f64>,
     hypotheses: Vec<Hypothesis>,
@@ -230,7 +230,7 @@ impl<'a> Covariance<'a> {
     }
 
     /// One row further, the slope shaken with this variance somewhere within it.
-    fn step(&mut self, slope_variance: f64) -> Gains {
+    fn step(&mut self, slope_variance: f64) -> FilterGains {
         let Dynamics { transition, rate, reading, shock, noise, .. } = self.dynamics;
         let n = transition.nrows();
         let shaken = shock * slope_variance + noise;
@@ -257,12 +257,12 @@ impl<'a> Covariance<'a> {
             cross.iter_mut().zip(gain.iter()).for_each(|(c, k)| *c -= k * (entry * variance));
             all.push(entry);
         }
-        Gains { gain: all, variance }
+        FilterGains { gain: all, variance }
     }
 }
 
 /// The largest change of a gain, as a share of the largest one of its kind.
-fn difference(a: &Gains, b: &Gains, states: usize) -> f64 {
+fn difference(a: &FilterGains, b: &FilterGains, states: usize) -> f64 {
     let part = |from: usize, to: usize| {
         let pairs = || a.gain[from..to].iter().zip(&b.gain[from..to]);
         let size = pairs().map(|(_, b)| b.abs()).fold(f64::MIN_POSITIVE, f64::max);
@@ -272,7 +272,7 @@ fn difference(a: &Gains, b: &Gains, states: usize) -> f64 {
 }
 
 /// Gains of long ago, and those by age after a break before them.
-fn schedule(dynamics: &Dynamics, tuning: &Tuning) -> Vec<Gains> {
+fn schedule(dynamics: &Dynamics, tuning: &Tuning) -> Vec<FilterGains> {
     const MOST_ROUNDS: usize = 20_000;
     const STILL: f64 = 1e-12;
     let n = dynamics.states();

@@ -19,7 +19,7 @@ use crate::rate::CoilModel;
 pub(crate) const MOST_COLUMNS: usize = 8;
 
 /// A row's values of them; None where there is none.
-pub type Columns = [Option<f64>; MOST_COLUMNS];
+pub type FormulaColumns = [Option<f64>; MOST_COLUMNS];
 
 /// What a rate sees of a column: its mean over the time that the rate is a mean over, at most that since the row before, by a
 /// straight line from there.
@@ -32,7 +32,12 @@ pub(crate) fn seen(now: f64, before: f64, since_s: f64, rate_mean_s: f64) -> f64
 }
 
 /// [`seen`] of each column; one that is missing stays so.
-pub(crate) fn columns_seen(now: &Columns, before: &Columns, since_s: f64, rate_mean_s: f64) -> Columns {
+pub(crate) fn columns_seen(
+    now: &FormulaColumns,
+    before: &FormulaColumns,
+    since_s: f64,
+    rate_mean_s: f64,
+) -> FormulaColumns {
     std::array::from_fn(|i| now[i].map(|value| seen(value, before[i].unwrap_or(f64::NAN), since_s, rate_mean_s)))
 }
 
@@ -154,7 +159,7 @@ impl AtWork {
         lag: usize,
         time_s: f64,
         thermal_rate_rad_per_s: f64,
-        columns: &Columns,
+        columns: &FormulaColumns,
     ) -> f64 {
         let Some(Some(seen)) = self.seen.get(lag) else { return 0.0 };
         let whole_m: f64 = self.lengths_m.iter().sum();

@@ -7,7 +7,7 @@
 //! | symbol | meaning | in code |
 //! |---|---|---|
 //! | x_i | lagged temperatures, powers, slopes, warming up, all of the past only | [`crate::metrics::thermal`] |
-//! | s_i, λ | the column's root mean square; the strength that predicts blocks left out best | `Learned::fit` |
+//! | s_i, λ | the column's root mean square; the strength that predicts blocks left out best | `LearnedCoefficients::fit` |
 //!
 //! Each eighth of the record (of several records each whole one) is predicted from the others for every λ; the least error of these is
 //! what the compensator is worth on such a day, beside what it leaves of what it was fitted to: where the two differ, it only fits.
@@ -21,7 +21,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::CompensateError;
 use crate::metrics::thermal::{COLUMNS, ThermalColumns};
-use crate::record::{Record, Row};
+use crate::record::{Record, RecordRow};
 
 /// One record is left out by so many blocks in turn.
 const BLOCKS: usize = 8;
@@ -36,7 +36,7 @@ pub(crate) const LONGEST_GAP: f64 = 1000.0;
 
 /// Ready for any record of the same gyro.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Learned {
+pub struct LearnedCoefficients {
     /// β_0, then one a column.
     pub(crate) coefficients: Vec<f64>,
     /// Of the record that it was fitted to, of several the longest; the shortest lag follows it.
@@ -91,7 +91,7 @@ impl Sums {
     }
 }
 
-impl Learned {
+impl LearnedCoefficients {
     /// To some records together.
     ///
     /// # Errors
@@ -153,7 +153,7 @@ pub(super) struct Follower {
 
 impl Follower {
     fn columns(&mut self, time_s: f64, temperature_k: f64, interval_s: f64) -> DVector<f64> {
-        let row = Row { time_s, temperature_k, rate_rad_per_s: 0.0, table_rad_per_s: None };
+        let row = RecordRow { time_s, temperature_k, rate_rad_per_s: 0.0, table_rad_per_s: None };
         if time_s - self.last_s > LONGEST_GAP * interval_s {
             self.columns = None;
         }
@@ -166,7 +166,7 @@ impl Follower {
     }
 
     /// A reading that is missing repeats the bias; `most` of them are kept.
-    pub(super) fn step(&mut self, learned: &Learned, time_s: f64, temperature_k: Option<f64>, most: usize) {
+    pub(super) fn step(&mut self, learned: &LearnedCoefficients, time_s: f64, temperature_k: Option<f64>, most: usize) {
         let bias = match temperature_k {
             Some(temperature_k) => learned.bias_rad_per_s(&self.columns(time_s, temperature_k, learned.interval_s)),
             None => self.recent.back().copied().unwrap_or(learned.coefficients[0]),
@@ -203,7 +203,7 @@ mod tests {
 
     #[test]
     fn a_learned_day_compensates_another_one_and_says_what_it_is_worth() {
-        let learned = Learned::fit(&[&day(0.0)]).unwrap();
+        let learned = LearnedCoefficients::fit(&[&day(0.0)]).unwrap();
         println!("left {:e}, cross-validated {:e}", learned.left_rad_per_s, learned.cross_validated_rad_per_s);
         let other = day(0.0);
         let mut follower = Follower::default();
@@ -224,6 +224,6 @@ mod tests {
     #[test]
     fn a_record_too_short_to_leave_parts_out_is_refused() {
         let short = Record::new("x", vec![0.0, 1.0, 2.0], vec![300.0; 3], vec![0.0; 3]).unwrap();
-        assert!(matches!(Learned::fit(&[&short]), Err(CompensateError::TooFew { .. })));
+        assert!(matches!(LearnedCoefficients::fit(&[&short]), Err(CompensateError::TooFew { .. })));
     }
 }

@@ -26,8 +26,8 @@ use crate::rate::{CoilModel, RateError};
 use crate::record::{Record, RecordError};
 use crate::thermal::ThermalError;
 use empirical::{PiecewiseBias, Regression};
-use formulas::Columns;
-use learned::Learned;
+use formulas::FormulaColumns;
+use learned::LearnedCoefficients;
 use physical::{MOST_DELAY_ROWS, Physical};
 use stream::{Compensated, Reading, Stream};
 
@@ -70,7 +70,7 @@ pub enum Compensator {
     /// See [`Method::Regression`].
     Regression(Regression),
     /// See [`Method::Learned`].
-    Learned(Learned),
+    Learned(LearnedCoefficients),
 }
 
 /// Why nothing can be compensated.
@@ -202,7 +202,7 @@ impl Compensator {
             Method::Physical => Compensator::Physical(Box::new(physical_in(model, pattern, days, &records)?)),
             Method::Piecewise => Compensator::Piecewise(PiecewiseBias::fit(&records)?),
             Method::Regression => Compensator::Regression(Regression::fit(&records)?),
-            Method::Learned => Compensator::Learned(Learned::fit(&records)?),
+            Method::Learned => Compensator::Learned(LearnedCoefficients::fit(&records)?),
         })
     }
 
@@ -266,10 +266,12 @@ impl Compensator {
         }
     }
 
-    fn columns_of(&self, record: &Record, row: usize) -> Columns {
+    fn columns_of(&self, record: &Record, row: usize) -> FormulaColumns {
         match self {
             Compensator::Physical(physical) => physical.columns_of(record, row),
-            Compensator::Piecewise(_) | Compensator::Regression(_) | Compensator::Learned(_) => Columns::default(),
+            Compensator::Piecewise(_) | Compensator::Regression(_) | Compensator::Learned(_) => {
+                FormulaColumns::default()
+            }
         }
     }
 

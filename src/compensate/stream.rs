@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 use super::Compensator;
 use super::empirical::Window;
 use super::filter::Filter;
-use super::formulas::{AtWork, Columns, columns_seen, seen};
+use super::formulas::{AtWork, FormulaColumns, columns_seen, seen};
 use super::learned::Follower;
 use crate::numeric::statistics::{median, median_in_place};
 
@@ -25,7 +25,7 @@ pub struct Reading {
     /// What the model's further columns add to the rate error; 0 where it reads none.
     pub channel_rad_per_s: Option<f64>,
     /// What formulas read of the further columns.
-    pub columns: Columns,
+    pub columns: FormulaColumns,
     /// As measured.
     pub rate_rad_per_s: Option<f64>,
 }
@@ -108,7 +108,7 @@ struct Pending<T> {
     time_s: f64,
     temperature_k: Option<f64>,
     channel_rad_per_s: f64,
-    columns: Columns,
+    columns: FormulaColumns,
     rate_rad_per_s: Option<f64>,
     flags: Vec<Flag>,
     bias_rad_per_s: Option<f64>,
@@ -137,7 +137,7 @@ pub struct Stream<'c, T> {
     bridgeable_steps: f64,
     last_temperature: Option<(f64, u64)>,
     /// What the further columns were in the row before, and when; none before the first.
-    last_columns: Option<(f64, f64, Columns)>,
+    last_columns: Option<(f64, f64, FormulaColumns)>,
     leaps: Vec<f64>,
     before: VecDeque<f64>,
     usual_change: f64,
@@ -193,7 +193,7 @@ impl<'c, T> Stream<'c, T> {
             self.start(&mut out);
         }
         for row in 0..self.pending.len() {
-            self.settle(row);
+            self.find_bias(row);
         }
         while !self.pending.is_empty() {
             self.emit(&mut out);
@@ -245,7 +245,7 @@ impl<'c, T> Stream<'c, T> {
             time_s: f64::NAN,
             temperature_k: None,
             channel_rad_per_s: 0.0,
-            columns: Columns::default(),
+            columns: FormulaColumns::default(),
             rate_rad_per_s: None,
             flags: Vec::new(),
             bias_rad_per_s: None,
@@ -279,7 +279,7 @@ impl<'c, T> Stream<'c, T> {
         self.pending.push_back(pending);
         // Rows that waited their time, and unreadable ones in front of the queue.
         while self.pending.front().is_some_and(|p| p.step.is_none_or(|s| self.step - s >= self.delay as u64)) {
-            self.settle(0);
+            self.find_bias(0);
             self.emit(out);
         }
     }
@@ -302,7 +302,7 @@ impl<'c, T> Stream<'c, T> {
         let steps = (since_s / self.interval_s).round();
         if steps > self.bridgeable_steps {
             for row in 0..self.pending.len() {
-                self.settle(row);
+                self.find_bias(row);
             }
             self.restart();
             self.last_temperature = None;
@@ -337,10 +337,10 @@ impl<'c, T> Stream<'c, T> {
     }
 
     fn advance(&mut self, temperature_k: Option<f64>, inner_k: Option<f64>) {
-        // A row whose time is up is settled before the step that would push it out of the filter's memory.
+        // The bias of a row whose time is up is found before the step that would push it out of the filter's memory.
         for row in 0..self.pending.len() {
             match self.pending[row].step {
-                Some(step) if self.step - step >= self.delay as u64 => self.settle(row),
+                Some(step) if self.step - step >= self.delay as u64 => self.find_bias(row),
                 Some(_) => break,
                 None => {}
             }
@@ -365,8 +365,8 @@ impl<'c, T> Stream<'c, T> {
     }
 
     /// What the row's rate sees of the further columns: of what the model's channels add, and of each that formulas read.
-    fn seen(&mut self, time_s: f64, channel_rad_per_s: Option<f64>, columns: &Columns) -> (f64, Columns) {
-        let Compensator::Physical(physical) = self.compensator else { return (0.0, Columns::default()) };
+    fn seen(&mut self, time_s: f64, channel_rad_per_s: Option<f64>, columns: &FormulaColumns) -> (f64, FormulaColumns) {
+        let Compensator::Physical(physical) = self.compensator else { return (0.0, FormulaColumns::default()) };
         let Some((last_s, last, before)) = self.last_columns else {
             let channel = channel_rad_per_s.unwrap_or(0.0);
             self.last_columns = Some((time_s, channel, *columns));
@@ -379,7 +379,7 @@ impl<'c, T> Stream<'c, T> {
     }
 
     /// The bias of a pending row as it is known now.
-    fn settle(&mut self, row: usize) {
+    fn find_bias(&mut self, row: usize) {
         let Some(pending) = self.pending.get(row) else { return };
         let (Some(step), None) = (pending.step, pending.bias_rad_per_s) else { return };
         let lag = (self.step - step) as usize;

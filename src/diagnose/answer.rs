@@ -17,13 +17,13 @@ use crate::record::Record;
 const HALF: f64 = 0.5;
 
 /// An explanation with the fits of the held-out records.
-pub(super) struct Settled<'e> {
+pub(super) struct ScoredExplanation<'e> {
     pub(crate) explanation: &'e Explanation,
     /// One a held-out record, in their order.
     pub(crate) held_out: Vec<Fit>,
 }
 
-impl<'e> Settled<'e> {
+impl<'e> ScoredExplanation<'e> {
     pub(crate) fn new(question: &Question, explanation: &'e Explanation) -> Result<Self, DiagnoseError> {
         let fits: Result<Vec<Fit>, _> =
             question.held_out.par_iter().map(|&r| question.chamber.held_out(&explanation.fit, r)).collect();
@@ -72,14 +72,14 @@ pub(super) fn answer(question: &Question, found: &Found, records: &[&Record]) ->
     };
     let likeliest =
         if outside >= HALF { found.explanations.iter().find(|e| e.is_outside()).unwrap_or(top) } else { top };
-    let (settled, first) = (Settled::new(question, named)?, Settled::new(question, declared)?);
+    let (scored, first) = (ScoredExplanation::new(question, named)?, ScoredExplanation::new(question, declared)?);
     let noise = noises(question, likeliest)?;
     let noise_floor = {
         let squares: f64 = noise.iter().take(question.fitted.len()).map(|n| n.noise.white_rad_per_s.powi(2)).sum();
         (squares / question.fitted.len().max(1) as f64).sqrt()
     };
     let equals: &[&Explanation] = if verdict == Verdict::Indistinguishable { &family } else { &[] };
-    let effects = findings(question, found, &settled, &first, equals)?;
+    let effects = findings(question, found, &scored, &first, equals)?;
     let mut cautions = cautions(question.chamber, records);
     let hypothesis = hypothesis(question, found, named);
     if let Some(winding) = hypothesis.as_ref().and_then(|h| h.winding) {
@@ -91,7 +91,7 @@ pub(super) fn answer(question: &Question, found: &Found, records: &[&Record]) ->
     let suggested_experiment = experiment(verdict, &effects);
     Ok(Diagnosis {
         verdict,
-        ladder: ladder(question, found, &settled, &first, &noise)?,
+        ladder: ladder(question, found, &scored, &first, &noise)?,
         candidates: contenders(question, found, declared),
         noise_floor_rad_per_s: noise_floor,
         unexplained: match verdict {

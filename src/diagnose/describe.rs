@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::answer::{Settled, names};
+use super::answer::{ScoredExplanation, names};
 use super::joint::{Explanation, Found, Member, Question, refit_without};
-use super::plain::{Plain, Shape};
+use super::plain::{Plain, ResidualShape};
 use super::{Contender, DiagnoseError, Equivalent, Finding, FittedParameter, RecordNoise, Rung, Unexplained};
 use crate::chamber::{Fit, Place, Quantity};
 use crate::effect::DeclaredEffect;
@@ -14,11 +14,11 @@ use crate::numeric::statistics::{correlation, rms};
 pub(super) fn findings(
     question: &Question,
     found: &Found,
-    settled: &Settled,
-    declared: &Settled,
+    scored: &ScoredExplanation,
+    declared: &ScoredExplanation,
     equals: &[&Explanation],
 ) -> Result<Vec<Finding>, DiagnoseError> {
-    let named = settled.explanation;
+    let named = scored.explanation;
     let total = |fits: &[Fit]| fits.iter().map(|f| f.evidence).sum::<f64>();
     let effects = named.effects(question);
     let single = named.members.len() == 1;
@@ -28,12 +28,12 @@ pub(super) fn findings(
         let rest = if single { None } else { refit_without(question, named, member) };
         let (less, confirmed) = match &rest {
             Some(rest) => {
-                let again = Settled::new(question, rest)?;
-                (named.fit.log_likelihood - rest.fit.log_likelihood, total(&settled.held_out) - total(&again.held_out))
+                let again = ScoredExplanation::new(question, rest)?;
+                (named.fit.log_likelihood - rest.fit.log_likelihood, total(&scored.held_out) - total(&again.held_out))
             }
             None => (
                 named.fit.log_likelihood - declared.explanation.fit.log_likelihood,
-                total(&settled.held_out) - total(&declared.held_out),
+                total(&scored.held_out) - total(&declared.held_out),
             ),
         };
         Ok(Finding {
@@ -142,18 +142,18 @@ fn shortened(question: &Question, fit: &Fit, kept: usize) -> Fit {
 pub(super) fn ladder(
     question: &Question,
     found: &Found,
-    settled: &Settled,
-    declared: &Settled,
+    scored: &ScoredExplanation,
+    declared: &ScoredExplanation,
     noise: &[RecordNoise],
 ) -> Result<Vec<Rung>, DiagnoseError> {
-    let named = settled.explanation;
+    let named = scored.explanation;
     let effects = named.effects(question);
     let expected = |place: usize| {
         let n = &noise[place].noise;
         n.white_rad_per_s.powi(2) + n.wander_rad_per_s.powi(2) + n.unresolved_air_rad_per_s.powi(2)
     };
     let rung = |kept: usize| -> Result<Rung, DiagnoseError> {
-        let from = if kept == 0 { declared } else { settled };
+        let from = if kept == 0 { declared } else { scored };
         let kinds: Vec<String> = effects[..kept].iter().map(|(c, _)| question.candidates[*c].kind()).collect();
         let over = |fits: &[(Fit, usize, usize)]| -> Result<(f64, f64), DiagnoseError> {
             let (mut squares, mut chi_square, mut rows) = (0.0, 0.0, 0);
@@ -238,7 +238,7 @@ pub(super) fn contenders(question: &Question, found: &Found, declared: &Explanat
 /// What the declared model leaves, and what it goes with.
 pub(super) fn unexplained(
     question: &Question,
-    declared: &Settled,
+    declared: &ScoredExplanation,
     likeliest: &Explanation,
 ) -> Result<Unexplained, DiagnoseError> {
     let chamber = question.chamber;
@@ -280,11 +280,13 @@ pub(super) fn unexplained(
     let number = |q: Quantity| likeliest.fit.number(q, record);
     let gain = 2.0 * (likeliest.fit.log_likelihood - fit.log_likelihood);
     let plain = likeliest.members.iter().filter_map(|m| match m {
-        Member::Drift => {
-            Some((Shape::Drift { time_constant_s: number(Quantity::DriftTime) }, number(Quantity::DriftSize), 2))
-        }
+        Member::Drift => Some((
+            ResidualShape::Drift { time_constant_s: number(Quantity::DriftTime) },
+            number(Quantity::DriftSize),
+            2,
+        )),
         Member::Cycle => {
-            Some((Shape::Sinusoid { period_s: number(Quantity::CyclePeriod) }, number(Quantity::CycleSize), 2))
+            Some((ResidualShape::Sinusoid { period_s: number(Quantity::CyclePeriod) }, number(Quantity::CycleSize), 2))
         }
         _ => None,
     });

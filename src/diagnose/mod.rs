@@ -41,9 +41,9 @@ use crate::record::Record;
 use crate::units::Unit;
 
 pub use caution::{Caution, Refusal};
-use experiment::Contest;
+use experiment::ModelComparison;
 use joint::Question;
-pub(crate) use plain::{Plain, Shape};
+pub(crate) use plain::{Plain, ResidualShape};
 pub(crate) use standing::{Standing, standing};
 pub use terms::Terms;
 pub(crate) use together::{declared_with, extend_together};
@@ -202,7 +202,7 @@ pub struct Diagnosis {
     /// Fitted records first, then those held out.
     pub(crate) noise: Vec<RecordNoise>,
     /// Formulas that explain what no listed effect does, best first.
-    pub proposals: Vec<discover::Proposal>,
+    pub proposals: Vec<discover::FormulaProposal>,
     /// What the fitted records say of film, offset and chamber, with the accepted effects.
     pub(crate) boundary: Learned,
 }
@@ -456,8 +456,8 @@ fn beyond(
 ///
 /// # Errors
 /// Records that say nothing, models that cannot be solved.
-pub(crate) fn contest(request: &Request, diagnosis: &Diagnosis) -> Result<Contest, DiagnoseError> {
-    Contest::new(request, diagnosis)
+pub(crate) fn model_comparison(request: &Request, diagnosis: &Diagnosis) -> Result<ModelComparison, DiagnoseError> {
+    ModelComparison::new(request, diagnosis)
 }
 
 impl From<ChamberError> for DiagnoseError {

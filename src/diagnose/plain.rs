@@ -2,7 +2,7 @@
 
 /// A shape in time.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Shape {
+pub(crate) enum ResidualShape {
     /// Slow wander, and the time after which it has forgotten itself.
     Drift {
         time_constant_s: f64,
@@ -15,7 +15,7 @@ pub(crate) enum Shape {
 /// A shape that goes along with what is left over.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Plain {
-    pub(crate) shape: Shape,
+    pub(crate) shape: ResidualShape,
     /// By how much χ² falls.
     pub(crate) gain: f64,
     pub(crate) parameters: usize,

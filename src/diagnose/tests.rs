@@ -95,7 +95,7 @@ fn a_wander_that_nothing_explains_is_told_with_its_size_and_its_time_constant() 
     assert_eq!(found.verdict, Verdict::Unexplained);
     let plain = found.unexplained.unwrap().plain;
     // Two records of twenty time constants: a time constant is known to a third, a size to a sixth.
-    let [Plain { shape: Shape::Drift { time_constant_s }, rms_rad_per_s, .. }] = plain[..] else {
+    let [Plain { shape: ResidualShape::Drift { time_constant_s }, rms_rad_per_s, .. }] = plain[..] else {
         panic!("{plain:?}");
     };
     assert!((time_constant_s / 300.0).ln().abs() < 0.6, "{time_constant_s}");

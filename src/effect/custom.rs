@@ -25,7 +25,7 @@
 use thiserror::Error;
 
 use super::{Acts, Binding, Effect, EffectSpec, Memory, Nature, PackState, Subject};
-use crate::numeric::expression::{Degree, EvaluationError, Expression, ExpressionError, Interval};
+use crate::numeric::expression::{Degree, EvaluationError, Expression, ExpressionError, ValueRange};
 use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s, rad_per_s_from_deg_per_h};
 
 pub(super) const SPEC: EffectSpec = EffectSpec {
@@ -185,14 +185,14 @@ impl Formula {
         if !self.channels.is_empty() {
             return 0.0;
         }
-        let rates = Interval { low: -max_rate_k_per_s, high: max_rate_k_per_s };
+        let rates = ValueRange { low: -max_rate_k_per_s, high: max_rate_k_per_s };
         let of = |name: &str| match self.parameters.iter().position(|p| p == name) {
-            Some(place) => Interval::at(values[place]),
+            Some(place) => ValueRange::at(values[place]),
             None if is_rate(name) => rates,
-            None if name == "t" => Interval { low: 0.0, high: f64::INFINITY },
-            None => Interval::EVERYTHING,
+            None if name == "t" => ValueRange { low: 0.0, high: f64::INFINITY },
+            None => ValueRange::EVERYTHING,
         };
-        let bounds: Vec<Interval> = self.expression.variables().iter().map(|v| of(&v.name)).collect();
+        let bounds: Vec<ValueRange> = self.expression.variables().iter().map(|v| of(&v.name)).collect();
         rad_per_s_from_deg_per_h(self.expression.range(&bounds).size())
     }
 }

@@ -8,7 +8,7 @@ use crate::units::{
 
 /// What a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
+pub enum ColumnQuantity {
     /// The day of a time of day that stands in a column of its own.
     Date,
     /// When a row was written.
@@ -79,47 +79,50 @@ impl SensorPlace {
     }
 }
 
-impl Quantity {
+impl ColumnQuantity {
     /// Of a mapping's role.
     pub(in crate::io) fn of_role(role: &str) -> Option<Self> {
         let known = Self::ROLES.iter().find(|(name, _)| *name == role).map(|(_, quantity)| *quantity);
-        known.or_else(|| SensorPlace::named(role).map(Quantity::Sensor))
+        known.or_else(|| SensorPlace::named(role).map(ColumnQuantity::Sensor))
     }
 
     /// As a mapping names it.
-    pub(in crate::io) const ROLES: [(&'static str, Quantity); 7] = [
-        ("time", Quantity::Time),
-        ("temperature", Quantity::Temperature),
-        ("rate", Quantity::Rate),
-        ("inner", Quantity::InnerTemperature),
-        ("ambient", Quantity::AmbientTemperature),
-        ("table", Quantity::Table),
-        ("date", Quantity::Date),
+    pub(in crate::io) const ROLES: [(&'static str, ColumnQuantity); 7] = [
+        ("time", ColumnQuantity::Time),
+        ("temperature", ColumnQuantity::Temperature),
+        ("rate", ColumnQuantity::Rate),
+        ("inner", ColumnQuantity::InnerTemperature),
+        ("ambient", ColumnQuantity::AmbientTemperature),
+        ("table", ColumnQuantity::Table),
+        ("date", ColumnQuantity::Date),
     ];
 
     /// The names before the unit that a header may have without a mapping.
-    pub(in crate::io) const STEMS: [(&'static str, Quantity); 6] = [
-        ("time", Quantity::Time),
-        ("temperature", Quantity::Temperature),
-        ("rate", Quantity::Rate),
-        ("temperature_inner", Quantity::InnerTemperature),
-        ("temperature_ambient", Quantity::AmbientTemperature),
-        ("table_rate", Quantity::Table),
+    pub(in crate::io) const STEMS: [(&'static str, ColumnQuantity); 6] = [
+        ("time", ColumnQuantity::Time),
+        ("temperature", ColumnQuantity::Temperature),
+        ("rate", ColumnQuantity::Rate),
+        ("temperature_inner", ColumnQuantity::InnerTemperature),
+        ("temperature_ambient", ColumnQuantity::AmbientTemperature),
+        ("table_rate", ColumnQuantity::Table),
     ];
 
     pub(in crate::io) fn is_temperature(self) -> bool {
         matches!(
             self,
-            Quantity::Temperature | Quantity::InnerTemperature | Quantity::AmbientTemperature | Quantity::Sensor(_)
+            ColumnQuantity::Temperature
+                | ColumnQuantity::InnerTemperature
+                | ColumnQuantity::AmbientTemperature
+                | ColumnQuantity::Sensor(_)
         )
     }
 
     pub(in crate::io) fn default_unit(self) -> &'static str {
         match self {
-            Quantity::Time => "s",
-            Quantity::Rate => "deg_per_h",
-            Quantity::Table => "deg_per_s",
-            Quantity::Date | Quantity::Channel => "",
+            ColumnQuantity::Time => "s",
+            ColumnQuantity::Rate => "deg_per_h",
+            ColumnQuantity::Table => "deg_per_s",
+            ColumnQuantity::Date | ColumnQuantity::Channel => "",
             _ => "c",
         }
     }
@@ -146,24 +149,29 @@ impl Conversion {
 }
 
 /// A unit that a column may be in.
-pub(in crate::io) struct Unit {
+pub(in crate::io) struct ColumnUnit {
     /// As a name ends with it.
     pub(in crate::io) key: &'static str,
     /// As it may stand in brackets.
     written: &'static [&'static str],
-    pub(in crate::io) of: Kind,
+    pub(in crate::io) of: QuantityKind,
     pub(in crate::io) conversion: Conversion,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::io) enum Kind {
+pub(in crate::io) enum QuantityKind {
     Time,
     Temperature,
     Rate,
 }
 
-const fn unit(key: &'static str, written: &'static [&'static str], of: Kind, conversion: Conversion) -> Unit {
-    Unit { key, written, of, conversion }
+const fn unit(
+    key: &'static str,
+    written: &'static [&'static str],
+    of: QuantityKind,
+    conversion: Conversion,
+) -> ColumnUnit {
+    ColumnUnit { key, written, of, conversion }
 }
 
 fn as_it_is(value: f64) -> f64 {
@@ -178,39 +186,44 @@ fn rad_per_s_from_mdeg_per_h(value: f64) -> f64 {
     rad_per_s_from_deg_per_h(value / 1000.0)
 }
 
-pub(in crate::io) const UNITS: &[Unit] = &[
-    unit("s", &["sec", "seconds", "epoch_s"], Kind::Time, Conversion::By(as_it_is)),
-    unit("ms", &["msec", "epoch_ms"], Kind::Time, Conversion::By(s_from_ms)),
-    unit("us", &["µs", "μs", "epoch_us"], Kind::Time, Conversion::By(s_from_us)),
-    unit("ns", &["epoch_ns"], Kind::Time, Conversion::By(s_from_ns)),
-    unit("min", &["minutes"], Kind::Time, Conversion::By(s_from_min)),
-    unit("h", &["hr", "hours"], Kind::Time, Conversion::By(s_from_h)),
-    unit("d", &["days"], Kind::Time, Conversion::By(s_from_days)),
-    unit("iso", &["iso8601", "utc"], Kind::Time, Conversion::Stamp),
-    unit("c", &["°c", "degc", "celsius"], Kind::Temperature, Conversion::By(kelvin_from_celsius)),
-    unit("k", &["kelvin"], Kind::Temperature, Conversion::By(as_it_is)),
-    unit("f", &["°f", "degf", "fahrenheit"], Kind::Temperature, Conversion::By(kelvin_from_fahrenheit)),
-    unit("deg_per_h", &["°/h", "deg/h", "deg/hr", "°/hr"], Kind::Rate, Conversion::By(rad_per_s_from_deg_per_h)),
-    unit("mdeg_per_h", &["m°/h", "mdeg/h"], Kind::Rate, Conversion::By(rad_per_s_from_mdeg_per_h)),
-    unit("deg_per_s", &["°/s", "deg/s", "dps"], Kind::Rate, Conversion::By(rad_per_s_from_deg_per_s)),
-    unit("rad_per_s", &["rad/s"], Kind::Rate, Conversion::By(as_it_is)),
-    unit("arcsec_per_s", &["arcsec/s", "\"/s", "″/s"], Kind::Rate, Conversion::By(rad_per_s_from_arcsec_per_s)),
-    unit("counts", &["bit", "bits", "lsb"], Kind::Rate, Conversion::Raw),
-    unit("mv", &[], Kind::Rate, Conversion::Raw),
-    unit("v", &["volt", "volts"], Kind::Rate, Conversion::Raw),
+pub(in crate::io) const UNITS: &[ColumnUnit] = &[
+    unit("s", &["sec", "seconds", "epoch_s"], QuantityKind::Time, Conversion::By(as_it_is)),
+    unit("ms", &["msec", "epoch_ms"], QuantityKind::Time, Conversion::By(s_from_ms)),
+    unit("us", &["µs", "μs", "epoch_us"], QuantityKind::Time, Conversion::By(s_from_us)),
+    unit("ns", &["epoch_ns"], QuantityKind::Time, Conversion::By(s_from_ns)),
+    unit("min", &["minutes"], QuantityKind::Time, Conversion::By(s_from_min)),
+    unit("h", &["hr", "hours"], QuantityKind::Time, Conversion::By(s_from_h)),
+    unit("d", &["days"], QuantityKind::Time, Conversion::By(s_from_days)),
+    unit("iso", &["iso8601", "utc"], QuantityKind::Time, Conversion::Stamp),
+    unit("c", &["°c", "degc", "celsius"], QuantityKind::Temperature, Conversion::By(kelvin_from_celsius)),
+    unit("k", &["kelvin"], QuantityKind::Temperature, Conversion::By(as_it_is)),
+    unit("f", &["°f", "degf", "fahrenheit"], QuantityKind::Temperature, Conversion::By(kelvin_from_fahrenheit)),
+    unit(
+        "deg_per_h",
+        &["°/h", "deg/h", "deg/hr", "°/hr"],
+        QuantityKind::Rate,
+        Conversion::By(rad_per_s_from_deg_per_h),
+    ),
+    unit("mdeg_per_h", &["m°/h", "mdeg/h"], QuantityKind::Rate, Conversion::By(rad_per_s_from_mdeg_per_h)),
+    unit("deg_per_s", &["°/s", "deg/s", "dps"], QuantityKind::Rate, Conversion::By(rad_per_s_from_deg_per_s)),
+    unit("rad_per_s", &["rad/s"], QuantityKind::Rate, Conversion::By(as_it_is)),
+    unit("arcsec_per_s", &["arcsec/s", "\"/s", "″/s"], QuantityKind::Rate, Conversion::By(rad_per_s_from_arcsec_per_s)),
+    unit("counts", &["bit", "bits", "lsb"], QuantityKind::Rate, Conversion::Raw),
+    unit("mv", &[], QuantityKind::Rate, Conversion::Raw),
+    unit("v", &["volt", "volts"], QuantityKind::Rate, Conversion::Raw),
 ];
 
-impl Kind {
-    pub(in crate::io) fn of(quantity: Quantity) -> Option<Self> {
+impl QuantityKind {
+    pub(in crate::io) fn of(quantity: ColumnQuantity) -> Option<Self> {
         match quantity {
-            Quantity::Time => Some(Kind::Time),
-            Quantity::Rate | Quantity::Table => Some(Kind::Rate),
-            Quantity::Date | Quantity::Channel => None,
-            _ => Some(Kind::Temperature),
+            ColumnQuantity::Time => Some(QuantityKind::Time),
+            ColumnQuantity::Rate | ColumnQuantity::Table => Some(QuantityKind::Rate),
+            ColumnQuantity::Date | ColumnQuantity::Channel => None,
+            _ => Some(QuantityKind::Temperature),
         }
     }
 
-    pub(in crate::io) fn unit(self, text: &str) -> Option<&'static Unit> {
+    pub(in crate::io) fn unit(self, text: &str) -> Option<&'static ColumnUnit> {
         let text = text.trim().to_lowercase();
         UNITS.iter().find(|u| u.of == self && (u.key == text || u.written.contains(&text.as_str())))
     }
@@ -222,8 +235,8 @@ impl Kind {
 
 /// Every name that a header may have without a mapping, quantity by quantity.
 pub(crate) fn accepted_names() -> Vec<String> {
-    let names = Quantity::STEMS.iter().flat_map(|(stem, quantity)| {
-        let of = Kind::of(*quantity);
+    let names = ColumnQuantity::STEMS.iter().flat_map(|(stem, quantity)| {
+        let of = QuantityKind::of(*quantity);
         UNITS
             .iter()
             .filter(move |u| Some(u.of) == of && !u.conversion.is_raw())
@@ -235,7 +248,7 @@ pub(crate) fn accepted_names() -> Vec<String> {
 /// One column that a mapping names.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::io) struct Mapped {
-    pub(in crate::io) quantity: Quantity,
+    pub(in crate::io) quantity: ColumnQuantity,
     pub(in crate::io) name: String,
     pub(in crate::io) unit: Option<&'static str>,
 }
@@ -274,19 +287,21 @@ impl RecordFormat {
             })?);
             return Ok(());
         }
-        let Some(quantity) = &Quantity::of_role(role) else {
+        let Some(quantity) = &ColumnQuantity::of_role(role) else {
             let sensors = ["layer_1, layer_2 and so on"].into_iter().chain(SensorPlace::roles());
             let known: Vec<&str> =
-                Quantity::ROLES.iter().map(|(name, _)| *name).chain(sensors).chain(["scale"]).collect();
+                ColumnQuantity::ROLES.iter().map(|(name, _)| *name).chain(sensors).chain(["scale"]).collect();
             return Err(format!("expected one of {}, found \"{role}\"", known.join(", ")));
         };
         let (name, unit) = match target.rsplit_once(':') {
-            Some((name, unit)) if Kind::of(*quantity).is_some_and(|k| k.unit(unit).is_some()) => (name, Some(unit)),
-            Some(_) if *quantity == Quantity::Date => {
+            Some((name, unit)) if QuantityKind::of(*quantity).is_some_and(|k| k.unit(unit).is_some()) => {
+                (name, Some(unit))
+            }
+            Some(_) if *quantity == ColumnQuantity::Date => {
                 return Err(format!("{role}: expected a column's name without a unit, found \"{target}\""));
             }
             Some((_, unit)) => {
-                let accepted = Kind::of(*quantity).map(Kind::accepted).unwrap_or_default();
+                let accepted = QuantityKind::of(*quantity).map(QuantityKind::accepted).unwrap_or_default();
                 return Err(format!("{role}: expected a unit of {accepted} behind the colon, found \"{unit}\""));
             }
             None => (target, None),
@@ -294,7 +309,7 @@ impl RecordFormat {
         if name.trim().is_empty() {
             return Err(format!("{role}: expected a column's name, found nothing"));
         }
-        let unit = unit.and_then(|u| Kind::of(*quantity)?.unit(u)).map(|u| u.key);
+        let unit = unit.and_then(|u| QuantityKind::of(*quantity)?.unit(u)).map(|u| u.key);
         self.mapped.retain(|m| m.quantity != *quantity);
         self.mapped.push(Mapped { quantity: *quantity, name: name.trim().to_owned(), unit });
         Ok(())

@@ -11,7 +11,7 @@
 //! # Source
 //! IERS Conventions (2010), table 1.2: Ω_E = 7.292115e-5 rad/s. IEEE Std 952-1997, 12.8.
 
-use super::scale_factor::Estimate;
+use super::scale_factor::ScaleFactorEstimate;
 
 /// Of the earth \[rad/s\].
 pub(crate) const EARTH_RATE_RAD_PER_S: f64 = 7.292_115e-5;
@@ -37,7 +37,7 @@ impl Attitude {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Positions {
     /// ε, of one; its standard error is infinite where two attitudes determine it just so.
-    pub(crate) scale_error: Estimate,
+    pub(crate) scale_error: ScaleFactorEstimate,
     /// D.
     pub(crate) bias_rad_per_s: f64,
 }
@@ -56,7 +56,10 @@ pub(crate) fn positions(earth_rad_per_s: &[f64], offset_rad_per_s: &[f64]) -> Op
     let slope = pairs().map(|(e, b)| e * b).sum::<f64>() / square;
     let left: f64 = pairs().map(|(e, b)| (b - slope * e).powi(2)).sum();
     let standard_error = if count > 2.0 { (left / (count - 2.0) / square).sqrt() } else { f64::INFINITY };
-    Some(Positions { scale_error: Estimate { value: slope - 1.0, standard_error }, bias_rad_per_s: b0 - slope * e0 })
+    Some(Positions {
+        scale_error: ScaleFactorEstimate { value: slope - 1.0, standard_error },
+        bias_rad_per_s: b0 - slope * e0,
+    })
 }
 
 #[cfg(test)]

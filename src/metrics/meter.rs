@@ -12,7 +12,7 @@ use crate::numeric::allan::RunningAllan;
 use crate::numeric::coloured::noise_strengths;
 use crate::numeric::pyramid::Pyramid;
 use crate::numeric::statistics::RunningDeviation;
-use crate::record::{MIN_ROWS, Row};
+use crate::record::{MIN_ROWS, RecordRow};
 use crate::units::REFERENCE_TEMPERATURE_K;
 
 /// Rows that tell the usual interval.
@@ -37,7 +37,7 @@ const LEAST_LED_ROWS: usize = 400;
 #[derive(Debug)]
 pub(crate) struct Meter {
     average_s: f64,
-    first: Vec<Row>,
+    first: Vec<RecordRow>,
     running: Option<Running>,
 }
 
@@ -52,7 +52,7 @@ impl Meter {
     }
 
     /// Times must increase; the caller has checked that.
-    pub(crate) fn push(&mut self, row: Row) {
+    pub(crate) fn push(&mut self, row: RecordRow) {
         match &mut self.running {
             Some(running) => running.push(row),
             None => {
@@ -142,7 +142,7 @@ struct Running {
     level: f64,
     rows: usize,
     first_s: f64,
-    last: Option<Row>,
+    last: Option<RecordRow>,
     gaps: usize,
     irregular: usize,
     /// About `level`.
@@ -168,7 +168,7 @@ struct Running {
 }
 
 impl Running {
-    fn new(first: Row, interval_s: f64, level: f64, average_s: f64, is_short: bool) -> Self {
+    fn new(first: RecordRow, interval_s: f64, level: f64, average_s: f64, is_short: bool) -> Self {
         let bottom = (THERMAL_STEP_S / interval_s).log2().floor().clamp(0.0, 40.0) as usize;
         Self {
             interval_s,
@@ -199,7 +199,7 @@ impl Running {
         }
     }
 
-    fn push(&mut self, row: Row) {
+    fn push(&mut self, row: RecordRow) {
         let step_s = self.last.map_or(self.interval_s, |last| row.time_s - last.time_s);
         if step_s >= GAP * self.interval_s {
             self.gaps += 1;
@@ -317,7 +317,7 @@ mod tests {
         for i in 0..rows {
             rate += drawn();
             let temperature_k = REFERENCE_TEMPERATURE_K + drawn();
-            meter.push(Row { time_s: i as f64, temperature_k, rate_rad_per_s: rate, table_rad_per_s: None });
+            meter.push(RecordRow { time_s: i as f64, temperature_k, rate_rad_per_s: rate, table_rad_per_s: None });
         }
         meter.finish().unwrap()
     }

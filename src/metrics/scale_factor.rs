@@ -24,7 +24,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::numeric::statistics::standard_deviation;
-use crate::record::Row;
+use crate::record::RecordRow;
 
 /// A table that is told to turn evenly does so within this share …
 const EVEN: f64 = 0.01;
@@ -55,7 +55,7 @@ pub(crate) struct Stretch {
 
 /// A value with its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Estimate {
+pub(crate) struct ScaleFactorEstimate {
     pub(crate) value: f64,
     pub(crate) standard_error: f64,
 }
@@ -63,17 +63,17 @@ pub(crate) struct Estimate {
 /// What a record on a rate table says of the scale factor. Ratios are of one.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ScaleFactor {
-    pub(crate) error: Estimate,
+    pub(crate) error: ScaleFactorEstimate,
     /// At which temperature that is.
     pub(crate) at_k: f64,
     pub(crate) offset_rad_per_s: f64,
     /// None where the temperature did not change.
-    pub(crate) per_k: Option<Estimate>,
+    pub(crate) per_k: Option<ScaleFactorEstimate>,
     /// None where it did not get both warmer and cooler.
-    pub(crate) hysteresis: Option<Estimate>,
+    pub(crate) hysteresis: Option<ScaleFactorEstimate>,
     pub(crate) nonlinearity: f64,
     /// None where the table turned one way only.
-    pub(crate) asymmetry: Option<Estimate>,
+    pub(crate) asymmetry: Option<ScaleFactorEstimate>,
     /// None where the rates were gone through once.
     pub(crate) repeatability: Option<f64>,
     pub(crate) runs: usize,
@@ -99,13 +99,13 @@ struct Current {
     level_rad_per_s: f64,
     first_k: f64,
     /// Counted when the next one shows that it was not the last.
-    waiting: Option<(f64, Row)>,
+    waiting: Option<(f64, RecordRow)>,
     sums: [f64; 3],
     rows: usize,
 }
 
 impl Stretches {
-    pub(crate) fn push(&mut self, row: Row) {
+    pub(crate) fn push(&mut self, row: RecordRow) {
         let Some(table) = row.table_rad_per_s else { return };
         let goes_on = |c: &Current| {
             (table - c.level_rad_per_s).abs() <= EVEN * c.level_rad_per_s.abs() + STILL_RAD_PER_S
@@ -159,7 +159,7 @@ impl Stretches {
 }
 
 /// The least squares over stretches: values, standard errors, residuals.
-fn fitted(stretches: &[Stretch], columns: &[&dyn Fn(&Stretch) -> f64]) -> Option<(Vec<Estimate>, Vec<f64>)> {
+fn fitted(stretches: &[Stretch], columns: &[&dyn Fn(&Stretch) -> f64]) -> Option<(Vec<ScaleFactorEstimate>, Vec<f64>)> {
     let (rows, count) = (stretches.len(), columns.len());
     if rows < count {
         return None;
@@ -178,7 +178,7 @@ fn fitted(stretches: &[Stretch], columns: &[&dyn Fn(&Stretch) -> f64]) -> Option
     let inverse = (design.transpose() * &design).try_inverse()?;
     let left = &wanted - &design * &solution;
     let variance = left.norm_squared() / (rows - count).max(1) as f64;
-    let estimates = (0..count).map(|k| Estimate {
+    let estimates = (0..count).map(|k| ScaleFactorEstimate {
         value: solution[k] / sizes[k],
         standard_error: if rows > count { (variance * inverse[(k, k)]).sqrt() / sizes[k] } else { f64::INFINITY },
     });
@@ -293,7 +293,7 @@ mod tests {
                     let table = table * (0.2 * f64::from(row + 1)).min(1.0);
                     let white = normal.inverse_cdf(random.random::<f64>());
                     let rate_rad_per_s = error(temperature_k, direction, table) * table + 7e-5 + white;
-                    stretches.push(Row { time_s, temperature_k, rate_rad_per_s, table_rad_per_s: Some(table) });
+                    stretches.push(RecordRow { time_s, temperature_k, rate_rad_per_s, table_rad_per_s: Some(table) });
                     time_s += 1.0;
                 }
             }
@@ -321,7 +321,7 @@ mod tests {
         let found = record(&runs, 1e-5, true_error).finish().unwrap();
         println!("{:?} {:?} {:?}", found.error, found.per_k, found.hysteresis);
         let at = 120e-6 + 3e-6 * (found.at_k - 293.0);
-        let within = |e: Estimate, truth: f64| {
+        let within = |e: ScaleFactorEstimate, truth: f64| {
             (e.value - truth).abs() < 4.0 * e.standard_error && e.standard_error < 0.05 * truth
         };
         assert!(
@@ -366,7 +366,7 @@ mod tests {
         let mut stretches = Stretches::default();
         for i in 0..100 {
             let (time_s, temperature_k, rate_rad_per_s) = (f64::from(i), 300.0, 1e-6);
-            stretches.push(Row { time_s, temperature_k, rate_rad_per_s, table_rad_per_s: Some(0.0) });
+            stretches.push(RecordRow { time_s, temperature_k, rate_rad_per_s, table_rad_per_s: Some(0.0) });
         }
         assert_eq!(stretches.finish(), None);
     }

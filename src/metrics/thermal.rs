@@ -16,7 +16,7 @@
 //! # Source
 //! The form of a linear thermal response, a sum of exponentials, is that of the modal solution in [`crate::thermal`].
 
-use crate::record::Row;
+use crate::record::RecordRow;
 
 /// Number of lags.
 pub(crate) const LAGS: usize = 10;
@@ -59,7 +59,7 @@ pub(crate) fn lags_s(interval_s: f64) -> [f64; LAGS] {
 
 impl ThermalColumns {
     /// At rest at the first row's temperature.
-    pub(crate) fn new(first: Row, interval_s: f64) -> Self {
+    pub(crate) fn new(first: RecordRow, interval_s: f64) -> Self {
         Self {
             lags_s: lags_s(interval_s),
             behind_k: [first.temperature_k; LAGS],
@@ -72,7 +72,7 @@ impl ThermalColumns {
         }
     }
 
-    pub(crate) fn advance(&mut self, row: Row) {
+    pub(crate) fn advance(&mut self, row: RecordRow) {
         let step_s = row.time_s - self.last_s;
         // Steps of equal length differ by rounding.
         if (step_s - self.step_s).abs() > 1e-9 * step_s.abs() {
@@ -109,8 +109,12 @@ mod tests {
 
     #[test]
     fn a_step_leaves_each_lag_behind_by_its_own_exponential_and_rest_leaves_nothing() {
-        let row =
-            |time_s: f64, temperature_k: f64| Row { time_s, temperature_k, rate_rad_per_s: 0.0, table_rad_per_s: None };
+        let row = |time_s: f64, temperature_k: f64| RecordRow {
+            time_s,
+            temperature_k,
+            rate_rad_per_s: 0.0,
+            table_rad_per_s: None,
+        };
         let mut columns = ThermalColumns::new(row(0.0, 300.0), 10.0);
         let mut found = vec![f64::NAN; COLUMNS];
         columns.write(&mut found);

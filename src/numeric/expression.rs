@@ -22,7 +22,7 @@ mod grammar {
 }
 use grammar::{FormulaParser, Rule};
 
-pub(crate) use analysis::{Degree, EvaluationError, Interval};
+pub(crate) use analysis::{Degree, EvaluationError, ValueRange};
 pub use memory::Memory;
 use memory::{AtRest, Keeper, Recall};
 

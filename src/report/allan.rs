@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::page::figure;
-use super::plot::{Axis, Chart, Series};
+use super::plot::{Axis, Chart, ChartSeries};
 use crate::io::json::metrics::{AllanNoiseJson, MetricsJson, RecordMetricsJson};
 
 /// Points of a noise's straight line; two would do, but parts of it are cut away.
@@ -19,16 +19,16 @@ pub(crate) fn allan_chart(record: &RecordMetricsJson) -> Chart {
         .size(860, 460)
         .x(Axis::log("averaging time τ [s]"))
         .y(Axis::log("Allan deviation σ(τ) [°/h]"))
-        .with(Series::points("measured, ± one standard error", points).with_errors(errors));
+        .with(ChartSeries::points("measured, ± one standard error", points).with_errors(errors));
     for noise in &record.allan_noises {
         // What a data sheet calls the bias instability is the curve's minimum, another number.
         let kind = if noise.slope == 0.0 { "flicker" } else { noise.noise.as_str() };
         let name = format!("{kind} {} {} (slope {})", digits(noise.value), noise.unit, slope(noise.slope));
-        chart = chart.with(Series::dashed(name, line(record, noise)));
+        chart = chart.with(ChartSeries::dashed(name, line(record, noise)));
     }
     if let (Some(tau_s), Some(deviation)) = (record.bias_instability_tau_s, record.bias_instability_deg_per_h) {
         let name = format!("minimum {} °/h at {tau_s:.0} s", digits(deviation));
-        chart = chart.with(Series::points(name, vec![(tau_s, deviation)]));
+        chart = chart.with(ChartSeries::points(name, vec![(tau_s, deviation)]));
     }
     chart
 }

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::page::{figure, page};
-use super::plot::{Axis, Chart, Series};
+use super::plot::{Axis, Chart, ChartSeries};
 use super::words;
 use crate::io::json::built_coils::{BuiltCoilsJson, BuiltPatternJson, QuantileJson};
 use crate::io::json::campaign::CampaignJson;
@@ -92,7 +92,7 @@ fn chart(model: &BuiltCoilsJson) -> String {
         .y(Axis::log("share of the coils"));
     for pattern in model.patterns.iter().take(MOST_CURVES) {
         let points = pattern.exceeded.iter().map(|(share, worst)| (*worst, *share)).collect();
-        chart = chart.with(Series::line(&pattern.name, points));
+        chart = chart.with(ChartSeries::line(&pattern.name, points));
     }
     chart.svg_to_read()
 }

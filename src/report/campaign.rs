@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::page::{figure, page};
-use super::plot::{Axis, Chart, Series};
+use super::plot::{Axis, Chart, ChartSeries};
 use super::words;
 use crate::io::json::campaign::{CampaignJson, CellJson};
 use crate::search::cost::objective::Objective;
@@ -155,7 +155,7 @@ fn chart(groups: &[Group], objective: &str) -> String {
             let is_it = |g: &&&Group| (g.best.model.as_str(), g.best.layers) == *coil && g.best.windability == class;
             own.iter().find(is_it).map_or(f64::NAN, |g| g.value)
         };
-        chart = chart.with(Series::bars(class, &coils.iter().map(of).collect::<Vec<f64>>()));
+        chart = chart.with(ChartSeries::bars(class, &coils.iter().map(of).collect::<Vec<f64>>()));
     }
     chart.svg_to_read()
 }

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::page::figure;
-use super::plot::{Axis, Band, Chart, Mark, Series};
+use super::plot::{Axis, Band, Chart, ChartSeries, Mark};
 use crate::compare::regimes::Regime;
 use crate::io::json::comparison::{CompareJson, PartJson, RecordComparisonJson};
 use crate::io::write::comparison_rows::ComparisonRow;
@@ -82,8 +82,8 @@ fn prediction_chart(rows: &[ComparisonRow]) -> Chart {
         .size(WIDTH_PX, 360)
         .x(Axis::linear("time [min]"))
         .y(Axis::linear("rate [°/h]"))
-        .with(Series::line("measured", over_time(rows, |r| r.rate_deg_per_h)))
-        .with(Series::line("predicted", over_time(rows, |r| r.predicted_deg_per_h)))
+        .with(ChartSeries::line("measured", over_time(rows, |r| r.rate_deg_per_h)))
+        .with(ChartSeries::line("predicted", over_time(rows, |r| r.predicted_deg_per_h)))
 }
 
 fn residual_chart(record: &RecordComparisonJson, rows: &[ComparisonRow]) -> Chart {
@@ -92,7 +92,7 @@ fn residual_chart(record: &RecordComparisonJson, rows: &[ComparisonRow]) -> Char
         .size(WIDTH_PX, 360)
         .x(Axis::linear("time [min]"))
         .y(Axis::linear("measured − predicted [°/h]"))
-        .with(Series::line("residual", over_time(rows, |r| r.residual_deg_per_h)))
+        .with(ChartSeries::line("residual", over_time(rows, |r| r.residual_deg_per_h)))
         .mark(Mark::horizontal("+3 × noise", three))
         .mark(Mark::horizontal("", -three));
     shaded(chart, rows)
@@ -103,7 +103,7 @@ fn temperature_chart(rows: &[ComparisonRow]) -> Chart {
         .size(WIDTH_PX, 230)
         .x(Axis::linear("time [min]"))
         .y(Axis::linear("outermost layer [°C]"))
-        .with(Series::line("temperature", over_time(rows, |r| r.temperature_c)));
+        .with(ChartSeries::line("temperature", over_time(rows, |r| r.temperature_c)));
     shaded(chart, rows)
 }
 
@@ -141,8 +141,8 @@ fn shares_chart(record: &RecordComparisonJson) -> Chart {
         .size(WIDTH_PX, 240)
         .x(Axis::linear("share [%]"))
         .categories(record.regimes.iter().map(|part| regime_words(&part.name).0))
-        .with(Series::bars("of the squared error", &share(|p| p.share_of_squared_error)))
-        .with(Series::bars("of the rows", &share(|p| p.share_of_rows)))
+        .with(ChartSeries::bars("of the squared error", &share(|p| p.share_of_squared_error)))
+        .with(ChartSeries::bars("of the rows", &share(|p| p.share_of_rows)))
 }
 
 fn states_chart(record: &RecordComparisonJson, rows: &[ComparisonRow]) -> Chart {
@@ -176,7 +176,7 @@ fn states_chart(record: &RecordComparisonJson, rows: &[ComparisonRow]) -> Chart 
         .size(WIDTH_PX, 400)
         .x(Axis::linear("temperature T [°C]"))
         .y(Axis::linear("dT/dt [°C/min]"))
-        .with(Series::cells("mean residual [°/h]", (width, height), &cells).at_least(least))
+        .with(ChartSeries::cells("mean residual [°/h]", (width, height), &cells).at_least(least))
 }
 
 fn autocorrelation_chart(record: &RecordComparisonJson) -> Chart {
@@ -186,7 +186,7 @@ fn autocorrelation_chart(record: &RecordComparisonJson) -> Chart {
         .size(WIDTH_PX, 300)
         .x(Axis::linear("lag [rows]").reaching(0.0))
         .y(Axis::linear("autocorrelation [1]"))
-        .with(Series::points("autocorrelation", points))
+        .with(ChartSeries::points("autocorrelation", points))
         .band(Band::horizontal("99 % of a white residual", -band, band))
 }
 

@@ -1,6 +1,6 @@
 //! What compensators leave of a rate, as a picture.
 
-use super::plot::{Axis, Chart, Series};
+use super::plot::{Axis, Chart, ChartSeries};
 use crate::units::{deg_per_h_from_rad_per_s, h_from_s};
 
 /// Points of a curve: means over as many rows as it takes.
@@ -21,6 +21,6 @@ pub(crate) fn compensation_chart(title: &str, times_s: &[f64], curves: &[(&str, 
             .zip(rates.chunks(rows))
             .map(|(t, r)| (h_from_s(mean(t)), deg_per_h_from_rad_per_s(mean(r))))
             .collect();
-        chart.with(Series::line(*name, points))
+        chart.with(ChartSeries::line(*name, points))
     })
 }

@@ -5,8 +5,8 @@ use maud::{Markup, html};
 use super::ladder::ladder_chart;
 use super::noise::{noise_chart, noise_in_words};
 use super::page::figure;
-use super::plot::{Axis, Chart, Mark, Series};
-use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow, FindingJson, ParameterJson, RefittedJson};
+use super::plot::{Axis, Chart, ChartSeries, Mark};
+use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow, FindingJson, FittedParameterJson, RefittedJson};
 use crate::io::json::experiment::ExperimentJson;
 use crate::units::{h_from_s, min_from_s, percent_from_fraction};
 
@@ -88,7 +88,7 @@ pub(crate) fn posterior_in_words(body: &DiagnosisJson) -> Vec<String> {
 }
 
 /// With its error, and whether a bound holds it.
-pub(crate) fn value_in_words(parameter: &ParameterJson) -> String {
+pub(crate) fn value_in_words(parameter: &FittedParameterJson) -> String {
     let mut text = format!("{:.5e}", parameter.value);
     if let Some(error) = parameter.standard_error {
         text += &format!(" ± {error:.1e}");
@@ -145,8 +145,8 @@ pub(crate) fn before_and_after_chart(title: &str, rows: &[DiagnosisRow], noise_d
         .size(860, 320)
         .x(Axis::linear("time [min]"))
         .y(Axis::linear("measured − predicted [°/h]"))
-        .with(Series::line("as declared", points(|r| r.residual_declared_deg_per_h)))
-        .with(Series::line("with the effects found", points(|r| r.residual_extended_deg_per_h)))
+        .with(ChartSeries::line("as declared", points(|r| r.residual_declared_deg_per_h)))
+        .with(ChartSeries::line("with the effects found", points(|r| r.residual_extended_deg_per_h)))
         .mark(Mark::horizontal("+3 × noise", 3.0 * noise_deg_per_h))
         .mark(Mark::horizontal("", -3.0 * noise_deg_per_h))
 }
@@ -313,7 +313,7 @@ fn experiment_chart(found: &ExperimentJson) -> Chart {
         .size(860, 240)
         .x(Axis::linear("time [min]"))
         .y(Axis::linear("air's temperature [°C]"))
-        .with(Series::line("", points))
+        .with(ChartSeries::line("", points))
 }
 
 fn candidates(body: &DiagnosisJson) -> Markup {

@@ -6,7 +6,7 @@ use maud::{Markup, html};
 
 use super::cross_section::cross_section;
 use super::page::{figure, page};
-use super::plot::{Axis, Chart, Mark, Series};
+use super::plot::{Axis, Chart, ChartSeries, Mark};
 use super::search_run::{ReportError, all, certificate, convergence, on_a_readable_scale};
 use super::words;
 use crate::io::read::run_reader::{Run, RunField};
@@ -68,7 +68,7 @@ fn bars(run: &Run) -> String {
         .size(860, 240)
         .x(Axis::linear("worst |rate error| [°/h]").reaching(0.0))
         .categories(all(run).map(|pattern| pattern.name.clone()))
-        .with(Series::bars("over the given temperatures", &values));
+        .with(ChartSeries::bars("over the given temperatures", &values));
     if let Some(qua) = run.summary.baselines.iter().find(|pattern| pattern.name == "qua") {
         chart = chart.mark(Mark::vertical("QUA", qua.worst_rate_deg_per_h));
     }
@@ -156,7 +156,7 @@ fn temperatures(field: &RunField, rates: &FieldRates) -> String {
         .y(Axis::linear("temperature [°C]"));
     for (layer, course) in &rates.layers_c {
         let points = times_min.iter().copied().zip(course.iter().copied()).collect();
-        chart = chart.with(Series::line(format!("layer {layer}"), points));
+        chart = chart.with(ChartSeries::line(format!("layer {layer}"), points));
     }
     chart.svg_to_read()
 }

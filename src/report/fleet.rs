@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::page::{figure, page};
-use super::plot::{Axis, Chart, Mark, Series};
+use super::plot::{Axis, Chart, ChartSeries, Mark};
 use crate::io::json::campaign::GyroJson;
 use crate::io::json::fleet::{FleetEffectJson, FleetJson, GyroValueJson, MeasureJson, four_digits};
 
@@ -66,8 +66,8 @@ fn figures(fleet: &FleetJson) -> Vec<Figure> {
             .size(860, 240)
             .x(Axis::whole(format!("gyros of {}", fleet.gyros)).reaching(fleet.gyros as f64))
             .categories(fleet.effects.iter().map(|e| e.kind.clone()))
-            .with(Series::bars("found", &counts(|e| e.found_in.len())))
-            .with(Series::bars("explains as well what was found", &counts(|e| e.equivalent_in.len())));
+            .with(ChartSeries::bars("found", &counts(|e| e.found_in.len())))
+            .with(ChartSeries::bars("explains as well what was found", &counts(|e| e.equivalent_in.len())));
         let caption = "What at least half of the gyros have is common to the batch.";
         found.push(Figure { about: first.kind.clone(), markup: figure(&chart.svg_to_read(), caption) });
     }
@@ -87,7 +87,7 @@ fn figures(fleet: &FleetJson) -> Vec<Figure> {
             .size(860, 240)
             .x(Axis::linear("temperature [°C]"))
             .y(Axis::linear("about each gyro's own mean [°/h]"))
-            .with(Series::points("batch", points));
+            .with(ChartSeries::points("batch", points));
         let share = 100.0 * curve.common_share;
         let caption = format!(
             "Means over the gyros. The curve of the others takes {share:.0} % of a gyro's own thermal mean square away."
@@ -187,10 +187,10 @@ fn values(title: &str, unit: &str, usual: f64, values: &[GyroValueJson]) -> Stri
         .size(860, 240)
         .x(Axis::linear(if unit == "1" { title.to_owned() } else { format!("{title} [{unit}]") }))
         .categories(drawn.iter().map(|v| v.gyro.clone()))
-        .with(Series::bars("as the batch", &of(false)))
+        .with(ChartSeries::bars("as the batch", &of(false)))
         .mark(Mark::vertical("batch", usual));
     if drawn.iter().any(|v| v.single) {
-        chart = chart.with(Series::bars("apart", &of(true)));
+        chart = chart.with(ChartSeries::bars("apart", &of(true)));
     }
     chart.svg_to_read()
 }

@@ -4,7 +4,7 @@ use maud::html;
 use serde_json::Value;
 
 use super::page::{figure, page};
-use super::plot::{Axis, Chart, Series};
+use super::plot::{Axis, Chart, ChartSeries};
 use super::proposal::proposal_in_words;
 use super::words;
 use crate::io::json::improve::{ImproveJson, PredictedRow};
@@ -72,8 +72,8 @@ fn predicted_chart(rows: &[PredictedRow]) -> String {
         .size(860, 320)
         .x(Axis::linear("time [min]"))
         .y(Axis::linear("rate [°/h]"))
-        .with(Series::line("predicted", line(|row| row.rate_deg_per_h)))
-        .with(Series::dashed("lower", line(|row| row.low_deg_per_h)))
-        .with(Series::dashed("upper", line(|row| row.high_deg_per_h)))
+        .with(ChartSeries::line("predicted", line(|row| row.rate_deg_per_h)))
+        .with(ChartSeries::dashed("lower", line(|row| row.low_deg_per_h)))
+        .with(ChartSeries::dashed("upper", line(|row| row.high_deg_per_h)))
         .svg_to_read()
 }

@@ -1,6 +1,6 @@
 //! The ladder of a diagnosis as a picture: what each piece of physics bought, against the noise.
 
-use super::plot::{Axis, Chart, Mark, Series};
+use super::plot::{Axis, Chart, ChartSeries, Mark};
 use crate::io::json::diagnosis::DiagnosisJson;
 
 /// Noise floors that differ by less than this share are one line.
@@ -21,11 +21,11 @@ pub(crate) fn ladder_chart(body: &DiagnosisJson) -> Chart {
         .size(860, 200)
         .x(Axis::linear("root mean square of the residual [°/h]"))
         .categories(names)
-        .with(Series::bars("on the records that were fitted", &fitted).labelled(labels));
+        .with(ChartSeries::bars("on the records that were fitted", &fitted).labelled(labels));
     let held_out: Vec<f64> = body.ladder.iter().map(|r| r.holdout_rmse_deg_per_h.unwrap_or(f64::NAN)).collect();
     if held_out.iter().any(|v| v.is_finite()) {
         let labels = held_out.iter().map(|v| words(*v, true)).collect();
-        chart = chart.with(Series::bars("on the hold-out, which was not", &held_out).labelled(labels));
+        chart = chart.with(ChartSeries::bars("on the hold-out, which was not", &held_out).labelled(labels));
     }
     let floor = body.noise_floor_deg_per_h;
     let other = body.holdout_noise_floor_deg_per_h.filter(|h| (h / floor - 1.0).abs() > SAME_FLOOR);

@@ -1,7 +1,7 @@
 //! The noise of a diagnosed record told apart: as a picture, and in words with what would help most.
 
-use super::plot::{Axis, Chart, Series};
-use crate::io::json::diagnosis::{DiagnosisJson, NoiseJson};
+use super::plot::{Axis, Chart, ChartSeries};
+use crate::io::json::diagnosis::{DiagnosisJson, RecordNoiseJson};
 
 /// Lying bars: what the rate of each record consists of beside the coil, and how much the air would leave unseen otherwise.
 pub(crate) fn noise_chart(body: &DiagnosisJson) -> Chart {
@@ -23,7 +23,7 @@ pub(crate) fn noise_chart(body: &DiagnosisJson) -> Chart {
             own.map_or(f64::NAN, |r| r.unresolved_air_deg_per_h)
         }));
         let labels = values.iter().map(|v| format!("{v:.4} °/h")).collect();
-        chart = chart.with(Series::bars(noise.record.clone(), &values).labelled(labels));
+        chart = chart.with(ChartSeries::bars(noise.record.clone(), &values).labelled(labels));
     }
     chart
 }
@@ -54,7 +54,7 @@ impl Limit {
     }
 }
 
-fn limit(n: &NoiseJson) -> Limit {
+fn limit(n: &RecordNoiseJson) -> Limit {
     let all = [
         (n.white_deg_per_h, Limit::White),
         (n.wander_deg_per_h, Limit::Wander),
@@ -66,7 +66,7 @@ fn limit(n: &NoiseJson) -> Limit {
 
 /// White noise, wander, unresolved air and model error of each record, what limits it most and what would help.
 pub(crate) fn noise_in_words(body: &DiagnosisJson) -> Vec<String> {
-    let line = |n: &NoiseJson| {
+    let line = |n: &RecordNoiseJson| {
         let own = limit(n);
         let best = n.remedies.first().filter(|r| r.unresolved_air_deg_per_h < n.unresolved_air_deg_per_h);
         let help = match (own, best) {

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::page::figure;
-use super::plot::{Axis, Chart, Series};
+use super::plot::{Axis, Chart, ChartSeries};
 use crate::io::json::diagnosis::DiagnosisJson;
 use crate::io::json::proposals::{ProposalJson, TermJson, TermParameterJson};
 use crate::units::percent_from_fraction;
@@ -53,7 +53,7 @@ pub(crate) fn term_chart(term: &TermJson) -> Option<Chart> {
         .y(Axis::linear("measured − all but this term [°/h]"));
     for shown in &term.shown {
         let points = shown.x.iter().copied().zip(shown.left_deg_per_h.iter().copied()).collect();
-        chart = chart.with(Series::points(shown.record.clone(), points));
+        chart = chart.with(ChartSeries::points(shown.record.clone(), points));
     }
     // In the order of time: what remembers draws a loop.
     let curve = |factor: f64| -> Vec<(f64, f64)> {
@@ -61,9 +61,9 @@ pub(crate) fn term_chart(term: &TermJson) -> Option<Chart> {
     };
     Some(
         chart
-            .with(Series::line("the term, fitted", curve(1.0)))
-            .with(Series::dashed("± 2 standard errors", curve(1.0 + share)))
-            .with(Series::dashed("", curve(1.0 - share))),
+            .with(ChartSeries::line("the term, fitted", curve(1.0)))
+            .with(ChartSeries::dashed("± 2 standard errors", curve(1.0 + share)))
+            .with(ChartSeries::dashed("", curve(1.0 - share))),
     )
 }
 

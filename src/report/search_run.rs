@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::cross_section::cross_section;
 use super::page::{figure, page};
-use super::plot::{Axis, Chart, Mark, Series};
+use super::plot::{Axis, Chart, ChartSeries, Mark};
 use super::words;
 use crate::io::files::sha256_hex;
 use crate::io::read::run_reader::{Run, RunPattern};
@@ -185,7 +185,7 @@ fn relative_bars(run: &Run) -> String {
         .x(axis("worst |rate error| [°/h]".to_owned()))
         .categories(all(run).map(|p| p.name.clone()));
     for (name, values) in shown {
-        chart = chart.with(Series::bars(name, &values));
+        chart = chart.with(ChartSeries::bars(name, &values));
     }
     if let Some(qua) = run.summary.baselines.iter().find(|p| p.name == "qua") {
         chart = chart.mark(Mark::vertical("QUA", qua.worst_rate_deg_per_h));
@@ -262,7 +262,7 @@ pub(super) fn on_a_readable_scale(profile: &str, times_min: &[f64], series: &[(&
         .y(Axis::sizes("|rate error| [°/h]", floor));
     for (name, rates) in series {
         let points = times_min.iter().zip(rates).map(|(t, rate)| (*t, *rate));
-        chart = chart.with(Series::line(*name, points.collect()));
+        chart = chart.with(ChartSeries::line(*name, points.collect()));
     }
     (chart, format!(" What is below {floor:.1e} °/h is drawn there."))
 }
@@ -312,7 +312,7 @@ fn declared_tolerance(run: &Run, best: &Pattern, declared: &ToleranceSpec) -> Re
         let p95_deg_per_h = deg_per_h_from_rad_per_s(p95);
         let values: Vec<f64> = distribution.worst_rad_per_s.iter().map(|r| deg_per_h_from_rad_per_s(*r)).collect();
         chart = chart
-            .with(Series::histogram(*name, &edges, &binned(&values, &edges)))
+            .with(ChartSeries::histogram(*name, &edges, &binned(&values, &edges)))
             .mark(Mark::vertical(format!("P95 of {name}"), p95_deg_per_h));
         let shares: Vec<String> = distribution
             .variance_shares
@@ -375,7 +375,7 @@ fn turn_tolerance(run: &Run, best: &Pattern) -> Result<String, ReportError> {
         .size(720, 280)
         .x(Axis::linear("worst |rate error| [°/h]"))
         .y(Axis::whole("coils"))
-        .with(Series::histogram("", &edges, &counts))
+        .with(ChartSeries::histogram("", &edges, &counts))
         .mark(Mark::vertical("as designed", run.summary.best.worst_rate_deg_per_h))
         .svg_to_read())
 }
@@ -389,7 +389,7 @@ fn profile_chart(profile: &Profile) -> String {
         .size(720, 220)
         .x(Axis::linear("time [min]"))
         .y(Axis::linear("boundary's rate [°C/h]").reaching(0.0))
-        .with(Series::step("", times_min.zip(held).collect()))
+        .with(ChartSeries::step("", times_min.zip(held).collect()))
         .svg_to_read()
 }
 
@@ -400,7 +400,7 @@ fn trade_off(run: &Run) -> (String, String) {
         .y(Axis::log("worst |rate error| [°/h]"));
     let compared = |name: &str| {
         let points = all(run).map(|p| (p.windability.max_climb as f64, p.worst_rate_deg_per_h)).collect();
-        Series::points(name, points).labelled(all(run).map(|p| p.name.clone()).collect())
+        ChartSeries::points(name, points).labelled(all(run).map(|p| p.name.clone()).collect())
     };
     let better = "Every step to the left is an easier crossover, every step down a smaller error.";
     match &run.front {
@@ -418,7 +418,7 @@ fn trade_off(run: &Run) -> (String, String) {
             for count in captive {
                 let points = front.iter().filter(|p| p.captive == count);
                 let points = points.map(|p| (p.max_climb as f64, p.worst_rate_deg_per_h)).collect();
-                chart = chart.with(Series::points(format!("front, {count} captive"), points));
+                chart = chart.with(ChartSeries::points(format!("front, {count} captive"), points));
             }
             (
                 chart.svg_to_read(),
@@ -436,9 +436,9 @@ pub(super) fn convergence(run: &Run) -> String {
         .x(Axis::linear("moves judged [1]").reaching(0.0))
         .y(Axis::linear("best objective [°/h]"))
         .with(if points.len() > 1 {
-            Series::step("best so far", points)
+            ChartSeries::step("best so far", points)
         } else {
-            Series::points("best so far", points)
+            ChartSeries::points("best so far", points)
         });
     if let Some(bound) = run.summary.proof.lower_bound_deg_per_h {
         chart = chart.mark(Mark::horizontal("proved lower bound", bound));

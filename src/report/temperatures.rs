@@ -1,6 +1,6 @@
 //! Pictures of the pack's temperatures and of their rates.
 
-use super::plot::{Axis, Chart, Series};
+use super::plot::{Axis, Chart, ChartSeries};
 use crate::io::json::temperatures::TemperaturesJson;
 use crate::units::min_from_s;
 
@@ -11,7 +11,7 @@ const LINES: usize = 6;
 pub(crate) fn temperature_chart(body: &TemperaturesJson) -> Chart {
     let ambient = body.times_s.iter().zip(&body.ambient_c).map(|(t, v)| (min_from_s(*t), *v)).collect();
     layers(body, &body.temperatures_c, "Layer temperatures", "temperature [°C]")
-        .with(Series::dashed("ambient or drive", ambient))
+        .with(ChartSeries::dashed("ambient or drive", ambient))
 }
 
 /// The rate of some layers.
@@ -33,7 +33,7 @@ fn layers(body: &TemperaturesJson, rows: &[Vec<f64>], what: &str, unit: &str) ->
             l if l + 1 == count => " (outermost)",
             _ => "",
         };
-        chart = chart.with(Series::line(format!("layer {}{place}", layer + 1), points));
+        chart = chart.with(ChartSeries::line(format!("layer {}{place}", layer + 1), points));
     }
     chart
 }

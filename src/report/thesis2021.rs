@@ -2,14 +2,14 @@
 
 use serde::Serialize;
 
-use super::plot::{Axis, Chart, Mark, Series};
-use super::yan1998::ReproductionFile;
-use crate::reproduce::thesis2021::{BAND_DEG_PER_S, LINES, Reproduction, TITLE};
+use super::plot::{Axis, Chart, ChartSeries, Mark};
+use super::yan1998::{ErratumJson, ReproductionFile};
+use crate::reproduce::thesis2021::{BAND_DEG_PER_S, LINES, TITLE, ThesisReproduction};
 
 /// The answer of `reproduce thesis2021`.
 #[derive(Debug, Serialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-pub struct ReproductionJson {
+pub struct ThesisReproductionJson {
     pub(crate) publication: &'static str,
     pub(crate) record: &'static str,
     pub(crate) comparisons: Vec<ComparisonJson>,
@@ -29,20 +29,12 @@ pub(crate) struct ComparisonJson {
     pub(crate) explanation: &'static str,
 }
 
-#[derive(Debug, Serialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-pub(crate) struct ErratumJson {
-    pub(crate) place: &'static str,
-    pub(crate) printed: &'static str,
-    pub(crate) used: &'static str,
-}
-
 /// What the numbers are of.
 pub(crate) const RECORD: &str = "simulated from the chapter's stated numbers: it prints no record";
 
-impl ReproductionJson {
+impl ThesisReproductionJson {
     /// With the files that were written beside it.
-    pub fn new(reproduction: &Reproduction, files: Vec<String>) -> Self {
+    pub fn new(reproduction: &ThesisReproduction, files: Vec<String>) -> Self {
         let comparisons = reproduction.comparisons.iter().map(|c| ComparisonJson {
             place: c.place,
             what: c.what,
@@ -99,8 +91,8 @@ const ITEMS: [(&str, &str); 26] = [
 ];
 
 /// Published beside computed.
-pub(crate) fn table_rows(reproduction: &Reproduction) -> Vec<Vec<String>> {
-    let row = |c: &crate::reproduce::thesis2021::Comparison| {
+pub(crate) fn table_rows(reproduction: &ThesisReproduction) -> Vec<Vec<String>> {
+    let row = |c: &crate::reproduce::thesis2021::PrintedComparison| {
         let published = c.published.map_or_else(|| "–".to_owned(), |value| format!("{value}"));
         [c.place, c.what, &published, &digits(c.computed), c.unit, c.explanation].map(str::to_owned).to_vec()
     };
@@ -112,7 +104,7 @@ fn digits(value: f64) -> String {
 }
 
 /// Everything that goes into the folder.
-pub fn files(reproduction: &Reproduction, command: &str) -> Vec<ReproductionFile> {
+pub fn files(reproduction: &ThesisReproduction, command: &str) -> Vec<ReproductionFile> {
     let file = |name: &str, contents: String| ReproductionFile { name: name.to_owned(), contents };
     let over = |x: usize, y: usize| -> Vec<(f64, f64)> { reproduction.rows.iter().map(|r| (r[x], r[y])).collect() };
     let (time, temperature, before, after) = (0, 1, 2, 3);
@@ -124,27 +116,27 @@ pub fn files(reproduction: &Reproduction, command: &str) -> Vec<ReproductionFile
             .fold(chart, |chart, line| chart.mark(Mark::vertical(format!("{} °C, printed", line.2), line.2)))
     };
     let figure_2 = breaks(chart("Fig. 3-2: rate over temperature, before", "temperature [°C]"))
-        .with(Series::points("simulated, filtered", over(temperature, before)));
+        .with(ChartSeries::points("simulated, filtered", over(temperature, before)));
     let figure_4 = breaks(chart("Fig. 3-4: rate over temperature, after", "temperature [°C]"))
-        .with(Series::points("compensated", over(temperature, after)))
+        .with(ChartSeries::points("compensated", over(temperature, after)))
         .mark(Mark::horizontal("printed band", BAND_DEG_PER_S))
         .mark(Mark::horizontal("", -BAND_DEG_PER_S));
     let figure_5 = chart("Figs. 3-5 and 3-6: rate over time, after and before", "time [s]")
-        .with(Series::line("before", over(time, before)))
-        .with(Series::line("after", over(time, after)));
+        .with(ChartSeries::line("before", over(time, before)))
+        .with(ChartSeries::line("after", over(time, after)));
     let angle = |column: usize| -> Vec<(f64, f64)> { reproduction.angles.iter().map(|r| (r[0], r[column])).collect() };
     let figure_7 = Chart::new("Figs. 3-7 and 3-8: angle over time, after and before")
         .size(760, 400)
         .x(Axis::linear("time [s]"))
         .y(Axis::linear("angle [°]"))
-        .with(Series::line("before", angle(1)))
-        .with(Series::line("lines and shift taken off", angle(2)));
+        .with(ChartSeries::line("before", angle(1)))
+        .with(ChartSeries::line("lines and shift taken off", angle(2)));
     let density = reproduction.spectrum.iter().map(|d| (d.frequency_hz, d.density)).collect();
     let figure_3 = Chart::new("Fig. 3-3: power spectral density before")
         .size(760, 400)
         .x(Axis::log("frequency [Hz]"))
         .y(Axis::log("density [(°/s)²/Hz]"))
-        .with(Series::line("one-sided, of the raw rows", density))
+        .with(ChartSeries::line("one-sided, of the raw rows", density))
         .mark(Mark::vertical("0.04 Hz, printed", 0.04));
     let mut rows = "time_s,temperature_c,rate_deg_per_s,rate_compensated_deg_per_s\n".to_owned();
     for [time_s, temperature_c, before, after] in &reproduction.rows {
@@ -162,7 +154,7 @@ pub fn files(reproduction: &Reproduction, command: &str) -> Vec<ReproductionFile
     ]
 }
 
-fn csv(reproduction: &Reproduction) -> String {
+fn csv(reproduction: &ThesisReproduction) -> String {
     let mut text = "place,what,published,computed,unit\n".to_owned();
     for c in &reproduction.comparisons {
         let published = c.published.map_or_else(String::new, |value| format!("{value}"));
@@ -171,7 +163,7 @@ fn csv(reproduction: &Reproduction) -> String {
     text
 }
 
-fn words(reproduction: &Reproduction, command: &str) -> String {
+fn words(reproduction: &ThesisReproduction, command: &str) -> String {
     let mut text =
         format!("# {TITLE}\n\nWritten by `{command}`. The record is {RECORD}.\n\n| {} |\n", TABLE_HEAD.join(" | "));
     text += "|---|---|---|---|---|---|\n";

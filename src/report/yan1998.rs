@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-use super::plot::{Axis, Chart, Mark, Series};
+use super::plot::{Axis, Chart, ChartSeries, Mark};
 use crate::pattern::classic::Classic;
 use crate::reproduce::yan1998::{
-    DURATION_S, Discrepancy, ERRATA, ErrorOverTime, LAYERS, LayerRates, RAMP_S, Reproduction, TITLE, WINDINGS,
+    DURATION_S, Discrepancy, ERRATA, ErrorOverTime, LAYERS, LayerRates, PaperReproduction, RAMP_S, TITLE, WINDINGS,
 };
 use crate::units::{c_per_h_from_k_per_s, deg_per_h_from_rad_per_s, min_from_s, mm_from_m};
 
@@ -19,7 +19,7 @@ pub struct ReproductionFile {
 /// The answer of `reproduce yan1998`.
 #[derive(Debug, Serialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-pub struct ReproductionJson {
+pub struct PaperReproductionJson {
     pub(crate) publication: &'static str,
     pub(crate) table_2: Vec<PeakJson>,
     pub(crate) discrepancies: Vec<String>,
@@ -39,6 +39,7 @@ pub(crate) struct PeakJson {
     pub(crate) published_is_possible: bool,
 }
 
+/// A misprint of a publication, and what was used in its place.
 #[derive(Debug, Serialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct ErratumJson {
@@ -47,9 +48,9 @@ pub(crate) struct ErratumJson {
     pub(crate) used: &'static str,
 }
 
-impl ReproductionJson {
+impl PaperReproductionJson {
     /// With the files that were written beside it.
-    pub fn new(reproduction: &Reproduction, files: Vec<String>) -> Self {
+    pub fn new(reproduction: &PaperReproduction, files: Vec<String>) -> Self {
         let peaks = reproduction.peaks.iter().map(|peak| PeakJson {
             length_m: peak.length_m,
             winding: peak.winding.key(),
@@ -78,7 +79,7 @@ fn rounded(published_deg_per_h: f64) -> f64 {
 pub(crate) const TABLE_HEAD: [&str; 7] =
     ["length m", "winding", "published °/h", "computed °/h", "at s", "hard bound °/h", "published value"];
 
-pub(crate) fn table_rows(reproduction: &Reproduction) -> Vec<Vec<String>> {
+pub(crate) fn table_rows(reproduction: &PaperReproduction) -> Vec<Vec<String>> {
     let row = |peak: &crate::reproduce::yan1998::Peak| {
         vec![
             peak.length_m.to_string(),
@@ -130,7 +131,7 @@ pub(crate) fn discrepancy_words(discrepancy: &Discrepancy) -> String {
 }
 
 /// All files; `command` is written into the page of words.
-pub fn files(reproduction: &Reproduction, command: &str) -> Vec<ReproductionFile> {
+pub fn files(reproduction: &PaperReproduction, command: &str) -> Vec<ReproductionFile> {
     let file = |name: &str, contents: String| ReproductionFile { name: name.to_owned(), contents };
     let mut files = vec![
         file("README.md", words(reproduction, command)),
@@ -145,7 +146,7 @@ pub fn files(reproduction: &Reproduction, command: &str) -> Vec<ReproductionFile
     files
 }
 
-fn words(reproduction: &Reproduction, command: &str) -> String {
+fn words(reproduction: &PaperReproduction, command: &str) -> String {
     let markdown_row = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
     let head = TABLE_HEAD.map(str::to_owned);
     let mut page = format!("# {TITLE}\n\nMade by `{command}`, coilwright {}.\n\n", env!("CARGO_PKG_VERSION"));
@@ -171,7 +172,7 @@ fn lines(rows: impl IntoIterator<Item = Vec<String>>) -> String {
     rows.into_iter().map(|row| row.join(",") + "\n").collect()
 }
 
-fn table_csv(reproduction: &Reproduction) -> String {
+fn table_csv(reproduction: &PaperReproduction) -> String {
     let head = [
         "length_m",
         "winding",
@@ -209,7 +210,11 @@ fn layer_rates_chart(figure: &LayerRates) -> String {
                 figure.depths_m.iter().zip(rates).map(|(&d, &r)| (mm_from_m(d), c_per_h_from_k_per_s(r))).collect();
             let name = format!("{time_s} s");
             // After the ramp's end the lines are dashed.
-            chart.with(if *time_s > RAMP_S { Series::dashed(name, points) } else { Series::line(name, points) })
+            chart.with(if *time_s > RAMP_S {
+                ChartSeries::dashed(name, points)
+            } else {
+                ChartSeries::line(name, points)
+            })
         })
         .svg()
 }
@@ -241,7 +246,7 @@ fn error_chart(figure: &ErrorOverTime) -> String {
                 .zip(series)
                 .map(|(&t, &r)| (min_from_s(t), deg_per_h_from_rad_per_s(r)))
                 .collect();
-            chart.with(Series::line(winding.key(), points))
+            chart.with(ChartSeries::line(winding.key(), points))
         })
         .svg()
 }

@@ -61,7 +61,7 @@ const STRETCH: usize = 2048;
 
 /// A printed number beside the computed one.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Comparison {
+pub(crate) struct PrintedComparison {
     pub(crate) place: &'static str,
     pub(crate) what: &'static str,
     pub(crate) unit: &'static str,
@@ -73,8 +73,8 @@ pub(crate) struct Comparison {
 
 /// Everything that the chapter shows, computed.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Reproduction {
-    pub(crate) comparisons: Vec<Comparison>,
+pub struct ThesisReproduction {
+    pub(crate) comparisons: Vec<PrintedComparison>,
     /// Of the filtered means: time, temperature [°C], rate before and after [°/s].
     pub(crate) rows: Vec<[f64; 4]>,
     /// Of another start-up: time, angle integrated before and behind the lines of the first, its shift removed [°].
@@ -240,7 +240,7 @@ fn kalman_estimate(raw: &[(f64, f64)], lines: &PiecewiseBias) -> (f64, f64) {
 
 /// # Errors
 /// None that the chapter's own numbers lead to.
-pub fn reproduce() -> Result<Reproduction, ThesisError> {
+pub fn reproduce() -> Result<ThesisReproduction, ThesisError> {
     let raw_rows = raw(SEED, 0.0);
     let record = filtered(&raw_rows)?;
     let lines = PiecewiseBias::fit(&[&record])?;
@@ -266,7 +266,7 @@ pub fn reproduce() -> Result<Reproduction, ThesisError> {
     let crossing = |a: usize, b: usize| (LINES[b].1 - LINES[a].1) / (LINES[a].0 - LINES[b].0);
     // A row a second holds white noise up to 1 Hz, counted on both sides of zero.
     let walk = rms(&noise) / BANDWIDTH_HZ.sqrt();
-    let comparisons = table::comparisons(&table::Found {
+    let comparisons = table::comparisons(&table::SimulatedMeasures {
         measured: &measured,
         left: &left,
         lines: &lines,
@@ -292,7 +292,7 @@ pub fn reproduce() -> Result<Reproduction, ThesisError> {
         })
         .collect();
     let spectrum = power_spectral_density(&all, 1.0, STRETCH, 60);
-    Ok(Reproduction { comparisons, rows, angles, spectrum, errata: ERRATA })
+    Ok(ThesisReproduction { comparisons, rows, angles, spectrum, errata: ERRATA })
 }
 
 #[cfg(test)]

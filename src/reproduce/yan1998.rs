@@ -73,7 +73,7 @@ impl Peak {
 
 /// Everything that the paper prints and the equations give.
 #[derive(Debug)]
-pub struct Reproduction {
+pub struct PaperReproduction {
     /// Length by length, in the order of [`WINDINGS`].
     pub(crate) peaks: Vec<Peak>,
     pub(crate) discrepancies: Vec<Discrepancy>,
@@ -239,7 +239,7 @@ pub fn profile() -> Profile {
 ///
 /// # Errors
 /// None in practice: the coil is a constant.
-pub fn reproduce() -> Result<Reproduction, SearchError> {
+pub fn reproduce() -> Result<PaperReproduction, SearchError> {
     let (mut peaks, mut errors) = (Vec::new(), Vec::new());
     for (row, length_m) in LENGTHS_M.into_iter().enumerate() {
         let model = model(length_m)?;
@@ -266,7 +266,7 @@ pub fn reproduce() -> Result<Reproduction, SearchError> {
         errors.push(error);
     }
     let discrepancies = discrepancies(&peaks, &errors);
-    Ok(Reproduction { peaks, discrepancies, layer_rates: layer_rates()?, errors })
+    Ok(PaperReproduction { peaks, discrepancies, layer_rates: layer_rates()?, errors })
 }
 
 /// Fine where the error changes fast: behind the ramp's start and its end.

@@ -21,11 +21,11 @@ use crate::pattern::{Half, Pattern};
 use crate::rate::{Laid, RateError};
 use crate::thermal::Flange;
 pub(crate) use reels::{Reel, ReelName};
-use reels::{Reels, Start};
+use reels::{Reels, SegmentStart};
 
 /// One layer's winding.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Step {
+pub struct ScheduleStep {
     /// Counted from 1, as layers and segments are.
     pub(crate) step: usize,
     pub(crate) layer: usize,
@@ -83,7 +83,7 @@ pub(crate) struct Crossing {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Schedule {
     pattern: Pattern,
-    steps: Vec<Step>,
+    steps: Vec<ScheduleStep>,
     reels: Vec<Reel>,
     length_m: f64,
     start_mark_m: f64,
@@ -106,8 +106,8 @@ impl Schedule {
         for (number, (&at, graph_step)) in order.iter().zip(&graph_steps).enumerate() {
             let piece = &pieces[at];
             let start = match (graph_step.joined_low, graph_step.joined_high) {
-                (Some(_), _) => Start::Low,
-                (None, Some(_)) => Start::High,
+                (Some(_), _) => SegmentStart::Low,
+                (None, Some(_)) => SegmentStart::High,
                 (None, None) => island_start(pattern, piece.layer),
             };
             let (low_flange, high_flange) =
@@ -124,7 +124,7 @@ impl Schedule {
             .into_iter()
             .flatten()
             .collect();
-            let from_flange = if start == Start::Low { low_flange } else { high_flange };
+            let from_flange = if start == SegmentStart::Low { low_flange } else { high_flange };
             let whole_turns = coil.turns()[piece.layer];
             let start_gap_turns = match from_flange {
                 _ if piece.share >= 1.0 => 0.0,
@@ -135,14 +135,14 @@ impl Schedule {
             let (supply_reel, cumulative_m) = reels.wind(number + 1, at + 1, start);
             let half = piece.added_at.unwrap_or_else(|| pattern.half(piece.layer));
             balance_m += if half == Half::A { piece.length_m } else { -piece.length_m };
-            steps.push(Step {
+            steps.push(ScheduleStep {
                 step: number + 1,
                 layer: piece.layer + 1,
                 half,
                 segment: piece.segment,
                 supply_reel,
                 from_flange,
-                rotation: if start == Start::Low { Rotation::Clockwise } else { Rotation::Counterclockwise },
+                rotation: if start == SegmentStart::Low { Rotation::Clockwise } else { Rotation::Counterclockwise },
                 turns: piece.turns,
                 free_turns: piece.free_turns,
                 start_gap_turns,
@@ -159,8 +159,8 @@ impl Schedule {
             });
         }
         let start_mark_m = match first_start {
-            Start::Low => pieces[order[0]].from_m,
-            Start::High => pieces[order[0]].to_m,
+            SegmentStart::Low => pieces[order[0]].from_m,
+            SegmentStart::High => pieces[order[0]].to_m,
         };
         Ok(Self {
             pattern: pattern.clone(),
@@ -176,7 +176,7 @@ impl Schedule {
     }
 
     /// In winding order.
-    pub fn steps(&self) -> &[Step] {
+    pub fn steps(&self) -> &[ScheduleStep] {
         &self.steps
     }
 
@@ -194,7 +194,8 @@ impl Schedule {
     pub(crate) fn midpoint_layer(&self) -> usize {
         let middle_m = 0.5 * self.length_m;
         let rounding_m = 1e-10 * self.length_m;
-        let holds = |s: &&Step| s.fibre_from_m <= middle_m + rounding_m && s.fibre_to_m >= middle_m - rounding_m;
+        let holds =
+            |s: &&ScheduleStep| s.fibre_from_m <= middle_m + rounding_m && s.fibre_to_m >= middle_m - rounding_m;
         self.steps.iter().find(holds).map_or(1, |s| s.layer)
     }
 
@@ -214,12 +215,12 @@ impl Schedule {
 }
 
 /// With which end a segment begins that continues nothing.
-fn island_start(pattern: &Pattern, layer: usize) -> Start {
+fn island_start(pattern: &Pattern, layer: usize) -> SegmentStart {
     let segment = pattern.segment(layer);
     if segment == 1 || (segment != pattern.layers() && pattern.half(layer) == Half::B) {
-        Start::Low
+        SegmentStart::Low
     } else {
-        Start::High
+        SegmentStart::High
     }
 }
 

@@ -36,7 +36,7 @@ pub(crate) struct Reel {
 
 /// With which end a segment begins, by arclength.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Start {
+pub(super) enum SegmentStart {
     Low,
     High,
 }
@@ -60,13 +60,13 @@ pub(super) struct Reels<'a> {
 impl<'a> Reels<'a> {
     /// The fibre before winding: on one reel if its own end is wound first, else on two that part where layer 1 begins. `first` is
     /// the piece that is wound first.
-    pub(super) fn new(first: usize, start: Start, ends_m: &'a [f64]) -> Self {
+    pub(super) fn new(first: usize, start: SegmentStart, ends_m: &'a [f64]) -> Self {
         let count = ends_m.len() - 1;
         let mut reels = Self { ends_m, list: Vec::new(), drawn_m: Vec::new(), runs: Vec::new() };
         // Up to which piece reel A holds the fibre.
         let split = match start {
-            Start::Low => first - 1,
-            Start::High => first,
+            SegmentStart::Low => first - 1,
+            SegmentStart::High => first,
         };
         for (name, from, to) in [(ReelName::A, 1, split), (ReelName::B, split + 1, count)] {
             if from <= to {
@@ -107,24 +107,24 @@ impl<'a> Reels<'a> {
     }
 
     /// Takes a piece off its reel, spooling over first what this makes captive. The reel, and what it has given so far.
-    pub(super) fn wind(&mut self, step: usize, segment: usize, start: Start) -> (ReelName, f64) {
+    pub(super) fn wind(&mut self, step: usize, segment: usize, start: SegmentStart) -> (ReelName, f64) {
         let at =
             self.runs.iter().position(|r| r.first <= segment && segment <= r.last).expect("each segment is wound once");
         let run = self.runs.remove(at);
         let count = self.ends_m.len() - 1;
         // The side that feeds the layer includes it; the other side is left behind its starting end.
         let (feed, left) = match start {
-            Start::Low => ((segment, run.last), (run.first, segment - 1)),
-            Start::High => ((run.first, segment), (segment + 1, run.last)),
+            SegmentStart::Low => ((segment, run.last), (run.first, segment - 1)),
+            SegmentStart::High => ((run.first, segment), (segment + 1, run.last)),
         };
         let was_captive = self.list[run.reel].captive;
         let begins_inside_or_at_own_end = match start {
-            Start::Low => step > 1 && segment == run.first && run.first == 1,
-            Start::High => step > 1 && segment == run.last && run.last == count,
+            SegmentStart::Low => step > 1 && segment == run.first && run.first == 1,
+            SegmentStart::High => step > 1 && segment == run.last && run.last == count,
         };
         let feed_is_held = match start {
-            Start::Low => feed.1 < count,
-            Start::High => feed.0 > 1,
+            SegmentStart::Low => feed.1 < count,
+            SegmentStart::High => feed.0 > 1,
         };
         let splits = left.0 <= left.1;
         let mut feed_reel = run.reel;
@@ -137,8 +137,8 @@ impl<'a> Reels<'a> {
             self.runs.push(Run { first: left.0, last: left.1, reel });
         }
         let rest = match start {
-            Start::Low => (segment + 1, run.last),
-            Start::High => (run.first, segment - 1),
+            SegmentStart::Low => (segment + 1, run.last),
+            SegmentStart::High => (run.first, segment - 1),
         };
         if rest.0 <= rest.1 {
             self.runs.push(Run { first: rest.0, last: rest.1, reel: feed_reel });

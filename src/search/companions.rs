@@ -5,7 +5,7 @@
 //! find, with the look-ahead of the proof where the class has one, and judges it by its own. These short searches have a
 //! seed of their own, the same for every command and seed, so that what one of them comes upon no other misses.
 
-use super::anneal::rounds::{Found, Plan, Rounds, Rules};
+use super::anneal::rounds::{FoundPattern, Plan, Rounds, Rules};
 use super::cost::objective::Objective;
 use super::evaluator::{Evaluator, JudgeError};
 use crate::pattern::Pattern;
@@ -102,11 +102,12 @@ impl<'a> Evaluator<'a> {
         class: WindabilityClass,
         shared: &[Pattern],
         refine: bool,
-    ) -> Vec<Found> {
+    ) -> Vec<FoundPattern> {
         let admitted = shared.iter().filter(|pattern| class.admits(pattern));
-        let judged: Vec<Found> = admitted.map(|pattern| search.judged(pattern.segments())).collect();
-        let mut found: Vec<Found> = search.state().found.iter().cloned().chain(judged).collect();
-        let order = |a: &Found, b: &Found| a.cost.total_cmp(&b.cost).then_with(|| a.segments.cmp(&b.segments));
+        let judged: Vec<FoundPattern> = admitted.map(|pattern| search.judged(pattern.segments())).collect();
+        let mut found: Vec<FoundPattern> = search.state().found.iter().cloned().chain(judged).collect();
+        let order =
+            |a: &FoundPattern, b: &FoundPattern| a.cost.total_cmp(&b.cost).then_with(|| a.segments.cmp(&b.segments));
         found.sort_by(order);
         found.dedup_by(|a, b| a.segments == b.segments);
         if refine {

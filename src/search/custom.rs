@@ -12,13 +12,13 @@ use std::sync::Arc;
 use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
-use super::anneal::limits::{Limits, draw, neighbour};
+use super::anneal::limits::{WindingLimits, draw, neighbour};
 use super::anneal::quantile;
-use super::anneal::rounds::{Found, Optimisation, Plan, RoundRecord, Rounds, State};
+use super::anneal::rounds::{FoundPattern, Optimisation, Plan, RoundRecord, Rounds, State};
 use super::answer::Ended;
 use super::cost::columns::Work;
 use super::cost::samples::SampleMatrix;
-use super::cost::{Cost, InFull, Pace, Position, Proposal};
+use super::cost::{Cost, InFull, MoveProposal, Pace, Position};
 use super::run::{Halt, Observer};
 use crate::pattern::classic::Classic;
 
@@ -87,7 +87,7 @@ pub fn default_function_plan(layers: usize, seed: u64) -> Plan {
 #[non_exhaustive]
 pub struct CustomAnswer {
     /// Best first, no two alike.
-    pub found: Vec<Found>,
+    pub found: Vec<FoundPattern>,
     /// Moves judged.
     pub evaluations: u64,
     /// Rounds that have ended.
@@ -140,13 +140,13 @@ fn run<C: Cost>(mut search: Optimisation<C>, observer: &mut dyn Observer) -> Opt
 pub struct FunctionCost<F> {
     function: Arc<F>,
     layers: usize,
-    limits: Limits,
+    limits: WindingLimits,
 }
 
 impl<F: Fn(&[usize]) -> f64 + Send + Sync> FunctionCost<F> {
     /// # Errors
     /// A layer count that no winding has.
-    pub fn new(layers: usize, limits: impl Into<Limits>, function: F) -> Result<Self, CustomError> {
+    pub fn new(layers: usize, limits: impl Into<WindingLimits>, function: F) -> Result<Self, CustomError> {
         check_layers(layers)?;
         Ok(Self { function: Arc::new(function), layers, limits: limits.into() })
     }
@@ -185,13 +185,13 @@ impl<F: Fn(&[usize]) -> f64 + Send + Sync> Position<FunctionCost<F>> for Functio
         self.segments.clone()
     }
 
-    fn propose(&mut self, cost: &FunctionCost<F>, random: &mut ChaCha8Rng, limit: f64) -> Proposal {
+    fn propose(&mut self, cost: &FunctionCost<F>, random: &mut ChaCha8Rng, limit: f64) -> MoveProposal {
         self.work.moves += 1;
-        let Some(candidate) = neighbour(cost.limits, &self.segments, random) else { return Proposal::Outside };
+        let Some(candidate) = neighbour(cost.limits, &self.segments, random) else { return MoveProposal::Outside };
         let proposed = (cost.function)(&candidate);
         self.work.samples += 1;
         self.proposed = (candidate, proposed);
-        if proposed <= limit { Proposal::Within(proposed) } else { Proposal::Refused }
+        if proposed <= limit { MoveProposal::Within(proposed) } else { MoveProposal::Refused }
     }
 
     fn accept(&mut self, _cost: &FunctionCost<F>) {
@@ -295,7 +295,7 @@ mod tests {
     fn array_and_function_find_the_best_of_all_patterns_and_report_the_cost_that_the_formula_gives() {
         let constant = [0.4, -0.3, 0.2];
         for class in [WindabilityClass::Any, WindabilityClass::Captive(1), WindabilityClass::Standard] {
-            let limits = Limits::from(class);
+            let limits = WindingLimits::from(class);
             let all = permutations((1..=LAYERS).collect()).into_iter().filter(|p| limits.admits(p));
             let smallest = all.map(|p| cost_of(&p, &constant)).fold(f64::INFINITY, f64::min);
             let matrix = sensitivity_matrix(LAYERS, &sensitivities(), &constant).unwrap();

@@ -7,7 +7,7 @@ use crate::pattern::classic::Classic;
 use crate::pattern::windability::WindabilityClass;
 use crate::profile::{Profile, ProfileSpec};
 use crate::rate::{CoilModel, RateModel};
-use crate::search::anneal::rounds::Found;
+use crate::search::anneal::rounds::FoundPattern;
 use crate::search::aside::{Aside, GridCheck, GridChecked, GridFigure, PointingError};
 use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
 use crate::search::cost::objective::{Objective, POINTING_S};
@@ -16,7 +16,7 @@ use crate::search::cost::tolerance::{Coils, ToleranceError, ToleranceSpec};
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles, WorstCase};
 use crate::search::proof::compound::compounded;
 use crate::search::proof::permutation_tree::MOST_LAYERS;
-use crate::search::proof::{Effort, Goal, Improvement, Task, improve};
+use crate::search::proof::{Goal, Improvement, ProofEffort, Task, improve};
 use crate::thermal::{Extent, Location};
 use crate::units::percent_from_fraction;
 
@@ -297,7 +297,7 @@ impl Evaluator<'_> {
         &self,
         class: WindabilityClass,
         best: Judged,
-        found: &[Found],
+        found: &[FoundPattern],
         good_enough_rad_per_s: Option<f64>,
     ) -> Result<(Judged, bool), JudgeError> {
         let layers = self.model.coil.layers();
@@ -309,7 +309,7 @@ impl Evaluator<'_> {
         let Improvement { mut pattern, is_optimal } = if self.can_improve(class) {
             let most_nodes = if self.is_provable(class) { PROVING_NODES } else { IMPROVING_NODES };
             let beam_width = if layers > PROVABLE_LAYERS { BEAM_WIDTH } else { 0 };
-            improve(&task, &starts, Effort { most_nodes, beam_width, good_enough_rad_per_s })?
+            improve(&task, &starts, ProofEffort { most_nodes, beam_width, good_enough_rad_per_s })?
         } else {
             Improvement { pattern: best.pattern.clone(), is_optimal: false }
         };
@@ -333,7 +333,7 @@ impl Evaluator<'_> {
     pub fn best(
         &self,
         class: WindabilityClass,
-        found: &[Found],
+        found: &[FoundPattern],
         baselines: &[Judged],
     ) -> Result<Option<Judged>, JudgeError> {
         let mut best: Option<Judged> = None;
@@ -346,7 +346,7 @@ impl Evaluator<'_> {
                 best = Some(baseline.clone());
             }
         }
-        let named = |candidate: &Found| {
+        let named = |candidate: &FoundPattern| {
             let pattern = Pattern::new(candidate.segments.clone()).expect("a walk visits permutations only");
             (name_of(&pattern), pattern)
         };

@@ -7,7 +7,7 @@ use super::cost::tolerance::{Measure, ToleranceSpec, measure, study};
 use super::cost::worst_case::{SearchError, SolvedProfiles};
 use super::evaluator::{Evaluator, JudgeError, Judged, name_of};
 use super::proof::permutation_tree::MOST_LAYERS;
-use super::proof::{Effort, Goal, Task, improve};
+use super::proof::{Goal, ProofEffort, Task, improve};
 use super::prospect::worst_rates_rad_per_s;
 use super::weighed_pointing::PointingFigures;
 use super::weighing::{TIE, Weighed};
@@ -52,7 +52,7 @@ impl Evaluator<'_> {
             None => (Goal::WorstRate, "worst rate error"),
         };
         let task = Task { model: self.model, solved: self.solved, class: WindabilityClass::Captive(1), goal };
-        let effort = Effort { most_nodes: 0, beam_width: 0, good_enough_rad_per_s: 0.0 };
+        let effort = ProofEffort { most_nodes: 0, beam_width: 0, good_enough_rad_per_s: 0.0 };
         let pattern = improve(&task, std::slice::from_ref(&recommended.judged.pattern), effort)?.pattern;
         let under = if is_for_pointing { Objective::Pointing } else { Objective::WorstRate };
         let judged = self.under(under).judge("captive-1", &pattern)?;

@@ -5,7 +5,7 @@ use crate::search::evaluator::Judged;
 
 /// A pattern with everything that it is weighed by; less is better throughout.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Point {
+pub(crate) struct ParetoPoint {
     pub(crate) judged: Judged,
     pub(crate) windability: Windability,
 }
@@ -13,7 +13,7 @@ pub(crate) struct Point {
 /// Errors this close count as equal, so that rounding makes no trade-off.
 const SAME_ERROR: f64 = 1e-6;
 
-impl Point {
+impl ParetoPoint {
     pub(crate) fn new(judged: Judged) -> Self {
         let windability = WindingGraph::new(&judged.pattern).windability();
         Self { judged, windability }
@@ -40,10 +40,10 @@ impl Point {
 const KNEE: f64 = 0.8;
 
 /// Whether a point buys much: its error is well below that of every point that asks no more of the winding shop.
-pub(crate) fn is_knee(point: &Point, points: &[Point]) -> bool {
-    let effort = |p: &Point| [p.windability.captive, p.windability.max_climb, p.windability.long_crossovers];
-    let error = |p: &Point| p.judged.objective_rad_per_s;
-    let is_easier = |p: &&Point| {
+pub(crate) fn is_knee(point: &ParetoPoint, points: &[ParetoPoint]) -> bool {
+    let effort = |p: &ParetoPoint| [p.windability.captive, p.windability.max_climb, p.windability.long_crossovers];
+    let error = |p: &ParetoPoint| p.judged.objective_rad_per_s;
+    let is_easier = |p: &&ParetoPoint| {
         effort(p) != effort(point) && effort(p).iter().zip(effort(point)).all(|(theirs, mine)| *theirs <= mine)
     };
     points.iter().filter(is_easier).all(|p| error(point) <= KNEE * error(p))
@@ -54,8 +54,8 @@ fn is_same(a: f64, b: f64) -> bool {
 }
 
 /// The points that no other beats, smallest error first; of several that are equal in every respect the first.
-pub(crate) fn front(points: &[Point]) -> Vec<Point> {
-    let mut kept: Vec<Point> = Vec::new();
+pub(crate) fn front(points: &[ParetoPoint]) -> Vec<ParetoPoint> {
+    let mut kept: Vec<ParetoPoint> = Vec::new();
     for (index, point) in points.iter().enumerate() {
         let beaten = points.iter().any(|other| other.beats(point));
         let same_before = points[..index].iter().any(|other| {
@@ -80,7 +80,7 @@ mod tests {
     use crate::pattern::Pattern;
     use crate::search::cost::worst_case::WorstCase;
 
-    fn point(segments: &[usize], objective_rad_per_s: f64) -> Point {
+    fn point(segments: &[usize], objective_rad_per_s: f64) -> ParetoPoint {
         let worst =
             WorstCase { rate_rad_per_s: objective_rad_per_s, profile: "p".into(), profile_index: 0, time_s: 0.0 };
         let judged = Judged {
@@ -94,7 +94,7 @@ mod tests {
             grid_margin_rad_per_s: None,
             pointing: None,
         };
-        Point::new(judged)
+        ParetoPoint::new(judged)
     }
 
     #[test]

@@ -20,7 +20,7 @@
 //! such). Of what is equally good to `TIE` the pattern is taken that is easiest to wind: fewest captive runs, then the
 //! smallest climb, then the fewest long crossovers.
 
-use super::anneal::rounds::Found;
+use super::anneal::rounds::FoundPattern;
 use super::answer::{Outlook, Proof};
 use super::cost::objective::Objective;
 use super::cost::tolerance::ToleranceError;
@@ -86,7 +86,7 @@ impl Evaluator<'_> {
     pub(super) fn advised(
         &self,
         context: &Context,
-        found: &[Found],
+        found: &[FoundPattern],
         shared: &[Pattern],
     ) -> Result<Advised, JudgeError> {
         let candidates = self.candidates(context, found, shared)?;
@@ -140,7 +140,12 @@ impl Evaluator<'_> {
     }
 
     /// The classics, the best pattern, and of what was found the best in each figure.
-    fn candidates(&self, context: &Context, found: &[Found], shared: &[Pattern]) -> Result<Vec<Judged>, JudgeError> {
+    fn candidates(
+        &self,
+        context: &Context,
+        found: &[FoundPattern],
+        shared: &[Pattern],
+    ) -> Result<Vec<Judged>, JudgeError> {
         let is_for_pointing = self.objective == Objective::Pointing;
         let plain = if is_for_pointing { *self } else { self.under(Objective::WorstRate) };
         let mut candidates: Vec<Judged> = context.baselines.to_vec();

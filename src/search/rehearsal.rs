@@ -144,7 +144,7 @@ impl Evaluator<'_> {
 
     fn bound_over_classics(
         &self,
-        layout: super::cost::samples::Layout,
+        layout: super::cost::samples::ColumnLayout,
         classics: &[Pattern],
         weights: &dyn Fn(&Pattern) -> Result<LayerWeights, SearchError>,
     ) -> Result<Option<Bound>, JudgeError> {

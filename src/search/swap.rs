@@ -5,7 +5,7 @@
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindingGraph;
 use crate::rate::{CoilModel, LayerWeights, RateError, RateModel};
-use crate::search::cost::columns::{Change, Norm, Values};
+use crate::search::cost::columns::{Change, Norm, SampleValues};
 use crate::search::cost::samples::SampleMatrix;
 use crate::search::cost::worst_case::{SearchError, SolvedProfile};
 use crate::thermal::Instant;
@@ -35,7 +35,7 @@ pub(crate) fn best_swap(
 ) -> Result<Option<Swap>, RateError> {
     let coil = model.wound_coil()?;
     let here = matrix.coefficients(&LayerWeights::new(&coil, pattern)?);
-    let mut values = Values::new(&matrix.columns, &here, norm);
+    let mut values = SampleValues::new(&matrix.columns, &here, norm);
     let before_rad_per_s = values.cost();
     let captive = |pattern: &Pattern| WindingGraph::new(pattern).windability().captive;
     let most = captive(pattern);

@@ -75,13 +75,13 @@ pub(crate) struct GlassStrain {
 
 /// A layer's material at one temperature.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Cell {
+pub(crate) struct LayerMaterial {
     pub(crate) moduli: LayerModuli,
     pub(crate) glass: GlassStrain,
     pub(crate) glass_expansion_per_k: f64,
 }
 
-impl Cell {
+impl LayerMaterial {
     /// From the glass outwards; `hole_radius_m` is 0 where the glass is solid.
     pub(crate) fn new(hole_radius_m: f64, rings: &[Ring]) -> Self {
         let (first, last) = (rings[0], rings[rings.len() - 1]);
@@ -251,7 +251,7 @@ mod tests {
     #[test]
     fn a_cell_of_one_material_is_that_material() {
         let of = |outer| ring(outer, 3e9, 0.35, 6e-5);
-        let cell = Cell::new(0.0, &[of(40.0), of(60.0), of(100.0)]);
+        let cell = LayerMaterial::new(0.0, &[of(40.0), of(60.0), of(100.0)]);
         let same = LayerModuli::isotropic(&of(1.0).material);
         let (m, n) = (&cell.moduli, &same);
         close(m.plane_bulk_pa, n.plane_bulk_pa, 1e-12);
@@ -269,7 +269,7 @@ mod tests {
     #[test]
     fn a_fibre_in_a_matrix_has_hills_and_christensens_moduli() {
         let (fibre, matrix) = (ring(60.0, 72e9, 0.17, 5.5e-7), ring(100.0, 3e9, 0.35, 6e-5));
-        let cell = Cell::new(0.0, &[fibre, matrix]);
+        let cell = LayerMaterial::new(0.0, &[fibre, matrix]);
         let (f, m) = (fibre.material, matrix.material);
         let (vf, vm) = (0.36, 0.64);
         let (kf, km, gm) = (f.plane_bulk_pa(), m.plane_bulk_pa(), m.shear_pa());
@@ -302,14 +302,14 @@ mod tests {
         let d = 3.0 * c * square(1.0 - c) * (x - 1.0) * (x + ei)
             + (x * em + (x - 1.0) * c + 1.0) * (x + ei + (x * em - ei) * c.powi(3));
         let ratio = positive_root(a, b, d);
-        let found = Cell::new(0.0, &[fibre, matrix]).moduli.shear_pa / matrix.material.shear_pa();
+        let found = LayerMaterial::new(0.0, &[fibre, matrix]).moduli.shear_pa / matrix.material.shear_pa();
         close(found, ratio, 1e-9);
     }
 
     #[test]
     fn a_tube_gives_way_as_a_hole_and_a_soft_core_do() {
-        let tube = Cell::new(50e-6, &[ring(100.0, 72e9, 0.17, 5.5e-7)]);
-        let filled = Cell::new(0.0, &[ring(50.0, 1.0, 0.0, 0.0), ring(100.0, 72e9, 0.17, 5.5e-7)]);
+        let tube = LayerMaterial::new(50e-6, &[ring(100.0, 72e9, 0.17, 5.5e-7)]);
+        let filled = LayerMaterial::new(0.0, &[ring(50.0, 1.0, 0.0, 0.0), ring(100.0, 72e9, 0.17, 5.5e-7)]);
         close(tube.moduli.plane_bulk_pa, filled.moduli.plane_bulk_pa, 1e-8);
         close(tube.moduli.shear_pa, filled.moduli.shear_pa, 1e-8);
         close(tube.moduli.axial_pa, filled.moduli.axial_pa, 1e-8);

@@ -1,7 +1,7 @@
 //! Fibres that coils are wound of: optics, glass and coatings, each with where its numbers are from.
 
 use super::CoatedFibre;
-use super::library::{Source, find};
+use super::library::{NumberSource, find};
 use crate::coil::Fibre;
 use crate::units::{m_from_nm, m_from_um};
 
@@ -20,7 +20,7 @@ pub(crate) struct FibreEntry {
     pub(crate) hole_diameter_um: f64,
     /// Materials of the library, each with its outer diameter \[µm\].
     pub(crate) coatings: &'static [(&'static str, f64)],
-    pub(crate) source: Source,
+    pub(crate) source: NumberSource,
 }
 
 /// p11 and p12 of silica fibre: Bertholds and Dändliker, J. Lightwave Technol. 6, 17 (1988).
@@ -61,8 +61,8 @@ impl FibreEntry {
     }
 }
 
-const fn usual(text: &'static str) -> Source {
-    Source { text, was_read: false }
+const fn usual(text: &'static str) -> NumberSource {
+    NumberSource { text, was_read: false }
 }
 
 /// Every fibre, thickest solid one first.

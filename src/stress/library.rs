@@ -1,7 +1,7 @@
 //! Materials that coils are made of, each with where its numbers are from.
 //!
 //! Numbers of polymers differ between batches and cures by tens of percent: those of the supplier belong into the model
-//! file. Where [`Source::was_read`] is false the number is the field's usual one and no accessible source of it was read.
+//! file. Where [`NumberSource::was_read`] is false the number is the field's usual one and no accessible source of it was read.
 
 use super::material::{Compression, Material, Property};
 use crate::units::kelvin_from_celsius;
@@ -56,18 +56,18 @@ enum Beside {
 
 /// Where numbers are from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Source {
+pub(crate) struct NumberSource {
     pub(crate) text: &'static str,
     /// Whether an accessible text with these numbers was read.
     pub(crate) was_read: bool,
 }
 
-const fn read(text: &'static str) -> Source {
-    Source { text, was_read: true }
+const fn read(text: &'static str) -> NumberSource {
+    NumberSource { text, was_read: true }
 }
 
-const fn usual(text: &'static str) -> Source {
-    Source { text, was_read: false }
+const fn usual(text: &'static str) -> NumberSource {
+    NumberSource { text, was_read: false }
 }
 
 /// A material of the library.
@@ -78,7 +78,7 @@ pub struct Entry {
     youngs_pa: Stated,
     beside: Beside,
     expansion_per_k: Stated,
-    pub(crate) source: Source,
+    pub(crate) source: NumberSource,
 }
 
 impl Entry {

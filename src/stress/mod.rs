@@ -8,7 +8,7 @@
 //! |---|---|---|---|
 //! | ξ | dn/dT of the free fibre | 1/K | `Fibre::thermo_optic_per_k` |
 //! | ε_a, ε_t | strain of the glass along and across the fibre | 1 | `Strain`, `GlassStrain` |
-//! | α_g | expansion of the glass | 1/K | `Cell::glass_expansion_per_k` |
+//! | α_g | expansion of the glass | 1/K | `LayerMaterial::glass_expansion_per_k` |
 //! | p11, p12 | elasto-optic coefficients, mean of both polarisations | 1 | `CoatedFibre` |
 //!
 //! A turn with its coatings and its share of adhesive is a composite cylinder ([`cell`]); layers of such cells and the spool
@@ -32,7 +32,7 @@ use std::sync::OnceLock;
 
 use crate::coil::{Coil, Fibre};
 
-use cell::{Cell, Ring};
+use cell::{LayerMaterial, Ring};
 use material::{COLDEST_K, HOTTEST_K, Material};
 use ring::{Annulus, LayeredRing, Strain};
 
@@ -55,7 +55,7 @@ pub struct CoatedFibre {
 
 /// The spool that the pack is bonded to.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Spool {
+pub struct BondedSpool {
     /// Of the spool.
     pub material: Material,
     /// Of its wall.
@@ -70,7 +70,7 @@ pub struct Materials {
     /// Between the turns.
     pub adhesive: Material,
     /// None for a free-standing pack.
-    pub spool: Option<Spool>,
+    pub spool: Option<BondedSpool>,
 }
 
 impl Materials {
@@ -100,13 +100,13 @@ impl CoatedFibre {
 
     /// The coated fibre by itself, nothing holding it.
     pub fn free_fibre(&self, optics: &Fibre, temperature_k: f64) -> FreeFibre {
-        let cell = Cell::new(self.hole_radius_m, &self.rings(temperature_k));
+        let cell = LayerMaterial::new(self.hole_radius_m, &self.rings(temperature_k));
         let (axial, transverse) = cell.moduli.free_expansion_per_k();
         let strain = Strain { hoop: axial, radial: transverse, axial: transverse };
         FreeFibre { expansion_per_k: axial, path_per_k: self.path_change(optics, &cell, &strain, 1.0).path }
     }
 
-    fn path_change(&self, fibre: &Fibre, cell: &Cell, strain: &Strain, change_k: f64) -> LayerChange {
+    fn path_change(&self, fibre: &Fibre, cell: &LayerMaterial, strain: &Strain, change_k: f64) -> LayerChange {
         let glass = &cell.glass;
         let across = glass.per_transverse * 0.5 * (strain.radial + strain.axial)
             + glass.per_axial * strain.hoop
@@ -154,7 +154,7 @@ pub struct PackStress {
     cell_radius_m: f64,
     layers: usize,
     /// By temperature, worked out when first asked for; one where nothing depends on temperature.
-    cells: Vec<OnceLock<Cell>>,
+    cells: Vec<OnceLock<LayerMaterial>>,
     /// The ring, where nothing depends on temperature.
     steady: Option<LayeredRing>,
 }
@@ -180,15 +180,15 @@ impl PackStress {
         pack
     }
 
-    fn node(&self, place: usize) -> &Cell {
+    fn node(&self, place: usize) -> &LayerMaterial {
         self.cells[place].get_or_init(|| {
             let temperature_k = COLDEST_K + place as f64 * CELL_STEP_K;
             let rings = self.materials.rings(temperature_k, self.cell_radius_m);
-            Cell::new(self.materials.fibre.hole_radius_m, &rings)
+            LayerMaterial::new(self.materials.fibre.hole_radius_m, &rings)
         })
     }
 
-    fn cell(&self, temperature_k: f64) -> Cell {
+    fn cell(&self, temperature_k: f64) -> LayerMaterial {
         let last = self.cells.len() - 1;
         let place = ((temperature_k - COLDEST_K) / CELL_STEP_K).clamp(0.0, last as f64);
         let below = (place as usize).min(last.saturating_sub(1));

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::io::json::campaign::{BlockJson, CampaignJson, CellDocument, CellJson, CellStateJson, GyroJson};
-use crate::io::read::campaign_file::{CampaignFile, Cell, Kind, Work};
+use crate::io::read::campaign_file::{CampaignCell, CampaignFile, CampaignKind, CellWork};
 use crate::io::write::campaign_cells::read_cell;
 use crate::io::write::campaign_tables;
 use crate::rate::CoilModel;
@@ -20,14 +20,14 @@ pub(crate) mod search;
 
 /// Some of a campaign's cells, in the grid's order.
 #[derive(Debug, Clone)]
-pub struct Part<'a> {
+pub struct CampaignPart<'a> {
     pub(crate) campaign: &'a CampaignFile,
-    pub(crate) cells: Vec<&'a Cell>,
+    pub(crate) cells: Vec<&'a CampaignCell>,
 }
 
-impl<'a> Part<'a> {
+impl<'a> CampaignPart<'a> {
     /// All of its cells.
-    pub fn whole(campaign: &'a CampaignFile, cells: &'a [Cell]) -> Self {
+    pub fn whole(campaign: &'a CampaignFile, cells: &'a [CampaignCell]) -> Self {
         Self { campaign, cells: cells.iter().collect() }
     }
 
@@ -35,7 +35,7 @@ impl<'a> Part<'a> {
     ///
     /// # Errors
     /// An identifier that no cell has.
-    pub fn of_ids(campaign: &'a CampaignFile, cells: &'a [Cell], ids: &[String]) -> Result<Self, TaskError> {
+    pub fn of_ids(campaign: &'a CampaignFile, cells: &'a [CampaignCell], ids: &[String]) -> Result<Self, TaskError> {
         if let Some(unknown) = ids.iter().find(|id| !cells.iter().any(|cell| cell.id == **id)) {
             let message = format!(
                 "no cell of this campaign has the identifier \"{unknown}\": it changes with model, settings and program; see campaign --list"
@@ -46,7 +46,7 @@ impl<'a> Part<'a> {
     }
 
     /// One of `count` parts that cost about the same: cells are dealt by falling cost, there and back. `index` counts from 1.
-    pub fn dealt(campaign: &'a CampaignFile, cells: &'a [Cell], index: usize, count: usize) -> Self {
+    pub fn dealt(campaign: &'a CampaignFile, cells: &'a [CampaignCell], index: usize, count: usize) -> Self {
         let costs: Vec<f64> = cells.iter().map(|cell| estimated_s(campaign, cell)).collect();
         let mut order: Vec<usize> = (0..cells.len()).collect();
         order.sort_by(|&a, &b| costs[b].total_cmp(&costs[a]));
@@ -93,28 +93,28 @@ impl<'a> Part<'a> {
     }
 
     /// The answer about a whole campaign, and its table if nothing is missing.
-    pub(crate) fn merged(&self, folder: &Path, searched: usize) -> (CampaignJson, Option<Table>) {
+    pub(crate) fn merged(&self, folder: &Path, searched: usize) -> (CampaignJson, Option<CampaignTable>) {
         let mut answer = self.answer(Some(folder), searched);
         if !answer.missing.is_empty() {
             return (answer, None);
         }
         let mut gyros = Vec::new();
         let table = match &self.campaign.kind {
-            Kind::Search(_) => campaign_tables::searches(&answer.results),
-            Kind::Tolerance(_) => {
+            CampaignKind::Search(_) => campaign_tables::searches(&answer.results),
+            CampaignKind::Tolerance(_) => {
                 answer.built_coils = coils::merged(folder, &self.cells);
                 campaign_tables::built_coils(&answer.built_coils)
             }
-            Kind::Metrics(_) | Kind::Diagnose(_) => {
+            CampaignKind::Metrics(_) | CampaignKind::Diagnose(_) => {
                 gyros = self.cells.iter().filter_map(|cell| read_cell::<GyroJson>(folder, &cell.id)).collect();
                 answer.fleet = Some(batch::of(self.campaign.kind.key(), &gyros));
                 campaign_tables::gyros(&gyros)
             }
         };
-        (answer, Some(Table { csv: table, gyros }))
+        (answer, Some(CampaignTable { csv: table, gyros }))
     }
 
-    fn state(&self, cell: &Cell, done: bool) -> CellStateJson {
+    fn state(&self, cell: &CampaignCell, done: bool) -> CellStateJson {
         let state = CellStateJson {
             id: cell.id.clone(),
             kind: self.campaign.kind.key().to_owned(),
@@ -130,18 +130,18 @@ impl<'a> Part<'a> {
         };
         let of = |model: &CoilModel| (Some(model.name.clone()), Some(model.coil.layers()));
         match &cell.work {
-            Work::Search(search) => {
+            CellWork::Search(search) => {
                 let (model, layers) = of(&search.file.model);
                 let (class, objective) = (search.class.to_string(), search.objective.key().to_owned());
                 let seed = Some(search.seed);
                 CellStateJson { model, layers, class: Some(class), objective: Some(objective), seed, ..state }
             }
-            Work::Tolerance(block) => {
+            CellWork::Tolerance(block) => {
                 let (model, layers) = of(&block.file.model);
                 let coils = Some([block.coils.start + 1, block.coils.end]);
                 CellStateJson { model, layers, seed: Some(block.spec.seed), coils, ..state }
             }
-            Work::Metrics(gyro) | Work::Diagnose(gyro) => {
+            CellWork::Metrics(gyro) | CellWork::Diagnose(gyro) => {
                 let (model, layers) = gyro.file.as_ref().map_or((None, None), |file| of(&file.model));
                 CellStateJson { model, layers, gyro: Some(gyro.name.clone()), ..state }
             }
@@ -151,7 +151,7 @@ impl<'a> Part<'a> {
 
 /// What a table is written from beside the answer.
 #[derive(Debug)]
-pub(crate) struct Table {
+pub(crate) struct CampaignTable {
     pub(crate) csv: Vec<u8>,
     /// Of a fleet.
     pub(crate) gyros: Vec<GyroJson>,
@@ -165,11 +165,11 @@ enum Found {
 }
 
 impl Found {
-    fn read(folder: &Path, cell: &Cell) -> Option<Self> {
+    fn read(folder: &Path, cell: &CampaignCell) -> Option<Self> {
         match &cell.work {
-            Work::Search(_) => read_cell(folder, &cell.id).map(|found| Found::Search(Box::new(found))),
-            Work::Tolerance(_) => read_cell(folder, &cell.id).map(|found| Found::Block(Box::new(found))),
-            Work::Metrics(_) | Work::Diagnose(_) => {
+            CellWork::Search(_) => read_cell(folder, &cell.id).map(|found| Found::Search(Box::new(found))),
+            CellWork::Tolerance(_) => read_cell(folder, &cell.id).map(|found| Found::Block(Box::new(found))),
+            CellWork::Metrics(_) | CellWork::Diagnose(_) => {
                 read_cell(folder, &cell.id).map(|found| Found::Gyro(Box::new(found)))
             }
         }
@@ -185,13 +185,13 @@ impl Found {
 }
 
 /// What a cell takes on one thread, to deal and to group cells by.
-fn estimated_s(campaign: &CampaignFile, cell: &Cell) -> f64 {
+fn estimated_s(campaign: &CampaignFile, cell: &CampaignCell) -> f64 {
     match (&campaign.kind, &cell.work) {
-        (Kind::Search(grid), Work::Search(search)) => search::estimated_s(grid, search),
-        (_, Work::Tolerance(block)) => coils::estimated_s(block),
-        (_, Work::Metrics(gyro) | Work::Diagnose(gyro)) => gyros::estimated_s(gyro),
+        (CampaignKind::Search(grid), CellWork::Search(search)) => search::estimated_s(grid, search),
+        (_, CellWork::Tolerance(block)) => coils::estimated_s(block),
+        (_, CellWork::Metrics(gyro) | CellWork::Diagnose(gyro)) => gyros::estimated_s(gyro),
         // A search stands in a grid.
-        (_, Work::Search(_)) => 0.0,
+        (_, CellWork::Search(_)) => 0.0,
     }
 }
 

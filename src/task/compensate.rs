@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::compensate::learned::Learned;
+use crate::compensate::learned::LearnedCoefficients;
 use crate::compensate::stream::{Compensated, Flag, Stream};
 use crate::compensate::{CompensateError, Compensator, Day, Method};
 use crate::effect::{Acts, DeclaredEffect};
@@ -341,7 +341,7 @@ fn worse(before_rad_per_s: &[f64], after_rad_per_s: &[f64]) -> Option<String> {
 /// What a learned compensator leaves of days that it was not shown, where that is not what it leaves of its own.
 fn worth(compensator: &Compensator) -> Option<String> {
     let Compensator::Learned(learned) = compensator else { return None };
-    let Learned { left_rad_per_s, cross_validated_rad_per_s, .. } = learned;
+    let LearnedCoefficients { left_rad_per_s, cross_validated_rad_per_s, .. } = learned;
     learned.only_fits().then(|| {
         format!(
             "leaves {:.5} °/h of the record it was fitted to, {:.5} °/h of the parts of it that it was not shown: it only fits",

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::compare::suspicion;
 use crate::diagnose::discover::Allowed;
-use crate::diagnose::experiment::{Chamber, Experiment, design};
+use crate::diagnose::experiment::{ChamberCapability, Experiment, design};
 use crate::diagnose::{self, Diagnosis, Terms, Verdict};
 use crate::effect;
 use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow, FindingJson};
@@ -92,9 +92,9 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
     let diagnosis = diagnose::diagnose(&asked, &|share| observer.at(share, ""))?;
     let all: Vec<&Record> = records.iter().chain(&holdout).collect();
     let seed = request.experiment_seed.filter(|_| !diagnosis.effects.is_empty());
-    let experiment = match Chamber::of(&all).zip(seed) {
-        Some((chamber, seed)) => match diagnose::contest(&asked, &diagnosis) {
-            Ok(contest) => design(&contest, &chamber, seed),
+    let experiment = match ChamberCapability::of(&all).zip(seed) {
+        Some((chamber, seed)) => match diagnose::model_comparison(&asked, &diagnosis) {
+            Ok(comparison) => design(&comparison, &chamber, seed),
             // What was found holds without it.
             Err(error) => {
                 observer.note(&format!("no experiment could be planned: {error}"));

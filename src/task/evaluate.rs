@@ -47,7 +47,7 @@ pub(crate) struct Groundwork {
 
 /// A winding, judged.
 #[derive(Debug)]
-pub(crate) struct Judged {
+pub(crate) struct JudgedWinding {
     pub(crate) body: PatternJson,
     pub(crate) worst: WorstCase,
     pub(crate) bound: Option<Guaranteed>,
@@ -79,7 +79,7 @@ impl Groundwork {
         &self,
         file: &ModelFile,
         NamedPattern { name, pattern }: &NamedPattern,
-    ) -> Result<Judged, TaskError> {
+    ) -> Result<JudgedWinding, TaskError> {
         let worst = self.solved.worst_case(&file.model, pattern)?;
         let phase_rad = RateModel::new(&file.model, pattern, &[])?.phase_rad(worst.rate_rad_per_s);
         let bound = match &self.step {
@@ -90,7 +90,7 @@ impl Groundwork {
         let grid_margin_rad_per_s = self.aside.margin.of(&self.solved, pattern, self.steepest_k_per_s)?;
         let pointing = self.aside.pointing(&file.model, &self.solved, pattern, file.profiles.max_rate_k_per_s)?;
         let body = PatternJson::new(name, pattern, &worst, phase_rad, bound_rad_per_s);
-        Ok(Judged { body: body.with_margin(grid_margin_rad_per_s).with_pointing(&pointing), worst, bound })
+        Ok(JudgedWinding { body: body.with_margin(grid_margin_rad_per_s).with_pointing(&pointing), worst, bound })
     }
 
     /// What a reader of the guaranteed rates should know.
@@ -120,7 +120,7 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
     for (index, named) in all.iter().enumerate() {
         let name = &named.name;
         observer.at(index as f64 / all.len() as f64, name);
-        let Judged { body, worst, bound } = groundwork.judge(file, named)?;
+        let JudgedWinding { body, worst, bound } = groundwork.judge(file, named)?;
         if let Some(after) = &after {
             warn_of_growth(name, &worst, &after.worst_case(&file.model, &named.pattern)?, observer);
         }

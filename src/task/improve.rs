@@ -13,7 +13,7 @@ use crate::io::fault::Faults;
 use crate::io::files::{WriteError, read_text, write_atomically};
 use crate::io::folder::{Replacement, remove_kinds};
 use crate::io::json::diagnosis::{DiagnosisJson, RefittedJson};
-use crate::io::json::improve::{ImproveJson, PredictedRow, StepJson};
+use crate::io::json::improve::{ImproveJson, ImproveStepJson, PredictedRow};
 use crate::io::json::search::{GainJson, OptimiseJson};
 use crate::io::model::{ModelFile, NamedPattern};
 use crate::io::read::model_file::read_model;
@@ -85,7 +85,7 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Option<ImproveJ
     let old_path = folder.join("measured-pattern.toml");
     let comment = TomlComment::of("the winding that was measured");
     let old_source = print_pattern(&old, &[comment]);
-    let mut way = Way { request, old: &old, old_source: &old_source, steps: Steps::of(folder), observer };
+    let mut way = ImproveRun { request, old: &old, old_source: &old_source, steps: Steps::of(folder), observer };
     let (before, after) = (folder.join("before"), folder.join("after"));
     if !way.of_records(file).is_some_and(|made_of| way.steps.is_taken(&before, &made_of, &[COMPARISON])) {
         clear(folder)?;
@@ -191,7 +191,7 @@ fn clear_behind_search(folder: &Path) -> Result<(), WriteError> {
 }
 
 /// What the steps have in common.
-struct Way<'a> {
+struct ImproveRun<'a> {
     request: &'a Request<'a>,
     /// The winding that was measured, and as a file.
     old: &'a NamedPattern,
@@ -200,7 +200,7 @@ struct Way<'a> {
     observer: &'a dyn Observer,
 }
 
-impl Way<'_> {
+impl ImproveRun<'_> {
     fn all(&self) -> Vec<&Measurement> {
         self.request.measurements.iter().chain(self.request.holdout).collect()
     }
@@ -311,8 +311,11 @@ impl Way<'_> {
             cutting_planes: false,
             fields: &[],
         };
-        // A search of something else, or none, is begun anew.
-        request.saved = read_checkpoint(folder, &written.fingerprint()).ok().flatten();
+        request.saved = read_checkpoint(folder, &written.fingerprint()).unwrap_or_else(|_| {
+            let step = name_of(folder);
+            self.observer.note(&format!("{step}: its checkpoint is damaged or of another search, which begins anew"));
+            None
+        });
         let mut kept = Kept { folder, request: &written, observer: self.observer, fault: None };
         let answer = search::run(&request, &mut kept)?;
         kept.fault.map_or(Ok(()), Err)?;
@@ -486,10 +489,10 @@ fn predicted_rows(file: &ModelFile, pattern: &Pattern, record: &Record) -> Resul
 /// 95 % of a normal distribution lie within so many standard deviations.
 const TWO_SIGMA: f64 = 1.96;
 
-fn steps(folders: &[&PathBuf]) -> Vec<StepJson> {
+fn steps(folders: &[&PathBuf]) -> Vec<ImproveStepJson> {
     folders
         .iter()
-        .map(|folder| StepJson {
+        .map(|folder| ImproveStepJson {
             step: folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
             folder: shown(folder),
         })

@@ -119,10 +119,11 @@ fn of_method(
         });
     }
     let is_whole = found.iter().all(|one| one.reason.is_none());
-    let fitted_rms = trial.fit(method, None).ok().and_then(|compensator| {
+    let fitted = trial.fit(method, None).and_then(|compensator| {
         let left: Result<Vec<Vec<f64>>, _> = records.iter().map(|record| trial.tried(&compensator, record)).collect();
-        Some(shown(rms(&left.ok()?.concat())))
+        Ok(shown(rms(&left?.concat())))
     });
+    let fitted_rms = fitted.as_ref().ok().copied();
     let left_out_rms = is_whole.then(|| shown(rms(&all)));
     let only_fits = matches!((fitted_rms, left_out_rms), (Some(own), Some(other)) if other > ONLY_FITS * own);
     let reason = match (fitted_rms, left_out_rms) {
@@ -133,7 +134,7 @@ fn of_method(
             "no better on a record that it was not shown than the mean rate of the others, which leaves {by_offset_rms_deg_per_h:.5} °/h"
         )),
         (_, None) => found.iter().find_map(|one| Some(format!("{}: {}", one.file, one.reason.as_ref()?))),
-        _ => None,
+        _ => fitted.err().map(|error| format!("cannot be fitted to all records together: {error}")),
     };
     let row = LeftOutMethodJson {
         method: method.key(),

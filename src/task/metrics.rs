@@ -1,14 +1,14 @@
 //! What a gyro's data sheet says, from records.
 
 use crate::io::json::inputs::{InputsJson, RecordInputJson};
-use crate::io::json::metrics::{GrossErrorJson, GrossErrors as Found, MetricsJson, RecordMetricsJson};
+use crate::io::json::metrics::{GrossErrorJson, GrossErrorTally as Found, MetricsJson, RecordMetricsJson};
 use crate::io::json::scale_factor::PositionsJson;
 use crate::io::read::record_columns::RecordFormat;
 use crate::io::read::record_rows::{CHUNK, stream_source};
 use crate::io::read::table_file::Source;
 use crate::metrics::earth::{Attitude, positions};
 use crate::metrics::{Meter, Metrics, repeatability_rad_per_s};
-use crate::record::{Row, gross_errors_of};
+use crate::record::{RecordRow, gross_errors_of};
 
 use super::measurement::{GrossErrors, Measurement, say_gross, say_read};
 use super::{Observer, TaskError};
@@ -59,7 +59,7 @@ impl Metering {
         Ok(Self { meter, dropped, found: Found::default(), scale, earth_rad_per_s })
     }
 
-    fn take(&mut self, rows: &[Row]) {
+    fn take(&mut self, rows: &[RecordRow]) {
         let temperature_k: Vec<f64> = rows.iter().map(|r| r.temperature_k).collect();
         let rates: Vec<f64> = rows.iter().map(|r| r.rate_rad_per_s).collect();
         let mut gross = gross_errors_of(&temperature_k, &rates).into_iter().peekable();
@@ -99,7 +99,7 @@ pub fn measure_stream(
     let mut format = format.clone();
     format.compensated = true;
     let mut metering = Metering::new(settings, format.scale())?;
-    let noticed = stream_source(shown_as, source, &format, |rows: &[Row]| metering.take(rows))?;
+    let noticed = stream_source(shown_as, source, &format, |rows: &[RecordRow]| metering.take(rows))?;
     say_read(&input.file, noticed.skipped_rows, &noticed.remarks, observer);
     say_gross(&input.file, metering.found.count, metering.found.first.first(), metering.dropped, observer);
     metering.finish(input)
@@ -112,7 +112,7 @@ pub fn measure_stream(
 pub fn measure(measurement: &Measurement, settings: &Settings, observer: &dyn Observer) -> Result<Measured, TaskError> {
     let mut metering = Metering::new(settings, None)?;
     // As a stream hands them on, so that both say the same.
-    for rows in measurement.record.each_row().collect::<Vec<Row>>().chunks(CHUNK) {
+    for rows in measurement.record.each_row().collect::<Vec<RecordRow>>().chunks(CHUNK) {
         metering.take(rows);
     }
     measurement.say(None, observer);

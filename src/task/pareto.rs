@@ -8,10 +8,10 @@ use crate::io::model::ModelFile;
 use crate::io::write::pareto_parts::Front;
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
-use crate::search::anneal::limits::Limits;
+use crate::search::anneal::limits::WindingLimits;
 use crate::search::anneal::quantile::QuantileCost;
 use crate::search::anneal::rounds::{
-    DEFAULT_RESTARTS_PER_ROUND, Found, Optimisation, Plan, Rounds, Rules, default_moves_per_restart,
+    DEFAULT_RESTARTS_PER_ROUND, FoundPattern, Optimisation, Plan, Rounds, Rules, default_moves_per_restart,
 };
 use crate::search::compile::Whose;
 use crate::search::cost::guaranteed::UnitStep;
@@ -20,7 +20,7 @@ use crate::search::cost::sampled_coils::SampledCoils;
 use crate::search::cost::tolerance::Coils;
 use crate::search::cost::worst_case::SolvedProfiles;
 use crate::search::evaluator::{Evaluator, Judged};
-use crate::search::pareto::{Point, front, is_knee};
+use crate::search::pareto::{ParetoPoint, front, is_knee};
 
 use super::{Observer, TaskError};
 
@@ -54,7 +54,7 @@ impl<'a> Request<'a> {
 /// The front, smallest error first, each point under a name of its own.
 #[derive(Debug)]
 pub struct Answer {
-    pub(crate) points: Vec<Point>,
+    pub(crate) points: Vec<ParetoPoint>,
     model: String,
     seed: u64,
 }
@@ -63,7 +63,8 @@ impl Answer {
     /// As the program prints it; `files` are the pattern files that were written, one a point, or none.
     pub fn document(&self, files: Option<&[String]>) -> ParetoJson {
         let file = |index: usize| files.and_then(|files| files.get(index).cloned());
-        let point = |(index, point): (usize, &Point)| PointJson::of(point, is_knee(point, &self.points), file(index));
+        let point =
+            |(index, point): (usize, &ParetoPoint)| PointJson::of(point, is_knee(point, &self.points), file(index));
         let points = self.points.iter().enumerate().map(point).collect();
         ParetoJson { model: self.model.clone(), seed: self.seed, status: "best found", points }
     }
@@ -105,7 +106,7 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Option<Answer>,
                 let searched = match part.climb {
                     Climb::Unlimited => candidates(&evaluator, file, part.class, seed, request.rounds, observer)?,
                     Climb::Within { most_climb, builds } => {
-                        let limits = Limits { class: part.class, most_climb };
+                        let limits = WindingLimits { class: part.class, most_climb };
                         limited(&evaluator, &whose[builds], limits, seed, observer)?
                     }
                 };
@@ -216,7 +217,7 @@ fn candidates(
 fn limited(
     evaluator: &Evaluator,
     builds: &SampledCoils,
-    limits: Limits,
+    limits: WindingLimits,
     seed: u64,
     observer: &dyn Observer,
 ) -> Result<Option<Vec<Pattern>>, TaskError> {
@@ -238,13 +239,13 @@ fn limited(
     Ok(Some(patterns(&found[..found.len().min(LIMITED_RESTARTS / 2)])))
 }
 
-fn patterns(found: &[Found]) -> Vec<Pattern> {
-    let walked = |f: &Found| Pattern::new(f.segments.clone()).expect("a walk visits permutations only");
+fn patterns(found: &[FoundPattern]) -> Vec<Pattern> {
+    let walked = |f: &FoundPattern| Pattern::new(f.segments.clone()).expect("a walk visits permutations only");
     found.iter().map(walked).collect()
 }
 
 /// The points with their 95 % quantiles, where the model states tolerances.
-fn with_spreads(file: &ModelFile, judged: Vec<Judged>) -> Result<Vec<Point>, TaskError> {
+fn with_spreads(file: &ModelFile, judged: Vec<Judged>) -> Result<Vec<ParetoPoint>, TaskError> {
     let spreads = match &file.tolerance {
         None => vec![None; judged.len()],
         Some(spec) => {
@@ -253,7 +254,7 @@ fn with_spreads(file: &ModelFile, judged: Vec<Judged>) -> Result<Vec<Point>, Tas
             found.into_iter().map(Some).collect()
         }
     };
-    let with = |(judged, p95_rad_per_s): (Judged, _)| Point::new(Judged { p95_rad_per_s, ..judged });
+    let with = |(judged, p95_rad_per_s): (Judged, _)| ParetoPoint::new(Judged { p95_rad_per_s, ..judged });
     Ok(judged.into_iter().zip(spreads).map(with).collect())
 }
 
@@ -279,7 +280,7 @@ mod folder {
     use crate::io::read::pattern_file::print_pattern;
     use crate::io::write::pareto_parts::files_of_front;
     use crate::pattern::classic::Classic;
-    use crate::report::plot::{Axis, Chart, Series};
+    use crate::report::plot::{Axis, Chart, ChartSeries};
     use crate::text::sink::TomlComment;
 
     impl Answer {
@@ -335,7 +336,7 @@ mod folder {
                 Some((at, if classic { p.pattern.name.clone() } else { String::new() }))
             };
             let (places, labels) = of_count.filter_map(place).unzip();
-            chart = chart.with(Series::points(format!("{count} captive"), places).labelled(labels));
+            chart = chart.with(ChartSeries::points(format!("{count} captive"), places).labelled(labels));
         }
         chart.svg()
     }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::io::json::stress::{
-    ChoiceJson, FreeFibreJson, LayerStressJson, PatternStressJson, PottingJson, StressAtJson, StressJson,
+    FreeFibreJson, LayerStressJson, PatternStressJson, PottingChoiceJson, PottingJson, StressAtJson, StressJson,
 };
 use crate::io::model::{ModelFile, NamedPattern};
 use crate::pattern::Pattern;
@@ -12,7 +12,7 @@ use crate::search::cost::guaranteed::UnitStep;
 use crate::search::cost::worst_case::SolvedProfiles;
 use crate::stress::library::{MATERIALS, Use};
 use crate::stress::material::Material;
-use crate::stress::{Materials, PackStress, Spool};
+use crate::stress::{BondedSpool, Materials, PackStress};
 use crate::units::{REFERENCE_TEMPERATURE_K, celsius_from_kelvin, deg_per_h_from_rad_per_s};
 
 use super::{Observer, TaskError, advise, own_and_classics};
@@ -170,7 +170,7 @@ fn choices_of(file: &ModelFile, declared: &Materials, with_spools: bool) -> Vec<
     if let (true, Some(spool)) = (with_spools, &declared.spool) {
         let thickness_m = spool.thickness_m;
         let others = of_use(Use::Spool).filter(|m| m.name != spool.material.name);
-        spools.extend(others.map(|material| Some(Spool { material, thickness_m })));
+        spools.extend(others.map(|material| Some(BondedSpool { material, thickness_m })));
     }
     let pairs = spools.iter().flat_map(|spool| adhesives.iter().map(move |adhesive| (spool, adhesive)));
     pairs
@@ -184,7 +184,7 @@ fn judged(
     materials: &Materials,
     patterns: &[NamedPattern],
     solved: &SolvedProfiles,
-) -> Result<ChoiceJson, TaskError> {
+) -> Result<PottingChoiceJson, TaskError> {
     let model = file.model.with_materials(materials);
     let worst = patterns
         .par_iter()
@@ -201,7 +201,7 @@ fn judged(
         .iter()
         .map(|layer| layer.path)
         .collect();
-    Ok(ChoiceJson {
+    Ok(PottingChoiceJson {
         adhesive: materials.adhesive.name.clone(),
         spool: materials.spool.as_ref().map(|spool| spool.material.name.clone()),
         is_declared: materials == declared,

@@ -181,7 +181,7 @@ pub(crate) fn evaluate(
 
 /// A search under fields.
 #[derive(Debug, Clone)]
-pub(crate) struct Search<'a> {
+pub(crate) struct FieldSearch<'a> {
     pub(crate) model: &'a ModelFile,
     pub(crate) fields: &'a [FieldFile],
     pub(crate) class: WindabilityClass,
@@ -195,7 +195,7 @@ pub(crate) struct Search<'a> {
 
 /// The document, and the pattern that it names.
 #[derive(Debug)]
-pub(crate) struct Found {
+pub(crate) struct FieldSearchFound {
     pub(crate) document: FieldSearchJson,
     pub(crate) best: NamedPattern,
     pub(crate) ended: Ended,
@@ -230,11 +230,11 @@ pub(crate) fn objective(model: &ModelFile, stated: Option<Objective>) -> Result<
 /// Fields that do not fit the coil; a formula without a value, or one that patterns cannot be searched with; a saved state that
 /// no such search can have been in.
 pub(crate) fn search(
-    request: &Search,
+    request: &FieldSearch,
     observer: &dyn Observer,
     watch: &mut dyn search::Observer,
-) -> Result<Option<Found>, TaskError> {
-    let Search { model, fields, class, objective, .. } = *request;
+) -> Result<Option<FieldSearchFound>, TaskError> {
+    let FieldSearch { model, fields, class, objective, .. } = *request;
     let cases = cases(model, fields, observer)?;
     let matrix = matrix_of(model, cases.iter().map(|case| &case.states))?;
     let Some(answer) = annealed(request, matrix.clone(), watch)? else { return Ok(None) };
@@ -292,11 +292,11 @@ pub(crate) fn search(
         stopped_by: answer.ended.key().to_owned(),
         reproducible: matches!(answer.ended, Ended::Rule(_)) && !proof.was_cut_short,
     };
-    Ok(Some(Found { document, best: named, ended: answer.ended, history: answer.history, rates }))
+    Ok(Some(FieldSearchFound { document, best: named, ended: answer.ended, history: answer.history, rates }))
 }
 
 fn annealed(
-    request: &Search,
+    request: &FieldSearch,
     samples: SampleMatrix,
     watch: &mut dyn search::Observer,
 ) -> Result<Option<CustomAnswer>, RunError> {
@@ -309,13 +309,13 @@ fn annealed(
 
 /// Begins with the best pattern, classics and what else was found.
 fn proved(
-    request: &Search,
+    request: &FieldSearch,
     samples: SampleMatrix,
     best: &Pattern,
     others: impl Iterator<Item = Pattern>,
     observer: &dyn search::Observer,
 ) -> Result<Certificate, TaskError> {
-    let Search { model, class, objective, .. } = *request;
+    let FieldSearch { model, class, objective, .. } = *request;
     let classics = own_and_classics(model).into_iter().map(|named| named.pattern);
     let starts: Vec<Pattern> = std::iter::once(best.clone()).chain(classics).chain(others).collect();
     let watcher = |at| observer.proving(at);
@@ -380,8 +380,8 @@ pub(crate) fn prove(
     Ok(exact::Answer::under_fields(request, certificate, best, fields.len()))
 }
 
-fn statement(request: &Search, cost: f64, qua: Option<f64>) -> String {
-    let Search { fields, class, objective, .. } = *request;
+fn statement(request: &FieldSearch, cost: f64, qua: Option<f64>) -> String {
+    let FieldSearch { fields, class, objective, .. } = *request;
     let over = if fields.len() == 1 { "the field".to_owned() } else { format!("{} fields", fields.len()) };
     let shown = |cost: f64| format!("{:.4} {}", deg_per_h_from_rad_per_s(cost), objective.unit());
     let against = qua.map_or_else(String::new, |qua| format!("; QUA has {}", shown(qua)));

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::TaskError;
 use super::page::{REPORT_FILE, write_report};
 use super::schedule;
-use super::under_fields::Found;
+use super::under_fields::FieldSearchFound;
 use crate::io::folder::Replacement;
 use crate::io::json::Document;
 use crate::io::model::ModelFile;
@@ -15,7 +15,7 @@ use crate::io::write::field_rates::{RATES_FILE, rates_csv};
 use crate::io::write::run_directory::{KINDS, baselines_csv, history_csv};
 use crate::text::sink::TomlComment;
 
-impl Found {
+impl FieldSearchFound {
     /// Writes the pattern, its schedule, tables, the document and the page.
     ///
     /// # Errors

@@ -5,7 +5,7 @@
 use nalgebra::DMatrix;
 
 use super::modal::heated_mode;
-use super::network::{Axis, Network};
+use super::network::{AxialElements, Network};
 use super::{BoreHeat, HeatPath, ThermalError};
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::numeric::tridiagonal::diagonalise_full;
@@ -64,9 +64,9 @@ impl<'a> Track<'a> {
 
 /// The linear pack at T_m with its modes, and what bends it.
 #[derive(Debug)]
-pub(super) struct System {
+pub(super) struct LinearisedPack {
     pub(super) network: Network,
-    pub(super) axis: Option<Axis>,
+    pub(super) axis: Option<AxialElements>,
     /// a at T_m.
     pub(super) slope_per_k: f64,
     diffusivity_m2_per_s: f64,
@@ -89,12 +89,12 @@ pub(super) struct System {
     pub(super) bending_drive: Vec<f64>,
 }
 
-impl System {
+impl LinearisedPack {
     /// `path` conducts as at T_m.
     #[expect(clippy::too_many_lines, reason = "modes first, then what each input makes of them")]
     pub(super) fn new(path: &HeatPath, middle_k: f64) -> Result<Self, ThermalError> {
         let network = Network::new(path);
-        let axis = Axis::new(path);
+        let axis = AxialElements::new(path);
         let diffusivity_m2_per_s = path.material.diffusivity_m2_per_s();
         let n = network.nodes();
         let (axial, axial_per_m2) = axial_modes(axis.as_ref(), network.conductivity_w_per_m_k)?;
@@ -268,7 +268,7 @@ impl System {
 
 /// Modes along the axis (places × modes, orthonormal over it) and their decays [1/m²]; one, uniform, without a flange.
 pub(super) fn axial_modes(
-    axis: Option<&Axis>,
+    axis: Option<&AxialElements>,
     conductivity_w_per_m_k: f64,
 ) -> Result<(DMatrix<f64>, Vec<f64>), ThermalError> {
     let Some(axis) = axis else { return Ok((DMatrix::from_element(1, 1, 1.0), vec![0.0])) };

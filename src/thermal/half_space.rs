@@ -20,8 +20,8 @@ use std::collections::HashMap;
 
 use libm::erfc;
 
-use super::half_space_memory::{Memory, RECENT_S};
-use super::{Drive, HeatPath, Instant, Side, ThermalHistory, Wanted};
+use super::half_space_memory::{HalfSpaceMemory, RECENT_S};
+use super::{Drive, HeatPath, Instant, Side, ThermalHistory, WantedColumns};
 
 /// With so many changes of rate, superposing all of them at every instant is too slow.
 const MANY_KINKS: usize = 100;
@@ -114,7 +114,7 @@ impl HalfSpaceField {
     }
 
     /// A drive with many kinks, asked for in the order of time, is remembered in exponentials; see `half_space_memory`.
-    pub(super) fn at(&self, instants: &[Instant], wanted: Wanted) -> ThermalHistory {
+    pub(super) fn at(&self, instants: &[Instant], wanted: WantedColumns) -> ThermalHistory {
         if self.kinks.len() > MANY_KINKS && instants.is_sorted_by(|a, b| a.time_s <= b.time_s) {
             self.at_by_memory(instants, wanted)
         } else {
@@ -129,14 +129,14 @@ impl HalfSpaceField {
         }
     }
 
-    fn at_by_memory(&self, instants: &[Instant], wanted: Wanted) -> ThermalHistory {
+    fn at_by_memory(&self, instants: &[Instant], wanted: WantedColumns) -> ThermalHistory {
         let layers = self.half_space.depths_m.len();
         let mut history = ThermalHistory::with_capacity(layers, instants.len());
         let start_k = self.drive.boundary_k.first_value();
         let start_s = instants.first().map_or(0.0, |i| i.time_s).min(self.drive.start_s());
         let depths_m = &self.half_space.depths_m;
         let rise_s: Vec<f64> = depths_m.iter().map(|x| self.half_space.ramp_temperature(*x, RECENT_S)).collect();
-        let mut memory = Memory::new(depths_m, &rise_s, self.half_space.diffusivity_m2_per_s, start_s);
+        let mut memory = HalfSpaceMemory::new(depths_m, &rise_s, self.half_space.diffusivity_m2_per_s, start_s);
         // Knots mostly lie on a grid, so the same few times since a change come again and again.
         let mut known: HashMap<u64, Vec<(f64, f64)>> = HashMap::new();
         let mut absorbed = 0;
@@ -173,7 +173,7 @@ impl HalfSpaceField {
         history
     }
 
-    fn at_by_superposition(&self, instants: &[Instant], wanted: Wanted) -> ThermalHistory {
+    fn at_by_superposition(&self, instants: &[Instant], wanted: WantedColumns) -> ThermalHistory {
         let layers = self.half_space.depths_m.len();
         let mut history = ThermalHistory::with_capacity(layers, instants.len());
         let start_k = self.drive.boundary_k.first_value();
@@ -215,7 +215,7 @@ mod tests {
         let field = HalfSpaceField::new(HalfSpace::new(&path), &drive);
         let steps = 40_000;
         let times: Vec<Instant> = (0..=steps).map(|i| Instant::after(60.0 * i as f64 / steps as f64)).collect();
-        let history = field.at(&times, Wanted::All);
+        let history = field.at(&times, WantedColumns::All);
         for layer in 0..12 {
             let trapezium: f64 = (0..steps)
                 .map(|i| {
@@ -236,8 +236,8 @@ mod tests {
         let drive = Drive::boundary(PiecewiseLinear::new(knots, values).unwrap());
         let field = HalfSpaceField::new(HalfSpace::new(&path), &drive);
         let times: Vec<Instant> = (0..300).map(|i| Instant::before(33.0 * f64::from(i) - 10.0)).collect();
-        let fast = field.at_by_memory(&times, Wanted::All);
-        let slow = field.at_by_superposition(&times, Wanted::All);
+        let fast = field.at_by_memory(&times, WantedColumns::All);
+        let slow = field.at_by_superposition(&times, WantedColumns::All);
         let worst = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         let (rate, temperature) =
             (worst(&fast.rate_k_per_s, &slow.rate_k_per_s), worst(&fast.temperature_k, &slow.temperature_k));

@@ -23,7 +23,7 @@ const LARGEST_EXPONENT: f64 = 42.0;
 
 /// The old changes of rate of one drive, at one time.
 #[derive(Debug, Clone)]
-pub(super) struct Memory {
+pub(super) struct HalfSpaceMemory {
     /// s_i² [1/s].
     decay_per_s: Vec<f64>,
     /// Row-major, layers × decays: a_i(x_j).
@@ -43,7 +43,7 @@ pub(super) struct Memory {
     gone: Vec<f64>,
 }
 
-impl Memory {
+impl HalfSpaceMemory {
     /// `rise_s` is each layer's exact rise [`RECENT_S`] after a unit change of rate.
     pub(crate) fn new(depths_m: &[f64], rise_s: &[f64], diffusivity_m2_per_s: f64, start_s: f64) -> Self {
         let largest = (LARGEST_EXPONENT / RECENT_S).sqrt();

@@ -23,7 +23,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::network::{Axis, Network};
+use super::network::{AxialElements, Network};
 use super::pack::{AxialModes, Mode, part_node};
 use super::{HeatPath, Location, ThermalError};
 use crate::numeric::tridiagonal::diagonalise_full;
@@ -112,7 +112,7 @@ impl Joined {
         axial: &AxialModes,
         part: Option<Location>,
     ) -> Result<Self, ThermalError> {
-        let axis = Axis::new(path).ok_or(ThermalError::Eigen)?;
+        let axis = AxialElements::new(path).ok_or(ThermalError::Eigen)?;
         let places = Places::new(path, network, axial.mean.len());
         let (pack, layers) = (network.pack(), network.layers);
         let n = network.pack_nodes;
@@ -230,7 +230,7 @@ impl Joined {
         path: &HeatPath,
         network: &Network,
         axial: &AxialModes,
-        axis: &Axis,
+        axis: &AxialElements,
         places: &Places,
         face: f64,
     ) -> Vec<f64> {

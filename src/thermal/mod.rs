@@ -255,34 +255,34 @@ impl Solver {
 
 /// Which columns of a history are wanted; the others stay empty.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Wanted {
+pub(crate) enum WantedColumns {
     All,
     Rates,
     Temperatures,
 }
 
-impl Wanted {
+impl WantedColumns {
     fn rates(self) -> bool {
-        self != Wanted::Temperatures
+        self != WantedColumns::Temperatures
     }
 
     fn temperatures(self) -> bool {
-        self != Wanted::Rates
+        self != WantedColumns::Rates
     }
 }
 
 impl Field {
     /// The field at given instants.
     pub fn at(&self, instants: &[Instant]) -> ThermalHistory {
-        self.sample(instants, Wanted::All)
+        self.sample(instants, WantedColumns::All)
     }
 
     /// As [`Field::at`] without the temperatures, which stay empty: half the work.
     pub fn rates_at(&self, instants: &[Instant]) -> ThermalHistory {
-        self.sample(instants, Wanted::Rates)
+        self.sample(instants, WantedColumns::Rates)
     }
 
-    fn sample(&self, instants: &[Instant], wanted: Wanted) -> ThermalHistory {
+    fn sample(&self, instants: &[Instant], wanted: WantedColumns) -> ThermalHistory {
         match self {
             Field::HalfSpace(field) => field.at(instants, wanted),
             Field::Pack(field) => field.at(instants, wanted),
@@ -299,7 +299,7 @@ impl Field {
         if window_s <= 0.0 {
             return self.at(&instants);
         }
-        let at = self.sample(&instants, Wanted::Temperatures);
+        let at = self.sample(&instants, WantedColumns::Temperatures);
         let over = |values: &[f64], columns: usize, f: fn(f64, f64) -> f64| -> Vec<f64> {
             if values.is_empty() {
                 return Vec::new();

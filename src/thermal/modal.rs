@@ -11,7 +11,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::pack::{OwnStart, Pack};
-use super::{BoreHeat, Drive, Instant, Side, ThermalHistory, Wanted};
+use super::{BoreHeat, Drive, Instant, Side, ThermalHistory, WantedColumns};
 use crate::numeric::piecewise::PiecewiseLinear;
 
 /// How one input acts: the outputs' steady response to it and what each mode takes away from that.
@@ -222,7 +222,7 @@ impl PackField {
         &self.prepared.pack
     }
 
-    pub(super) fn at(&self, instants: &[Instant], wanted: Wanted) -> ThermalHistory {
+    pub(super) fn at(&self, instants: &[Instant], wanted: WantedColumns) -> ThermalHistory {
         let mut history = ThermalHistory::with_capacity(self.pack().layers, instants.len());
         for batch in instants.chunks(BATCH) {
             self.add_batch(batch, wanted, &mut history);
@@ -234,7 +234,7 @@ impl PackField {
         history
     }
 
-    fn add_batch(&self, batch: &[Instant], wanted: Wanted, history: &mut ThermalHistory) {
+    fn add_batch(&self, batch: &[Instant], wanted: WantedColumns, history: &mut ThermalHistory) {
         let modes = self.pack().decay_per_s.len();
         let mut state = DMatrix::zeros(modes, batch.len());
         let mut temperature = wanted.temperatures().then(|| DMatrix::zeros(self.pack().outputs, batch.len()));

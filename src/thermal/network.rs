@@ -239,7 +239,7 @@ impl Network {
 
 /// Elements along the axis where a flange is heated, in shares of the height.
 #[derive(Debug, Clone)]
-pub(super) struct Axis {
+pub(super) struct AxialElements {
     /// Shares of the nodes in a mean over the axis.
     pub(crate) masses: Vec<f64>,
     /// ∫ ℓ_i' ℓ_j' dz over the height [1/m²].
@@ -250,7 +250,7 @@ pub(super) struct Axis {
     pub(crate) flanges: Vec<(usize, f64)>,
 }
 
-impl Axis {
+impl AxialElements {
     /// None where no flange is heated.
     pub(crate) fn new(path: &HeatPath) -> Option<Self> {
         let touched =

@@ -32,7 +32,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::joined;
 use super::modal::Response;
-use super::network::{Axis, Network};
+use super::network::{AxialElements, Network};
 use super::{BoreHeat, HeatPath, Location, ThermalError};
 use crate::numeric::tridiagonal::diagonalise_full;
 
@@ -85,7 +85,7 @@ pub(super) struct AxialModes {
 impl AxialModes {
     fn new(path: &HeatPath, network: &Network) -> Result<Self, ThermalError> {
         let diffusivity_m2_per_s = path.material.diffusivity_m2_per_s();
-        let Some(axis) = Axis::new(path) else {
+        let Some(axis) = AxialElements::new(path) else {
             return Ok(Self {
                 decay_per_m2: vec![0.0],
                 mean: vec![1.0],

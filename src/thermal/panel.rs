@@ -73,9 +73,9 @@ impl Panel {
     }
 
     /// Of all modes on a panel of a length.
-    pub(super) fn weights(&self, decay_per_s: &[f64], length_s: f64) -> Weights {
+    pub(super) fn weights(&self, decay_per_s: &[f64], length_s: f64) -> PanelWeights {
         let nodes = DEGREE + 1;
-        let mut weights = Weights {
+        let mut weights = PanelWeights {
             left: Vec::with_capacity(decay_per_s.len() * nodes),
             made: Vec::with_capacity(decay_per_s.len() * nodes * nodes),
         };
@@ -100,7 +100,7 @@ impl Panel {
 
 /// Of every mode at every node: what is left of e, and what the values of g make of it.
 #[derive(Debug)]
-pub(super) struct Weights {
+pub(super) struct PanelWeights {
     pub(super) left: Vec<f64>,
     /// By mode, node and value.
     pub(super) made: Vec<f64>,

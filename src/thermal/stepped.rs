@@ -31,11 +31,11 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
-use super::bending::{System, Track};
+use super::bending::{LinearisedPack, Track};
 use super::modal::PackField;
-use super::panel::{DEGREE, Panel, Weights};
+use super::panel::{DEGREE, Panel, PanelWeights};
 use super::varying::{Shared, Varying, conducting};
-use super::{Drive, HeatPath, Instant, Material, Side, ThermalError, ThermalHistory, Wanted};
+use super::{Drive, HeatPath, Instant, Material, Side, ThermalError, ThermalHistory, WantedColumns};
 use crate::numeric::lobatto::Lobatto;
 use crate::numeric::piecewise::PiecewiseLinear;
 
@@ -147,7 +147,7 @@ impl SteppedField {
         })
     }
 
-    pub(super) fn at(&self, instants: &[Instant], wanted: Wanted) -> ThermalHistory {
+    pub(super) fn at(&self, instants: &[Instant], wanted: WantedColumns) -> ThermalHistory {
         let mut history = self.linear.at(instants, wanted);
         let (layers, first) = (self.layers, &self.pieces[0]);
         for (row, &instant) in instants.iter().enumerate() {
@@ -211,7 +211,7 @@ fn scale_k_per_s(path: &HeatPath, drive: &Drive) -> f64 {
 /// On the way through a drive.
 struct March<'a> {
     shared: &'a Shared,
-    system: &'a System,
+    system: &'a LinearisedPack,
     /// When the bore's heat begins.
     heated_s: f64,
     tracks: Vec<Track<'a>>,
@@ -226,7 +226,7 @@ struct March<'a> {
     first_s: f64,
     pieces: Vec<Piece>,
     /// By the length's bits.
-    weights: HashMap<u64, Arc<Weights>>,
+    weights: HashMap<u64, Arc<PanelWeights>>,
 }
 
 impl March<'_> {
@@ -290,7 +290,7 @@ impl March<'_> {
     }
 
     /// Of panels of a length. Those that begin behind a knot come again under every drive.
-    fn weights(&mut self, length_s: f64) -> Arc<Weights> {
+    fn weights(&mut self, length_s: f64) -> Arc<PanelWeights> {
         let key = length_s.to_bits();
         if let Some(known) = self.weights.get(&key) {
             return Arc::clone(known);
@@ -411,9 +411,9 @@ mod tests {
     /// The largest differences of temperatures, rates, moments and their rates, each as a share of its largest value.
     fn differences(path: &HeatPath) -> [f64; 4] {
         let instants: Vec<Instant> = (0..240).map(|i| Instant::after(1.0 + 4.9 * i as f64)).collect();
-        let exact =
-            PackField::new(Arc::new(Prepared::new(Pack::new(path).unwrap())), &drive()).at(&instants, Wanted::All);
-        let stepped = SteppedField::new(path, &Varying::default(), &drive()).unwrap().at(&instants, Wanted::All);
+        let exact = PackField::new(Arc::new(Prepared::new(Pack::new(path).unwrap())), &drive())
+            .at(&instants, WantedColumns::All);
+        let stepped = SteppedField::new(path, &Varying::default(), &drive()).unwrap().at(&instants, WantedColumns::All);
         let share =
             |a: &[f64], b: &[f64], scale: f64| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / scale;
         let largest = |a: &[f64]| a.iter().map(|v| v.abs()).fold(1e-300, f64::max);
@@ -458,7 +458,7 @@ mod tests {
             let field = SteppedField::new(&path, &varying, &drive).unwrap();
             let sides: Vec<Instant> =
                 knots[1..].iter().flat_map(|&t| [Instant::before(t), Instant::after(t)]).collect();
-            let found = field.at(&sides, Wanted::All);
+            let found = field.at(&sides, WantedColumns::All);
             for pair in found.temperature_k.chunks_exact(2 * path.shape.layers) {
                 let (before, after) = pair.split_at(path.shape.layers);
                 largest_k = before.iter().zip(after).map(|(b, a)| (b - a).abs()).fold(largest_k, f64::max);
@@ -479,7 +479,10 @@ mod tests {
         let instants: Vec<Instant> = (0..50).map(|i| Instant::after(20.0 * i as f64)).collect();
         let with_slope = |slope_per_k: f64| {
             let path = HeatPath { conductivity_slope_per_k: slope_per_k, ..path(Location::OuterLayer) };
-            SteppedField::new(&path, &Varying::default(), &drive()).unwrap().at(&instants, Wanted::All).temperature_k
+            SteppedField::new(&path, &Varying::default(), &drive())
+                .unwrap()
+                .at(&instants, WantedColumns::All)
+                .temperature_k
         };
         let (none, one, two) = (with_slope(0.0), with_slope(1e-3), with_slope(2e-3));
         let change = |a: &[f64]| a.iter().zip(&none).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);

@@ -5,10 +5,10 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
-use super::bending::System;
+use super::bending::LinearisedPack;
 use super::modal::Prepared;
 use super::pack::Pack;
-use super::panel::{Panel, Weights};
+use super::panel::{Panel, PanelWeights};
 use super::{HeatPath, ThermalError};
 use crate::units::REFERENCE_TEMPERATURE_K;
 
@@ -20,12 +20,12 @@ const MIDDLES_APART: f64 = 0.02;
 #[derive(Debug)]
 pub(super) struct Shared {
     pub(super) middle_k: f64,
-    pub(super) system: System,
+    pub(super) system: LinearisedPack,
     pub(super) linear: Arc<Prepared>,
     pub(super) settling_s: f64,
     pub(super) shortest_s: f64,
     /// By the length's bits: panels behind every knot begin with the same lengths.
-    weights: Mutex<HashMap<u64, Arc<Weights>>>,
+    weights: Mutex<HashMap<u64, Arc<PanelWeights>>>,
 }
 
 impl Shared {
@@ -39,7 +39,7 @@ impl Shared {
         let linear = Pack::new(&at_middle)?;
         Ok(Self {
             middle_k,
-            system: System::new(&at_middle, middle_k)?,
+            system: LinearisedPack::new(&at_middle, middle_k)?,
             settling_s: linear.settling_s(),
             shortest_s: linear.shortest_s(),
             linear: Arc::new(Prepared::new(linear)),
@@ -48,7 +48,7 @@ impl Shared {
     }
 
     /// Of panels of a length that comes again under other drives.
-    pub(super) fn weights(&self, panel: &Panel, length_s: f64) -> Arc<Weights> {
+    pub(super) fn weights(&self, panel: &Panel, length_s: f64) -> Arc<PanelWeights> {
         let key = length_s.to_bits();
         if let Some(known) = self.weights.lock().ok().and_then(|known| known.get(&key).cloned()) {
             return known;

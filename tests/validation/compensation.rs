@@ -10,7 +10,7 @@ use std::process::Command;
 use std::sync::Mutex;
 
 use coilwright::compensate::empirical::{BiasLine, PiecewiseBias, Regression};
-use coilwright::compensate::learned::Learned;
+use coilwright::compensate::learned::LearnedCoefficients;
 use coilwright::compensate::physical::USUAL_HYPOTHESES;
 use coilwright::compensate::stream::{Compensated, Reading, Stream};
 use coilwright::compensate::{CompensateError, Compensator, Method};
@@ -353,7 +353,7 @@ fn the_headers_of_the_methods_that_know_no_coil_give_the_programs_own_output() {
         Compensator::Piecewise(PiecewiseBias::fit(&[&calibration]).unwrap()),
         Compensator::Regression(Regression::fit(&[&calibration]).unwrap()),
         Compensator::Regression(Regression::fit(&[&inner(&calibration)]).unwrap()),
-        Compensator::Learned(Learned::fit(&[&calibration]).unwrap()),
+        Compensator::Learned(LearnedCoefficients::fit(&[&calibration]).unwrap()),
     ];
     for compensator in cases {
         let interval_s = holdout.interval_s();

@@ -20,7 +20,7 @@ use coilwright::search::cost::columns::Norm;
 use coilwright::search::cost::guaranteed::UnitStep;
 use coilwright::search::cost::objective::Objective;
 use coilwright::search::cost::sampled_coils::SampledCoils;
-use coilwright::search::cost::samples::{Layout, SampleMatrix};
+use coilwright::search::cost::samples::{ColumnLayout, SampleMatrix};
 use coilwright::search::cost::signs::segments_of_signs;
 use coilwright::search::cost::worst_case::SolvedProfiles;
 use coilwright::search::evaluator::Evaluator;
@@ -99,7 +99,7 @@ enum Bound {
     /// Rows of a constant and the columns' coefficients.
     Samples {
         norm: Norm,
-        layout: Layout,
+        layout: ColumnLayout,
         lengths_m: Vec<f64>,
         rows: Vec<Vec<f64>>,
     },
@@ -170,7 +170,7 @@ impl Bound {
 }
 
 /// ∫(2z − L)dz of each layer's segment by halves, and 2 d_j l_j².
-fn weigh(segments: &[usize], layout: &Layout, lengths_m: &[f64], coefficients: &mut Vec<f64>) {
+fn weigh(segments: &[usize], layout: &ColumnLayout, lengths_m: &[f64], coefficients: &mut Vec<f64>) {
     let layers = segments.len();
     coefficients.clear();
     coefficients.resize(layout.columns(), 0.0);

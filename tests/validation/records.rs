@@ -7,8 +7,8 @@
 use std::path::{Path, PathBuf};
 
 use coilwright::compare::regimes::Regime;
-use coilwright::compare::verdict::{Finding, Verdict};
-use coilwright::compare::{Comparison, Quantity, compare};
+use coilwright::compare::verdict::{Adequacy, ResidualFinding};
+use coilwright::compare::{Comparison, Covariate, compare};
 use coilwright::io::model::ModelFile;
 use coilwright::io::read::model_file::read_model;
 use coilwright::io::read::record_file::read_record;
@@ -76,18 +76,18 @@ fn the_noise_floor_is_the_simulators_within_its_own_standard_error() {
 }
 
 fn names_transients(found: &Comparison) -> bool {
-    found.findings.iter().any(|f| matches!(f, Finding::Regime { regime: Regime::Transient, .. }))
+    found.findings.iter().any(|f| matches!(f, ResidualFinding::Regime { regime: Regime::Transient, .. }))
 }
 
-fn names(found: &Comparison, wanted: &Quantity) -> bool {
-    found.findings.iter().any(|f| matches!(f, Finding::Follows { quantity, .. } if quantity == wanted))
+fn names(found: &Comparison, wanted: &Covariate) -> bool {
+    found.findings.iter().any(|f| matches!(f, ResidualFinding::Follows { quantity, .. } if quantity == wanted))
 }
 
 #[test]
 fn a_complete_model_is_adequate_and_no_regime_stands_out() {
     for name in ["a-control", "g-control-zyl"] {
         let found = compared(name);
-        assert_eq!(found.verdict, Verdict::Adequate, "{name}");
+        assert_eq!(found.verdict, Adequacy::Adequate, "{name}");
         assert!((0.9..=1.15).contains(&found.reduced_chi_square), "{name}");
         assert!(found.regimes.iter().all(|r| r.chi_square_per_row < 1.35), "{name}");
     }
@@ -97,7 +97,7 @@ fn a_complete_model_is_adequate_and_no_regime_stands_out() {
 fn a_hidden_spool_and_a_lagging_sensor_show_after_each_change_of_ramp() {
     for name in ["c-spool", "e-sensor"] {
         let found = compared(name);
-        assert_eq!(found.verdict, Verdict::Missing, "{name}");
+        assert_eq!(found.verdict, Adequacy::Missing, "{name}");
         assert!(names_transients(&found), "{name}");
     }
 }
@@ -105,22 +105,22 @@ fn a_hidden_spool_and_a_lagging_sensor_show_after_each_change_of_ramp() {
 #[test]
 fn a_hidden_mismatch_of_the_halves_shows_as_a_dependence_on_the_rate_of_temperature() {
     let found = compared("d-mismatch");
-    assert_eq!(found.verdict, Verdict::Missing);
-    assert!(names(&found, &Quantity::TemperatureRate));
+    assert_eq!(found.verdict, Adequacy::Missing);
+    assert!(names(&found, &Covariate::TemperatureRate));
 }
 
 #[test]
 fn stress_and_a_temperature_bias_show_as_dependences_on_rate_and_temperature() {
     let found = compared("f-two");
-    assert_eq!(found.verdict, Verdict::Missing);
-    assert!(names(&found, &Quantity::TemperatureRate) && names(&found, &Quantity::Temperature));
+    assert_eq!(found.verdict, Adequacy::Missing);
+    assert!(names(&found, &Covariate::TemperatureRate) && names(&found, &Covariate::Temperature));
 }
 
 #[test]
 fn a_half_space_for_a_pack_that_ends_shows_as_a_wrong_prediction() {
     let found = compared("b-half-space");
-    assert_eq!(found.verdict, Verdict::Missing);
-    assert!(names(&found, &Quantity::Prediction) && names(&found, &Quantity::GradientRate));
+    assert_eq!(found.verdict, Adequacy::Missing);
+    assert!(names(&found, &Covariate::Prediction) && names(&found, &Covariate::GradientRate));
 }
 
 /// A copy of the record with rows left out here and there and for ten minutes, and with gross errors; the rows of those.
@@ -145,7 +145,7 @@ fn irregular_rows_a_gap_and_gross_errors_leave_a_complete_model_adequate() {
     let clean = spoilt.without_rows(&rows).unwrap();
     let found = compare(&file.model, &file.pattern.unwrap().pattern, &clean).unwrap();
     println!("chi-square {:.3} of {} rows", found.reduced_chi_square, found.rows);
-    assert_eq!(found.verdict, Verdict::Adequate);
+    assert_eq!(found.verdict, Adequacy::Adequate);
     assert!((0.9..=1.15).contains(&found.reduced_chi_square));
 }
 

@@ -7,7 +7,7 @@ use coilwright::pattern::Pattern;
 use coilwright::pattern::classic::Classic;
 use coilwright::rate::{CoilModel, LayerWeights, RateModel};
 use coilwright::stress::material::Material;
-use coilwright::stress::{CoatedFibre, Materials, PackStress, Spool, library};
+use coilwright::stress::{BondedSpool, CoatedFibre, Materials, PackStress, library};
 use coilwright::units::{LIGHT_SPEED_M_PER_S, REFERENCE_TEMPERATURE_K, kelvin_from_celsius};
 use serde_json::Value;
 
@@ -54,7 +54,7 @@ fn potted() -> Materials {
     Materials {
         fibre: coated(Material::constant("glass", 72e9, 0.17, 5.5e-7), 80.0, 0.0, &[(soft, 125.0), (hard, 165.0)]),
         adhesive: Material::constant("epoxy", 4e9, 0.35, 6e-5),
-        spool: Some(Spool { material: Material::constant("aluminium", 68.9e9, 0.35, 24e-6), thickness_m: 3e-3 }),
+        spool: Some(BondedSpool { material: Material::constant("aluminium", 68.9e9, 0.35, 24e-6), thickness_m: 3e-3 }),
     }
 }
 

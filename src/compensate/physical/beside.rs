@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::{MOST_DELAY_ROWS, Physical};
-use crate::compensate::formulas::{AtWork, Columns, Formulas, MOST_COLUMNS, columns_seen};
+use crate::compensate::formulas::{AtWork, FormulaColumns, Formulas, MOST_COLUMNS, columns_seen};
 use crate::record::Record;
 
 impl Physical {
@@ -43,8 +43,8 @@ impl Physical {
     }
 
     /// What formulas read of a record's row.
-    pub(in crate::compensate) fn columns_of(&self, record: &Record, row: usize) -> Columns {
-        let mut columns = Columns::default();
+    pub(in crate::compensate) fn columns_of(&self, record: &Record, row: usize) -> FormulaColumns {
+        let mut columns = FormulaColumns::default();
         for (value, name) in columns.iter_mut().zip(self.formula_columns()) {
             *value = record.channels().iter().find(|c| c.name == name).map(|c| c.values[row]);
         }
@@ -52,7 +52,7 @@ impl Physical {
     }
 
     /// As a rate sees them.
-    fn columns_seen(&self, record: &Record, row: usize) -> Columns {
+    fn columns_seen(&self, record: &Record, row: usize) -> FormulaColumns {
         let Some(last) = row.checked_sub(1) else { return self.columns_of(record, row) };
         let since_s = record.times_s()[row] - record.times_s()[last];
         columns_seen(&self.columns_of(record, row), &self.columns_of(record, last), since_s, self.rate_mean_s)

@@ -14,7 +14,7 @@ pub(crate) enum Class {
 
 /// A variable as it stands in a formula.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Variable {
+pub(crate) struct FormulaVariable {
     /// With parentheses where it is a sum.
     pub(crate) text: String,
     /// The names of which it is made.
@@ -52,7 +52,7 @@ impl Inner {
     }
 
     /// Where to look for it first.
-    pub(crate) fn grid(self, x: &Variable, longest_s: f64) -> Vec<f64> {
+    pub(crate) fn grid(self, x: &FormulaVariable, longest_s: f64) -> Vec<f64> {
         let range = x.high - x.low;
         let largest = x.low.abs().max(x.high.abs());
         match self {

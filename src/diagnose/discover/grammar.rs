@@ -10,7 +10,7 @@ use crate::effect::custom::Formula;
 use crate::numeric::expression::{Expression, Memory};
 
 use super::courses::Courses;
-pub(crate) use super::forms::{Class, FORMS, Form, Inner, Variable};
+pub(crate) use super::forms::{Class, FORMS, Form, FormulaVariable, Inner};
 use Class::{Centred, Column, Difference, Rate, Temperature, Time};
 use Inner::{At, HalfWidth, Knee, TimeConstant, Width};
 
@@ -18,8 +18,8 @@ use Inner::{At, HalfWidth, Knee, TimeConstant, Width};
 #[derive(Debug, Clone)]
 pub(crate) struct Family {
     pub(crate) form: &'static Form,
-    pub(crate) x: Variable,
-    pub(crate) y: Option<Variable>,
+    pub(crate) x: FormulaVariable,
+    pub(crate) y: Option<FormulaVariable>,
     /// Without the amplitude.
     pub(crate) text: String,
     expression: Expression,
@@ -36,14 +36,14 @@ pub(crate) struct Term {
 const REFERENCE_C: f64 = 20.0;
 
 /// The variables of a set of records.
-pub(crate) fn variables(courses: &Courses) -> Vec<Variable> {
+pub(crate) fn variables(courses: &Courses) -> Vec<FormulaVariable> {
     let mut all = Vec::new();
     let mut add = |text: &str, name: &str, class, unit: &str, shift: f64| {
         let Some((low, high)) = courses.range(name) else { return };
         if high - low > 1e-9 * high.abs().max(low.abs()) {
             let (low, high) = (low - shift, high - shift);
             let (text, name, unit) = (text.to_owned(), name.to_owned(), unit.to_owned());
-            all.push(Variable { text, name, class, unit, low, high });
+            all.push(FormulaVariable { text, name, class, unit, low, high });
         }
     };
     for name in ["T_mean", "T_in", "T"] {
@@ -104,7 +104,7 @@ impl Allowed {
 }
 
 /// All families of some variables.
-pub(crate) fn families(variables: &[Variable], allowed: &Allowed) -> Vec<Family> {
+pub(crate) fn families(variables: &[FormulaVariable], allowed: &Allowed) -> Vec<Family> {
     let mut all: Vec<Family> = Vec::new();
     for form in FORMS {
         for (place, x) in variables.iter().enumerate().filter(|(_, v)| form.of.contains(&v.class)) {
@@ -124,14 +124,14 @@ pub(crate) fn families(variables: &[Variable], allowed: &Allowed) -> Vec<Family>
 }
 
 impl Family {
-    fn new(form: &'static Form, x: &Variable, y: Option<&Variable>) -> Option<Self> {
+    fn new(form: &'static Form, x: &FormulaVariable, y: Option<&FormulaVariable>) -> Option<Self> {
         // The size of what never changes its sign is that itself, for which there is a plainer form.
         if form.template.contains("abs({x})") && (x.low >= 0.0 || x.high <= 0.0) {
             return None;
         }
         // Powers and products of a temperature are counted from 20 °C, what remembers and thresholds as it is read.
         let shifted = form.inner.is_empty();
-        let text_of = |v: &Variable| match v.class {
+        let text_of = |v: &FormulaVariable| match v.class {
             Temperature if shifted => format!("({} - {REFERENCE_C})", v.text),
             _ => v.text.clone(),
         };
@@ -295,12 +295,12 @@ pub(crate) fn short(value: f64) -> String {
 mod tests {
     use super::*;
 
-    fn variable(text: &str, class: Class, low: f64, high: f64) -> Variable {
+    fn variable(text: &str, class: Class, low: f64, high: f64) -> FormulaVariable {
         let (name, unit) = (text.trim_matches(['(', ')']).to_owned(), "K".to_owned());
-        Variable { text: text.to_owned(), name, class, unit, low, high }
+        FormulaVariable { text: text.to_owned(), name, class, unit, low, high }
     }
 
-    fn all() -> Vec<Variable> {
+    fn all() -> Vec<FormulaVariable> {
         vec![
             variable("T_mean", Temperature, 10.0, 60.0),
             variable("T_in", Temperature, 12.0, 58.0),

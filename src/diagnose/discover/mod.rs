@@ -21,7 +21,7 @@ use crate::diagnose::joint::{Explanation, Found, Member, Question, Winding};
 
 pub(crate) use grammar::Allowed;
 pub(in crate::diagnose) use proposal::amend;
-pub(crate) use proposal::{NO_WINDING, Proposal, ProposedTerm, Shown, TermParameter};
+pub(crate) use proposal::{FormulaProposal, NO_WINDING, ProposedTerm, Shown, TermParameter};
 
 use courses::Courses;
 use search::{MOST_TERMS, Set, Tools};
@@ -31,7 +31,7 @@ use search::{MOST_TERMS, Set, Tools};
 pub(in crate::diagnose) struct Discovered {
     pub(crate) best: Set,
     /// The best set, refitted to all records.
-    pub(crate) settled: Set,
+    pub(crate) refined: Set,
     /// Standard errors of amplitude and inner numbers, a list a term.
     pub(crate) errors: Vec<Vec<f64>>,
     /// Of the best set, and of the sets that do nearly as well.
@@ -140,13 +140,13 @@ fn concluded(tools: &Tools, sets: Vec<Set>, listed: &[f64], least: f64) -> Resul
     let probability = 1.0 / sum;
     let alternatives =
         near.into_iter().skip(1).map(|s| ((s.total() - best.total()).exp() / sum, s)).map(|(p, s)| (s, p)).collect();
-    let (settled, errors) = settled(tools, &best);
+    let (refined, errors) = refined(tools, &best);
     let mut frozen = best.explanation.fit.clone();
     frozen.assumed.inputs.iter_mut().for_each(|i| i.deviation = 0.0);
     let days: Result<Vec<Fit>, ChamberError> =
         question.held_out.iter().map(|&r| question.chamber.held_out(&frozen, r)).collect();
     let courses = tools.courses.clone();
-    Ok(Some(Discovered { best, settled, errors, probability, alternatives, days: days?, courses }))
+    Ok(Some(Discovered { best, refined, errors, probability, alternatives, days: days?, courses }))
 }
 
 /// The variables are those of a fit; None where no term can be made of these records.
@@ -184,7 +184,7 @@ fn umbrella(tools: &Tools, found: &Found, declared: &Explanation) -> Set {
 }
 
 /// The set fitted to all records, and the errors of its numbers there.
-fn settled(tools: &Tools, best: &Set) -> (Set, Vec<Vec<f64>>) {
+fn refined(tools: &Tools, best: &Set) -> (Set, Vec<Vec<f64>>) {
     let everything = Question {
         fitted: tools.question.fitted.iter().chain(&tools.question.held_out).copied().collect(),
         held_out: Vec::new(),

@@ -4,7 +4,7 @@ use super::grammar::{Class, Family, Term};
 use super::search::Set;
 use super::{Discovered, Question};
 use crate::chamber::Fit;
-use crate::diagnose::answer::{Settled, names, noises};
+use crate::diagnose::answer::{ScoredExplanation, names, noises};
 use crate::diagnose::describe::{findings, unexplained};
 use crate::diagnose::joint::{Explanation, Found};
 use crate::diagnose::{DiagnoseError, Diagnosis, Rung, Share, Verdict};
@@ -14,7 +14,7 @@ use crate::rate::CoilModel;
 
 /// A formula that explains what no listed effect does.
 #[derive(Debug, Clone)]
-pub struct Proposal {
+pub struct FormulaProposal {
     /// With its numbers, in °/h.
     pub formula: String,
     pub terms: Vec<ProposedTerm>,
@@ -125,11 +125,11 @@ pub(in crate::diagnose) fn amend(
     // Amplitudes as they were fitted wherever a record is only judged by.
     let mut frozen = best.explanation.clone();
     frozen.fit.assumed.inputs.iter_mut().for_each(|input| input.deviation = 0.0);
-    let settled = Settled { explanation: &frozen, held_out: discovered.days.clone() };
-    let first = Settled::new(question, declared)?;
+    let refined = ScoredExplanation { explanation: &frozen, held_out: discovered.days.clone() };
+    let first = ScoredExplanation::new(question, declared)?;
     // Sets that do as well with another listed effect in the place of one.
     let equals: Vec<&Explanation> = discovered.alternatives.iter().map(|(set, _)| &set.explanation).collect();
-    diagnosis.effects = findings(question, found, &settled, &first, &equals)?;
+    diagnosis.effects = findings(question, found, &refined, &first, &equals)?;
     diagnosis.verdict = Verdict::Unexplained;
     diagnosis.suggested_experiment = None;
     let noise = noises(question, &best.explanation)?;
@@ -177,8 +177,8 @@ fn proposal(
     question: &Question,
     discovered: &Discovered,
     diagnosis: &mut Diagnosis,
-) -> Result<Proposal, DiagnoseError> {
-    let (best, settled) = (&discovered.best, &discovered.settled);
+) -> Result<FormulaProposal, DiagnoseError> {
+    let (best, refined) = (&discovered.best, &discovered.refined);
     let over = |fits: &[(&Fit, usize)], terms: usize| -> Result<f64, DiagnoseError> {
         let (mut squares, mut rows) = (0.0, 0.0);
         for (fit, record) in fits {
@@ -219,16 +219,16 @@ fn proposal(
     let holdout_rmse_rad_per_s = if unseen.is_empty() { None } else { Some(over(&unseen, best.terms.len())?) };
     diagnosis.ladder = ladder;
     let mut terms = Vec::new();
-    let mut proposed = settled.explanation.fit.assumed.model.clone();
-    for (place, term) in settled.terms.iter().enumerate() {
-        let amplitude = settled.amplitude(place);
+    let mut proposed = refined.explanation.fit.assumed.model.clone();
+    for (place, term) in refined.terms.iter().enumerate() {
+        let amplitude = refined.amplitude(place);
         let Some(effect) = term.effect(amplitude) else { continue };
         proposed.effects.push(effect.clone());
         terms.push(ProposedTerm {
             text: term.formula_text(),
             form: term.family.form.key,
             variables: term.family.variables(),
-            parameters: parameters(settled, place, &discovered.errors[place]),
+            parameters: parameters(refined, place, &discovered.errors[place]),
             reading: term.reading(),
             shown: shown(question, discovered, place)?,
             effect,
@@ -240,9 +240,9 @@ fn proposal(
         .iter()
         .map(|(set, probability)| Alternative { formula: formula_in_numbers(set), probability: *probability })
         .collect();
-    Ok(Proposal {
-        formula: formula_in_numbers(settled),
-        experiment: experiment(settled, &discovered.alternatives),
+    Ok(FormulaProposal {
+        formula: formula_in_numbers(refined),
+        experiment: experiment(refined, &discovered.alternatives),
         terms,
         alternatives,
         predicts: only_describes.is_none(),
@@ -297,7 +297,7 @@ fn parameters(set: &Set, place: usize, errors: &[f64]) -> Vec<TermParameter> {
 
 /// What is left without a term against its variable, on the fitted records.
 fn shown(question: &Question, discovered: &Discovered, place: usize) -> Result<Vec<Shown>, DiagnoseError> {
-    let set = &discovered.settled;
+    let set = &discovered.refined;
     let fit = &set.explanation.fit;
     let term = &set.terms[place];
     let column = discovered.courses.column(term);
@@ -326,20 +326,20 @@ fn shown(question: &Question, discovered: &Discovered, place: usize) -> Result<V
 fn experiment(set: &Set, alternatives: &[(Set, f64)]) -> Option<String> {
     let own = &set.terms.first()?.family;
     let other = alternatives.iter().map(|(s, _)| s).find_map(|s| {
-        let rival = s.terms.iter().find(|t| !set.terms.iter().any(|o| o.is_sister_of(t)))?;
-        Some(&rival.family)
+        let alternative = s.terms.iter().find(|t| !set.terms.iter().any(|o| o.is_sister_of(t)))?;
+        Some(&alternative.family)
     });
     let text = match other {
-        Some(rival) => apart(own, rival),
+        Some(alternative) => apart(own, alternative),
         None => alone(own),
     };
     Some(text)
 }
 
-fn apart(own: &Family, rival: &Family) -> String {
-    let (a, b) = (own.variables().join(" and "), rival.variables().join(" and "));
+fn apart(own: &Family, alternative: &Family) -> String {
+    let (a, b) = (own.variables().join(" and "), alternative.variables().join(" and "));
     if a != b {
-        let how = match (own.x.class, rival.x.class) {
+        let how = match (own.x.class, alternative.x.class) {
             (Class::Temperature, Class::Temperature) => {
                 "a steep ramp after a long soak, in which the inner layers follow late"
             }
@@ -349,9 +349,9 @@ fn apart(own: &Family, rival: &Family) -> String {
             (Class::Time, _) | (_, Class::Time) => "the same cycle begun an hour after switch-on",
             _ => "ramps of several rates at several temperatures",
         };
-        return format!("to tell {} from {}: {how}", own.text, rival.text);
+        return format!("to tell {} from {}: {how}", own.text, alternative.text);
     }
-    format!("to tell {} from {}: {}", own.text, rival.text, alone(own))
+    format!("to tell {} from {}: {}", own.text, alternative.text, alone(own))
 }
 
 fn alone(own: &Family) -> String {

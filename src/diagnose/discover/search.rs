@@ -93,7 +93,7 @@ const STEP_SHARE: f64 = 0.02;
 
 /// A term that promises something at a fit.
 #[derive(Debug, Clone)]
-pub(crate) struct Promise {
+pub(crate) struct PromisingTerm {
     pub(crate) term: Term,
     /// Rise of the log likelihood at the best amplitude, and that amplitude.
     pub(crate) gain: f64,
@@ -112,10 +112,10 @@ impl Tools<'_, '_> {
         -EFFECT.log + (self.candidates.max(1) as f64).ln() + 0.5 * rows.ln() * term.inner.len() as f64
     }
 
-    fn promise(&self, term: Term, scored: &Scored, rows: f64) -> Promise {
+    fn promise(&self, term: Term, scored: &Scored, rows: f64) -> PromisingTerm {
         let (gain, amplitude) = scored.gain();
         let worth = gain - self.price(&term, rows) - 0.5 * rows.ln();
-        Promise { term, gain, amplitude, worth }
+        PromisingTerm { term, gain, amplitude, worth }
     }
 
     /// The most that any point of any grid is worth at a fit.
@@ -135,10 +135,10 @@ impl Tools<'_, '_> {
     }
 
     /// The best of each family at a fit, refined; most worth first.
-    pub(crate) fn promises(&self, scorer: &Scorer, fit: &Fit) -> Vec<Promise> {
+    pub(crate) fn promises(&self, scorer: &Scorer, fit: &Fit) -> Vec<PromisingTerm> {
         let rows = self.rows(fit);
         let longest_s = self.courses.longest_s();
-        let mut best: Vec<Promise> = self
+        let mut best: Vec<PromisingTerm> = self
             .families
             .par_iter()
             .filter_map(|family| {
@@ -150,19 +150,19 @@ impl Tools<'_, '_> {
                 scored.max_by(|a, b| a.gain.total_cmp(&b.gain))
             })
             .collect();
-        let order = |all: &mut Vec<Promise>| {
+        let order = |all: &mut Vec<PromisingTerm>| {
             all.sort_by(|a, b| b.worth.total_cmp(&a.worth).then_with(|| a.term.family.text.cmp(&b.term.family.text)))
         };
         order(&mut best);
         best.truncate(REFINED);
-        let mut refined: Vec<Promise> =
+        let mut refined: Vec<PromisingTerm> =
             best.into_par_iter().map(|promise| self.refined(scorer, promise, rows, longest_s)).collect();
         order(&mut refined);
         refined
     }
 
     /// Inner numbers where the gain is largest, one after the other.
-    fn refined(&self, scorer: &Scorer, promise: Promise, rows: f64, longest_s: f64) -> Promise {
+    fn refined(&self, scorer: &Scorer, promise: PromisingTerm, rows: f64, longest_s: f64) -> PromisingTerm {
         let count = promise.term.inner.len();
         let mut best = promise;
         for _ in 0..if count > 1 { 2 } else { count } {
@@ -222,7 +222,7 @@ impl Tools<'_, '_> {
     }
 
     /// A set with one more term, fitted from the set's own chamber.
-    fn with_term(&self, set: &Set, promise: &Promise) -> Option<Set> {
+    fn with_term(&self, set: &Set, promise: &PromisingTerm) -> Option<Set> {
         let mut assumed = set.explanation.fit.assumed.clone();
         assumed.drift = false;
         assumed.cycle = false;
@@ -408,7 +408,7 @@ impl Tools<'_, '_> {
         };
         let worthy = promises.iter().filter(|p| p.worth > 0.0 && p.gain > WORTH_BESIDE * first).take(ALIKE_TRIED);
         let tried = worthy.enumerate().filter(|(place, p)| *place < TRIED || p.gain > first - NEAR);
-        let tried: Vec<&Promise> = tried.map(|(_, p)| p).collect();
+        let tried: Vec<&PromisingTerm> = tried.map(|(_, p)| p).collect();
         let mut next: Vec<Set> = tried.par_iter().filter_map(|promise| self.with_term(set, promise)).collect();
         next.extend(listed.par_iter().filter_map(|p| self.with_listed(set, p)).collect::<Vec<_>>());
         next.sort_by(|a, b| b.merit.total_cmp(&a.merit));

@@ -9,7 +9,7 @@ use crate::units::REFERENCE_TEMPERATURE_K;
 
 /// What the records show the chamber to be capable of.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Chamber {
+pub(crate) struct ChamberCapability {
     pub(crate) coldest_k: f64,
     pub(crate) warmest_k: f64,
     pub(crate) rate_k_per_s: f64,
@@ -32,7 +32,7 @@ const SAMPLED: usize = 40;
 /// Legs of the swings that are tried.
 const SWINGS_S: [f64; 5] = [300.0, 450.0, 700.0, 1100.0, 1800.0];
 
-impl Chamber {
+impl ChamberCapability {
     /// None where the records hold no change of temperature.
     pub(crate) fn of(records: &[&Record]) -> Option<Self> {
         let temperatures = || records.iter().flat_map(|r| r.temperature_k().iter().copied());
@@ -73,7 +73,7 @@ struct Leg {
     soak_share: f64,
 }
 
-pub(super) fn profiles(chamber: &Chamber, seed: u64) -> Vec<Profile> {
+pub(super) fn profiles(chamber: &ChamberCapability, seed: u64) -> Vec<Profile> {
     let (cold, warm) = (chamber.coldest_k, chamber.warmest_k);
     let leg = |to_k: f64, rate_share: f64, soak_share: f64| Leg { to_k, rate_share, soak_share };
     let between = |share: f64| cold + share * (warm - cold);
@@ -121,7 +121,7 @@ pub(super) fn profiles(chamber: &Chamber, seed: u64) -> Vec<Profile> {
 }
 
 /// A record that begins at rest says what rest is; then the legs as far as the duration goes; a last soak fills it.
-fn profile_of(name: &str, legs: &[Leg], chamber: &Chamber) -> Option<Profile> {
+fn profile_of(name: &str, legs: &[Leg], chamber: &ChamberCapability) -> Option<Profile> {
     let (mut at_k, mut left_s) = (REFERENCE_TEMPERATURE_K, chamber.duration_s);
     let mut pieces: Vec<Piece> = Vec::new();
     let mut add = |rate_k_per_s: f64, wanted_s: f64| {
@@ -150,7 +150,7 @@ fn profile_of(name: &str, legs: &[Leg], chamber: &Chamber) -> Option<Profile> {
 mod tests {
     use super::*;
 
-    const CHAMBER: Chamber = Chamber {
+    const CHAMBER: ChamberCapability = ChamberCapability {
         coldest_k: 253.0,
         warmest_k: 333.0,
         rate_k_per_s: 1.0 / 60.0,
@@ -179,7 +179,7 @@ mod tests {
         let temperature_k =
             times_s.iter().enumerate().map(|(i, t)| 300.0 + 0.02 * t + 0.004 * (i % 2) as f64).collect();
         let record = Record::new("x", times_s, temperature_k, vec![0.0; 400]).unwrap();
-        let chamber = Chamber::of(&[&record]).unwrap();
+        let chamber = ChamberCapability::of(&[&record]).unwrap();
         assert!((chamber.rate_k_per_s / 0.02 - 1.0).abs() < 0.01);
         assert_eq!(chamber.coldest_k, REFERENCE_TEMPERATURE_K);
     }

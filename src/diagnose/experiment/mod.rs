@@ -23,8 +23,8 @@
 //! Hunter and Reiner, Technometrics 7 (1965) 307, and Box and Hill, ibid. 9 (1967) 57: the experiment at which rival models
 //! differ most, and what refitting takes of that.
 
+mod alternatives;
 mod chamber;
-mod contest;
 mod plan;
 
 use rayon::prelude::*;
@@ -33,14 +33,14 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use crate::profile::Profile;
 use crate::units::REFERENCE_TEMPERATURE_K;
 use chamber::profiles;
-use plan::{Difference, Plan, Refit};
+use plan::{Difference, ExperimentPlan, Refit};
 
-pub(crate) use chamber::Chamber;
-pub(crate) use contest::Contest;
-pub(crate) use plan::Refusal;
+pub(crate) use alternatives::ModelComparison;
+pub(crate) use chamber::ChamberCapability;
+pub(crate) use plan::ExpectedRefusal;
 
 #[cfg(test)]
-pub(super) use contest::tests as fixtures;
+pub(super) use alternatives::tests as fixtures;
 
 /// Candidates that differ by less than this share of what they explain explain it equally well: no effect's equation is
 /// more accurate than that.
@@ -53,7 +53,7 @@ const EQUAL: f64 = 12.0;
 pub(crate) struct Experiment {
     pub(crate) profile: Profile,
     /// The candidates' names, and the experiments of another kind that would isolate what they add.
-    pub(crate) rivals: Vec<(String, Vec<&'static str>)>,
+    pub(crate) alternatives: Vec<(String, Vec<&'static str>)>,
     pub(crate) separations: Vec<Separation>,
     /// Profiles that it was chosen from.
     pub(crate) tried: usize,
@@ -67,15 +67,15 @@ pub(crate) struct Separation {
     /// Root mean square of the difference of their predictions, the mean taken out, nothing fitted again.
     pub(crate) rms_rad_per_s: f64,
     /// If the first is true and if the second is; one where the first is a special case of the second.
-    pub(crate) outcomes: Vec<Outcome>,
+    pub(crate) outcomes: Vec<ExpectedOutcome>,
     /// Whether some profile was found that tells the two apart, be it not the one that was chosen.
     pub(crate) possible: bool,
 }
 
 /// What is expected if one candidate is true.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Outcome {
-    pub(crate) refusal: Refusal,
+pub(crate) struct ExpectedOutcome {
+    pub(crate) refusal: ExpectedRefusal,
     pub(crate) needed_alone: f64,
     pub(crate) needed_with_records: f64,
     /// That what is found with the records exceeds what is needed.
@@ -101,7 +101,7 @@ const JUDGED_IN_FULL: usize = 3;
 
 impl Separation {
     /// The less sure of the outcomes.
-    pub(crate) fn least(&self) -> Option<&Outcome> {
+    pub(crate) fn least(&self) -> Option<&ExpectedOutcome> {
         self.outcomes.iter().min_by(|a, b| a.chance.total_cmp(&b.chance).then(a.margin().total_cmp(&b.margin())))
     }
 
@@ -114,8 +114,8 @@ impl Separation {
     }
 }
 
-impl Outcome {
-    fn new(refusal: Refusal, variance: f64) -> Self {
+impl ExpectedOutcome {
+    fn new(refusal: ExpectedRefusal, variance: f64) -> Self {
         let needed = |explained: f64| (EQUAL * variance).max(EQUAL_SHARE.powi(2) * explained);
         let needed_with_records = needed(refusal.explained_alone + refusal.explained_of_records);
         let chance = |runs: usize| {
@@ -150,22 +150,22 @@ fn chance_of_more(expected: f64, needed: f64, variance: f64) -> f64 {
 /// What was judged under one profile.
 struct Judged {
     profile: usize,
-    outcomes: Vec<Outcome>,
+    outcomes: Vec<ExpectedOutcome>,
     differences: Vec<Difference>,
 }
 
 /// The profile that tells the candidates apart most surely; None where there is nothing to tell apart, and where no profile
 /// can be solved for all of them.
-pub(crate) fn design(contest: &Contest, chamber: &Chamber, seed: u64) -> Option<Experiment> {
-    if contest.rivals.len() < 2 {
+pub(crate) fn design(comparison: &ModelComparison, chamber: &ChamberCapability, seed: u64) -> Option<Experiment> {
+    if comparison.alternatives.len() < 2 {
         return None;
     }
     let profiles = profiles(chamber, seed);
     let judge = |profile: usize, refit: Refit| -> Option<Judged> {
         let step_s = chamber.interval_s.max(profiles[profile].duration_s() / MOST_ROWS);
-        let plan = Plan::new(contest, &profiles[profile], REFERENCE_TEMPERATURE_K, step_s);
+        let plan = ExperimentPlan::new(comparison, &profiles[profile], REFERENCE_TEMPERATURE_K, step_s);
         let foreseen = plan.judge(refit)?;
-        let outcomes = foreseen.refusals.into_iter().map(|r| Outcome::new(r, contest.variance)).collect();
+        let outcomes = foreseen.refusals.into_iter().map(|r| ExpectedOutcome::new(r, comparison.variance)).collect();
         Some(Judged { profile, outcomes, differences: foreseen.differences })
     };
     let mut screened: Vec<Judged> =
@@ -192,7 +192,7 @@ pub(crate) fn design(contest: &Contest, chamber: &Chamber, seed: u64) -> Option<
         .differences
         .iter()
         .map(|&Difference { first, second, rms_rad_per_s }| {
-            let of_pair = |o: &Outcome| {
+            let of_pair = |o: &ExpectedOutcome| {
                 [o.refusal.truth, o.refusal.refused] == [first, second]
                     || [o.refusal.refused, o.refusal.truth] == [first, second]
             };
@@ -206,38 +206,43 @@ pub(crate) fn design(contest: &Contest, chamber: &Chamber, seed: u64) -> Option<
             }
         })
         .collect();
-    let rivals = contest.rivals.iter().map(|r| (r.name.clone(), r.isolating())).collect();
-    Some(Experiment { profile: profiles[chosen.profile].clone(), rivals, separations, tried: profiles.len() })
+    let alternatives = comparison.alternatives.iter().map(|r| (r.name.clone(), r.isolating())).collect();
+    Some(Experiment { profile: profiles[chosen.profile].clone(), alternatives, separations, tried: profiles.len() })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::contest::Rival;
-    use super::contest::tests::{contest, effect, model, rival};
+    use super::alternatives::FittedAlternative;
+    use super::alternatives::tests::{alternative, comparison, effect, model};
     use super::*;
 
-    const CHAMBER: Chamber =
-        Chamber { coldest_k: 253.0, warmest_k: 333.0, rate_k_per_s: 0.025, duration_s: 5000.0, interval_s: 10.0 };
+    const CHAMBER: ChamberCapability = ChamberCapability {
+        coldest_k: 253.0,
+        warmest_k: 333.0,
+        rate_k_per_s: 0.025,
+        duration_s: 5000.0,
+        interval_s: 10.0,
+    };
 
-    fn mismatch() -> Rival {
-        rival("mismatch", model(vec![effect("strain_mismatch", &[0.008])]))
+    fn mismatch() -> FittedAlternative {
+        alternative("mismatch", model(vec![effect("strain_mismatch", &[0.008])]))
     }
 
     #[test]
     fn rivals_that_are_the_same_but_for_their_size_are_told_apart_by_no_profile_and_by_no_number_of_runs() {
-        let larger = rival("larger", model(vec![effect("strain_mismatch", &[0.012])]));
-        let found = design(&contest(vec![mismatch(), larger]), &CHAMBER, 1).unwrap();
+        let larger = alternative("larger", model(vec![effect("strain_mismatch", &[0.012])]));
+        let found = design(&comparison(vec![mismatch(), larger]), &CHAMBER, 1).unwrap();
         let pair = &found.separations[0];
         println!("{pair:?}");
         assert!(pair.rms_rad_per_s > 1e-8 && !pair.possible && pair.promise() == Promise::NotToldApart);
         assert!(pair.outcomes.iter().all(|o| o.refusal.chi_square_alone.abs() < 0.1 && o.runs.is_none()));
-        assert_eq!(found.rivals[1].1, vec![effect("strain_mismatch", &[0.0]).spec().experiment]);
+        assert_eq!(found.alternatives[1].1, vec![effect("strain_mismatch", &[0.0]).spec().experiment]);
     }
 
     #[test]
     fn a_profile_that_tells_rivals_apart_is_found_where_there_is_one() {
-        let bias = rival("bias", model(vec![effect("bias_temperature", &[5e-9, 0.0])]));
-        let found = design(&contest(vec![mismatch(), bias]), &CHAMBER, 1).unwrap();
+        let bias = alternative("bias", model(vec![effect("bias_temperature", &[5e-9, 0.0])]));
+        let found = design(&comparison(vec![mismatch(), bias]), &CHAMBER, 1).unwrap();
         let pair = &found.separations[0];
         println!("{} {pair:?}", found.profile.name());
         assert!(pair.possible && pair.promise() == Promise::ToldApart);

@@ -9,7 +9,7 @@
 
 use rayon::prelude::*;
 
-use super::contest::{Contest, Rival};
+use super::alternatives::{FittedAlternative, ModelComparison};
 use crate::chamber::{Bend, Chamber, Fit, Quantity};
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::numeric::statistics::standard_deviation;
@@ -20,15 +20,15 @@ use crate::thermal::exposure::expose;
 use crate::thermal::solve;
 
 /// A profile as the chamber's air.
-pub(super) struct Plan<'a> {
-    contest: &'a Contest,
+pub(super) struct ExperimentPlan<'a> {
+    comparison: &'a ModelComparison,
     air_k: PiecewiseLinear,
     times_s: Vec<f64>,
 }
 
 /// By how much χ² one candidate is expected to be refused if another one is true.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Refusal {
+pub(crate) struct ExpectedRefusal {
     /// Places among the candidates.
     pub(crate) truth: usize,
     pub(crate) refused: usize,
@@ -45,7 +45,7 @@ pub(crate) struct Refusal {
 
 /// What is foreseen of one profile.
 pub(super) struct Foreseen {
-    pub(crate) refusals: Vec<Refusal>,
+    pub(crate) refusals: Vec<ExpectedRefusal>,
     /// Each pair's.
     pub(crate) differences: Vec<Difference>,
 }
@@ -80,31 +80,34 @@ struct Told {
     explained: f64,
 }
 
-impl<'a> Plan<'a> {
+impl<'a> ExperimentPlan<'a> {
     /// Readings every `step_s` over the whole profile.
-    pub(crate) fn new(contest: &'a Contest, profile: &Profile, start_k: f64, step_s: f64) -> Self {
+    pub(crate) fn new(comparison: &'a ModelComparison, profile: &Profile, start_k: f64, step_s: f64) -> Self {
         let rows = (profile.duration_s() / step_s) as usize;
         let times_s = (0..=rows).map(|i| step_s * i as f64).collect();
-        Self { contest, air_k: profile.temperature(start_k), times_s }
+        Self { comparison, air_k: profile.temperature(start_k), times_s }
     }
 
     /// Every candidate refused by every other one, and how far they are apart.
     pub(crate) fn judge(&self, refit: Refit) -> Option<Foreseen> {
-        let rivals = &self.contest.rivals;
-        let air = self.contest.air.as_ref()?;
-        let shown: Vec<Record> = rivals.iter().map(|r| self.shown(r, air)).collect::<Option<_>>()?;
-        let told: Vec<Told> =
-            (0..rivals.len()).into_par_iter().map(|i| self.told(&shown[i], i, air, refit)).collect::<Option<_>>()?;
+        let alternatives = &self.comparison.alternatives;
+        let air = self.comparison.air.as_ref()?;
+        let shown: Vec<Record> = alternatives.iter().map(|r| self.shown(r, air)).collect::<Option<_>>()?;
+        let told: Vec<Told> = (0..alternatives.len())
+            .into_par_iter()
+            .map(|i| self.told(&shown[i], i, air, refit))
+            .collect::<Option<_>>()?;
         let mut refusals = Vec::new();
-        for truth in 0..rivals.len() {
-            for refused in 0..rivals.len() {
-                if truth == refused || self.contest.is_within(truth, refused) {
+        for truth in 0..alternatives.len() {
+            for refused in 0..alternatives.len() {
+                if truth == refused || self.comparison.is_within(truth, refused) {
                     continue;
                 }
                 let (own, other) = (told[truth].deviances[truth], told[truth].deviances[refused]);
-                let chi_square_of_records = rivals[refused].deviance - rivals[truth].deviance;
-                let explained = self.contest.without.as_ref().map_or(0.0, |w| w.deviance - rivals[truth].deviance);
-                refusals.push(Refusal {
+                let chi_square_of_records = alternatives[refused].deviance - alternatives[truth].deviance;
+                let explained =
+                    self.comparison.without.as_ref().map_or(0.0, |w| w.deviance - alternatives[truth].deviance);
+                refusals.push(ExpectedRefusal {
                     truth,
                     refused,
                     chi_square_alone: other[0] - own[0],
@@ -128,15 +131,16 @@ impl<'a> Plan<'a> {
     }
 
     fn told(&self, shown: &Record, truth: usize, air: &Fit, refit: Refit) -> Option<Told> {
-        let noise = self.contest.noise_rad_per_s;
-        let chamber = Chamber::planned(self.contest.rivals[truth].model(), shown, &self.bends(), noise).ok()?;
-        let left = |rival: &Rival| -> Option<[f64; 2]> {
-            let alone = chamber.foresee(&rival.fit, air, None, 0, refit.steps()).ok()?;
-            let held = chamber.foresee(&rival.fit, air, rival.hold.as_ref(), 0, refit.steps()).ok()?;
+        let noise = self.comparison.noise_rad_per_s;
+        let chamber =
+            Chamber::planned(self.comparison.alternatives[truth].model(), shown, &self.bends(), noise).ok()?;
+        let left = |alternative: &FittedAlternative| -> Option<[f64; 2]> {
+            let alone = chamber.foresee(&alternative.fit, air, None, 0, refit.steps()).ok()?;
+            let held = chamber.foresee(&alternative.fit, air, alternative.hold.as_ref(), 0, refit.steps()).ok()?;
             Some([alone, held])
         };
-        let deviances: Vec<[f64; 2]> = self.contest.rivals.iter().map(left).collect::<Option<_>>()?;
-        let explained = match &self.contest.without {
+        let deviances: Vec<[f64; 2]> = self.comparison.alternatives.iter().map(left).collect::<Option<_>>()?;
+        let explained = match &self.comparison.without {
             Some(without) => chamber.foresee(&without.fit, air, None, 0, 0).ok()? - deviances[truth][0],
             None => 0.0,
         };
@@ -153,21 +157,21 @@ impl<'a> Plan<'a> {
     }
 
     /// What is measured if a candidate is true, without noise.
-    fn shown(&self, rival: &Rival, air: &Fit) -> Option<Record> {
-        let model = rival.model();
+    fn shown(&self, alternative: &FittedAlternative, air: &Fit) -> Option<Record> {
+        let model = alternative.model();
         let path = model.heat_path().ok()?;
-        let film = rival.fit.number(Quantity::Film, rival.fit.records.first().copied().unwrap_or(0));
+        let film = alternative.fit.number(Quantity::Film, alternative.fit.records.first().copied().unwrap_or(0));
         let film = if film.is_finite() { film } else { air.number(Quantity::Film, air.records[0]) };
         let exposed = expose(&path, Some(film), model.sensor_lag_s(), &self.air_k, &self.times_s).ok()?;
         let history = solve(&exposed.path, &exposed.drive).ok()?.means(&self.times_s, model.rate_mean_s);
-        let rates = RateModel::new(model, &rival.fit.assumed.pattern, &[]).ok()?.series_rad_per_s(&history);
+        let rates = RateModel::new(model, &alternative.fit.assumed.pattern, &[]).ok()?.series_rad_per_s(&history);
         Record::new("planned", self.times_s.clone(), exposed.shown_k, rates).ok()
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::contest::tests::{contest, effect, model, rival};
+    use super::super::alternatives::tests::{alternative, comparison, effect, model};
     use super::*;
     use nalgebra::DMatrix;
 
@@ -183,18 +187,18 @@ mod tests {
         Profile::new("swings", pieces).unwrap()
     }
 
-    fn plan(contest: &Contest) -> Plan<'_> {
-        Plan::new(contest, &profile(), REFERENCE_TEMPERATURE_K, 10.0)
+    fn plan(comparison: &ModelComparison) -> ExperimentPlan<'_> {
+        ExperimentPlan::new(comparison, &profile(), REFERENCE_TEMPERATURE_K, 10.0)
     }
 
-    fn refusal(refusals: &[Refusal], truth: usize, refused: usize) -> Refusal {
+    fn refusal(refusals: &[ExpectedRefusal], truth: usize, refused: usize) -> ExpectedRefusal {
         *refusals.iter().find(|r| r.truth == truth && r.refused == refused).unwrap()
     }
 
     #[test]
     fn a_rival_of_another_size_is_fitted_again_and_is_refused_only_as_far_as_the_records_hold_it() {
-        let of_gain = |gain: f64| rival("mismatch", model(vec![effect("strain_mismatch", &[gain])]));
-        let mut free = contest(vec![of_gain(0.004), of_gain(0.006)]);
+        let of_gain = |gain: f64| alternative("mismatch", model(vec![effect("strain_mismatch", &[gain])]));
+        let mut free = comparison(vec![of_gain(0.004), of_gain(0.006)]);
         for refit in [Refit::Linear, Refit::Full] {
             let found = refusal(&plan(&free).judge(refit).unwrap().refusals, 0, 1);
             println!("{refit:?}: {found:?}");
@@ -202,10 +206,10 @@ mod tests {
         }
         // Held by the records at its own size, far more firmly than by the experiment: the whole difference is left.
         // The film is held too.
-        free.rivals[1].hold = Some(Hold { information: DMatrix::identity(2, 2) * 1e12 });
-        free.rivals[1].deviance = 5.0;
+        free.alternatives[1].hold = Some(Hold { information: DMatrix::identity(2, 2) * 1e12 });
+        free.alternatives[1].deviance = 5.0;
         let found = refusal(&plan(&free).judge(Refit::Full).unwrap().refusals, 0, 1);
-        let given = contest(vec![of_gain(0.004), rival("nothing", model(Vec::new()))]);
+        let given = comparison(vec![of_gain(0.004), alternative("nothing", model(Vec::new()))]);
         let whole = refusal(&plan(&given).judge(Refit::Full).unwrap().refusals, 0, 1).chi_square_alone;
         println!("{found:?}, whole {whole}");
         // By half the size that it is wrong by, a quarter of what the whole effect is worth; air takes some of both.
@@ -216,11 +220,11 @@ mod tests {
     #[test]
     fn the_model_without_an_effect_is_refused_by_the_one_with_it_but_never_the_other_way_round() {
         let given = vec![
-            rival("declared", model(Vec::new())),
-            rival("with it", model(vec![effect("strain_mismatch", &[0.004])])),
+            alternative("declared", model(Vec::new())),
+            alternative("with it", model(vec![effect("strain_mismatch", &[0.004])])),
         ];
-        let contest = contest(given);
-        let refusals = plan(&contest).judge(Refit::Linear).unwrap().refusals;
+        let comparison = comparison(given);
+        let refusals = plan(&comparison).judge(Refit::Linear).unwrap().refusals;
         assert_eq!(refusals.len(), 1);
         assert!(refusals[0].truth == 1 && refusals[0].chi_square_alone > 100.0);
     }

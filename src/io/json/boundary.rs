@@ -8,15 +8,8 @@ use serde_json::{Map, Value, json};
 use crate::chamber::{Estimate, Learned, PRIORS, Quantity};
 use crate::units::deg_per_h_from_rad_per_s;
 
+use super::EstimateJson;
 use super::schema::{described, table};
-
-/// A number with its standard error; null where that is not known.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-pub(crate) struct EstimateJson {
-    pub(crate) value: f64,
-    pub(crate) standard_error: Option<f64>,
-}
 
 /// What is written into the `[boundary]` table of a model file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

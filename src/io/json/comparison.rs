@@ -4,9 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::chamber::Noise;
 use crate::compare::Comparison;
-use crate::compare::regimes::Part;
+use crate::compare::regimes::RecordPart;
 use crate::compare::sensors::SensorMisfit;
-use crate::compare::verdict::Verdict;
+use crate::compare::verdict::Adequacy;
 use crate::units::deg_per_h_from_rad_per_s;
 
 use super::inputs::InputsJson;
@@ -154,15 +154,15 @@ pub(crate) struct PartJson {
 pub(crate) const NOISE_FLOOR_METHOD: &str =
     "what quadratics leave of 11 rows each, windows above the 98 % point of chi-square left out";
 
-fn verdict_word(verdict: Verdict) -> &'static str {
+fn verdict_word(verdict: Adequacy) -> &'static str {
     match verdict {
-        Verdict::Adequate => "adequate",
-        Verdict::Missing => "missing",
+        Adequacy::Adequate => "adequate",
+        Adequacy::Missing => "missing",
     }
 }
 
 impl PartJson {
-    fn new(part: &Part) -> Self {
+    fn new(part: &RecordPart) -> Self {
         Self {
             name: part.name.clone(),
             share_of_squared_error: part.share_of_squared_error,
@@ -176,7 +176,7 @@ impl PartJson {
 
 impl RecordComparisonJson {
     pub(crate) fn new(file: &str, found: &Comparison, gross_errors: Vec<GrossErrorJson>, gaps: usize) -> Self {
-        let parts = |parts: &[Part]| parts.iter().map(PartJson::new).collect();
+        let parts = |parts: &[RecordPart]| parts.iter().map(PartJson::new).collect();
         Self {
             file: file.to_owned(),
             field: None,
@@ -223,12 +223,12 @@ impl RecordComparisonJson {
 
 impl CompareJson {
     pub(crate) fn new(model: &str, pattern: &str, records: Vec<RecordComparisonJson>, inputs: InputsJson) -> Self {
-        let all = records.iter().all(|r| r.verdict == verdict_word(Verdict::Adequate));
-        let verdict = verdict_word(if all { Verdict::Adequate } else { Verdict::Missing });
+        let all = records.iter().all(|r| r.verdict == verdict_word(Adequacy::Adequate));
+        let verdict = verdict_word(if all { Adequacy::Adequate } else { Adequacy::Missing });
         Self { model: model.to_owned(), pattern: pattern.to_owned(), verdict: verdict.to_owned(), records, inputs }
     }
 
     pub(crate) fn is_adequate(&self) -> bool {
-        self.verdict == verdict_word(Verdict::Adequate)
+        self.verdict == verdict_word(Adequacy::Adequate)
     }
 }

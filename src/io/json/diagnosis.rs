@@ -1,4 +1,4 @@
-//! The JSON documents of `diagnose` and `extend`; the former is also read back for reports.
+//! The JSON document of `diagnose`, which is also read back for reports.
 
 use std::collections::BTreeMap;
 
@@ -7,17 +7,16 @@ use serde::{Deserialize, Serialize};
 use crate::chamber::EffectEstimate;
 use crate::diagnose::experiment::Experiment;
 use crate::diagnose::{
-    Contender, Diagnosis, Equivalent, Finding, FittedParameter, Hypothesis, OffsetStep, Plain, Refitted, Rung, Shape,
-    Share, Unexplained, Verdict,
+    Contender, Diagnosis, Equivalent, Finding, FittedParameter, Hypothesis, OffsetStep, Plain, Refitted, ResidualShape,
+    Rung, Share, Unexplained, Verdict,
 };
 use crate::effect::DeclaredEffect;
 use crate::units::deg_per_h_from_rad_per_s;
 
 use super::boundary::BoundaryJson;
-use super::comparison::CompareJson;
 use super::experiment::ExperimentJson;
 use super::inputs::InputsJson;
-pub(crate) use super::noise::NoiseJson;
+pub(crate) use super::noise::RecordNoiseJson;
 use super::proposals::ProposalJson;
 
 /// The answer of `diagnose`.
@@ -42,7 +41,7 @@ pub struct DiagnosisJson {
     pub(crate) cautions: Vec<String>,
     /// Sets of explanations with their posterior probability, largest first.
     #[serde(default)]
-    pub posterior: Vec<ShareJson>,
+    pub posterior: Vec<PosteriorShareJson>,
     /// Declared numbers that the records contradict.
     #[serde(default)]
     pub refitted: Vec<RefittedJson>,
@@ -51,7 +50,7 @@ pub struct DiagnosisJson {
     pub(crate) hypothesis: Option<HypothesisJson>,
     /// White noise, wander and unresolved air of each record, fitted ones first.
     #[serde(default)]
-    pub(crate) noise: Vec<NoiseJson>,
+    pub(crate) noise: Vec<RecordNoiseJson>,
     /// Formulas for what no listed effect explains, best first.
     #[serde(default)]
     pub(crate) proposals: Vec<ProposalJson>,
@@ -63,7 +62,7 @@ pub struct DiagnosisJson {
 /// One set of effects and its probability.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-pub struct ShareJson {
+pub struct PosteriorShareJson {
     pub(crate) effects: Vec<String>,
     pub(crate) probability: f64,
     /// All effects of the model that the set makes of the declared one, the declared ones first.
@@ -71,7 +70,7 @@ pub struct ShareJson {
     pub(crate) members: Vec<MemberJson>,
     /// What the records say of the members' parameters.
     #[serde(default)]
-    pub(crate) estimates: Vec<EstimateJson>,
+    pub(crate) estimates: Vec<PosteriorEstimateJson>,
     /// Of the estimates, or of their logarithms where that is what is normal.
     #[serde(default)]
     pub(crate) correlation: Vec<Vec<f64>>,
@@ -87,7 +86,7 @@ pub(crate) struct MemberJson {
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-pub(crate) struct EstimateJson {
+pub(crate) struct PosteriorEstimateJson {
     /// Place among the members, counted from 0.
     pub(crate) member: usize,
     pub(crate) parameter: String,
@@ -141,7 +140,7 @@ pub(crate) struct DiagnosisRow {
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct FindingJson {
     pub(crate) kind: String,
-    pub(crate) parameters: BTreeMap<String, ParameterJson>,
+    pub(crate) parameters: BTreeMap<String, FittedParameterJson>,
     /// The words among which the effect lets one choose, such as `lead`.
     pub(crate) choices: BTreeMap<String, String>,
     /// Kinds that explain the records equally well.
@@ -160,7 +159,7 @@ pub(crate) struct FindingJson {
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-pub(crate) struct ParameterJson {
+pub(crate) struct FittedParameterJson {
     pub(crate) value: f64,
     /// Null where the records do not determine it, at a bound, or where it was held.
     pub(crate) standard_error: Option<f64>,
@@ -210,13 +209,13 @@ pub(crate) struct ContenderJson {
 pub(crate) struct UnexplainedJson {
     pub(crate) excess_deg_per_h: f64,
     pub(crate) share_of_excess: f64,
-    pub(crate) correlations: Vec<CorrelationJson>,
+    pub(crate) correlations: Vec<UnexplainedCorrelationJson>,
     pub(crate) plain: Vec<PlainJson>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-pub(crate) struct CorrelationJson {
+pub(crate) struct UnexplainedCorrelationJson {
     pub(crate) with: String,
     pub(crate) correlation: f64,
 }
@@ -264,10 +263,10 @@ impl DiagnosisJson {
             holdout_noise_floor_deg_per_h: holdout_noise_rad_per_s.map(deg_per_h_from_rad_per_s),
             experiment: experiment.map(|e| ExperimentJson::new(e, diagnosis.noise_floor_rad_per_s)),
             ladder_in_words: Vec::new(),
-            posterior: diagnosis.posterior.iter().map(ShareJson::new).collect(),
+            posterior: diagnosis.posterior.iter().map(PosteriorShareJson::new).collect(),
             refitted: diagnosis.refitted.iter().map(RefittedJson::new).collect(),
             hypothesis: diagnosis.hypothesis.as_ref().map(HypothesisJson::new),
-            noise: diagnosis.noise.iter().map(NoiseJson::new).collect(),
+            noise: diagnosis.noise.iter().map(RecordNoiseJson::new).collect(),
             proposals: diagnosis.proposals.iter().map(ProposalJson::new).collect(),
             boundary: BoundaryJson::new(&diagnosis.boundary),
             inputs,
@@ -316,7 +315,7 @@ impl DiagnosisJson {
     }
 }
 
-impl ShareJson {
+impl PosteriorShareJson {
     fn new(share: &Share) -> Self {
         let member = |effect: &DeclaredEffect| {
             let values = effect.parameters().into_iter().zip(effect.values());
@@ -334,7 +333,7 @@ impl ShareJson {
             let parameter = &effect.parameters()[estimate.parameter];
             let si = effect.values()[estimate.parameter];
             let error = if estimate.is_logarithmic { deviation(i) * si } else { deviation(i) };
-            EstimateJson {
+            PosteriorEstimateJson {
                 member: estimate.effect,
                 parameter: parameter.key.clone(),
                 value: parameter.unit.from_si(si),
@@ -390,7 +389,7 @@ impl FindingJson {
     pub(crate) fn new(finding: &Finding) -> Self {
         Self {
             kind: finding.effect.kind(),
-            parameters: finding.parameters.iter().map(|p| (p.key.clone(), ParameterJson::new(p))).collect(),
+            parameters: finding.parameters.iter().map(|p| (p.key.clone(), FittedParameterJson::new(p))).collect(),
             choices: choices(&finding.effect),
             equivalents: finding.equivalents.iter().map(|e| e.effect.kind()).collect(),
             equivalents_in_detail: finding.equivalents.iter().map(EquivalentJson::new).collect(),
@@ -403,7 +402,7 @@ impl FindingJson {
     }
 }
 
-impl ParameterJson {
+impl FittedParameterJson {
     fn new(parameter: &FittedParameter) -> Self {
         Self {
             value: parameter.unit.from_si(parameter.value),
@@ -461,7 +460,7 @@ impl UnexplainedJson {
             excess_deg_per_h: deg_per_h_from_rad_per_s(unexplained.excess_rad_per_s),
             share_of_excess: unexplained.share_of_excess,
             correlations: correlations
-                .map(|(with, correlation)| CorrelationJson { with: with.clone(), correlation: *correlation })
+                .map(|(with, correlation)| UnexplainedCorrelationJson { with: with.clone(), correlation: *correlation })
                 .collect(),
             plain: unexplained.plain.iter().map(PlainJson::new).collect(),
         }
@@ -471,8 +470,8 @@ impl UnexplainedJson {
 impl PlainJson {
     fn new(plain: &Plain) -> Self {
         let (shape, period_s, time_constant_s) = match plain.shape {
-            Shape::Drift { time_constant_s } => ("drift", None, Some(time_constant_s)),
-            Shape::Sinusoid { period_s } => ("sinusoid", Some(period_s), None),
+            ResidualShape::Drift { time_constant_s } => ("drift", None, Some(time_constant_s)),
+            ResidualShape::Sinusoid { period_s } => ("sinusoid", Some(period_s), None),
         };
         Self {
             shape: shape.to_owned(),
@@ -484,30 +483,5 @@ impl PlainJson {
     }
 }
 
-/// The answer of `extend`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-pub struct ExtendJson {
-    /// The new model file.
-    pub(crate) written: String,
-    pub(crate) effect: FindingJson,
-    /// What the new model file states as `[boundary]`; null without a record to fit to.
-    pub(crate) boundary: Option<BoundaryJson>,
-    /// Every record given, as `compare` shows it.
-    pub(crate) before: CompareJson,
-    pub(crate) after: CompareJson,
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_wander_has_a_time_constant_and_a_cycle_a_period() {
-        let told = |shape| PlainJson::new(&Plain { shape, gain: 40.0, parameters: 2, rms_rad_per_s: 1e-6 });
-        let (wander, cycle) =
-            (told(Shape::Drift { time_constant_s: 300.0 }), told(Shape::Sinusoid { period_s: 900.0 }));
-        assert_eq!((wander.time_constant_s, wander.period_s), (Some(300.0), None));
-        assert_eq!((cycle.time_constant_s, cycle.period_s), (None, Some(900.0)));
-    }
-}
+mod tests;

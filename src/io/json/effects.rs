@@ -20,8 +20,8 @@ pub struct EffectJson {
     pub(crate) summary: &'static str,
     pub(crate) equation: &'static str,
     pub(crate) acts: &'static str,
-    pub(crate) parameters: Vec<ParameterJson>,
-    pub(crate) choices: Vec<ChoiceJson>,
+    pub(crate) parameters: Vec<EffectParameterJson>,
+    pub(crate) choices: Vec<EffectChoiceJson>,
     pub(crate) source: &'static str,
     pub(crate) signature: &'static str,
     pub(crate) happens: &'static str,
@@ -32,7 +32,7 @@ pub struct EffectJson {
 /// Bounds, start and default in the parameter's own unit.
 #[derive(Debug, Serialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-pub(crate) struct ParameterJson {
+pub(crate) struct EffectParameterJson {
     pub(crate) key: &'static str,
     pub(crate) unit: &'static str,
     pub(crate) meaning: &'static str,
@@ -45,7 +45,7 @@ pub(crate) struct ParameterJson {
 
 #[derive(Debug, Serialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-pub(crate) struct ChoiceJson {
+pub(crate) struct EffectChoiceJson {
     pub(crate) key: &'static str,
     pub(crate) options: &'static [&'static str],
     pub(crate) meaning: &'static str,
@@ -69,7 +69,7 @@ impl EffectJson {
             parameters: spec
                 .parameters
                 .iter()
-                .map(|p| ParameterJson {
+                .map(|p| EffectParameterJson {
                     key: p.key,
                     unit: p.unit.symbol(),
                     meaning: p.meaning,
@@ -82,7 +82,7 @@ impl EffectJson {
             choices: spec
                 .choices
                 .iter()
-                .map(|c| ChoiceJson { key: c.key, options: c.options, meaning: c.meaning })
+                .map(|c| EffectChoiceJson { key: c.key, options: c.options, meaning: c.meaning })
                 .collect(),
             source: spec.source,
             signature: spec.signature,

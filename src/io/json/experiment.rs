@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::diagnose::experiment::{Experiment, MOST_RUNS, Outcome, Promise, Separation};
+use crate::diagnose::experiment::{ExpectedOutcome, Experiment, MOST_RUNS, Promise, Separation};
 use crate::units::{c_per_h_from_k_per_s, deg_per_h_from_rad_per_s, h_from_s, percent_from_fraction};
 
 /// A profile of the chamber's air, and how surely it tells the candidates apart.
@@ -68,7 +68,7 @@ pub(crate) struct DirectionJson {
 impl ExperimentJson {
     pub(super) fn new(experiment: &Experiment, noise_rad_per_s: f64) -> Self {
         let profile = &experiment.profile;
-        let name = |rival: usize| experiment.rivals[rival].0.clone();
+        let name = |alternative: usize| experiment.alternatives[alternative].0.clone();
         let separations: Vec<SeparationJson> =
             experiment.separations.iter().map(|s| SeparationJson::new(s, name, noise_rad_per_s)).collect();
         let pairs = experiment.separations.iter().zip(&separations);
@@ -106,7 +106,7 @@ impl ExperimentJson {
 
 impl SeparationJson {
     fn new(separation: &Separation, name: impl Fn(usize) -> String, noise_rad_per_s: f64) -> Self {
-        let least = |of: fn(&Outcome) -> f64| separation.outcomes.iter().map(of).fold(f64::INFINITY, f64::min);
+        let least = |of: fn(&ExpectedOutcome) -> f64| separation.outcomes.iter().map(of).fold(f64::INFINITY, f64::min);
         Self {
             first: name(separation.first),
             second: name(separation.second),
@@ -153,7 +153,7 @@ fn expectation(experiment: &Experiment, pair: &Separation, shown: &SeparationJso
         None => format!("; nor would {MOST_RUNS} runs of this profile"),
     };
     let otherwise = || {
-        let isolating = [pair.first, pair.second].map(|rival| &experiment.rivals[rival]);
+        let isolating = [pair.first, pair.second].map(|alternative| &experiment.alternatives[alternative]);
         let ways = isolating.iter().filter(|(_, ways)| !ways.is_empty());
         ways.map(|(name, ways)| format!("for {name}: {}", ways.join("; "))).collect::<Vec<_>>().join("; ")
     };
@@ -183,13 +183,13 @@ fn number(chi_square: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::experiment::Refusal;
+    use crate::diagnose::experiment::ExpectedRefusal;
     use crate::profile::{Piece, Profile};
 
-    /// Two rivals, each refused by as much if the other is true.
+    /// Two alternatives, each refused by as much if the other is true.
     fn shown(chi_square: f64, chance: f64, runs: Option<usize>, possible: bool) -> ExperimentJson {
-        let outcome = |truth: usize, refused: usize| Outcome {
-            refusal: Refusal {
+        let outcome = |truth: usize, refused: usize| ExpectedOutcome {
+            refusal: ExpectedRefusal {
                 truth,
                 refused,
                 chi_square_alone: chi_square,
@@ -205,9 +205,9 @@ mod tests {
         };
         let outcomes = vec![outcome(0, 1), outcome(1, 0)];
         let profile = Profile::new("p", vec![Piece { rate_k_per_s: 0.01, duration_s: 3600.0 }]).unwrap();
-        let rivals = vec![("lead".to_owned(), vec!["heat it"]), ("bias".to_owned(), vec!["flip the coil"])];
+        let alternatives = vec![("lead".to_owned(), vec!["heat it"]), ("bias".to_owned(), vec!["flip the coil"])];
         let separations = vec![Separation { first: 0, second: 1, rms_rad_per_s: 1e-8, outcomes, possible }];
-        ExperimentJson::new(&Experiment { profile, rivals, separations, tried: 60 }, 2e-8)
+        ExperimentJson::new(&Experiment { profile, alternatives, separations, tried: 60 }, 2e-8)
     }
 
     #[test]

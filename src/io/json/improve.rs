@@ -36,14 +36,14 @@ pub struct ImproveJson {
     pub(crate) next_experiment: Option<String>,
     #[cfg_attr(feature = "cli", schemars(with = "Option<String>"))]
     pub(crate) suggested_experiment: Value,
-    pub(crate) steps: Vec<StepJson>,
+    pub(crate) steps: Vec<ImproveStepJson>,
     pub(crate) page: String,
 }
 
 /// A command of the loop and where its results are.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-pub(crate) struct StepJson {
+pub(crate) struct ImproveStepJson {
     pub step: String,
     pub(crate) folder: String,
 }

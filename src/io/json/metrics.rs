@@ -95,7 +95,7 @@ pub(crate) struct RecordMetricsJson {
 
 /// Values that stand alone, as a record passes by: counted all, listed as far as a document has use for them.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct GrossErrors {
+pub(crate) struct GrossErrorTally {
     pub(crate) first: Vec<GrossErrorJson>,
     pub(crate) count: usize,
 }
@@ -103,7 +103,7 @@ pub(crate) struct GrossErrors {
 /// More than this many are counted, not listed: a document and its page stay small however long the record is.
 const MOST_LISTED: usize = 10_000;
 
-impl GrossErrors {
+impl GrossErrorTally {
     pub(crate) fn push(&mut self, error: impl FnOnce() -> GrossErrorJson) {
         self.count += 1;
         if self.first.len() < MOST_LISTED {
@@ -163,7 +163,7 @@ pub(crate) struct GrossErrorJson {
 }
 
 impl RecordMetricsJson {
-    pub(crate) fn new(file: &str, metrics: &Metrics, gross_errors: GrossErrors, gaps: usize) -> Self {
+    pub(crate) fn new(file: &str, metrics: &Metrics, gross_errors: GrossErrorTally, gaps: usize) -> Self {
         let allan = metrics.allan.as_ref();
         let noises = metrics.noises.as_ref();
         let of_noise = |show: fn(&NoiseStrengths) -> f64| noises.map(show);

@@ -8,6 +8,7 @@ pub mod diagnosis;
 pub mod effects;
 pub(crate) mod experiment;
 pub(crate) mod explore;
+pub mod extend;
 pub(crate) mod fibres;
 pub(crate) mod field;
 pub(crate) mod fleet;
@@ -27,7 +28,7 @@ pub(crate) mod temperatures;
 pub(crate) mod tolerance;
 pub(crate) mod trim;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::io::fault::{Fault, Faults};
 use crate::pattern::Pattern;
@@ -55,6 +56,14 @@ impl<T: Serialize> Document<T> {
     pub fn new(body: T) -> Self {
         Self { schema_version: SCHEMA_VERSION, body }
     }
+}
+
+/// A value with its standard error; null where that is not known, or the records determine the value just so.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
+pub(crate) struct EstimateJson {
+    pub(crate) value: f64,
+    pub(crate) standard_error: Option<f64>,
 }
 
 /// What it takes to wind a pattern.

@@ -8,7 +8,7 @@ use crate::units::deg_per_h_from_rad_per_s;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-pub(crate) struct NoiseJson {
+pub(crate) struct RecordNoiseJson {
     pub(crate) record: String,
     /// Of one logged rate.
     pub(crate) white_deg_per_h: f64,
@@ -31,7 +31,7 @@ pub(crate) struct RemedyJson {
     pub(crate) unresolved_air_deg_per_h: f64,
 }
 
-impl NoiseJson {
+impl RecordNoiseJson {
     pub(super) fn new(of: &RecordNoise) -> Self {
         Self {
             record: of.record.clone(),

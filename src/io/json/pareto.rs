@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::io::table::Table;
-use crate::search::pareto::Point;
+use crate::search::pareto::ParetoPoint;
 use crate::text::sink::Cell;
 
 use super::PatternJson;
@@ -33,7 +33,7 @@ pub struct ParetoJson {
 }
 
 impl PointJson {
-    pub(crate) fn of(point: &Point, knee: bool, file: Option<String>) -> Self {
+    pub(crate) fn of(point: &ParetoPoint, knee: bool, file: Option<String>) -> Self {
         let long_crossovers = point.windability.long_crossovers;
         Self { pattern: PatternJson::of(&point.judged), long_crossovers, knee, file }
     }

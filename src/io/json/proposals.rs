@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::comparison::CompareJson;
 use super::diagnosis::FindingJson;
-use crate::diagnose::discover::{NO_WINDING, Proposal, ProposedTerm, Shown, TermParameter};
+use crate::diagnose::discover::{FormulaProposal, NO_WINDING, ProposedTerm, Shown, TermParameter};
 use crate::units::deg_per_h_from_rad_per_s;
 
 /// One proposal; the formula's values are in °/h.
@@ -76,7 +76,7 @@ pub(crate) struct ShownJson {
 const SHOWN_POINTS: usize = 400;
 
 impl ProposalJson {
-    pub(crate) fn new(proposal: &Proposal) -> Self {
+    pub(crate) fn new(proposal: &FormulaProposal) -> Self {
         Self {
             formula: proposal.formula.clone(),
             terms: proposal.terms.iter().map(TermJson::new).collect(),
@@ -139,7 +139,7 @@ fn short(value: f64) -> f64 {
     format!("{value:.4e}").parse().unwrap_or(value)
 }
 
-/// As [`super::diagnosis::ExtendJson`], of a proposal.
+/// As [`super::extend::ExtendJson`], of a proposal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub struct ProposalExtendJson {

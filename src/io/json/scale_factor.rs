@@ -2,22 +2,15 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::EstimateJson;
 use crate::metrics::earth::Positions;
-use crate::metrics::scale_factor::{Estimate, ScaleFactor};
+use crate::metrics::scale_factor::{ScaleFactor, ScaleFactorEstimate};
 use crate::units::{
     celsius_from_kelvin, deg_per_h_from_rad_per_s, deg_per_s_from_rad_per_s, fraction_from_ppm, ppm_from_fraction,
 };
 
-/// A value with its standard error; null where the record determines it just so.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-pub(crate) struct EstimateJson {
-    pub(crate) value: f64,
-    pub(crate) standard_error: Option<f64>,
-}
-
 impl EstimateJson {
-    fn ppm(estimate: Estimate) -> Self {
+    fn ppm(estimate: ScaleFactorEstimate) -> Self {
         let error = ppm_from_fraction(estimate.standard_error);
         Self { value: ppm_from_fraction(estimate.value), standard_error: Some(error).filter(|e| e.is_finite()) }
     }

@@ -12,7 +12,7 @@ use crate::io::model::{ModelFile, NamedPattern};
 use crate::pattern::windability::WindingGraph;
 use crate::pattern::{EndTurns, Half};
 use crate::schedule::production::Production;
-use crate::schedule::{Rotation, Schedule, Step};
+use crate::schedule::{Rotation, Schedule, ScheduleStep};
 use crate::search::cost::worst_case::WorstCase;
 use crate::thermal::Flange;
 use crate::units::{deg_per_h_from_rad_per_s, mm_from_m, nm_from_m, percent_from_fraction, um_from_m};
@@ -295,7 +295,7 @@ pub(in crate::io) struct ClaimColumns {
 }
 
 impl StepJson {
-    fn new(step: &Step) -> Self {
+    fn new(step: &ScheduleStep) -> Self {
         Self {
             step: step.step as i64,
             layer: step.layer as i64,
@@ -344,7 +344,7 @@ fn fibre_words(fibre: &Fibre) -> String {
 }
 
 /// What the operator reads about the crossovers that a step completes: `second flange, from layer 3, 2 layers`.
-pub(crate) fn crossover_words(step: &Step) -> String {
+pub(crate) fn crossover_words(step: &ScheduleStep) -> String {
     let begins = (step.start_gap_turns > 0.0).then(|| {
         let gap = rounded(step.start_gap_turns, TURNS_DECIMALS);
         format!("begin {gap} turns from the {} flange", flange_word(step.from_flange))

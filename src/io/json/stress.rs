@@ -121,12 +121,12 @@ pub(crate) struct PatternStressJson {
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 pub(crate) struct PottingJson {
     pub(crate) model: String,
-    pub(crate) choices: Vec<ChoiceJson>,
+    pub(crate) choices: Vec<PottingChoiceJson>,
 }
 
 #[derive(Debug, Serialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-pub(crate) struct ChoiceJson {
+pub(crate) struct PottingChoiceJson {
     pub(crate) adhesive: String,
     /// Null for a pack that stands by itself.
     pub(crate) spool: Option<String>,

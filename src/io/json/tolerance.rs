@@ -29,12 +29,12 @@ pub(crate) struct DistributionJson {
     #[serde(rename = "yield")]
     pub(crate) yield_share: Option<f64>,
     /// Largest first.
-    pub(crate) variance_shares: Vec<ShareJson>,
+    pub(crate) variance_shares: Vec<VarianceShareJson>,
 }
 
 #[derive(Debug, Serialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-pub(crate) struct ShareJson {
+pub(crate) struct VarianceShareJson {
     pub(crate) spread: &'static str,
     pub(crate) share: f64,
 }
@@ -65,7 +65,7 @@ impl DistributionJson {
             p95_deg_per_h: deg_per_h_from_rad_per_s(found.p95_rad_per_s()),
             p99_deg_per_h: deg_per_h_from_rad_per_s(found.p99_rad_per_s()),
             yield_share: found.yield_share,
-            variance_shares: shares.map(|&(spread, share)| ShareJson { spread: spread.key(), share }).collect(),
+            variance_shares: shares.map(|&(spread, share)| VarianceShareJson { spread: spread.key(), share }).collect(),
         }
     }
 }

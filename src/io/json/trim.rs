@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::EstimateJson;
 use super::diagnosis::FindingJson;
 use super::inputs::InputsJson;
 use crate::diagnose::trim::{End, Trim};
@@ -33,13 +34,6 @@ pub struct TrimJson {
     /// The fitted surplus, and what looks the same in these records.
     pub(crate) effect: FindingJson,
     pub(crate) inputs: InputsJson,
-}
-
-#[derive(Debug, Serialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-pub(crate) struct EstimateJson {
-    pub(crate) value: f64,
-    pub(crate) standard_error: Option<f64>,
 }
 
 /// Where what the winding itself makes is balanced as far as one length can.

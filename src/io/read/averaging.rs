@@ -1,17 +1,18 @@
 //! Several rows averaged into one, of a record that is held and of one that passes by.
 
 use crate::numeric::statistics::median;
-use crate::record::{Row, usual_interval_s};
+use crate::record::{RecordRow, usual_interval_s};
 
-use super::record_columns::{Column, Quantity};
+use super::record_columns::{ColumnQuantity, RecordColumn};
 
 /// Of `rows` rows each; the stamp is that of the last, since a rate's mean ends at its stamp.
-pub(super) fn average(columns: &[Column], values: Vec<Vec<f64>>, rows: usize) -> Vec<Vec<f64>> {
+pub(super) fn average(columns: &[RecordColumn], values: Vec<Vec<f64>>, rows: usize) -> Vec<Vec<f64>> {
     if rows <= 1 {
         return values;
     }
     let mean = |chunk: &[f64]| chunk.iter().sum::<f64>() / chunk.len() as f64;
-    let Some(times) = columns.iter().position(|c| c.quantity == Quantity::Time).map(|place| values[place].clone())
+    let Some(times) =
+        columns.iter().position(|c| c.quantity == ColumnQuantity::Time).map(|place| values[place].clone())
     else {
         return values;
     };
@@ -19,8 +20,8 @@ pub(super) fn average(columns: &[Column], values: Vec<Vec<f64>>, rows: usize) ->
     let usual_s = median(&steps);
     let is_whole = |from: usize| is_whole(times[from + rows - 1] - times[from], rows, usual_s);
     let starts: Vec<usize> = (0..times.len() / rows).map(|i| i * rows).filter(|from| is_whole(*from)).collect();
-    let reduced = |column: &Column, values: &[f64]| -> Vec<f64> {
-        let last = column.quantity == Quantity::Time;
+    let reduced = |column: &RecordColumn, values: &[f64]| -> Vec<f64> {
+        let last = column.quantity == ColumnQuantity::Time;
         starts.iter().map(|f| if last { values[f + rows - 1] } else { mean(&values[*f..f + rows]) }).collect()
     };
     columns.iter().zip(&values).map(|(column, values)| reduced(column, values)).collect()
@@ -49,8 +50,8 @@ pub(super) struct Averager {
     /// Of the first rows that came.
     usual_s: Option<f64>,
     /// Fewer than are averaged into one.
-    held: Vec<Row>,
-    means: Vec<Row>,
+    held: Vec<RecordRow>,
+    means: Vec<RecordRow>,
     made: usize,
 }
 
@@ -65,7 +66,7 @@ impl Averager {
     }
 
     /// The means that these rows complete; the rows themselves where nothing is averaged.
-    pub(super) fn averaged<'r>(&'r mut self, chunk: &'r [Row]) -> &'r [Row] {
+    pub(super) fn averaged<'r>(&'r mut self, chunk: &'r [RecordRow]) -> &'r [RecordRow] {
         if self.rows == 1 {
             return chunk;
         }
@@ -77,8 +78,8 @@ impl Averager {
             if self.held.len() == self.rows {
                 let (first, last) = (self.held[0], *row);
                 if is_whole(last.time_s - first.time_s, self.rows, usual_s) {
-                    let mean = |of: fn(&Row) -> f64| self.held.iter().map(of).sum::<f64>() / self.rows as f64;
-                    self.means.push(Row {
+                    let mean = |of: fn(&RecordRow) -> f64| self.held.iter().map(of).sum::<f64>() / self.rows as f64;
+                    self.means.push(RecordRow {
                         time_s: last.time_s,
                         temperature_k: mean(|r| r.temperature_k),
                         rate_rad_per_s: mean(|r| r.rate_rad_per_s),

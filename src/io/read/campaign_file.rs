@@ -15,20 +15,20 @@ pub(crate) mod coils;
 pub(crate) mod fleet;
 pub(crate) mod grid;
 
-use coils::{Block, CoilStudy};
+use coils::{CoilBlock, CoilStudy};
 use fleet::{Fleet, Gyro};
-use grid::{Search, SearchGrid};
+use grid::{GridSearch, SearchGrid};
 
 /// A campaign file, understood.
 #[derive(Debug, Clone)]
 pub struct CampaignFile {
     pub(crate) name: String,
-    pub(crate) kind: Kind,
+    pub(crate) kind: CampaignKind,
 }
 
 /// What its cells are.
 #[derive(Debug, Clone)]
-pub(crate) enum Kind {
+pub(crate) enum CampaignKind {
     /// Searches, the product of lists.
     Search(SearchGrid),
     /// Blocks of built coils.
@@ -39,7 +39,7 @@ pub(crate) enum Kind {
     Diagnose(Fleet),
 }
 
-impl Kind {
+impl CampaignKind {
     pub(crate) const SEARCH: &'static str = KINDS[0];
     pub(crate) const TOLERANCE: &'static str = KINDS[1];
     pub(crate) const METRICS: &'static str = KINDS[2];
@@ -47,27 +47,27 @@ impl Kind {
 
     pub(crate) fn key(&self) -> &'static str {
         match self {
-            Kind::Search(_) => Self::SEARCH,
-            Kind::Tolerance(_) => Self::TOLERANCE,
-            Kind::Metrics(_) => Self::METRICS,
-            Kind::Diagnose(_) => Self::DIAGNOSE,
+            CampaignKind::Search(_) => Self::SEARCH,
+            CampaignKind::Tolerance(_) => Self::TOLERANCE,
+            CampaignKind::Metrics(_) => Self::METRICS,
+            CampaignKind::Diagnose(_) => Self::DIAGNOSE,
         }
     }
 }
 
 /// One piece of a campaign that is computed by itself.
 #[derive(Debug, Clone)]
-pub struct Cell {
+pub struct CampaignCell {
     /// What the result depends on, as [`ID_DIGITS`] hexadecimal digits: models and records as far as they matter, the settings, and
     /// the program's version. What has changed nothing here need not be computed again.
     pub id: String,
-    pub(crate) work: Work,
+    pub(crate) work: CellWork,
 }
 
 #[derive(Debug, Clone)]
-pub(crate) enum Work {
-    Search(Search),
-    Tolerance(Block),
+pub(crate) enum CellWork {
+    Search(GridSearch),
+    Tolerance(CoilBlock),
     Metrics(Gyro),
     Diagnose(Gyro),
 }
@@ -101,11 +101,11 @@ pub fn parse_campaign(path: &Path, source: &str) -> Result<CampaignFile, Faults>
     let mut root = r.root(&document);
     let base = path.parent().unwrap_or(Path::new("."));
     let name = root.needed_name(r, "name").map(str::to_owned);
-    let kind = match root.word(r, "kind", &KINDS).map_or(Kind::SEARCH, |place| KINDS[place]) {
-        Kind::TOLERANCE => coils::read(r, &mut root, base).map(Kind::Tolerance),
-        Kind::METRICS => fleet::read(r, &mut root, base, false).map(Kind::Metrics),
-        Kind::DIAGNOSE => fleet::read(r, &mut root, base, true).map(Kind::Diagnose),
-        _ => grid::read(r, &mut root, base).map(Kind::Search),
+    let kind = match root.word(r, "kind", &KINDS).map_or(CampaignKind::SEARCH, |place| KINDS[place]) {
+        CampaignKind::TOLERANCE => coils::read(r, &mut root, base).map(CampaignKind::Tolerance),
+        CampaignKind::METRICS => fleet::read(r, &mut root, base, false).map(CampaignKind::Metrics),
+        CampaignKind::DIAGNOSE => fleet::read(r, &mut root, base, true).map(CampaignKind::Diagnose),
+        _ => grid::read(r, &mut root, base).map(CampaignKind::Search),
     };
     root.finish(r);
     let value = name.zip(kind).map(|(name, kind)| CampaignFile { name, kind });
@@ -124,21 +124,21 @@ impl CampaignFile {
     ///
     /// # Errors
     /// The faults of a model or pattern file, a record that cannot be read.
-    pub fn cells(&self) -> Result<Vec<Cell>, Faults> {
+    pub fn cells(&self) -> Result<Vec<CampaignCell>, Faults> {
         match &self.kind {
-            Kind::Search(grid) => grid.cells(),
-            Kind::Tolerance(study) => study.cells(),
-            Kind::Metrics(fleet) => fleet.cells(false),
-            Kind::Diagnose(fleet) => fleet.cells(true),
+            CampaignKind::Search(grid) => grid.cells(),
+            CampaignKind::Tolerance(study) => study.cells(),
+            CampaignKind::Metrics(fleet) => fleet.cells(false),
+            CampaignKind::Diagnose(fleet) => fleet.cells(true),
         }
     }
 
     /// The files that the cells are made from.
     pub fn inputs(&self) -> Vec<PathBuf> {
         match &self.kind {
-            Kind::Search(grid) => grid.models.clone(),
-            Kind::Tolerance(study) => study.inputs(),
-            Kind::Metrics(fleet) | Kind::Diagnose(fleet) => fleet.inputs(),
+            CampaignKind::Search(grid) => grid.models.clone(),
+            CampaignKind::Tolerance(study) => study.inputs(),
+            CampaignKind::Metrics(fleet) | CampaignKind::Diagnose(fleet) => fleet.inputs(),
         }
     }
 }

@@ -24,7 +24,7 @@ const MOST_BYTES: usize = 1 << 16;
 
 /// What stands at one place of the text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Piece {
+pub(crate) enum CsvPiece {
     /// A comment or an empty line.
     Aside,
     Row,
@@ -98,7 +98,7 @@ impl<R: BufRead> CsvRows<R> {
     ///
     /// # Errors
     /// An input that fails.
-    pub(crate) fn header(&mut self, mut aside: impl FnMut(&str)) -> io::Result<Option<(Piece, Division)>> {
+    pub(crate) fn header(&mut self, mut aside: impl FnMut(&str)) -> io::Result<Option<(CsvPiece, Division)>> {
         while let Some(first) = self.next_line()? {
             let line = String::from_utf8_lossy(&first.bytes);
             let line = line.trim_start_matches('\u{feff}');
@@ -127,7 +127,7 @@ impl<R: BufRead> CsvRows<R> {
     /// # Errors
     /// An input that fails.
     #[allow(clippy::should_implement_trait, reason = "what it gives borrows from it and may fail")]
-    pub(crate) fn next(&mut self) -> io::Result<Option<Piece>> {
+    pub(crate) fn next(&mut self) -> io::Result<Option<CsvPiece>> {
         self.begin_piece();
         let Some(first) = self.next_line()? else { return Ok(None) };
         let is_first = self.start == 0;
@@ -144,7 +144,7 @@ impl<R: BufRead> CsvRows<R> {
         }
         if is_aside(&self.text) {
             self.end_text();
-            return Ok(Some(Piece::Aside));
+            return Ok(Some(CsvPiece::Aside));
         }
         self.count = 0;
         let mut further = Vec::new();
@@ -176,7 +176,7 @@ impl<R: BufRead> CsvRows<R> {
             return Ok(Some(self.broken(NO_TEXT)));
         }
         self.end_text();
-        Ok(Some(Piece::Row))
+        Ok(Some(CsvPiece::Row))
     }
 
     /// As it stands, without its line break.
@@ -294,10 +294,10 @@ impl<R: BufRead> CsvRows<R> {
         self.text.truncate(length);
     }
 
-    fn broken(&mut self, why: &'static str) -> Piece {
+    fn broken(&mut self, why: &'static str) -> CsvPiece {
         self.end_text();
         self.count = 0;
-        Piece::Broken(why)
+        CsvPiece::Broken(why)
     }
 
     /// Whether the text so far is a whole row; its cells are then there.
@@ -406,7 +406,7 @@ mod tests {
         let mut rows = CsvRows::new(text);
         let mut found = Vec::new();
         while let Some(piece) = rows.next().unwrap() {
-            let cells = (piece == Piece::Row).then(|| rows.cells().map(str::to_owned).collect());
+            let cells = (piece == CsvPiece::Row).then(|| rows.cells().map(str::to_owned).collect());
             found.push((rows.line(), rows.text().to_owned(), cells));
         }
         found
@@ -457,7 +457,7 @@ mod tests {
                 found.push(piece);
                 passed.push(rows.text().to_owned());
             }
-            assert_eq!(found.iter().filter(|piece| **piece != Piece::Row).count(), broken, "{text}");
+            assert_eq!(found.iter().filter(|piece| **piece != CsvPiece::Row).count(), broken, "{text}");
             assert_eq!(passed.join("\n"), text.split_once('\n').unwrap().1.trim_end());
         }
     }
@@ -480,7 +480,7 @@ mod tests {
             let mut found = Vec::new();
             while let Some(piece) = rows.next().unwrap() {
                 let cells: Option<Vec<String>> =
-                    (piece == Piece::Row).then(|| rows.cells().map(str::to_owned).collect());
+                    (piece == CsvPiece::Row).then(|| rows.cells().map(str::to_owned).collect());
                 found.push((rows.line(), rows.text().replace('\r', ""), cells.map(|c| c.join("|").replace('\r', ""))));
             }
             let expected: Vec<_> = whole

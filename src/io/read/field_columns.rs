@@ -3,7 +3,7 @@
 //! Wide: `time_s, layer_1_c, …, layer_12_c`, one row a time. Long: `time_s, layer, temperature_c`, one row a time and layer,
 //! or with `turn` one a turn.
 
-use crate::io::record_format::{Conversion, Kind};
+use crate::io::record_format::{Conversion, QuantityKind};
 use crate::units::{k_per_s_from_c_per_h, k_per_s_from_c_per_min};
 
 /// What a column of a field holds.
@@ -60,7 +60,7 @@ fn rate_unit(unit: &str) -> Option<Unit> {
 }
 
 fn temperature_unit(unit: &str) -> Option<Unit> {
-    Kind::Temperature.unit(unit).map(|u| Unit::Temperature(u.conversion))
+    QuantityKind::Temperature.unit(unit).map(|u| Unit::Temperature(u.conversion))
 }
 
 impl FieldColumn {
@@ -84,7 +84,8 @@ impl FieldColumn {
             "layer" => (Holds::Layer, Unit::Number),
             "turn" => (Holds::Turn, Unit::Number),
             _ => numbered(&bare, &unit).or_else(|| {
-                let time = behind("time").and_then(|u| Kind::Time.unit(&u)).filter(|u| !u.conversion.is_stamp());
+                let time =
+                    behind("time").and_then(|u| QuantityKind::Time.unit(&u)).filter(|u| !u.conversion.is_stamp());
                 time.map(|u| (Holds::Time, Unit::Time(u.conversion)))
                     .or_else(|| Some((Holds::Temperature, temperature_unit(&behind("temperature")?)?)))
                     .or_else(|| Some((Holds::Ambient, temperature_unit(&behind("ambient")?)?)))

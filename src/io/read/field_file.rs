@@ -19,7 +19,7 @@ use crate::record::LEAST_INTERVAL_S;
 use crate::thermal::{GivenField, ThermalHistory};
 use crate::units::celsius_from_kelvin;
 
-use super::csv_rows::{CsvRows, Piece};
+use super::csv_rows::{CsvPiece, CsvRows};
 use super::field_columns::{FieldColumn, Holds};
 use super::record_rows::PLAUSIBLE_C;
 
@@ -112,7 +112,7 @@ impl Table {
             return Err(vec![Fault::new(format!("the file is empty or holds comments only: {EXPECTED}"), None)]);
         };
         let header = Some(rows.span());
-        if let Piece::Broken(why) = piece {
+        if let CsvPiece::Broken(why) = piece {
             return Err(vec![Fault::new(format!("line {}: {why}", rows.line()), header)]);
         }
         let names: Vec<String> = rows.names().map(str::to_owned).collect();
@@ -131,14 +131,14 @@ impl Table {
                 false => uncounted += 1,
             };
             match piece {
-                Piece::Aside => continue,
-                Piece::Broken(why) => fault(format!("line {}: {why}", rows.line()), rows.span()),
-                Piece::Row if rows.len() != table.names.len() => {
+                CsvPiece::Aside => continue,
+                CsvPiece::Broken(why) => fault(format!("line {}: {why}", rows.line()), rows.span()),
+                CsvPiece::Row if rows.len() != table.names.len() => {
                     let (expected, found) = (table.names.len(), rows.len());
                     let message = format!("expected {expected} columns as in the header, found {found}");
                     fault(format!("line {}: {message}", rows.line()), rows.span());
                 }
-                Piece::Row => {
+                CsvPiece::Row => {
                     let cells: Vec<&str> = rows.cells().collect();
                     for (column, values) in table.columns.iter().zip(&mut table.values) {
                         let cell = cells[column.place];

@@ -8,7 +8,7 @@ use crate::io::fault::Fault;
 use crate::rate::CoilModel;
 use crate::stress::fibres::{FibreEntry, STRAIN_OPTIC};
 use crate::stress::material::{COLDEST_K, Compression, HOTTEST_K, Material, Property};
-use crate::stress::{CoatedFibre, Materials, Spool, library};
+use crate::stress::{BondedSpool, CoatedFibre, Materials, library};
 use crate::units::{celsius_from_kelvin, kelvin_from_celsius, m_from_mm, m_from_um, mm_from_m, pa_from_mpa, um_from_m};
 
 use super::toml_reader::{Limits, TableReader, TomlReader, nearest};
@@ -88,7 +88,7 @@ pub(super) fn read_materials(
     let materials = Materials {
         fibre,
         adhesive: adhesive?,
-        spool: spool.zip(thickness_mm).map(|(material, mm)| Spool { material, thickness_m: m_from_mm(mm) }),
+        spool: spool.zip(thickness_mm).map(|(material, mm)| BondedSpool { material, thickness_m: m_from_mm(mm) }),
     };
     Some(Stated { materials, own, spool_span, span, surface_span })
 }

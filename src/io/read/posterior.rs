@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::effect::{self, DeclaredEffect};
-use crate::io::json::diagnosis::{MemberJson, RefittedJson, ShareJson};
+use crate::io::json::diagnosis::{MemberJson, PosteriorShareJson, RefittedJson};
 use crate::rate::CoilModel;
 
 /// What is left out of sets that hold less than this of the probability.
@@ -17,12 +17,12 @@ const LEAST_PROBABILITY: f64 = 0.01;
 /// the same models.
 pub fn drawn_models(
     design: &CoilModel,
-    posterior: &[ShareJson],
+    posterior: &[PosteriorShareJson],
     refitted: &[RefittedJson],
     count: usize,
     seed: u64,
 ) -> Vec<CoilModel> {
-    let shares: Vec<&ShareJson> = posterior.iter().filter(|s| s.probability >= LEAST_PROBABILITY).collect();
+    let shares: Vec<&PosteriorShareJson> = posterior.iter().filter(|s| s.probability >= LEAST_PROBABILITY).collect();
     let total: f64 = shares.iter().map(|s| s.probability).sum();
     let learned: Vec<&RefittedJson> = refitted.iter().filter(|r| r.standard_error.is_some()).collect();
     let is_uncertain = shares.len() > 1 || shares.iter().any(|s| !s.estimates.is_empty()) || !learned.is_empty();
@@ -63,7 +63,11 @@ pub fn drawn_models(
 
 /// The effects of one set at values drawn from their covariance. What the design has beside the set, such as a film that
 /// was learned or the stress of its materials, stays; what it has in the place of another member of the set does not.
-fn drawn_effects(share: &ShareJson, design: &CoilModel, draw: &mut impl FnMut() -> f64) -> Option<Vec<DeclaredEffect>> {
+fn drawn_effects(
+    share: &PosteriorShareJson,
+    design: &CoilModel,
+    draw: &mut impl FnMut() -> f64,
+) -> Option<Vec<DeclaredEffect>> {
     let mut effects: Vec<DeclaredEffect> = Vec::with_capacity(share.members.len());
     for member in &share.members {
         effects.push(effect_of(member, design)?);
@@ -156,7 +160,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use crate::io::json::diagnosis::EstimateJson;
+    use crate::io::json::diagnosis::PosteriorEstimateJson;
     use crate::units::Unit;
 
     fn design() -> CoilModel {
@@ -169,8 +173,8 @@ mod tests {
         MemberJson { kind: "strain_mismatch".to_owned(), choices: BTreeMap::new(), values }
     }
 
-    fn share(members: Vec<MemberJson>, probability: f64, error: Option<f64>) -> ShareJson {
-        let estimate = |standard_error| EstimateJson {
+    fn share(members: Vec<MemberJson>, probability: f64, error: Option<f64>) -> PosteriorShareJson {
+        let estimate = |standard_error| PosteriorEstimateJson {
             member: 0,
             parameter: "mismatch".to_owned(),
             value: 0.004,
@@ -178,7 +182,7 @@ mod tests {
             unit: Unit::One.symbol().to_owned(),
             logarithmic: false,
         };
-        ShareJson {
+        PosteriorShareJson {
             effects: members.iter().map(|m| m.kind.clone()).collect(),
             probability,
             members,

@@ -6,8 +6,8 @@
 mod cells;
 
 use crate::io::fault::Fault;
-use crate::io::record_format::{Conversion, Kind, UNITS, Unit, accepted_names};
-pub use crate::io::record_format::{Quantity, RecordFormat, SensorPlace};
+pub use crate::io::record_format::{ColumnQuantity, RecordFormat, SensorPlace};
+use crate::io::record_format::{ColumnUnit, Conversion, QuantityKind, UNITS, accepted_names};
 use crate::units::{celsius_from_kelvin, rad_per_s_from_deg_per_h};
 
 use super::stamps::{is_stamp_pattern, seconds_of_date, seconds_of_stamp};
@@ -17,7 +17,7 @@ use super::toml_reader::{Limits, TableReader, TomlReader, nearest};
 pub(super) fn read_format(r: &mut TomlReader, table: &mut TableReader<'_>) -> RecordFormat {
     let mut format = RecordFormat::default();
     let mut stated: Vec<(String, &str)> = Vec::new();
-    for role in Quantity::ROLES.iter().map(|(role, _)| *role).chain(SensorPlace::roles()) {
+    for role in ColumnQuantity::ROLES.iter().map(|(role, _)| *role).chain(SensorPlace::roles()) {
         stated.extend(table.text(r, role).map(|target| (role.to_owned(), target)));
     }
     for role in table.keys().into_iter().filter(|key| matches!(SensorPlace::named(key), Some(SensorPlace::Layer(_)))) {
@@ -42,9 +42,9 @@ pub(super) fn read_format(r: &mut TomlReader, table: &mut TableReader<'_>) -> Re
 
 /// One column of a record file.
 #[derive(Debug, Clone)]
-pub(crate) struct Column {
+pub(crate) struct RecordColumn {
     pub(crate) name: String,
-    pub(crate) quantity: Quantity,
+    pub(crate) quantity: ColumnQuantity,
     conversion: Conversion,
     scale: f64,
     decimal_comma: bool,
@@ -56,22 +56,23 @@ pub(crate) struct Column {
 pub(crate) const COMPENSATED: &str = "rate_compensated_deg_per_h";
 pub(crate) const FLAGS: &str = "flags";
 
-impl Quantity {
+impl ColumnQuantity {
     /// What can be measured at all, in SI and in words. Gross errors of a logger (-999, 9999999) are within; what is beyond is
     /// a damaged file, and arithmetic on it would end in infinities.
     fn bounds(self) -> (f64, &'static str) {
         match self {
-            Quantity::Time => (1e11, "1e11 s from zero"),
-            Quantity::Temperature | Quantity::InnerTemperature | Quantity::AmbientTemperature | Quantity::Sensor(_) => {
-                (1e9, "any temperature")
-            }
-            Quantity::Rate | Quantity::Table => (1e6, "any rate: 1e6 rad/s, 2e11 °/h"),
+            ColumnQuantity::Time => (1e11, "1e11 s from zero"),
+            ColumnQuantity::Temperature
+            | ColumnQuantity::InnerTemperature
+            | ColumnQuantity::AmbientTemperature
+            | ColumnQuantity::Sensor(_) => (1e9, "any temperature"),
+            ColumnQuantity::Rate | ColumnQuantity::Table => (1e6, "any rate: 1e6 rad/s, 2e11 °/h"),
             _ => (1e30, "any reading: 1e30"),
         }
     }
 }
 
-impl Column {
+impl RecordColumn {
     /// Of a name, and of the cell of a units' row below it.
     #[expect(
         clippy::too_many_lines,
@@ -81,9 +82,9 @@ impl Column {
         let mapped = format.mapped.iter().find(|m| m.name == name);
         let (bare, bracketed) = unbracketed(name);
         let beside = bracketed.or(below.map(unit_in_cell));
-        let of_name = Quantity::STEMS.iter().find_map(|(stem, quantity)| {
+        let of_name = ColumnQuantity::STEMS.iter().find_map(|(stem, quantity)| {
             let ending = bare.strip_prefix(stem)?.strip_prefix('_');
-            let kind = Kind::of(*quantity)?;
+            let kind = QuantityKind::of(*quantity)?;
             match ending {
                 Some(ending) => kind.unit(ending).filter(|u| u.key == ending).map(|u| (*quantity, u)),
                 None => beside.and_then(|b| unit_beside(kind, b)).map(|u| (*quantity, u)),
@@ -92,27 +93,27 @@ impl Column {
         let of_sensor = || {
             let ended = || {
                 let (place, unit) = bare.strip_prefix("temperature_")?.rsplit_once('_')?;
-                Some((place, Kind::Temperature.unit(unit).filter(|u| u.key == unit)?))
+                Some((place, QuantityKind::Temperature.unit(unit).filter(|u| u.key == unit)?))
             };
-            let stated = |unit| Some((bare.strip_prefix("temperature_")?, Kind::Temperature.unit(unit)?));
+            let stated = |unit| Some((bare.strip_prefix("temperature_")?, QuantityKind::Temperature.unit(unit)?));
             let (place, unit) = match bracketed {
                 Some(unit) => stated(unit)?,
                 None => ended().or_else(|| stated(beside?))?,
             };
-            Some((Quantity::Sensor(SensorPlace::named(place)?), unit))
+            Some((ColumnQuantity::Sensor(SensorPlace::named(place)?), unit))
         };
         let of_name = of_name.or_else(of_sensor);
         // A quantity that is mapped elsewhere does not come from this name.
         let of_name =
             of_name.filter(|(quantity, _)| mapped.is_some() || format.mapped.iter().all(|m| m.quantity != *quantity));
-        let quantity = mapped.map_or_else(|| of_name.map_or(Quantity::Channel, |(q, _)| q), |m| m.quantity);
+        let quantity = mapped.map_or_else(|| of_name.map_or(ColumnQuantity::Channel, |(q, _)| q), |m| m.quantity);
         let mut assumed = None;
-        let conversion = match Kind::of(quantity) {
+        let conversion = match QuantityKind::of(quantity) {
             None => Conversion::By(|value| value),
             Some(kind) => {
                 let stated = mapped.and_then(|m| m.unit).and_then(|u| kind.unit(u));
                 let ending = || {
-                    let fits = |u: &&Unit| u.of == kind && bare.ends_with(&format!("_{}", u.key));
+                    let fits = |u: &&ColumnUnit| u.of == kind && bare.ends_with(&format!("_{}", u.key));
                     UNITS.iter().filter(fits).max_by_key(|u| u.key.len())
                 };
                 let own = bracketed.and_then(|b| kind.unit(b)).or_else(ending);
@@ -139,7 +140,7 @@ impl Column {
                     .map_or(Conversion::By(|value| value), |u| u.conversion)
             }
         };
-        if quantity == Quantity::Table && conversion.is_raw() {
+        if quantity == ColumnQuantity::Table && conversion.is_raw() {
             return Err(format!(
                 "column {name} is the table's rate: expected deg_per_s, deg_per_h, rad_per_s or arcsec_per_s"
             ));
@@ -157,7 +158,7 @@ impl Column {
 
     /// Whether its cells are dates or times.
     pub(crate) fn holds_stamps(&self) -> bool {
-        self.conversion.is_stamp() || self.quantity == Quantity::Date
+        self.conversion.is_stamp() || self.quantity == ColumnQuantity::Date
     }
 
     pub(crate) fn is_temperature(&self) -> bool {
@@ -167,8 +168,8 @@ impl Column {
     /// Under which name a record keeps it as a further column, if it does.
     pub(crate) fn channel(&self) -> Option<String> {
         match self.quantity {
-            Quantity::Channel => Some(self.name.clone()),
-            Quantity::Sensor(place) => Some(place.channel()),
+            ColumnQuantity::Channel => Some(self.name.clone()),
+            ColumnQuantity::Sensor(place) => Some(place.channel()),
             _ => None,
         }
     }
@@ -193,7 +194,7 @@ fn unit_in_cell(cell: &str) -> &str {
 }
 
 /// Of a kind; a pattern of stamps (`hh:mm:ss`) is a unit of times.
-fn unit_beside(kind: Kind, text: &str) -> Option<&'static Unit> {
+fn unit_beside(kind: QuantityKind, text: &str) -> Option<&'static ColumnUnit> {
     kind.unit(text).or_else(|| kind.unit("iso").filter(|_| is_stamp_pattern(text)))
 }
 
@@ -207,10 +208,10 @@ pub(super) fn states_units(names: &[&str], cells: &[&str], format: &RecordFormat
     let mut stated = 0;
     let is_one = |(name, cell): (&&str, &&str)| {
         let cell = unit_in_cell(cell);
-        let column = Column::new(name, None, format, division.decimal_comma);
-        let column = column.ok().filter(|c| c.quantity != Quantity::Channel);
-        let quantity = column.or_else(|| Column::new(name, Some(cell), format, division.decimal_comma).ok());
-        match quantity.and_then(|c| Kind::of(c.quantity)) {
+        let column = RecordColumn::new(name, None, format, division.decimal_comma);
+        let column = column.ok().filter(|c| c.quantity != ColumnQuantity::Channel);
+        let quantity = column.or_else(|| RecordColumn::new(name, Some(cell), format, division.decimal_comma).ok());
+        match quantity.and_then(|c| QuantityKind::of(c.quantity)) {
             Some(kind) if unit_beside(kind, cell).is_some() => {
                 stated += 1;
                 true
@@ -280,7 +281,7 @@ pub(crate) fn read_header(
     units: &[String],
     format: &RecordFormat,
     division: Division,
-) -> Result<Vec<Column>, Vec<(String, Option<String>)>> {
+) -> Result<Vec<RecordColumn>, Vec<(String, Option<String>)>> {
     columns_of(fields, units, format, division).map_err(|faults| {
         let instead = if is_toml(fields) {
             MODEL_GIVEN
@@ -318,15 +319,15 @@ fn columns_of(
     units: &[String],
     format: &RecordFormat,
     division: Division,
-) -> Result<Vec<Column>, Vec<(String, Option<String>)>> {
+) -> Result<Vec<RecordColumn>, Vec<(String, Option<String>)>> {
     let mut faults = Vec::new();
-    let mut columns: Vec<Column> = Vec::with_capacity(fields.len());
+    let mut columns: Vec<RecordColumn> = Vec::with_capacity(fields.len());
     let is_mapped = |quantity| format.mapped.iter().any(|m| m.quantity == quantity);
-    let has_date = !is_mapped(Quantity::Time) && !is_mapped(Quantity::Date);
+    let has_date = !is_mapped(ColumnQuantity::Time) && !is_mapped(ColumnQuantity::Date);
     for (place, field) in fields.iter().enumerate() {
         let below = units.get(place).map(String::as_str);
         let of_day = of_day(field, fields).filter(|_| has_date);
-        match Column::new(field, of_day.or(below), format, division.decimal_comma) {
+        match RecordColumn::new(field, of_day.or(below), format, division.decimal_comma) {
             Ok(column) => columns.push(column),
             Err(message) => faults.push((message, None)),
         }
@@ -335,9 +336,9 @@ fn columns_of(
         return Err(faults);
     }
     if has_date && let Some(date) = columns.iter_mut().find(|c| c.name == "date" && fields.contains(&"time")) {
-        date.quantity = Quantity::Date;
+        date.quantity = ColumnQuantity::Date;
     }
-    if format.compensated && format.mapped.iter().all(|m| m.quantity != Quantity::Rate) {
+    if format.compensated && format.mapped.iter().all(|m| m.quantity != ColumnQuantity::Rate) {
         prefer_compensated(&mut columns);
     }
     for mapped in format.mapped.iter().filter(|m| columns.iter().all(|c| c.name != m.name)) {
@@ -358,7 +359,7 @@ fn columns_of(
             faults.push((format!("column {}: its name {fault}", i + 1), None));
         } else if columns[..i].iter().any(|c| c.name == column.name) {
             faults.push((format!("column {} is there twice: give each column a name of its own", column.name), None));
-        } else if column.quantity != Quantity::Channel
+        } else if column.quantity != ColumnQuantity::Channel
             && let Some(other) = columns[..i].iter().find(|c| c.quantity == column.quantity)
         {
             faults.push((format!("columns {} and {} hold the same: leave one out", other.name, column.name), None));
@@ -369,21 +370,23 @@ fn columns_of(
 }
 
 /// The compensated rate takes the place of the raw one.
-fn prefer_compensated(columns: &mut [Column]) {
+fn prefer_compensated(columns: &mut [RecordColumn]) {
     let Some(place) = columns.iter().position(|c| c.name == COMPENSATED) else { return };
-    for column in columns.iter_mut().filter(|c| c.quantity == Quantity::Rate) {
-        column.quantity = Quantity::Channel;
+    for column in columns.iter_mut().filter(|c| c.quantity == ColumnQuantity::Rate) {
+        column.quantity = ColumnQuantity::Channel;
         column.conversion = Conversion::By(|value| value);
     }
-    columns[place].quantity = Quantity::Rate;
+    columns[place].quantity = ColumnQuantity::Rate;
     columns[place].conversion = Conversion::By(rad_per_s_from_deg_per_h);
 }
 
-fn missing(columns: &[Column]) -> Vec<(String, Option<String>)> {
+fn missing(columns: &[RecordColumn]) -> Vec<(String, Option<String>)> {
     let mut faults = Vec::new();
-    for (quantity, wanted) in
-        [(Quantity::Time, "time_s"), (Quantity::Temperature, "temperature_c"), (Quantity::Rate, "rate_deg_per_h")]
-    {
+    for (quantity, wanted) in [
+        (ColumnQuantity::Time, "time_s"),
+        (ColumnQuantity::Temperature, "temperature_c"),
+        (ColumnQuantity::Rate, "rate_deg_per_h"),
+    ] {
         if columns.iter().any(|c| c.quantity == quantity) {
             continue;
         }
@@ -395,7 +398,7 @@ fn missing(columns: &[Column]) -> Vec<(String, Option<String>)> {
             })
             .collect();
         let accepted: Vec<&str> = own.iter().map(String::as_str).collect();
-        let others = columns.iter().filter(|c| c.quantity == Quantity::Channel);
+        let others = columns.iter().filter(|c| c.quantity == ColumnQuantity::Channel);
         let meant = others.map(|c| c.name.as_str()).find(|n| n.starts_with(stem) || nearest(n, &accepted).is_some());
         let found = meant.map_or_else(|| "none of them".to_owned(), str::to_owned);
         let message = format!("column {wanted} is missing: expected one of {}, found {found}", accepted.join(", "));
@@ -412,7 +415,7 @@ mod tests {
     fn value(header: &str, mapping: &str, cell: &str) -> f64 {
         let mut format = RecordFormat::default();
         format.map_all(mapping).unwrap();
-        Column::new(header, None, &format, true).unwrap().value(cell).unwrap()
+        RecordColumn::new(header, None, &format, true).unwrap().value(cell).unwrap()
     }
 
     #[test]
@@ -438,7 +441,7 @@ mod tests {
         format.map_all("time=stamp:iso").unwrap();
         // Which of the two is the month, nobody knows.
         for unknown in ["03/01/2026 10:00:00", "1:2:3:4", "10:61:00", "yesterday"] {
-            assert!(Column::new("stamp", None, format, false).unwrap().value(unknown).is_err(), "{unknown}");
+            assert!(RecordColumn::new("stamp", None, format, false).unwrap().value(unknown).is_err(), "{unknown}");
         }
     }
 
@@ -454,7 +457,7 @@ mod tests {
             assert!(format.map_all(list).unwrap_err().contains(wanted), "{list}");
         }
         assert!(
-            Column::new(
+            RecordColumn::new(
                 "F [mV]",
                 None,
                 &{

@@ -14,8 +14,8 @@ use crate::record::{Channel, MIN_ROWS, Record, RecordError, TABLE_RATE};
 use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s};
 
 use super::averaging::{self, average};
-use super::csv_rows::{CsvRows, Piece};
-use super::record_columns::{Column, FLAGS, Quantity, RecordFormat, read_header};
+use super::csv_rows::{CsvPiece, CsvRows};
+use super::record_columns::{ColumnQuantity, FLAGS, RecordColumn, RecordFormat, read_header};
 use super::record_rows::{Cells, CellsRead, NO_HEADER, PLAUSIBLE_C, assumptions, implausible, suspicions};
 use super::table_file::Source;
 
@@ -127,7 +127,7 @@ impl<'s> Reading<'s> {
             return self.end(None, NO_HEADER);
         };
         let header_span = rows.span();
-        if let Piece::Broken(why) = head.piece {
+        if let CsvPiece::Broken(why) = head.piece {
             self.fault(Fault::new(format!("line {}: {why}", rows.line()), Some(header_span)));
             return self.end(None, "");
         }
@@ -142,11 +142,11 @@ impl<'s> Reading<'s> {
             }
         };
         let _ = rows.units_row(&head);
-        rows.expect(columns.iter().map(|c| c.quantity == Quantity::Channel));
+        rows.expect(columns.iter().map(|c| c.quantity == ColumnQuantity::Channel));
         let mut values: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
         let mut cells = Cells::new(&columns, self.format);
         while let Ok(Some(piece)) = rows.next() {
-            if piece == Piece::Aside {
+            if piece == CsvPiece::Aside {
                 continue;
             }
             match cells.read(piece, &rows) {
@@ -197,7 +197,7 @@ impl<'s> Reading<'s> {
         }
     }
 
-    fn check_temperatures(&mut self, columns: &[Column], values: &[Vec<f64>], header: &Range<usize>) {
+    fn check_temperatures(&mut self, columns: &[RecordColumn], values: &[Vec<f64>], header: &Range<usize>) {
         for (column, values) in columns.iter().zip(values) {
             let is_temperature = column.is_temperature();
             let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
@@ -209,9 +209,9 @@ impl<'s> Reading<'s> {
     }
 
     /// A column that holds no number at all is one fault, not one a row.
-    fn gather_empty_columns(&mut self, columns: &[Column], values: &[Vec<f64>], header: &Range<usize>) {
+    fn gather_empty_columns(&mut self, columns: &[RecordColumn], values: &[Vec<f64>], header: &Range<usize>) {
         for (column, values) in columns.iter().zip(values) {
-            let may_hold_words = column.quantity == Quantity::Channel && (self.lax() || column.name == FLAGS);
+            let may_hold_words = column.quantity == ColumnQuantity::Channel && (self.lax() || column.name == FLAGS);
             if values.len() < MIN_ROWS || values.iter().any(|v| v.is_finite()) || may_hold_words {
                 continue;
             }
@@ -220,7 +220,7 @@ impl<'s> Reading<'s> {
             self.faults.retain(|f| !f.message.contains(&own));
             let shown = before - self.faults.len();
             self.uncounted = self.uncounted.saturating_sub(values.len() - shown);
-            let what = if column.quantity == Quantity::Date {
+            let what = if column.quantity == ColumnQuantity::Date {
                 "date that is understood"
             } else if column.holds_stamps() {
                 "stamp that is understood"
@@ -229,8 +229,10 @@ impl<'s> Reading<'s> {
             };
             let message = format!("column {} holds no {what} in any of its {} rows", column.name, values.len());
             let note = match column.quantity {
-                Quantity::Date | Quantity::Time if column.holds_stamps() => column.expected(),
-                Quantity::Time | Quantity::Temperature | Quantity::Rate => "the sensor failed: measure again",
+                ColumnQuantity::Date | ColumnQuantity::Time if column.holds_stamps() => column.expected(),
+                ColumnQuantity::Time | ColumnQuantity::Temperature | ColumnQuantity::Rate => {
+                    "the sensor failed: measure again"
+                }
                 _ => "leave the column out",
             };
             self.fault(Fault::new(message, Some(header.clone())).with_note(note));
@@ -255,13 +257,14 @@ impl<'s> Reading<'s> {
     }
 }
 
-fn build(file: &str, lax: bool, columns: &[Column], mut values: Vec<Vec<f64>>) -> Result<Record, RecordError> {
-    let mut take = |quantity: Quantity| {
+fn build(file: &str, lax: bool, columns: &[RecordColumn], mut values: Vec<Vec<f64>>) -> Result<Record, RecordError> {
+    let mut take = |quantity: ColumnQuantity| {
         columns.iter().position(|c| c.quantity == quantity).map(|place| std::mem::take(&mut values[place]))
     };
-    let needed = [Quantity::Time, Quantity::Temperature, Quantity::Rate].map(|q| take(q).unwrap_or_default());
-    let (inner, ambient) = (take(Quantity::InnerTemperature), take(Quantity::AmbientTemperature));
-    let table = take(Quantity::Table);
+    let needed =
+        [ColumnQuantity::Time, ColumnQuantity::Temperature, ColumnQuantity::Rate].map(|q| take(q).unwrap_or_default());
+    let (inner, ambient) = (take(ColumnQuantity::InnerTemperature), take(ColumnQuantity::AmbientTemperature));
+    let table = take(ColumnQuantity::Table);
     let [times_s, temperature_k, mut rate_rad_per_s] = needed;
     if let Some(table) = &table {
         rate_rad_per_s.iter_mut().zip(table).for_each(|(rate, table)| *rate -= table);

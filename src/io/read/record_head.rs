@@ -5,7 +5,7 @@
 
 use std::io::{self, BufRead};
 
-use super::csv_rows::{CsvRows, Piece, is_aside};
+use super::csv_rows::{CsvPiece, CsvRows, is_aside};
 use super::record_columns::{Division, RecordFormat, are_numbers, read_header, states_units};
 
 /// A head is not sought further down.
@@ -14,7 +14,7 @@ const MOST_LINES_ABOVE: usize = 200;
 /// Where the columns' names stand, and what stands around them.
 #[derive(Debug)]
 pub(crate) struct Head {
-    pub(crate) piece: Piece,
+    pub(crate) piece: CsvPiece,
     pub(crate) division: Division,
     /// Of each column, as the row below the names states it; empty where there is no such row.
     pub(crate) units: Vec<String>,
@@ -52,7 +52,7 @@ impl Candidate {
     fn of(line: &[u8], place: usize) -> Option<Self> {
         let mut rows = CsvRows::new(line);
         let (piece, division) = rows.header(|_| {}).ok()??;
-        (piece == Piece::Row).then(|| Self { place, division, cells: rows.names().map(str::to_owned).collect() })
+        (piece == CsvPiece::Row).then(|| Self { place, division, cells: rows.names().map(str::to_owned).collect() })
     }
 
     fn cells(&self) -> Vec<&str> {

@@ -5,12 +5,12 @@ use std::ops::Range;
 
 use crate::io::fault::{Fault, Faults};
 use crate::numeric::statistics::median;
-use crate::record::{LEAST_INTERVAL_S, MIN_ROWS, RecordError, Row, usual_interval_s};
+use crate::record::{LEAST_INTERVAL_S, MIN_ROWS, RecordError, RecordRow, usual_interval_s};
 use crate::units::celsius_from_kelvin;
 
 use super::averaging::{self, Averager};
-use super::csv_rows::{CsvRows, Piece};
-use super::record_columns::{Column, Division, FLAGS, Quantity, RecordFormat, SensorPlace, read_header};
+use super::csv_rows::{CsvPiece, CsvRows};
+use super::record_columns::{ColumnQuantity, Division, FLAGS, RecordColumn, RecordFormat, SensorPlace, read_header};
 use super::record_head::Head;
 use super::table_file::Source;
 
@@ -49,7 +49,7 @@ pub(super) enum CellsRead {
 /// Turns the cells of each row into numbers in SI.
 #[derive(Debug)]
 pub(super) struct Cells<'c> {
-    columns: &'c [Column],
+    columns: &'c [RecordColumn],
     skips: bool,
     /// Further columns may hold words.
     lax: bool,
@@ -60,7 +60,7 @@ pub(super) struct Cells<'c> {
 }
 
 impl<'c> Cells<'c> {
-    pub(super) fn new(columns: &'c [Column], format: &RecordFormat) -> Self {
+    pub(super) fn new(columns: &'c [RecordColumn], format: &RecordFormat) -> Self {
         let is_compensated = format.compensated && columns.iter().any(|c| c.name == FLAGS);
         Self {
             columns,
@@ -79,9 +79,9 @@ impl<'c> Cells<'c> {
 
     /// What was read last of a text.
     #[expect(clippy::too_many_lines, reason = "each kind of cell beside what is said where it is wrong")]
-    pub(super) fn read(&mut self, piece: Piece, row: &CsvRows<impl BufRead>) -> CellsRead {
+    pub(super) fn read(&mut self, piece: CsvPiece, row: &CsvRows<impl BufRead>) -> CellsRead {
         self.numbers.clear();
-        if let Piece::Broken(why) = piece {
+        if let CsvPiece::Broken(why) = piece {
             if self.skips {
                 return CellsRead::Skipped;
             }
@@ -101,8 +101,8 @@ impl<'c> Cells<'c> {
         for (place, (column, field)) in self.columns.iter().zip(row.cells()).enumerate() {
             let number = match column.value(field) {
                 // Without its date no time of day is one; the date's own cell is the fault.
-                Ok(_) if column.quantity == Quantity::Time && date_s == Some(Err(())) => f64::NAN,
-                Ok(value) if column.quantity == Quantity::Time && date_s.is_some() && !DAY_S.contains(&value) => {
+                Ok(_) if column.quantity == ColumnQuantity::Time && date_s == Some(Err(())) => f64::NAN,
+                Ok(value) if column.quantity == ColumnQuantity::Time && date_s.is_some() && !DAY_S.contains(&value) => {
                     faults.push(CellFault {
                         message: format!(
                             "{}, column {}: expected a time of day beside the date, found {field}",
@@ -114,24 +114,26 @@ impl<'c> Cells<'c> {
                     });
                     f64::NAN
                 }
-                Ok(value) if column.quantity == Quantity::Time => match self.time(value, date_s.and_then(Result::ok)) {
-                    Ok(value) => value,
-                    Err(before_s) => {
-                        faults.push(CellFault {
-                            message: format!(
-                                "{}, column {}: times must increase strictly, found {field} after {before_s} s",
-                                row.place(),
-                                column.name
-                            ),
-                            place: Some(place),
-                            note: Some("sort the rows, or skip those that repeat or jump back: --bad-rows skip"),
-                        });
-                        value
+                Ok(value) if column.quantity == ColumnQuantity::Time => {
+                    match self.time(value, date_s.and_then(Result::ok)) {
+                        Ok(value) => value,
+                        Err(before_s) => {
+                            faults.push(CellFault {
+                                message: format!(
+                                    "{}, column {}: times must increase strictly, found {field} after {before_s} s",
+                                    row.place(),
+                                    column.name
+                                ),
+                                place: Some(place),
+                                note: Some("sort the rows, or skip those that repeat or jump back: --bad-rows skip"),
+                            });
+                            value
+                        }
                     }
-                },
+                }
                 Ok(value) => value,
                 Err(_)
-                    if column.quantity == Quantity::Channel
+                    if column.quantity == ColumnQuantity::Channel
                         && (self.lax || row.numbers_rows() || column.name == FLAGS) =>
                 {
                     f64::NAN
@@ -155,7 +157,7 @@ impl<'c> Cells<'c> {
         if !faults.is_empty() {
             return if self.skips { CellsRead::Skipped } else { CellsRead::Faults(faults) };
         }
-        if let Some(place) = self.columns.iter().position(|c| c.quantity == Quantity::Time) {
+        if let Some(place) = self.columns.iter().position(|c| c.quantity == ColumnQuantity::Time) {
             self.last_s = Some(self.numbers[place]);
         }
         CellsRead::Row
@@ -163,7 +165,7 @@ impl<'c> Cells<'c> {
 
     /// Seconds since 1970 at the midnight of the row's date; none where dates have no column of their own.
     fn date_of<'r>(&self, mut cells: impl Iterator<Item = &'r str>) -> Option<Result<f64, ()>> {
-        let (place, column) = self.columns.iter().enumerate().find(|(_, c)| c.quantity == Quantity::Date)?;
+        let (place, column) = self.columns.iter().enumerate().find(|(_, c)| c.quantity == ColumnQuantity::Date)?;
         Some(column.value(cells.nth(place)?).map_err(|_| ()))
     }
 
@@ -183,7 +185,7 @@ impl<'c> Cells<'c> {
 }
 
 /// Units that nothing stated, and how cells are divided where that is not by commas.
-pub(super) fn assumptions(columns: &[Column], division: Division) -> Vec<String> {
+pub(super) fn assumptions(columns: &[RecordColumn], division: Division) -> Vec<String> {
     let mut said = Vec::new();
     if division.separator != b',' {
         let name = match division.separator {
@@ -193,14 +195,14 @@ pub(super) fn assumptions(columns: &[Column], division: Division) -> Vec<String>
         };
         said.push(format!("{name} between columns; a comma inside a number is a decimal comma"));
     }
-    if let Some(table) = columns.iter().find(|c| c.quantity == Quantity::Table) {
+    if let Some(table) = columns.iter().find(|c| c.quantity == ColumnQuantity::Table) {
         said.push(format!(
             "column {} is the table's rate and is taken off: what is left is the gyro's error",
             table.name
         ));
     }
     for column in columns {
-        if let (Quantity::Sensor(place), Some(name)) = (column.quantity, column.channel()) {
+        if let (ColumnQuantity::Sensor(place), Some(name)) = (column.quantity, column.channel()) {
             let use_of_it = match place {
                 SensorPlace::Layer(_) => "`compare` sets it beside the model's layer",
                 _ => "the model's heat does not read it",
@@ -211,7 +213,7 @@ pub(super) fn assumptions(columns: &[Column], division: Division) -> Vec<String>
             ));
         }
         if let Some(unit) = column.assumed_unit() {
-            let of = if column.quantity == Quantity::Time { "numbers in it, not stamps, are " } else { "" };
+            let of = if column.quantity == ColumnQuantity::Time { "numbers in it, not stamps, are " } else { "" };
             said.push(format!("column {} states no unit: {of}taken as {unit}", column.name));
         }
     }
@@ -266,7 +268,7 @@ pub fn stream_rows(
     name: &str,
     input: impl Read,
     format: &RecordFormat,
-    sink: impl FnMut(&[Row]),
+    sink: impl FnMut(&[RecordRow]),
 ) -> Result<StreamNoticed, Faults> {
     stream_source(name, Source::text(input), format, sink)
 }
@@ -280,7 +282,7 @@ pub(crate) fn stream_source(
     name: &str,
     source: Source<'_>,
     format: &RecordFormat,
-    mut sink: impl FnMut(&[Row]),
+    mut sink: impl FnMut(&[RecordRow]),
 ) -> Result<StreamNoticed, Faults> {
     let (is_table, remarks) = (source.is_table(), source.remarks().to_vec());
     let mut rows = CsvRows::new(BufReader::with_capacity(1 << 18, source));
@@ -293,19 +295,20 @@ pub(crate) fn stream_source(
     };
     let columns = header_columns(name, &head, &rows, format)?;
     rows.units_row(&head).map_err(unreadable)?;
-    rows.expect(columns.iter().map(|c| c.quantity == Quantity::Channel));
-    let place = |quantity: Quantity| columns.iter().position(|c| c.quantity == quantity).unwrap_or(0);
-    let (time, temperature, rate) = (place(Quantity::Time), place(Quantity::Temperature), place(Quantity::Rate));
-    let table = columns.iter().position(|c| c.quantity == Quantity::Table);
+    rows.expect(columns.iter().map(|c| c.quantity == ColumnQuantity::Channel));
+    let place = |quantity: ColumnQuantity| columns.iter().position(|c| c.quantity == quantity).unwrap_or(0);
+    let (time, temperature, rate) =
+        (place(ColumnQuantity::Time), place(ColumnQuantity::Temperature), place(ColumnQuantity::Rate));
+    let table = columns.iter().position(|c| c.quantity == ColumnQuantity::Table);
     let mut cells = Cells::new(&columns, format);
     let remarks = remarks.into_iter().chain(head.remarks()).chain(assumptions(&columns, head.division)).collect();
     let mut noticed = StreamNoticed { remarks, ..StreamNoticed::default() };
     let (mut faults, mut uncounted) = (Vec::new(), 0);
-    let mut chunk: Vec<Row> = Vec::with_capacity(CHUNK);
+    let mut chunk: Vec<RecordRow> = Vec::with_capacity(CHUNK);
     let mut averager = Averager::new(format.average_rows);
     loop {
         let piece = match rows.next().map_err(unreadable)? {
-            Some(Piece::Aside) => continue,
+            Some(CsvPiece::Aside) => continue,
             Some(piece) => piece,
             None => break,
         };
@@ -313,7 +316,7 @@ pub(crate) fn stream_source(
             CellsRead::Row if faults.is_empty() => {
                 let numbers = cells.numbers();
                 let table_rad_per_s = table.map(|place| numbers[place]);
-                chunk.push(Row {
+                chunk.push(RecordRow {
                     time_s: numbers[time],
                     temperature_k: numbers[temperature],
                     rate_rad_per_s: numbers[rate] - table_rad_per_s.unwrap_or(0.0),
@@ -363,7 +366,13 @@ pub(crate) fn stream_source(
 }
 
 /// The first rows show whether the units are what they are said to be.
-fn look(chunk: &[Row], is_first: bool, temperature: &Column, remarks: &mut Vec<String>, faults: &mut Vec<Fault>) {
+fn look(
+    chunk: &[RecordRow],
+    is_first: bool,
+    temperature: &RecordColumn,
+    remarks: &mut Vec<String>,
+    faults: &mut Vec<Fault>,
+) {
     if !is_first || chunk.is_empty() {
         return;
     }
@@ -383,7 +392,7 @@ fn look(chunk: &[Row], is_first: bool, temperature: &Column, remarks: &mut Vec<S
 }
 
 /// A column whose numbers are no coil's temperature in its unit.
-pub(super) fn implausible(column: &Column, middle_c: f64, span: Option<Range<usize>>) -> Fault {
+pub(super) fn implausible(column: &RecordColumn, middle_c: f64, span: Option<Range<usize>>) -> Fault {
     let message = format!(
         "column {}: expected a coil's temperature between {} and {} °C, found a median of {middle_c:.2} °C",
         column.name, PLAUSIBLE_C.start, PLAUSIBLE_C.end
@@ -404,11 +413,11 @@ pub(in crate::io) fn header_columns(
     head: &Head,
     header: &CsvRows<impl BufRead>,
     format: &RecordFormat,
-) -> Result<Vec<Column>, Faults> {
+) -> Result<Vec<RecordColumn>, Faults> {
     let source = header.text();
     let fault = |(message, note)| Fault { message, span: Some(0..source.len()), note };
     let all = |faults: Vec<Fault>| Faults { file: name.to_owned(), source: source.to_owned(), faults };
-    if let Piece::Broken(why) = head.piece {
+    if let CsvPiece::Broken(why) = head.piece {
         return Err(all(vec![fault((format!("line {}: {why}", header.line()), None))]));
     }
     let fields: Vec<&str> = header.names().collect();
@@ -420,7 +429,7 @@ pub(in crate::io) fn header_columns(
 mod tests {
     use super::*;
 
-    fn rows(text: &str, format: &RecordFormat) -> Result<(Vec<Row>, StreamNoticed), Faults> {
+    fn rows(text: &str, format: &RecordFormat) -> Result<(Vec<RecordRow>, StreamNoticed), Faults> {
         let mut found = Vec::new();
         let noticed = stream_rows("x", text.as_bytes(), format, |chunk| found.extend_from_slice(chunk))?;
         Ok((found, noticed))

@@ -44,7 +44,7 @@ impl<'s> Source<'s> {
     }
 
     #[cfg(any(feature = "mat", feature = "parquet"))]
-    fn table(columns: impl rows::Columns + 's, remarks: Vec<String>) -> Self {
+    fn table(columns: impl rows::TableColumns + 's, remarks: Vec<String>) -> Self {
         Self { reader: Box::new(rows::TableText::new(columns)), is_table: true, remarks }
     }
 

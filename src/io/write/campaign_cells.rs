@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 use crate::io::files::{WriteError, sha256_hex, write_atomically};
 use crate::io::folder::{Replacement, check_read};
 use crate::io::json::campaign::{BlockJson, CellDocument, CellJson, GyroJson};
-use crate::io::read::campaign_file::{Cell, Work};
+use crate::io::read::campaign_file::{CampaignCell, CellWork};
 use crate::search::cost::objective::Objective;
 
 use super::checkpoint::CHECKPOINT_FILE;
@@ -39,11 +39,11 @@ fn sum(document: &Map<String, Value>) -> String {
 }
 
 /// Whether a cell's result is there.
-pub(crate) fn is_done(folder: &Path, cell: &Cell) -> bool {
+pub(crate) fn is_done(folder: &Path, cell: &CampaignCell) -> bool {
     match &cell.work {
-        Work::Search(_) => read_cell::<CellJson>(folder, &cell.id).is_some(),
-        Work::Tolerance(_) => read_cell::<BlockJson>(folder, &cell.id).is_some(),
-        Work::Metrics(_) | Work::Diagnose(_) => read_cell::<GyroJson>(folder, &cell.id).is_some(),
+        CellWork::Search(_) => read_cell::<CellJson>(folder, &cell.id).is_some(),
+        CellWork::Tolerance(_) => read_cell::<BlockJson>(folder, &cell.id).is_some(),
+        CellWork::Metrics(_) | CellWork::Diagnose(_) => read_cell::<GyroJson>(folder, &cell.id).is_some(),
     }
 }
 

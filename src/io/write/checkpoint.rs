@@ -13,7 +13,7 @@ use crate::io::fault::Faults;
 use crate::io::files::{WriteError, sha256_hex, write_atomically};
 use crate::io::json::SCHEMA_VERSION;
 use crate::search::anneal::restart::Restart;
-use crate::search::anneal::rounds::{Found, RoundRecord, State, Stop};
+use crate::search::anneal::rounds::{FoundPattern, RoundRecord, State, Stop};
 use crate::search::cost::columns::Work;
 
 /// The name of a checkpoint in its run's folder.
@@ -244,7 +244,7 @@ fn state_of(json: CheckpointJson) -> Option<State> {
         found: json
             .found
             .into_iter()
-            .map(|f| Found { cost: f64::from_bits(f.cost_bits), segments: f.segments })
+            .map(|f| FoundPattern { cost: f64::from_bits(f.cost_bits), segments: f.segments })
             .collect(),
         rounds_without_improvement: json.rounds_without_improvement,
         working: json.working,

@@ -5,12 +5,12 @@ use std::io::{BufRead, BufReader, Read, Write};
 use serde::Serialize;
 
 use crate::compensate::Compensator;
-use crate::compensate::formulas::Columns;
+use crate::compensate::formulas::FormulaColumns;
 use crate::compensate::stream::{Compensated, Flag, Reading, Stream};
 use crate::io::fault::Faults;
-use crate::io::json::metrics::{GrossErrors, RecordMetricsJson};
-use crate::io::read::csv_rows::{CsvRows, Piece};
-use crate::io::read::record_columns::{COMPENSATED, Column, FLAGS, Quantity, RecordFormat};
+use crate::io::json::metrics::{GrossErrorTally, RecordMetricsJson};
+use crate::io::read::csv_rows::{CsvPiece, CsvRows};
+use crate::io::read::record_columns::{COMPENSATED, ColumnQuantity, FLAGS, RecordColumn, RecordFormat};
 use crate::io::read::record_head::Head;
 use crate::io::read::record_rows::{NO_HEADER, header_columns};
 use crate::io::table::PassedRow;
@@ -133,7 +133,7 @@ impl TurnOn {
 /// Which cells of a row are needed.
 struct Places {
     count: usize,
-    columns: Vec<(usize, Column)>,
+    columns: Vec<(usize, RecordColumn)>,
     /// Of each further column that the compensator reads, its place among `columns`.
     channels: Vec<usize>,
 }
@@ -193,13 +193,13 @@ pub(crate) fn compensate_lines_from_turn_on(
     let mut channels = vec![None; places.columns.len()];
     let mut stream: Stream<Passed> = Stream::new(compensator);
     while let Some(piece) = rows.next().map_err(StreamError::Read)? {
-        let is_aside = piece == Piece::Aside;
+        let is_aside = piece == CsvPiece::Aside;
         let reading = if is_aside { None } else { reading(rows.cells(), &places, compensator, &mut channels) };
         let text = match piece {
-            Piece::Aside => passed_row.aside(rows.text()),
-            Piece::Row if rows.len() == places.count => passed_row.cells(rows.text(), rows.cells()),
+            CsvPiece::Aside => passed_row.aside(rows.text()),
+            CsvPiece::Row if rows.len() == places.count => passed_row.cells(rows.text(), rows.cells()),
             // As one quoted cell, so that the output stays a table and nothing is lost.
-            Piece::Row | Piece::Broken(_) => passed_row.one_cell(rows.text(), places.count),
+            CsvPiece::Row | CsvPiece::Broken(_) => passed_row.one_cell(rows.text(), places.count),
         };
         let time_s = reading.as_ref().map(|r| r.time_s);
         let has_commas = passed_row.has_decimal_comma(rows.cells());
@@ -238,15 +238,21 @@ fn places(
         );
         return Err(Faults::of_file(name, message));
     }
-    let may_hold_words = columns.iter().map(|c| c.quantity == Quantity::Channel).collect();
+    let may_hold_words = columns.iter().map(|c| c.quantity == ColumnQuantity::Channel).collect();
     let count = columns.len();
     let names = compensator.channel_names();
-    let needed = |c: &Column| match c.quantity {
-        Quantity::Date | Quantity::Time | Quantity::Temperature | Quantity::Rate | Quantity::InnerTemperature => true,
-        Quantity::Channel | Quantity::Sensor(_) => c.channel().is_some_and(|name| names.contains(&name.as_str())),
-        Quantity::AmbientTemperature | Quantity::Table => false,
+    let needed = |c: &RecordColumn| match c.quantity {
+        ColumnQuantity::Date
+        | ColumnQuantity::Time
+        | ColumnQuantity::Temperature
+        | ColumnQuantity::Rate
+        | ColumnQuantity::InnerTemperature => true,
+        ColumnQuantity::Channel | ColumnQuantity::Sensor(_) => {
+            c.channel().is_some_and(|name| names.contains(&name.as_str()))
+        }
+        ColumnQuantity::AmbientTemperature | ColumnQuantity::Table => false,
     };
-    let columns: Vec<(usize, Column)> = columns.into_iter().enumerate().filter(|(_, c)| needed(c)).collect();
+    let columns: Vec<(usize, RecordColumn)> = columns.into_iter().enumerate().filter(|(_, c)| needed(c)).collect();
     let place = |wanted: &&str| {
         let found = columns.iter().position(|(_, c)| c.channel().as_deref() == Some(*wanted));
         found.ok_or_else(|| Faults::of_file(name, format!("the model reads the column {wanted}, which is not there")))
@@ -267,7 +273,7 @@ fn reading<'r>(
         temperature_k: None,
         inner_k: None,
         channel_rad_per_s: Some(0.0),
-        columns: Columns::default(),
+        columns: FormulaColumns::default(),
         rate_rad_per_s: None,
     };
     let mut date_s = 0.0;
@@ -279,13 +285,15 @@ fn reading<'r>(
         {
             let value = column.value(cell).ok();
             match column.quantity {
-                Quantity::Date => date_s = value?,
-                Quantity::Time => found.time_s = value?,
-                Quantity::Temperature => found.temperature_k = value,
-                Quantity::Rate => found.rate_rad_per_s = value,
-                Quantity::InnerTemperature => found.inner_k = value,
-                Quantity::Channel | Quantity::Sensor(_) => channels[next] = value.map(|v| column.in_channel(v)),
-                Quantity::AmbientTemperature | Quantity::Table => {}
+                ColumnQuantity::Date => date_s = value?,
+                ColumnQuantity::Time => found.time_s = value?,
+                ColumnQuantity::Temperature => found.temperature_k = value,
+                ColumnQuantity::Rate => found.rate_rad_per_s = value,
+                ColumnQuantity::InnerTemperature => found.inner_k = value,
+                ColumnQuantity::Channel | ColumnQuantity::Sensor(_) => {
+                    channels[next] = value.map(|v| column.in_channel(v))
+                }
+                ColumnQuantity::AmbientTemperature | ColumnQuantity::Table => {}
             }
             next += 1;
         }
@@ -428,7 +436,7 @@ pub(crate) struct MeasuresJson {
 
 impl MeasuresJson {
     pub(crate) fn new(metrics: &Metrics) -> Self {
-        let all = RecordMetricsJson::new("", metrics, GrossErrors::default(), 0);
+        let all = RecordMetricsJson::new("", metrics, GrossErrorTally::default(), 0);
         Self {
             bias_deg_per_h: all.bias_deg_per_h,
             bias_stability_deg_per_h: all.bias_stability_deg_per_h,

@@ -3,7 +3,7 @@
 use super::formulas_in_c::FormulasInC;
 use serde::Serialize;
 
-use crate::compensate::filter::{FORGOTTEN_ROWS, Filter, Gains, LEAST_LOG_WEIGHT};
+use crate::compensate::filter::{FORGOTTEN_ROWS, Filter, FilterGains, LEAST_LOG_WEIGHT};
 use crate::compensate::physical::Physical;
 use crate::text::sink::CComment;
 use crate::units::deg_per_h_from_rad_per_s;
@@ -52,7 +52,7 @@ pub(crate) struct GainsJson {
 }
 
 impl GainsJson {
-    fn new(gains: &Gains, states: usize) -> Self {
+    fn new(gains: &FilterGains, states: usize) -> Self {
         let (gain, chain) = gains.gain.split_at(states);
         Self { gain: gain.to_vec(), chain_gain: shown(chain), variance: gains.variance }
     }

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::difference_equation::filled;
 use crate::compensate::Compensator;
 use crate::compensate::empirical::{BiasLine, PiecewiseBias, Regression};
-use crate::compensate::learned::{LONGEST_GAP, Learned};
+use crate::compensate::learned::{LONGEST_GAP, LearnedCoefficients};
 use crate::metrics::thermal::{COLUMNS, SLOPES, USUAL_K, WARM_UPS, lags_s};
 use crate::text::sink::CComment;
 use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s};
@@ -93,7 +93,7 @@ impl EmpiricalExport {
                 };
                 (&REGRESSION, compensator.delay_rows(interval_s), coefficients)
             }
-            Compensator::Learned(Learned { coefficients, interval_s: of_record_s, .. }) => {
+            Compensator::Learned(LearnedCoefficients { coefficients, interval_s: of_record_s, .. }) => {
                 let (offset, columns) = coefficients.split_first()?;
                 let coefficients = Coefficients::Learned {
                     offset_deg_per_h: shown(*offset),

@@ -35,12 +35,12 @@ pub enum Degree {
 
 /// Least and largest value.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Interval {
+pub(crate) struct ValueRange {
     pub(crate) low: f64,
     pub(crate) high: f64,
 }
 
-impl Interval {
+impl ValueRange {
     pub(crate) const EVERYTHING: Self = Self { low: f64::NEG_INFINITY, high: f64::INFINITY };
 
     pub(crate) fn at(value: f64) -> Self {
@@ -140,7 +140,7 @@ impl Expression {
     }
 
     /// Within which bounds it stays while its variables stay within theirs.
-    pub(crate) fn range(&self, variables: &[Interval]) -> Interval {
+    pub(crate) fn range(&self, variables: &[ValueRange]) -> ValueRange {
         range(&self.root, variables)
     }
 }
@@ -209,41 +209,41 @@ fn product(x: f64, y: f64) -> f64 {
     if x == 0.0 || y == 0.0 { 0.0 } else { x * y }
 }
 
-fn corners(x: Interval, y: Interval, f: impl Fn(f64, f64) -> f64) -> Interval {
-    Interval::of([f(x.low, y.low), f(x.low, y.high), f(x.high, y.low), f(x.high, y.high)])
+fn corners(x: ValueRange, y: ValueRange, f: impl Fn(f64, f64) -> f64) -> ValueRange {
+    ValueRange::of([f(x.low, y.low), f(x.low, y.high), f(x.high, y.low), f(x.high, y.high)])
 }
 
-fn range(node: &Node, variables: &[Interval]) -> Interval {
+fn range(node: &Node, variables: &[ValueRange]) -> ValueRange {
     match node {
-        Node::Number(number) => Interval::at(*number),
+        Node::Number(number) => ValueRange::at(*number),
         Node::Variable(index) => variables[*index],
         Node::Negate(operand) => {
             let x = range(operand, variables);
-            Interval { low: -x.high, high: -x.low }
+            ValueRange { low: -x.high, high: -x.low }
         }
         Node::Binary(operator, _, left, right) => {
             let (x, y) = (range(left, variables), range(right, variables));
             match operator {
-                Operator::Add => Interval::of([x.low + y.low, x.high + y.high]),
-                Operator::Subtract => Interval::of([x.low - y.high, x.high - y.low]),
+                Operator::Add => ValueRange::of([x.low + y.low, x.high + y.high]),
+                Operator::Subtract => ValueRange::of([x.low - y.high, x.high - y.low]),
                 Operator::Multiply => corners(x, y, product),
-                Operator::Divide if y.holds(0.0) => Interval::EVERYTHING,
+                Operator::Divide if y.holds(0.0) => ValueRange::EVERYTHING,
                 Operator::Divide => corners(x, y, |x, y| if y.is_infinite() { 0.0 } else { x / y }),
                 Operator::Power => power(x, y),
             }
         }
         Node::Call(function, _, arguments) => {
             let x = range(&arguments[0], variables);
-            let y = arguments.get(1).map_or(Interval::at(0.0), |y| range(y, variables));
+            let y = arguments.get(1).map_or(ValueRange::at(0.0), |y| range(y, variables));
             match *function {
-                "abs" if x.holds(0.0) => Interval { low: 0.0, high: x.size() },
-                "abs" => Interval::of([x.low.abs(), x.high.abs()]),
-                "sin" | "cos" => Interval { low: -1.0, high: 1.0 },
-                "tan" => Interval::EVERYTHING,
+                "abs" if x.holds(0.0) => ValueRange { low: 0.0, high: x.size() },
+                "abs" => ValueRange::of([x.low.abs(), x.high.abs()]),
+                "sin" | "cos" => ValueRange { low: -1.0, high: 1.0 },
+                "tan" => ValueRange::EVERYTHING,
                 "pow" => power(x, y),
                 "min" | "max" => corners(x, y, |x, y| call(function, x, y)),
                 // All the others grow with their argument.
-                _ => Interval::of([call(function, x.low, 0.0), call(function, x.high, 0.0)]),
+                _ => ValueRange::of([call(function, x.low, 0.0), call(function, x.high, 0.0)]),
             }
         }
         // A lag and a play stay where their argument has been.
@@ -251,14 +251,14 @@ fn range(node: &Node, variables: &[Interval]) -> Interval {
     }
 }
 
-fn power(x: Interval, y: Interval) -> Interval {
+fn power(x: ValueRange, y: ValueRange) -> ValueRange {
     let whole = y.low == y.high && y.low.fract() == 0.0 && y.low >= 0.0;
     if whole {
-        let ends = Interval::of([x.low.powf(y.low), x.high.powf(y.low)]);
+        let ends = ValueRange::of([x.low.powf(y.low), x.high.powf(y.low)]);
         let even = y.low % 2.0 == 0.0 && y.low > 0.0;
-        return if even && x.holds(0.0) { Interval { low: 0.0, ..ends } } else { ends };
+        return if even && x.holds(0.0) { ValueRange { low: 0.0, ..ends } } else { ends };
     }
-    if x.low > 0.0 { corners(x, y, f64::powf) } else { Interval::EVERYTHING }
+    if x.low > 0.0 { corners(x, y, f64::powf) } else { ValueRange::EVERYTHING }
 }
 
 #[cfg(test)]
@@ -312,15 +312,15 @@ mod tests {
     #[test]
     fn ranges_hold_every_value_and_are_tight_where_a_variable_occurs_once() {
         let of =
-            |source: &str, low: f64, high: f64| Expression::parse(source).unwrap().range(&[Interval { low, high }]);
-        assert_eq!(of("3*tanh(x)", f64::NEG_INFINITY, f64::INFINITY), Interval { low: -3.0, high: 3.0 });
-        assert_eq!(of("x^2", -2.0, 1.0), Interval { low: 0.0, high: 4.0 });
-        assert_eq!(of("lag(max(x, 0), 5)", -2.0, 1.0), Interval { low: 0.0, high: 1.0 });
-        assert_eq!(of("1/x", -1.0, 1.0), Interval::EVERYTHING);
+            |source: &str, low: f64, high: f64| Expression::parse(source).unwrap().range(&[ValueRange { low, high }]);
+        assert_eq!(of("3*tanh(x)", f64::NEG_INFINITY, f64::INFINITY), ValueRange { low: -3.0, high: 3.0 });
+        assert_eq!(of("x^2", -2.0, 1.0), ValueRange { low: 0.0, high: 4.0 });
+        assert_eq!(of("lag(max(x, 0), 5)", -2.0, 1.0), ValueRange { low: 0.0, high: 1.0 });
+        assert_eq!(of("1/x", -1.0, 1.0), ValueRange::EVERYTHING);
         assert_eq!(of("x - lag(x, 5)", f64::NEG_INFINITY, f64::INFINITY).size(), f64::INFINITY);
         for source in ["abs(x)*x", "softplus(x) - x/3", "exp(-x)*sin(x)", "x*x*x"] {
             let e = Expression::parse(source).unwrap();
-            let bounds = e.range(&[Interval { low: -1.5, high: 2.5 }]);
+            let bounds = e.range(&[ValueRange { low: -1.5, high: 2.5 }]);
             for k in 0..=40 {
                 let value = e.evaluate(&[-1.5 + 0.1 * f64::from(k)]);
                 assert!(bounds.low <= value + 1e-12 && value <= bounds.high + 1e-12, "{source} {value} {bounds:?}");

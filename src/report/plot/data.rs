@@ -5,8 +5,8 @@ use plotters::style::RGBColor;
 use serde_json::{Value, json};
 
 use super::draw::{FINE, colour};
-use super::layout::Layout;
-use super::{Along, Chart, Series, Shape};
+use super::layout::ChartLayout;
+use super::{Along, Chart, ChartSeries, Shape};
 use crate::text::sink::JsonText;
 
 /// A line has at most so many points in the data: first, lowest, highest and last of a quarter as many stretches.
@@ -56,7 +56,7 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     kept
 }
 
-fn series(index: usize, series: &Series) -> Value {
+fn series(index: usize, series: &ChartSeries) -> Value {
     let is_line = matches!(series.shape, Shape::Line | Shape::Step | Shape::Dashed);
     let points = if is_line { thinned(&series.points) } else { series.points.clone() };
     let numbers = |of: &[f64]| of.iter().copied().map(number).collect::<Vec<Value>>();
@@ -74,7 +74,7 @@ fn series(index: usize, series: &Series) -> Value {
 }
 
 /// An attribute with the chart's data, in the picture's own units where it says where something is.
-pub(super) fn attribute(chart: &Chart, layout: &Layout) -> String {
+pub(super) fn attribute(chart: &Chart, layout: &ChartLayout) -> String {
     let along = |of: Along| if of == Along::X { "x" } else { "y" };
     let frame = [layout.left, layout.top, layout.right, layout.bottom].map(|px| px * FINE);
     let plot = json!({

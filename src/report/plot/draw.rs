@@ -6,8 +6,8 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::axis::three_digits;
-use super::layout::{Layout, LegendShape, MARK_ROW_PX, ROW_PX, TEXT_PX, text_width_px};
-use super::{Along, Chart, Series, Shape};
+use super::layout::{ChartLayout, LegendShape, MARK_ROW_PX, ROW_PX, TEXT_PX, text_width_px};
+use super::{Along, Chart, ChartSeries, Shape};
 use super::{data, labels};
 use crate::text::sink::Markup;
 
@@ -57,7 +57,7 @@ fn text<'a>(words: &'a str, x_px: i32, y_px: i32, h: HPos, v: VPos) -> Text<'a, 
 }
 
 pub(super) fn svg(chart: &Chart, to_read: bool) -> String {
-    let layout = Layout::new(chart);
+    let layout = ChartLayout::new(chart);
     let (width, height) = (chart.width_px, layout.height as u32);
     let drawn = |what: &dyn Fn(&Area) -> Drawn| {
         let mut out = String::new();
@@ -100,7 +100,7 @@ pub(in crate::report) const STYLE: &str = "svg.chart{color:#1b1f24;background:#f
     @media(prefers-color-scheme:dark){svg.chart{color:#e3e6ea;background:#15181c}svg.chart text{stroke:#15181c}}\
     @media print{svg.chart{color:#000;background:#fff}svg.chart text{stroke:#fff}}";
 
-fn draw(chart: &Chart, layout: &Layout, root: &Area) -> Drawn {
+fn draw(chart: &Chart, layout: &ChartLayout, root: &Area) -> Drawn {
     let lying = !chart.categories.is_empty();
     for band in &chart.bands {
         draw_band(chart, layout, root, band, lying)?;
@@ -121,7 +121,7 @@ fn draw(chart: &Chart, layout: &Layout, root: &Area) -> Drawn {
 }
 
 /// Title and legend.
-fn draw_words(chart: &Chart, layout: &Layout, root: &Area) -> Drawn {
+fn draw_words(chart: &Chart, layout: &ChartLayout, root: &Area) -> Drawn {
     if !chart.title.is_empty() {
         let style = TextStyle::from(("sans-serif", f64::from(15 * FINE) * 1.24, FontStyle::Bold).into_font())
             .color(&INK)
@@ -159,7 +159,7 @@ fn draw_words(chart: &Chart, layout: &Layout, root: &Area) -> Drawn {
     Ok(())
 }
 
-fn draw_frame(chart: &Chart, layout: &Layout, root: &Area) -> Drawn {
+fn draw_frame(chart: &Chart, layout: &ChartLayout, root: &Area) -> Drawn {
     let lying = !chart.categories.is_empty();
     let (left, right) = (f64::from(layout.left), f64::from(layout.right));
     let (top, bottom) = (f64::from(layout.top), f64::from(layout.bottom));
@@ -190,7 +190,7 @@ fn draw_frame(chart: &Chart, layout: &Layout, root: &Area) -> Drawn {
     root.draw(&Text::new(y_label, (6 * FINE, (layout.top + layout.bottom) / 2 * FINE), style))
 }
 
-fn draw_band(chart: &Chart, layout: &Layout, root: &Area, band: &super::Band, lying: bool) -> Drawn {
+fn draw_band(chart: &Chart, layout: &ChartLayout, root: &Area, band: &super::Band, lying: bool) -> Drawn {
     let (from, to) = (band.from.min(band.to), band.from.max(band.to));
     let corners = match band.along {
         Along::X => {
@@ -205,7 +205,7 @@ fn draw_band(chart: &Chart, layout: &Layout, root: &Area, band: &super::Band, ly
     root.draw(&Rectangle::new(corners, colour(chart.hue_of(band)).mix(0.18).filled()))
 }
 
-fn draw_marks(chart: &Chart, layout: &Layout, root: &Area, lying: bool) -> Drawn {
+fn draw_marks(chart: &Chart, layout: &ChartLayout, root: &Area, lying: bool) -> Drawn {
     let line = INK.mix(0.55).stroke_width(FINE as u32);
     let dash = |from: (i32, i32), to: (i32, i32)| DashedPathElement::new([from, to], 5 * FINE, 4 * FINE, line);
     for (mark, word) in chart.marks.iter().zip(&layout.mark_words) {
@@ -251,9 +251,9 @@ fn draw_run(
 /// Draws one series; whether there was anything to draw.
 fn draw_series(
     chart: &Chart,
-    layout: &Layout,
+    layout: &ChartLayout,
     root: &Area,
-    series: &Series,
+    series: &ChartSeries,
     index: usize,
 ) -> Result<bool, DrawingAreaErrorKind<std::io::Error>> {
     let hue = colour(index);
@@ -320,8 +320,8 @@ fn draw_series(
 }
 
 /// Where a lying bar is [px]: its ends and its middle across.
-fn bar(chart: &Chart, layout: &Layout, index: usize, value: f64, category: f64) -> (f64, f64, f64) {
-    let bars = |of: &[Series]| of.iter().filter(|s| s.shape == Shape::Bars).count() as f64;
+fn bar(chart: &Chart, layout: &ChartLayout, index: usize, value: f64, category: f64) -> (f64, f64, f64) {
+    let bars = |of: &[ChartSeries]| of.iter().filter(|s| s.shape == Shape::Bars).count() as f64;
     let zero = layout.x_px(layout.x.base(&chart.x));
     let x = layout.x_px(chart.x.position(value));
     let middle =
@@ -330,7 +330,7 @@ fn bar(chart: &Chart, layout: &Layout, index: usize, value: f64, category: f64) 
 }
 
 /// The numbers at the ends of lying bars.
-fn draw_bars_words(chart: &Chart, layout: &Layout, root: &Area) -> Drawn {
+fn draw_bars_words(chart: &Chart, layout: &ChartLayout, root: &Area) -> Drawn {
     for (index, series) in chart.series.iter().enumerate().filter(|(_, s)| s.shape == Shape::Bars) {
         for &(value, category) in series.points.iter().filter(|p| chart.x.admits(p.0)) {
             let (from, to, middle) = bar(chart, layout, index, value, category);
@@ -347,7 +347,7 @@ fn draw_bars_words(chart: &Chart, layout: &Layout, root: &Area) -> Drawn {
 }
 
 /// The words beside points.
-fn draw_labels(chart: &Chart, layout: &Layout, root: &Area) -> Drawn {
+fn draw_labels(chart: &Chart, layout: &ChartLayout, root: &Area) -> Drawn {
     for (series, places) in chart.series.iter().zip(labels::places(chart, layout)) {
         for ((word, point), place) in series.labels.iter().zip(&series.points).zip(places) {
             let Some(place) = place else { continue };

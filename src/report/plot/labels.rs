@@ -1,6 +1,6 @@
 //! Words beside points: where they go so that none lies on another, on a point, or outside the frame.
 
-use super::layout::{Layout, TEXT_PX, text_width_px};
+use super::layout::{ChartLayout, TEXT_PX, text_width_px};
 use super::{Chart, Shape};
 
 /// Free space between a point and its word [px].
@@ -15,7 +15,7 @@ type Area = [f64; 4];
 
 /// Where a word stands [px]: left edge, middle; whether it is so far from its point that a line should lead to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Place {
+pub(super) struct LabelPlace {
     pub(super) left: f64,
     pub(super) middle: f64,
     pub(super) is_far: bool,
@@ -26,7 +26,7 @@ fn overlap(a: &Area, b: &Area) -> bool {
 }
 
 /// For each series, for each of its points, where the word goes; none where there is no word or no point to see.
-pub(super) fn places(chart: &Chart, layout: &Layout) -> Vec<Vec<Option<Place>>> {
+pub(super) fn places(chart: &Chart, layout: &ChartLayout) -> Vec<Vec<Option<LabelPlace>>> {
     let at = |p: &(f64, f64)| {
         (chart.x.admits(p.0) && chart.y.admits(p.1))
             .then(|| (layout.x_px(chart.x.position(p.0)), layout.y_px(chart.y.position(p.1), false)))
@@ -34,7 +34,7 @@ pub(super) fn places(chart: &Chart, layout: &Layout) -> Vec<Vec<Option<Place>>> 
     let points = chart.series.iter().filter(|s| s.shape == Shape::Points).flat_map(|s| s.points.iter().filter_map(at));
     let mut taken: Vec<Area> = points.map(|(x, y)| [x - POINT_PX, y - POINT_PX, x + POINT_PX, y + POINT_PX]).collect();
     let frame = [layout.left, layout.top, layout.right, layout.bottom].map(f64::from);
-    let mut place = |x: f64, y: f64, word: &str| -> Place {
+    let mut place = |x: f64, y: f64, word: &str| -> LabelPlace {
         let (wide, high) = (f64::from(text_width_px(word)), f64::from(TEXT_PX) + 2.0);
         let area = |left: f64, middle: f64| [left, middle - high / 2.0, left + wide, middle + high / 2.0];
         let sides = [x + GAP_PX, x - GAP_PX - wide, x - wide / 2.0];
@@ -55,12 +55,13 @@ pub(super) fn places(chart: &Chart, layout: &Layout) -> Vec<Vec<Option<Place>>> 
         let found = all.map(|(left, row)| (left, y + row * high, row)).find(|(left, y, _)| fits(&area(*left, *y)));
         let (left, middle, row) = found.unwrap_or((sides[0], y, 0.0));
         taken.push(area(left, middle));
-        Place { left, middle, is_far: row.abs() > 1.3 }
+        LabelPlace { left, middle, is_far: row.abs() > 1.3 }
     };
-    let of = |series: &super::Series, place: &mut dyn FnMut(f64, f64, &str) -> Place| -> Vec<Option<Place>> {
-        let words = series.labels.iter().zip(&series.points);
-        words.map(|(word, point)| at(point).map(|(x, y)| place(x, y, word))).collect()
-    };
+    let of =
+        |series: &super::ChartSeries, place: &mut dyn FnMut(f64, f64, &str) -> LabelPlace| -> Vec<Option<LabelPlace>> {
+            let words = series.labels.iter().zip(&series.points);
+            words.map(|(word, point)| at(point).map(|(x, y)| place(x, y, word))).collect()
+        };
     chart
         .series
         .iter()
@@ -70,7 +71,7 @@ pub(super) fn places(chart: &Chart, layout: &Layout) -> Vec<Vec<Option<Place>>> 
 
 /// Left and upper edge [px] of the word on a level mark at the height `y`: above it or below, further right or left, where it
 /// covers least of what is drawn.
-pub(super) fn along_a_mark(chart: &Chart, layout: &Layout, word: &str, y: f64) -> (i32, i32) {
+pub(super) fn along_a_mark(chart: &Chart, layout: &ChartLayout, word: &str, y: f64) -> (i32, i32) {
     let (wide, high) = (text_width_px(word), TEXT_PX + 3);
     let free = (layout.right - layout.left - wide - 8).max(0);
     let lines = chart.series.iter().filter(|s| !matches!(s.shape, Shape::Bars | Shape::Cells | Shape::Histogram));
@@ -92,14 +93,15 @@ pub(super) fn along_a_mark(chart: &Chart, layout: &Layout, word: &str, y: f64) -
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Axis, Series};
+    use super::super::{Axis, ChartSeries};
     use super::*;
 
     #[test]
     fn a_word_on_a_mark_keeps_clear_of_a_line_that_crosses_its_end() {
         let line: Vec<(f64, f64)> = (0..400).map(|i| (f64::from(i), if i < 200 { -8.0 } else { 1.0 })).collect();
-        let chart = Chart::new("x").with(Series::line("", line)).mark(super::super::Mark::horizontal("limit", 0.5));
-        let layout = Layout::new(&chart);
+        let chart =
+            Chart::new("x").with(ChartSeries::line("", line)).mark(super::super::Mark::horizontal("limit", 0.5));
+        let layout = ChartLayout::new(&chart);
         let y = layout.y_px(chart.y.position(0.5), false);
         let (left, top) = along_a_mark(&chart, &layout, "limit", y);
         assert!(top < y as i32 && left + text_width_px("limit") <= (layout.left + layout.right) / 2, "{left} {top}");
@@ -113,11 +115,11 @@ mod tests {
         let chart = Chart::new("x")
             .x(Axis::linear("climb").reaching(0.0))
             .y(Axis::log("rate"))
-            .with(Series::points("", points).labelled(names.map(str::to_owned).to_vec()));
-        let layout = Layout::new(&chart);
-        let found: Vec<Place> = places(&chart, &layout)[0].iter().map(|p| p.unwrap()).collect();
+            .with(ChartSeries::points("", points).labelled(names.map(str::to_owned).to_vec()));
+        let layout = ChartLayout::new(&chart);
+        let found: Vec<LabelPlace> = places(&chart, &layout)[0].iter().map(|p| p.unwrap()).collect();
         let area = |i: usize| {
-            let Place { left, middle, .. } = found[i];
+            let LabelPlace { left, middle, .. } = found[i];
             [left, middle - 6.0, left + f64::from(text_width_px(names[i])), middle + 6.0]
         };
         for (i, name) in names.iter().enumerate() {

@@ -15,7 +15,7 @@ pub(super) fn text_width_px(text: &str) -> i32 {
 }
 
 /// Where things are [px].
-pub(super) struct Layout {
+pub(super) struct ChartLayout {
     pub(super) left: i32,
     pub(super) top: i32,
     pub(super) right: i32,
@@ -91,7 +91,7 @@ fn make_room_for_numbers(x: &mut Ruler, chart: &Chart) {
     x.ticks.retain(|t| t.position >= x.low && t.position <= x.high);
 }
 
-impl Layout {
+impl ChartLayout {
     pub(super) fn new(chart: &Chart) -> Self {
         let width = chart.width_px as i32;
         let title = if chart.title.is_empty() { 8 } else { 34 };

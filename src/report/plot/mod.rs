@@ -1,17 +1,17 @@
 //! Charts as SVG: say what is to be seen, get a picture that is finished.
 //!
-//! A [`Chart`] takes two [`Axis`] and any number of [`Series`], marks and bands, and finds by itself where the axes
+//! A [`Chart`] takes two [`Axis`] and any number of [`ChartSeries`], marks and bands, and finds by itself where the axes
 //! end, which numbers stand along them, where the legend goes, and how many points a line needs. The text and the
 //! lines of the frame take the reader's colour (light or dark), the series have colours that are legible on both. The
 //! same chart gives the same bytes.
 //!
 //! ```
-//! use coilwright::report::plot::{Axis, Chart, Mark, Series};
+//! use coilwright::report::plot::{Axis, Chart, ChartSeries, Mark};
 //! let svg = Chart::new("Rate error during a ramp")
 //!     .x(Axis::linear("time [min]"))
 //!     .y(Axis::linear("rate error [°/h]"))
-//!     .with(Series::line("quadrupole", vec![(0.0, 0.0), (5.0, 2.1), (25.0, 0.3)]))
-//!     .with(Series::line("searched", vec![(0.0, 0.0), (5.0, 0.2), (25.0, 0.0)]))
+//!     .with(ChartSeries::line("quadrupole", vec![(0.0, 0.0), (5.0, 2.1), (25.0, 0.3)]))
+//!     .with(ChartSeries::line("searched", vec![(0.0, 0.0), (5.0, 0.2), (25.0, 0.0)]))
 //!     .mark(Mark::vertical("ramp ends", 20.0))
 //!     .svg();
 //! assert!(svg.starts_with("<svg") && svg.contains("rate error [°/h]"));
@@ -48,7 +48,7 @@ enum Shape {
 
 /// One set of numbers under one name.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Series {
+pub struct ChartSeries {
     name: String,
     shape: Shape,
     points: Vec<(f64, f64)>,
@@ -63,7 +63,7 @@ pub struct Series {
     least: f64,
 }
 
-impl Series {
+impl ChartSeries {
     /// A continuous line through the points in their order.
     pub fn line(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
         Self::of(name, Shape::Line, points)
@@ -198,7 +198,7 @@ pub struct Chart {
     height_px: u32,
     x: Axis,
     y: Axis,
-    series: Vec<Series>,
+    series: Vec<ChartSeries>,
     marks: Vec<Mark>,
     bands: Vec<Band>,
     categories: Vec<String>,
@@ -239,7 +239,7 @@ impl Chart {
     }
 
     /// Adds a series; colours follow the order.
-    pub fn with(mut self, series: Series) -> Self {
+    pub fn with(mut self, series: ChartSeries) -> Self {
         self.series.push(series);
         self
     }
@@ -256,7 +256,7 @@ impl Chart {
         self
     }
 
-    /// Names along the vertical axis, from the top, for [`Series::bars`]; the height follows their number.
+    /// Names along the vertical axis, from the top, for [`ChartSeries::bars`]; the height follows their number.
     pub(crate) fn categories(mut self, names: impl IntoIterator<Item = impl Into<String>>) -> Self {
         self.categories = names.into_iter().map(Into::into).collect();
         self
@@ -286,7 +286,7 @@ mod tests {
 
     #[test]
     fn the_same_chart_gives_the_same_bytes() {
-        let chart = Chart::new("a < b & c").with(Series::line("x", vec![(0.0, 1.0), (1.0, f64::NAN), (2.0, 3.0)]));
+        let chart = Chart::new("a < b & c").with(ChartSeries::line("x", vec![(0.0, 1.0), (1.0, f64::NAN), (2.0, 3.0)]));
         assert_eq!(chart.svg(), chart.svg());
         assert!(chart.svg().contains("a &lt; b &amp; c"));
     }
@@ -294,7 +294,7 @@ mod tests {
     #[test]
     fn a_chart_to_read_says_where_its_axes_are_whatever_its_names_hold() {
         let hostile = "'><script>\"&";
-        let chart = Chart::new("x").y(Axis::log("y")).with(Series::line(hostile, vec![(0.0, 1.0), (1.0, 100.0)]));
+        let chart = Chart::new("x").y(Axis::log("y")).with(ChartSeries::line(hostile, vec![(0.0, 1.0), (1.0, 100.0)]));
         let drawn = chart.svg_to_read();
         assert!(!drawn.contains("<script>"));
         let held = drawn.split("data-plot='").nth(1).and_then(|rest| rest.split('\'').next()).unwrap();
@@ -308,12 +308,12 @@ mod tests {
     #[test]
     fn a_line_of_a_million_points_stays_a_small_file() {
         let points = (0..1_000_000).map(|i| (f64::from(i), (f64::from(i) * 0.01).sin())).collect();
-        assert!(Chart::new("").with(Series::line("x", points)).svg().len() < 200_000);
+        assert!(Chart::new("").with(ChartSeries::line("x", points)).svg().len() < 200_000);
     }
 
     #[test]
     fn errors_of_either_sign_stand_on_one_logarithmic_scale_by_their_size() {
-        let series = Series::line("x", vec![(0.0, -10.0), (1.0, 0.0), (2.0, 0.1)]);
+        let series = ChartSeries::line("x", vec![(0.0, -10.0), (1.0, 0.0), (2.0, 0.1)]);
         let drawn = Chart::new("x").y(Axis::sizes("|y|", 0.01)).with(series).svg_to_read();
         assert!(drawn.contains("\"floor\":0.01") && drawn.contains("\"y\":[-10,0,0.1]"), "{drawn}");
     }
@@ -321,6 +321,6 @@ mod tests {
     #[test]
     fn a_chart_without_data_says_so() {
         assert!(Chart::new("empty").svg().contains("no data"));
-        assert!(Chart::new("nan").with(Series::points("x", vec![(f64::NAN, 1.0)])).svg().contains("no data"));
+        assert!(Chart::new("nan").with(ChartSeries::points("x", vec![(f64::NAN, 1.0)])).svg().contains("no data"));
     }
 }

@@ -1,6 +1,6 @@
 //! The chapter's numbers one by one: what is printed, what comes out, and why they differ.
 
-use super::{BAND_BIT, BAND_DEG_PER_S, Comparison, LINES, in_deg_per_s};
+use super::{BAND_BIT, BAND_DEG_PER_S, LINES, PrintedComparison, in_deg_per_s};
 use crate::compensate::empirical::PiecewiseBias;
 use crate::metrics::{Metrics, TemperaturePoint};
 use crate::units::{
@@ -14,7 +14,7 @@ const OUTPUTS: f64 = 100.0;
 const MIDDLE_C: f64 = 25.0;
 
 /// What the simulated record shows.
-pub(super) struct Found<'f> {
+pub(super) struct SimulatedMeasures<'f> {
     pub(crate) measured: &'f Metrics,
     pub(crate) left: &'f Metrics,
     pub(crate) lines: &'f PiecewiseBias,
@@ -32,8 +32,8 @@ pub(super) struct Found<'f> {
 
 /// Each number of the chapter beside the computed one.
 #[expect(clippy::too_many_lines, reason = "a row for each number of the chapter, in the chapter's order")]
-pub(super) fn comparisons(found: &Found) -> Vec<Comparison> {
-    let row = |place, what, unit, published: Option<f64>, computed, explanation| Comparison {
+pub(super) fn comparisons(found: &SimulatedMeasures) -> Vec<PrintedComparison> {
+    let row = |place, what, unit, published: Option<f64>, computed, explanation| PrintedComparison {
         place,
         what,
         unit,

@@ -13,19 +13,19 @@ pub(super) fn uniform(random: &mut ChaCha8Rng) -> f64 {
 
 /// What the winding shop puts up with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Limits {
+pub struct WindingLimits {
     pub(crate) class: WindabilityClass,
     /// No crossover may climb more layers.
     pub(crate) most_climb: Option<usize>,
 }
 
-impl From<WindabilityClass> for Limits {
+impl From<WindabilityClass> for WindingLimits {
     fn from(class: WindabilityClass) -> Self {
         Self { class, most_climb: None }
     }
 }
 
-impl Limits {
+impl WindingLimits {
     pub(crate) fn admits(self, segments: &[usize]) -> bool {
         let in_class = match self.class {
             WindabilityClass::Standard => signs_of_segments(segments).is_some(),
@@ -59,8 +59,8 @@ pub(super) fn most_captive(segments: &[usize]) -> usize {
 
 /// A pattern within the limits drawn at random; `captive:K` starts from a standard one, and where climbs are limited a
 /// random walk starts from the cylindrical winding, which climbs least.
-pub(crate) fn draw(limits: impl Into<Limits>, layers: usize, random: &mut ChaCha8Rng) -> Vec<usize> {
-    let limits: Limits = limits.into();
+pub(crate) fn draw(limits: impl Into<WindingLimits>, layers: usize, random: &mut ChaCha8Rng) -> Vec<usize> {
+    let limits: WindingLimits = limits.into();
     if limits.most_climb.is_some() {
         let mut segments: Vec<usize> = (1..=layers).collect();
         for _ in 0..STEPS_A_LAYER * layers {
@@ -91,7 +91,7 @@ pub(crate) fn pick(random: &mut ChaCha8Rng, count: usize) -> usize {
 const STEPS_A_LAYER: usize = 32;
 
 /// One end or two of a standard pattern; three swaps to one insertion elsewhere. `None` if it would leave the limits.
-pub(crate) fn neighbour(limits: Limits, segments: &[usize], random: &mut ChaCha8Rng) -> Option<Vec<usize>> {
+pub(crate) fn neighbour(limits: WindingLimits, segments: &[usize], random: &mut ChaCha8Rng) -> Option<Vec<usize>> {
     let layers = segments.len();
     let is_within = |candidate: &Vec<usize>| limits.admits(candidate);
     if limits.class == WindabilityClass::Standard {

@@ -15,13 +15,13 @@
 
 use rand_chacha::ChaCha8Rng;
 
-use super::limits::{Limits, draw, neighbour};
+use super::limits::{WindingLimits, draw, neighbour};
 use super::restart::generator;
 use super::rounds;
 use crate::search::cost::columns::Work;
 use crate::search::cost::objective::Objective;
 use crate::search::cost::sampled_coils::{QuantileWorst, SampledCoils};
-use crate::search::cost::{Cost, InFull, Pace, Position, Proposal};
+use crate::search::cost::{Cost, InFull, MoveProposal, Pace, Position};
 
 /// Coils that the rounds of a search run on; what they find is refined and judged on all of them.
 const COILS_THAT_TELL: usize = 40;
@@ -45,11 +45,11 @@ impl Objective {
 #[derive(Debug, Clone)]
 pub(crate) struct QuantileCost {
     coils: SampledCoils,
-    limits: Limits,
+    limits: WindingLimits,
 }
 
 impl QuantileCost {
-    pub(crate) fn new(coils: SampledCoils, limits: impl Into<Limits>) -> Self {
+    pub(crate) fn new(coils: SampledCoils, limits: impl Into<WindingLimits>) -> Self {
         Self { coils, limits: limits.into() }
     }
 }
@@ -73,12 +73,12 @@ impl Position<QuantileCost> for QuantilePosition {
         self.segments.clone()
     }
 
-    fn propose(&mut self, cost: &QuantileCost, random: &mut ChaCha8Rng, limit: f64) -> Proposal {
+    fn propose(&mut self, cost: &QuantileCost, random: &mut ChaCha8Rng, limit: f64) -> MoveProposal {
         self.moves += 1;
-        let Some(candidate) = neighbour(cost.limits, &self.segments, random) else { return Proposal::Outside };
+        let Some(candidate) = neighbour(cost.limits, &self.segments, random) else { return MoveProposal::Outside };
         let proposed = self.worst.propose(&cost.coils, &candidate, limit);
         self.candidate = candidate;
-        proposed.map_or(Proposal::Refused, Proposal::Within)
+        proposed.map_or(MoveProposal::Refused, MoveProposal::Within)
     }
 
     fn accept(&mut self, _cost: &QuantileCost) {

@@ -17,7 +17,7 @@ use rand_chacha::rand_core::SeedableRng;
 
 use super::limits::uniform;
 use crate::search::cost::columns::Work;
-use crate::search::cost::{Cost, Position, Proposal};
+use crate::search::cost::{Cost, MoveProposal, Position};
 
 /// A geometric cooling schedule; temperatures in the unit of the cost.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -90,7 +90,7 @@ impl Restart {
             while self.moves < pause {
                 self.moves += 1;
                 let limit = position.cost() - temperature * libm::log(uniform(&mut self.random));
-                if let Proposal::Within(_) = position.propose(cost, &mut self.random, limit) {
+                if let MoveProposal::Within(_) = position.propose(cost, &mut self.random, limit) {
                     position.accept(cost);
                     if position.cost() < self.best_cost {
                         (self.best_cost, self.best_segments) = (position.cost(), position.segments());
@@ -113,10 +113,10 @@ pub fn cooling_for<C: Cost>(cost: &C, seed: u64, moves: u64) -> Cooling {
         let mut position = cost.at(&cost.draw(&mut random));
         for _ in 0..C::PACE.probed_moves {
             let changed = match position.propose(cost, &mut random, f64::INFINITY) {
-                Proposal::Outside => continue,
+                MoveProposal::Outside => continue,
                 // A cost that is no number changes nothing.
-                Proposal::Refused => position.cost(),
-                Proposal::Within(changed) => {
+                MoveProposal::Refused => position.cost(),
+                MoveProposal::Within(changed) => {
                     position.refuse(cost);
                     changed
                 }

@@ -97,7 +97,7 @@ impl Stop {
 
 /// A pattern that was found, judged on all samples.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found {
+pub struct FoundPattern {
     /// In the cost's unit.
     pub cost: f64,
     /// P(j), innermost layer first.
@@ -120,7 +120,7 @@ pub struct State {
     pub round: u64,
     pub(crate) restarts: Vec<Restart>,
     /// Best first, no two alike, at most [`MOST_FOUND`].
-    pub found: Vec<Found>,
+    pub found: Vec<FoundPattern>,
     /// Since something better was found.
     pub rounds_without_improvement: u64,
     /// Indices of the samples that the restarts run on, those that bind most first.
@@ -161,7 +161,7 @@ impl State {
     }
 
     /// Puts a pattern in its place among the best.
-    pub(super) fn keep(&mut self, found: Found) {
+    pub(super) fn keep(&mut self, found: FoundPattern) {
         if !self.found.iter().any(|f| f.segments == found.segments) {
             let at = self.found.partition_point(|f| (f.cost, &f.segments) < (found.cost, &found.segments));
             self.found.insert(at, found);
@@ -228,13 +228,13 @@ pub trait Rounds {
     fn is_approximated(&self) -> bool;
 
     /// A pattern judged on all samples.
-    fn judged(&self, segments: &[usize]) -> Found;
+    fn judged(&self, segments: &[usize]) -> FoundPattern;
 
     /// What short restarts find that begin, hardly warm, at given patterns: each judged on all samples.
-    fn refined(&self, starts: &[Vec<usize>], moves: u64) -> Vec<Found>;
+    fn refined(&self, starts: &[Vec<usize>], moves: u64) -> Vec<FoundPattern>;
 
     /// The best pattern so far, if a round has ended or a start was given.
-    fn best(&self) -> Option<&Found> {
+    fn best(&self) -> Option<&FoundPattern> {
         self.state().found.first()
     }
 
@@ -319,7 +319,7 @@ impl<C: Cost> Optimisation<C> {
     /// Judges a pattern on all samples and keeps it if it is among the best; the samples that exceed the working set.
     fn judge(&mut self, segments: &[usize]) -> Vec<usize> {
         let InFull { cost, segments, joining } = self.full.in_full(segments, &self.state.working);
-        self.state.keep(Found { cost, segments });
+        self.state.keep(FoundPattern { cost, segments });
         joining
     }
 
@@ -379,12 +379,12 @@ impl<C: Cost> Rounds for Optimisation<C> {
         self.full.is_approximated()
     }
 
-    fn judged(&self, segments: &[usize]) -> Found {
+    fn judged(&self, segments: &[usize]) -> FoundPattern {
         let InFull { cost, segments, .. } = self.full.in_full(segments, &self.state.working);
-        Found { cost, segments }
+        FoundPattern { cost, segments }
     }
 
-    fn refined(&self, starts: &[Vec<usize>], moves: u64) -> Vec<Found> {
+    fn refined(&self, starts: &[Vec<usize>], moves: u64) -> Vec<FoundPattern> {
         let refine = |cost: &C, stream: usize, start: &[usize]| {
             let hot = WARMTH * self.full.in_full(start, &[]).cost;
             let cooling = Cooling { hot, cold: hot * COLD_OVER_WARM, moves };
@@ -411,7 +411,7 @@ impl<C: Cost> Rounds for Optimisation<C> {
                 let InFull { cost, segments: kept, joining } = self.full.in_full(segments, &working);
                 working.extend(joining);
                 segments.clone_from(&kept);
-                found.push(Found { cost, segments: kept });
+                found.push(FoundPattern { cost, segments: kept });
             }
             working.sort_unstable();
             working.dedup();

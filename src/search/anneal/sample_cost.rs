@@ -11,9 +11,9 @@ use super::restart::generator;
 use super::walk::{Space, Walk};
 use crate::pattern::windability::WindabilityClass;
 use crate::rate::LayerWeights;
-use crate::search::cost::columns::{BLOCK, Norm, Values, Work};
+use crate::search::cost::columns::{BLOCK, Norm, SampleValues, Work};
 use crate::search::cost::samples::SampleMatrix;
-use crate::search::cost::{Cost, InFull, Pace, Position, Proposal};
+use crate::search::cost::{Cost, InFull, MoveProposal, Pace, Position};
 
 /// A norm of all samples.
 #[derive(Debug, Clone)]
@@ -51,7 +51,7 @@ impl SampleCost {
 #[derive(Debug, Clone)]
 pub struct SamplePosition {
     walk: Walk,
-    values: Values,
+    values: SampleValues,
 }
 
 impl Position<SampleCost> for SamplePosition {
@@ -63,13 +63,13 @@ impl Position<SampleCost> for SamplePosition {
         self.walk.segments()
     }
 
-    fn propose(&mut self, cost: &SampleCost, random: &mut ChaCha8Rng, limit: f64) -> Proposal {
-        let Some(changes) = self.walk.propose(&cost.space, random) else { return Proposal::Outside };
+    fn propose(&mut self, cost: &SampleCost, random: &mut ChaCha8Rng, limit: f64) -> MoveProposal {
+        let Some(changes) = self.walk.propose(&cost.space, random) else { return MoveProposal::Outside };
         match self.values.propose(cost.space.columns(), changes, limit) {
-            Some(proposed) => Proposal::Within(proposed),
+            Some(proposed) => MoveProposal::Within(proposed),
             None => {
                 self.walk.refuse(&cost.space);
-                Proposal::Refused
+                MoveProposal::Refused
             }
         }
     }
@@ -111,7 +111,7 @@ impl Cost for SampleCost {
 
     fn at(&self, segments: &[usize]) -> SamplePosition {
         let walk = self.space.walk(segments.to_vec());
-        let values = Values::new(self.space.columns(), walk.coefficients(), self.norm);
+        let values = SampleValues::new(self.space.columns(), walk.coefficients(), self.norm);
         SamplePosition { walk, values }
     }
 

@@ -15,7 +15,7 @@ use rand_chacha::rand_core::Rng;
 use crate::pattern::axial_direction;
 use crate::pattern::windability::WindabilityClass;
 use crate::rate::segment_weights_m2;
-use crate::search::anneal::limits::{Limits, draw, most_captive, pick};
+use crate::search::anneal::limits::{WindingLimits, draw, most_captive, pick};
 use crate::search::cost::columns::{Change, Columns};
 use crate::search::cost::samples::SampleMatrix;
 use crate::search::cost::signs::{segments_of_signs, sign_columns, sign_value, signs_of_segments};
@@ -78,7 +78,7 @@ impl Space {
 
     /// Whether the class admits P(j).
     pub(crate) fn admits(&self, segments: &[usize]) -> bool {
-        Limits::from(self.class).admits(segments)
+        WindingLimits::from(self.class).admits(segments)
     }
 
     /// A pattern of the class drawn at random; `captive:K` starts from a standard one.
@@ -301,7 +301,7 @@ mod tests {
     use crate::coil::LayerLength;
     use crate::pattern::Pattern;
     use crate::pattern::windability::WindingGraph;
-    use crate::search::cost::columns::{Norm, Values};
+    use crate::search::cost::columns::{Norm, SampleValues};
     use crate::search::cost::samples::tests::{model, profiles};
     use crate::search::cost::worst_case::SolvedProfiles;
 
@@ -331,7 +331,7 @@ mod tests {
                     let mut random = ChaCha8Rng::seed_from_u64(7);
                     let mut walk = space.walk(space.draw(&mut random));
                     for norm in [Norm::Largest, Norm::RootMeanSquare, Norm::Sum] {
-                        let mut values = Values::new(space.columns(), walk.coefficients(), norm);
+                        let mut values = SampleValues::new(space.columns(), walk.coefficients(), norm);
                         for _ in 0..1000 {
                             let Some(changes) = walk.propose(&space, &mut random) else { continue };
                             values.propose(space.columns(), changes, f64::INFINITY).unwrap();

@@ -6,7 +6,7 @@
 //!
 //! | symbol | meaning | in code |
 //! |---|---|---|
-//! | v_s | value at sample s | `Values::values` |
+//! | v_s | value at sample s | `SampleValues::values` |
 //! | x_k | coefficient of column k | given as changes Δx_k |
 //! | D_k | column k, contiguous over samples | `Columns::column` |
 //!
@@ -200,7 +200,7 @@ pub(crate) struct Change {
 
 /// The values of all samples for the present coefficients, and room for a proposal.
 #[derive(Debug, Clone)]
-pub(crate) struct Values {
+pub(crate) struct SampleValues {
     norm: Norm,
     values: Vec<f64>,
     proposed: Vec<f64>,
@@ -209,7 +209,7 @@ pub(crate) struct Values {
     pub(crate) work: Work,
 }
 
-impl Values {
+impl SampleValues {
     pub(crate) fn new(columns: &Columns, coefficients: &[f64], norm: Norm) -> Self {
         let values = columns.padded_values(coefficients);
         let proposed = values.clone();
@@ -229,7 +229,7 @@ impl Values {
 
     /// The cost after changes, or `None` as soon as it is known to be above `limit`.
     ///
-    /// The answer is kept: [`Values::accept`] makes it the present state.
+    /// The answer is kept: [`SampleValues::accept`] makes it the present state.
     #[inline]
     pub(crate) fn propose(&mut self, columns: &Columns, changes: &[Change], limit: f64) -> Option<f64> {
         self.work.moves += 1;
@@ -292,7 +292,7 @@ mod tests {
         let columns = wave(1000, 6);
         for norm in [Norm::Largest, Norm::RootMeanSquare, Norm::Sum] {
             let mut coefficients = vec![1.0, -2.0, 0.5, 0.0, 3.0, -1.0];
-            let mut values = Values::new(&columns, &coefficients, norm);
+            let mut values = SampleValues::new(&columns, &coefficients, norm);
             for count in 1..=4 {
                 let changes: Vec<Change> =
                     (0..count).map(|k| Change { column: k, by: 0.3 * (k as f64 + 1.0) }).collect();
@@ -310,7 +310,7 @@ mod tests {
     #[test]
     fn a_move_over_the_limit_is_refused_after_the_first_block_and_one_within_it_sees_every_sample() {
         let columns = wave(1000, 3);
-        let mut values = Values::new(&columns, &[0.0; 3], Norm::Largest);
+        let mut values = SampleValues::new(&columns, &[0.0; 3], Norm::Largest);
         let change = [Change { column: 0, by: 10.0 }];
         assert_eq!(values.propose(&columns, &change, 5.0), None);
         assert_eq!(values.work.samples, BLOCK as u64);

@@ -33,7 +33,7 @@ pub struct Pace {
 
 /// What came of a proposed move.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Proposal {
+pub enum MoveProposal {
     /// It would leave what is allowed.
     Outside,
     /// Its cost is above the limit.
@@ -107,7 +107,7 @@ pub trait Position<C> {
     fn segments(&self) -> Vec<usize>;
 
     /// Draws a move and judges it against a limit that was drawn before.
-    fn propose(&mut self, cost: &C, random: &mut ChaCha8Rng, limit: f64) -> Proposal;
+    fn propose(&mut self, cost: &C, random: &mut ChaCha8Rng, limit: f64) -> MoveProposal;
 
     /// Goes where the last proposal leads, which must have been within its limit.
     fn accept(&mut self, cost: &C);

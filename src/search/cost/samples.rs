@@ -21,7 +21,7 @@ use crate::thermal::Instant;
 
 /// Which column belongs to which layer and half.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Layout {
+pub struct ColumnLayout {
     pub(crate) layers: usize,
     /// Both halves of the fibre respond alike: their weights share a column.
     pub(crate) halves_alike: bool,
@@ -29,7 +29,7 @@ pub struct Layout {
     pub axial: bool,
 }
 
-impl Layout {
+impl ColumnLayout {
     /// Of the half from end A.
     pub fn column_a(&self, layer: usize) -> usize {
         layer
@@ -53,7 +53,7 @@ impl Layout {
 
 /// Where a sample comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Origin {
+pub struct SampleOrigin {
     pub(crate) profile: usize,
     pub(crate) instant: Instant,
 }
@@ -62,7 +62,7 @@ pub struct Origin {
 #[derive(Debug, Clone)]
 pub struct SampleMatrix {
     /// Which column belongs to which layer and half.
-    pub layout: Layout,
+    pub layout: ColumnLayout,
     /// One row a sample.
     pub columns: Columns,
     lengths_m: Vec<f64>,
@@ -76,7 +76,7 @@ impl SampleMatrix {
     pub(crate) fn new(model: &CoilModel, responses: &[WeightResponse]) -> Result<Self, RateError> {
         let lengths_m = model.wound_coil()?.layer_lengths_m().to_vec();
         let layers = lengths_m.len();
-        let layout = Layout {
+        let layout = ColumnLayout {
             layers,
             halves_alike: responses.iter().all(|r| r.half_a_rad_per_s_m2 == r.half_b_rad_per_s_m2),
             axial: responses.iter().any(|r| r.axial_rad_per_s_m2.iter().any(|x| *x != 0.0)),
@@ -100,7 +100,7 @@ impl SampleMatrix {
     ///
     /// # Errors
     /// Effects that leave a layer no turns.
-    pub fn of_profiles(model: &CoilModel, solved: &SolvedProfiles) -> Result<(Self, Vec<Origin>), SearchError> {
+    pub fn of_profiles(model: &CoilModel, solved: &SolvedProfiles) -> Result<(Self, Vec<SampleOrigin>), SearchError> {
         let rate_model = any_rate_model(model)?;
         let responses: Vec<WeightResponse> =
             solved.profiles().par_iter().flat_map_iter(|profile| profile.responses(&rate_model)).collect();
@@ -109,9 +109,9 @@ impl SampleMatrix {
             .iter()
             .enumerate()
             .flat_map(|(index, solved)| {
-                solved.pieces.iter().flatten().map(move |&instant| Origin { profile: index, instant })
+                solved.pieces.iter().flatten().map(move |&instant| SampleOrigin { profile: index, instant })
             })
-            .collect::<Vec<Origin>>();
+            .collect::<Vec<SampleOrigin>>();
         if let Some((_, origin)) = responses.iter().zip(&origins).find(|(response, _)| !is_finite(response)) {
             if let Some(fault) = solved.profiles()[origin.profile].fault(&rate_model) {
                 return Err(fault.into());
@@ -130,7 +130,7 @@ impl SampleMatrix {
         let constant = if constant.is_empty() { &zero } else { constant };
         let column = |j: usize| sensitivities[j..].iter().step_by(layers).copied().collect::<Vec<f64>>();
         let columns: Vec<Vec<f64>> = (0..layers).map(column).collect();
-        let layout = Layout { layers, halves_alike: true, axial: false };
+        let layout = ColumnLayout { layers, halves_alike: true, axial: false };
         Self { layout, columns: Columns::new(constant, &columns), lengths_m: vec![1.0; layers] }
     }
 
@@ -166,7 +166,7 @@ impl SampleMatrix {
     /// A w^A + B w^B + X x ≈ S (w^A + w^B) + { D (w^A − w^B) + X x } at the given weights,   S = (A + B)/2,  D = (A − B)/2
     /// ```
     pub(crate) fn frozen_at(&self, weights: &LayerWeights) -> Self {
-        let Layout { layers, axial, .. } = self.layout;
+        let ColumnLayout { layers, axial, .. } = self.layout;
         let column = |k: usize| self.columns.column(k);
         let mut constant = self.columns.constant().to_vec();
         let mut means = Vec::with_capacity(layers);
@@ -183,7 +183,7 @@ impl SampleMatrix {
             }
             means.push(a.iter().zip(b).map(|(a, b)| 0.5 * (a + b)).collect());
         }
-        let layout = Layout { layers, halves_alike: true, axial: false };
+        let layout = ColumnLayout { layers, halves_alike: true, axial: false };
         Self { layout, columns: Columns::new(&constant, &means), lengths_m: self.lengths_m.clone() }
     }
 

@@ -230,7 +230,7 @@ impl Matching<'_> {
         &self,
         target: &Target,
         nodes: &mut u64,
-        visit: &mut impl FnMut(Step) -> ControlFlow<()>,
+        visit: &mut impl FnMut(BoxStep) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         self.search(NodePair { left: 1, right: 1 }, target, nodes, visit)
     }
@@ -242,11 +242,11 @@ impl Matching<'_> {
         pair: NodePair,
         target: &Target,
         nodes: &mut u64,
-        visit: &mut impl FnMut(Step) -> ControlFlow<()>,
+        visit: &mut impl FnMut(BoxStep) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         *nodes += 1;
         if nodes.is_multiple_of(PAIRS_PER_PAUSE) {
-            visit(Step::Pause)?;
+            visit(BoxStep::Pause)?;
         }
         if !self.within(pair, target) {
             return ControlFlow::Continue(());
@@ -273,12 +273,12 @@ impl Matching<'_> {
         &self,
         pair: NodePair,
         target: &Target,
-        visit: &mut impl FnMut(Step) -> ControlFlow<()>,
+        visit: &mut impl FnMut(BoxStep) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         for i in self.left.range(pair.left) {
             for k in self.right.range(pair.right) {
                 if point_within(self.left.point(i), self.right.point(k), target) {
-                    visit(Step::Match { left: self.left.names[i], right: self.right.names[k] })?;
+                    visit(BoxStep::Match { left: self.left.names[i], right: self.right.names[k] })?;
                 }
             }
         }
@@ -288,7 +288,7 @@ impl Matching<'_> {
 
 /// What a search asks its caller about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Step {
+pub(crate) enum BoxStep {
     /// A candidate.
     Match { left: u32, right: u32 },
     /// Nothing found for a while.
@@ -361,7 +361,7 @@ mod tests {
         let (mut nodes, mut found) = (0, Vec::new());
         for pair in matching.shares(&target, 16, &mut nodes) {
             let _ = matching.search(pair, &target, &mut nodes, &mut |step| {
-                if let Step::Match { left, right } = step {
+                if let BoxStep::Match { left, right } = step {
                     found.push((left, right));
                 }
                 ControlFlow::Continue(())

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::course::Course;
 use super::support::Support;
-use super::{Goal, Outcome, Task, Watch};
+use super::{Goal, PassOutcome, StopWish, Task};
 use crate::coil::Coil;
 use crate::pattern::Pattern;
 use crate::rate::{CoilModel, LayerWeights, RateError, RateModel};
@@ -19,12 +19,12 @@ use crate::search::cost::worst_case::{SearchError, WorstCase};
 
 /// A pattern and its cost by the reference, refined in time where it is a worst rate.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Candidate {
+pub(crate) struct PatternCandidate {
     pub(crate) rate_rad_per_s: f64,
     pub(crate) segments: Vec<usize>,
 }
 
-impl Candidate {
+impl PatternCandidate {
     /// The smaller rate; of equals the pattern that comes first, so that the answer does not depend on threads.
     pub(crate) fn better(self, other: Self) -> Self {
         let before = (other.rate_rad_per_s, &other.segments) < (self.rate_rad_per_s, &self.segments);
@@ -43,14 +43,14 @@ pub(crate) enum Witness {
 
 /// What was found out about a pattern.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Finding {
+pub(crate) enum PatternFinding {
     /// Its worst rate is not below the limit, as a sample shows.
     Refuted {
         sample: usize,
     },
     /// It is not below the limit, but only between samples.
     RefutedBetween(Witness),
-    Better(Candidate),
+    Better(PatternCandidate),
 }
 
 /// Instants of one profile closer than this share of its duration are one sample.
@@ -155,11 +155,11 @@ impl<'a> Judge<'a> {
     ///
     /// # Errors
     /// A pattern of another layer count.
-    pub(crate) fn candidate_and_witness(&self, pattern: &Pattern) -> Result<(Candidate, Witness), SearchError> {
+    pub(crate) fn candidate_and_witness(&self, pattern: &Pattern) -> Result<(PatternCandidate, Witness), SearchError> {
         let segments = pattern.segments().to_vec();
         let (Largest::Course(_, task) | Largest::Norm(_, Some(task))) = &self.of else {
             let rate_rad_per_s = self.sampled_worst_rad_per_s(&segments);
-            return Ok((Candidate { rate_rad_per_s, segments: segments.clone() }, Witness::Pattern(segments)));
+            return Ok((PatternCandidate { rate_rad_per_s, segments: segments.clone() }, Witness::Pattern(segments)));
         };
         let Task { model, solved, goal, .. } = *task;
         let of_time = |worst: WorstCase| {
@@ -183,7 +183,7 @@ impl<'a> Judge<'a> {
                 (bound, Witness::Pattern(segments.clone()))
             }
         };
-        Ok((Candidate { rate_rad_per_s, segments }, witness))
+        Ok((PatternCandidate { rate_rad_per_s, segments }, witness))
     }
 
     /// The largest size over the samples, or the norm of all of them.
@@ -244,7 +244,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Whether a pattern's worst rate is below a limit: first by the samples, then by the reference.
-    pub(crate) fn judge(&self, segments: &[usize], limit_rad_per_s: f64) -> Finding {
+    pub(crate) fn judge(&self, segments: &[usize], limit_rad_per_s: f64) -> PatternFinding {
         let pattern = Pattern::new(segments.to_vec()).expect("a search makes permutations only");
         let coefficients = self.coefficients(&pattern);
         let columns = &self.ordered.columns;
@@ -265,17 +265,17 @@ impl<'a> Judge<'a> {
                 }
             }
             if worst >= limit_rad_per_s {
-                return Finding::Refuted { sample: self.order[from + at] };
+                return PatternFinding::Refuted { sample: self.order[from + at] };
             }
         }
         match &self.of {
             Largest::Norm(support, _) if support.value(&coefficients) >= limit_rad_per_s => {
-                Finding::RefutedBetween(Witness::Pattern(segments.to_vec()))
+                PatternFinding::RefutedBetween(Witness::Pattern(segments.to_vec()))
             }
             // No sample refutes it: with nothing between them it is better.
             Largest::Norm(..) | Largest::Samples => match self.candidate_and_witness(&pattern) {
-                Ok((candidate, _)) if candidate.rate_rad_per_s < limit_rad_per_s => Finding::Better(candidate),
-                _ => Finding::RefutedBetween(Witness::Pattern(segments.to_vec())),
+                Ok((candidate, _)) if candidate.rate_rad_per_s < limit_rad_per_s => PatternFinding::Better(candidate),
+                _ => PatternFinding::RefutedBetween(Witness::Pattern(segments.to_vec())),
             },
             Largest::Course(course, task) => self.refined(course, task, &pattern, limit_rad_per_s),
         }
@@ -283,7 +283,7 @@ impl<'a> Judge<'a> {
 
     /// What is worst refined in time, over the profiles in the order of their worst samples, until one is not below the
     /// limit or none that is left can be worse.
-    fn refined(&self, course: &Course, task: &Task, pattern: &Pattern, limit_rad_per_s: f64) -> Finding {
+    fn refined(&self, course: &Course, task: &Task, pattern: &Pattern, limit_rad_per_s: f64) -> PatternFinding {
         let of_pattern = course.of(task, pattern).expect("a search makes patterns of the coil's layers");
         let values = self.matrix.columns.values(&self.coefficients(pattern));
         let mut largest = vec![0.0_f64; task.solved.profiles().len()];
@@ -300,10 +300,13 @@ impl<'a> Judge<'a> {
             let (rate_rad_per_s, time_s) = of_pattern.worst(&task.solved.profiles()[profile]);
             worst_rad_per_s = worst_rad_per_s.max(rate_rad_per_s.abs());
             if worst_rad_per_s >= limit_rad_per_s {
-                return Finding::RefutedBetween(Witness::Instant { profile, time_s });
+                return PatternFinding::RefutedBetween(Witness::Instant { profile, time_s });
             }
         }
-        Finding::Better(Candidate { rate_rad_per_s: worst_rad_per_s, segments: pattern.segments().to_vec() })
+        PatternFinding::Better(PatternCandidate {
+            rate_rad_per_s: worst_rad_per_s,
+            segments: pattern.segments().to_vec(),
+        })
     }
 
     fn coefficients_of(&self, segments: &[usize]) -> Vec<f64> {
@@ -377,21 +380,21 @@ impl<'a> Judge<'a> {
     }
 }
 
-impl Outcome {
+impl PassOutcome {
     /// Judges one pattern and keeps what comes of it.
     pub(super) fn consider(&mut self, judge: &Judge, segments: &[usize], limit_rad_per_s: f64) {
         self.judged += 1;
         let limit = self.best.as_ref().map_or(limit_rad_per_s, |b| b.rate_rad_per_s);
         match judge.judge(segments, limit) {
-            Finding::Better(candidate) => {
+            PatternFinding::Better(candidate) => {
                 self.best = Some(match self.best.take() {
                     Some(best) => best.better(candidate),
                     None => candidate,
                 });
             }
-            Finding::Refuted { sample } if self.refuting.len() < MOST_REFUTING => self.refuting.push(sample),
-            Finding::Refuted { .. } => {}
-            Finding::RefutedBetween(witness) => self.between.push(witness),
+            PatternFinding::Refuted { sample } if self.refuting.len() < MOST_REFUTING => self.refuting.push(sample),
+            PatternFinding::Refuted { .. } => {}
+            PatternFinding::RefutedBetween(witness) => self.between.push(witness),
         }
     }
 
@@ -401,7 +404,7 @@ impl Outcome {
         judge: &Judge,
         segments: &[usize],
         limit_rad_per_s: f64,
-        watch: &Watch,
+        watch: &StopWish,
     ) -> ControlFlow<()> {
         self.consider(judge, segments, limit_rad_per_s);
         let too_much = self.judged > MOST_JUDGED || self.between.len() > MOST_BETWEEN;

@@ -36,13 +36,13 @@ use std::ops::ControlFlow;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::box_join::{Matching, Step, Target, Tree};
-use super::candidates::{Candidate, Judge};
+use super::box_join::{BoxStep, Matching, Target, Tree};
+use super::candidates::{Judge, PatternCandidate};
 use super::sampling::neighbours;
-use super::{Outcome, Task, checked_judge, first_best};
+use super::{PassOutcome, Task, checked_judge, first_best};
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
-use crate::search::anneal::limits::{Limits, pick};
+use crate::search::anneal::limits::{WindingLimits, pick};
 use crate::search::anneal::restart::generator;
 use crate::search::cost::signs::{segments_of_signs, signs_of_segments};
 use crate::search::cost::worst_case::SearchError;
@@ -110,11 +110,11 @@ pub(crate) fn compounded(task: &Task, starts: &[Pattern], seed: u64) -> Result<P
                 (chain, Neighbourhood::draw(task.class, &chains[chain].segments, &mut random))
             })
             .collect();
-        let found: Vec<Outcome> = drawn
+        let found: Vec<PassOutcome> = drawn
             .par_iter()
             .map(|(chain, drawn)| drawn.search(&judge, &samples, task.class, chains[*chain].rate_rad_per_s))
             .collect();
-        let mut whole = Outcome::default();
+        let mut whole = PassOutcome::default();
         for ((chain, _), mut outcome) in drawn.iter().zip(found) {
             if let Some(better) = outcome.best.take() {
                 chains[*chain] = chains[*chain].clone().better(better);
@@ -122,7 +122,8 @@ pub(crate) fn compounded(task: &Task, starts: &[Pattern], seed: u64) -> Result<P
             whole.absorb(outcome);
         }
         join(&mut judge, &mut samples, &whole);
-        let is_better = |chain: &Candidate| chain.rate_rad_per_s < before_rad_per_s * (1.0 - super::RELATIVE_TOLERANCE);
+        let is_better =
+            |chain: &PatternCandidate| chain.rate_rad_per_s < before_rad_per_s * (1.0 - super::RELATIVE_TOLERANCE);
         idle = if chains.iter().any(is_better) { 0 } else { idle + 1 };
     }
     let best = chains.swap_remove(0);
@@ -130,7 +131,7 @@ pub(crate) fn compounded(task: &Task, starts: &[Pattern], seed: u64) -> Result<P
 }
 
 /// What refuted patterns that had stayed under the limit at the samples so far, as often as it did.
-fn join(judge: &mut Judge, samples: &mut Vec<usize>, outcome: &Outcome) {
+fn join(judge: &mut Judge, samples: &mut Vec<usize>, outcome: &PassOutcome) {
     let first_new = judge.matrix().samples();
     let mut joining: Vec<usize> = Vec::new();
     if judge.add_witnesses(&outcome.between) {
@@ -179,7 +180,7 @@ impl Neighbourhood {
             Move::End(_) => 0,
             Move::Exchange { from, middle, to } => (middle - from) * (to - middle),
         });
-        let limits = Limits::from(class);
+        let limits = WindingLimits::from(class);
         let mut drawn = Self { segments: segments.to_vec(), moves: Vec::new() };
         for made in all {
             if drawn.moves.len() < MOST_MOVES && limits.admits(&drawn.with(&[made])) {
@@ -221,8 +222,8 @@ impl Neighbourhood {
     }
 
     /// The best of the patterns below the limit that were judged, and what refuted others.
-    fn search(&self, judge: &Judge, samples: &[usize], class: WindabilityClass, limit_rad_per_s: f64) -> Outcome {
-        let mut outcome = Outcome::default();
+    fn search(&self, judge: &Judge, samples: &[usize], class: WindabilityClass, limit_rad_per_s: f64) -> PassOutcome {
+        let mut outcome = PassOutcome::default();
         if self.moves.len() < 2 || limit_rad_per_s == 0.0 {
             return outcome;
         }
@@ -256,7 +257,7 @@ impl Neighbourhood {
             let target = Target::new(samples.iter().map(|_| (-reach, reach)));
             let mut numbers = Vec::new();
             let is_whole = matching.visit_all(&target, &mut outcome.nodes, &mut |step| {
-                if let Step::Match { left: l, right: r } = step {
+                if let BoxStep::Match { left: l, right: r } = step {
                     numbers.push(u64::from(l) | u64::from(r) << left.len());
                 }
                 if numbers.len() < MOST_MATCHES { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
@@ -268,7 +269,7 @@ impl Neighbourhood {
                 let made: Vec<Move> =
                     self.moves.iter().enumerate().filter(|(k, _)| number >> k & 1 == 1).map(|(_, m)| *m).collect();
                 let segments = self.with(&made);
-                if judged == MOST_JUDGED || !Limits::from(class).admits(&segments) {
+                if judged == MOST_JUDGED || !WindingLimits::from(class).admits(&segments) {
                     continue;
                 }
                 judged += 1;

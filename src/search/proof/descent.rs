@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::candidates::Judge;
 use super::permutation_tree::{Node, PermutationTree, Places};
-use super::{Outcome, Watch};
+use super::{PassOutcome, StopWish};
 
 /// Pieces of work that are shared out: more than threads, and always the same.
 const SHARES: usize = 256;
@@ -30,7 +30,7 @@ struct Search<'a, 'w> {
     limit_rad_per_s: f64,
     mirrored: bool,
     most_nodes: u64,
-    watch: &'a Watch<'w>,
+    watch: &'a StopWish<'w>,
 }
 
 /// Judges every pattern that may stay under the limit.
@@ -39,9 +39,9 @@ pub(crate) fn search(
     judge: &Judge,
     limit_rad_per_s: f64,
     mirrored: bool,
-    watch: &Watch,
-) -> Outcome {
-    let mut outcome = Outcome::default();
+    watch: &StopWish,
+) -> PassOutcome {
+    let mut outcome = PassOutcome::default();
     let mut shares = vec![orders.root()];
     let mut places = Places::default();
     while shares.len() < SHARES && shares.iter().any(|n| n.open != 0) {
@@ -65,10 +65,10 @@ pub(crate) fn search(
         // What the pieces before found is a limit for these, at any number of threads.
         let limit_rad_per_s = outcome.best.as_ref().map_or(limit_rad_per_s, |best| best.rate_rad_per_s);
         let search = Search { orders, judge, limit_rad_per_s, mirrored, most_nodes, watch };
-        let found: Vec<Outcome> = together
+        let found: Vec<PassOutcome> = together
             .par_iter()
             .map(|share| {
-                let mut descent = Descent { search, places: Places::default(), found: Outcome::default() };
+                let mut descent = Descent { search, places: Places::default(), found: PassOutcome::default() };
                 descent.found.complete = descent.descend(&mut share.clone()).is_continue();
                 let count = done.fetch_add(1, Ordering::Relaxed) + 1;
                 let _ = watch.report(count as f64 / shares.len() as f64);
@@ -89,7 +89,7 @@ pub(crate) fn search(
 struct Descent<'a, 'w> {
     search: Search<'a, 'w>,
     places: Places,
-    found: Outcome,
+    found: PassOutcome,
 }
 
 impl Descent<'_, '_> {

@@ -50,9 +50,9 @@ pub use starts::starting_patterns;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use candidates::{Candidate, Judge, Witness};
-use rows::Row;
-use sampling::Proof;
+use candidates::{Judge, PatternCandidate, Witness};
+use rows::SampleRow;
+use sampling::SampledProof;
 
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
@@ -137,7 +137,7 @@ pub struct Certificate {
     /// Patterns judged on all samples.
     pub judged: u64,
     /// Samples that the last pass refuted by.
-    pub(crate) rows: Vec<Row>,
+    pub(crate) rows: Vec<SampleRow>,
 }
 
 /// Told from time to time; answers whether to go on.
@@ -236,7 +236,8 @@ fn proved(begun: Begun, watcher: Watcher) -> Result<Certificate, SearchError> {
         let Pass { over_best, most_nodes } = passes.next();
         let at =
             Progress { best_rad_per_s: best.rate_rad_per_s, lower_bound_rad_per_s, pass: over_best, share_done: 0.0 };
-        let mut watch = Watch { stop: &stop, watcher, at, most_nodes, good_enough_rad_per_s: 0.0, may_overflow: true };
+        let mut watch =
+            StopWish { stop: &stop, watcher, at, most_nodes, good_enough_rad_per_s: 0.0, may_overflow: true };
         let limit = best.rate_rad_per_s * over_best * (1.0 - RELATIVE_TOLERANCE);
         let outcome = proof.pass(&mut judge, limit, best.rate_rad_per_s, &mut watch);
         nodes += outcome.nodes;
@@ -279,8 +280,8 @@ fn proved(begun: Begun, watcher: Watcher) -> Result<Certificate, SearchError> {
 /// A search that has not made a pass yet.
 struct Begun<'a> {
     judge: Judge<'a>,
-    best: Candidate,
-    proof: Proof,
+    best: PatternCandidate,
+    proof: SampledProof,
 }
 
 fn begin<'a>(task: &Task<'a>, starts: &[Pattern], good_enough_rad_per_s: f64) -> Result<Begun<'a>, SearchError> {
@@ -305,19 +306,19 @@ fn begin_with<'a>(
     good_enough_rad_per_s: f64,
 ) -> Result<Begun<'a>, SearchError> {
     let mut best = first_best(&mut judge, class, starts)?;
-    let proof = Proof::new(class, &mut judge, starts, &mut best, good_enough_rad_per_s);
+    let proof = SampledProof::new(class, &mut judge, starts, &mut best, good_enough_rad_per_s);
     Ok(Begun { judge, best, proof })
 }
 
 /// The best of the starts; the judge then knows where they are worst.
-fn first_best(judge: &mut Judge, class: WindabilityClass, starts: &[Pattern]) -> Result<Candidate, SearchError> {
-    let mut best: Option<Candidate> = None;
+fn first_best(judge: &mut Judge, class: WindabilityClass, starts: &[Pattern]) -> Result<PatternCandidate, SearchError> {
+    let mut best: Option<PatternCandidate> = None;
     let mut witnesses = Vec::new();
     for start in starts.iter().filter(|p| class.admits(p)) {
         let (candidate, witness) = judge.candidate_and_witness(start)?;
         witnesses.push(witness);
         // Of starts that are equally good, the first: it may be one that has a name.
-        let is_better = |b: &Candidate| candidate.rate_rad_per_s < b.rate_rad_per_s * (1.0 - RELATIVE_TOLERANCE);
+        let is_better = |b: &PatternCandidate| candidate.rate_rad_per_s < b.rate_rad_per_s * (1.0 - RELATIVE_TOLERANCE);
         if best.as_ref().is_none_or(is_better) {
             best = Some(candidate);
         }
@@ -338,7 +339,7 @@ pub(crate) struct Improvement {
 
 /// How much a short search by bounds may do.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Effort {
+pub(crate) struct ProofEffort {
     pub(crate) most_nodes: u64,
     /// Nodes of a level that a last look ahead keeps ([`beam`]); zero for none.
     pub(crate) beam_width: usize,
@@ -351,8 +352,8 @@ pub(crate) struct Effort {
 ///
 /// # Errors
 /// As [`prove`].
-pub(crate) fn improve(task: &Task, starts: &[Pattern], effort: Effort) -> Result<Improvement, SearchError> {
-    let Effort { most_nodes, beam_width, good_enough_rad_per_s } = effort;
+pub(crate) fn improve(task: &Task, starts: &[Pattern], effort: ProofEffort) -> Result<Improvement, SearchError> {
+    let ProofEffort { most_nodes, beam_width, good_enough_rad_per_s } = effort;
     let Begun { mut judge, mut best, mut proof } = begin(task, starts, good_enough_rad_per_s)?;
     let stop = AtomicBool::new(false);
     let go_on = |_: Progress| ControlFlow::Continue(());
@@ -362,7 +363,7 @@ pub(crate) fn improve(task: &Task, starts: &[Pattern], effort: Effort) -> Result
         let at = Progress { best_rad_per_s: rate_rad_per_s, lower_bound_rad_per_s: 0.0, pass: 1.0, share_done: 0.0 };
         let most_nodes = most_nodes - nodes;
         let mut watch =
-            Watch { stop: &stop, watcher: &go_on, at, most_nodes, good_enough_rad_per_s, may_overflow: true };
+            StopWish { stop: &stop, watcher: &go_on, at, most_nodes, good_enough_rad_per_s, may_overflow: true };
         let limit = rate_rad_per_s * (1.0 - RELATIVE_TOLERANCE);
         let outcome = proof.pass(&mut judge, limit, rate_rad_per_s, &mut watch);
         nodes += outcome.nodes;
@@ -382,21 +383,21 @@ pub(crate) fn improve(task: &Task, starts: &[Pattern], effort: Effort) -> Result
 
 /// What a pass, or a piece of one, found.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Outcome {
+pub(crate) struct PassOutcome {
     /// Everything below the limit was judged.
     pub(crate) complete: bool,
     /// Too many patterns could not be refuted by the samples.
     pub(crate) overflowed: bool,
     pub(crate) nodes: u64,
     pub(crate) judged: u64,
-    pub(crate) best: Option<Candidate>,
+    pub(crate) best: Option<PatternCandidate>,
     /// Samples that refuted what was judged.
     pub(crate) refuting: Vec<usize>,
     /// Instants between samples that refuted what no sample did.
     pub(crate) between: Vec<Witness>,
 }
 
-impl Default for Outcome {
+impl Default for PassOutcome {
     fn default() -> Self {
         Self {
             complete: true,
@@ -410,7 +411,7 @@ impl Default for Outcome {
     }
 }
 
-impl Outcome {
+impl PassOutcome {
     /// Adds what the next piece found.
     pub(crate) fn absorb(&mut self, other: Self) {
         self.complete &= other.complete;
@@ -427,7 +428,7 @@ impl Outcome {
 }
 
 /// The caller's wish to stop, seen by every piece of work.
-pub(crate) struct Watch<'a> {
+pub(crate) struct StopWish<'a> {
     stop: &'a AtomicBool,
     watcher: Watcher<'a>,
     at: Progress,
@@ -439,7 +440,7 @@ pub(crate) struct Watch<'a> {
     pub(crate) may_overflow: bool,
 }
 
-impl Watch<'_> {
+impl StopWish<'_> {
     /// Asks whether to go on, without news.
     pub(crate) fn pause(&self) -> ControlFlow<()> {
         self.report(self.at.share_done)

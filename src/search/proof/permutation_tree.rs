@@ -29,8 +29,8 @@
 //! # Source
 //! Hardy, Littlewood, Pólya, Inequalities, theorem 368 (rearrangement).
 
-use super::rows::{Row, deviations_m};
-use super::simd_bounds::{Block, Bound, LANES, Level, Shape};
+use super::rows::{SampleRow, deviations_m};
+use super::simd_bounds::{Bound, BoundLanes, BoundLevel, BoundShape, LANES};
 use crate::pattern::windability::WindabilityClass;
 
 /// More layers than this do not fit the set of open places.
@@ -48,7 +48,7 @@ pub(crate) struct PermutationTree {
     has_difference: bool,
     /// Rows with an axial term are searched twice, for either direction of the first layer.
     axial_sign: Option<f32>,
-    levels: Vec<Level>,
+    levels: Vec<BoundLevel>,
     whole: f32,
     /// For each number of open layers: l̄, and half of Σ |δ_i|.
     mean: Vec<f32>,
@@ -116,7 +116,7 @@ impl PermutationTree {
             },
             has_difference,
             axial_sign,
-            levels: vec![Level::default(); layers + 1],
+            levels: vec![BoundLevel::default(); layers + 1],
             whole: lengths.iter().sum::<f64>() as f32,
             mean: (0..=layers).map(mean).collect(),
             half_deviation: (0..=layers).map(half_deviation).collect(),
@@ -125,8 +125,8 @@ impl PermutationTree {
     }
 
     /// Σ_s (row)_s ≥ limit refutes a node with so many open layers from now on; tried after what is there already.
-    pub(crate) fn add_bound(&mut self, open: usize, row: &Row) {
-        let shape = Shape {
+    pub(crate) fn add_bound(&mut self, open: usize, row: &SampleRow) {
+        let shape = BoundShape {
             lengths_m: &self.lengths_m,
             has_difference: self.has_difference,
             has_axial: self.axial_sign.is_some(),
@@ -213,7 +213,7 @@ impl PermutationTree {
 
     /// By how much each bound of a block exceeds the limit at best below a node.
     #[inline]
-    fn excess(&self, block: &Block, places: &Places, limit: f32) -> [f32; LANES] {
+    fn excess(&self, block: &BoundLanes, places: &Places, limit: f32) -> [f32; LANES] {
         let open_count = places.open.len();
         let mut sum = block.constant;
         let placed = |k: usize| self.layers - 1 - k;
@@ -248,7 +248,7 @@ impl PermutationTree {
     }
 
     /// max V_p − min V_p over the open places.
-    fn range_of_v(&self, block: &Block, places: &Places) -> [f32; LANES] {
+    fn range_of_v(&self, block: &BoundLanes, places: &Places) -> [f32; LANES] {
         let mut v = [0.0; LANES];
         for (layer, _) in &places.along {
             add(&mut v, &block.terms[0][*layer], 1.0);

@@ -10,14 +10,14 @@
 //! | symbol | meaning | in code |
 //! |---|---|---|
 //! | A_j, B_j | response of a layer's weight in either half of the fibre | `SampleMatrix` |
-//! | S_j, D_j | their mean and half their difference; D = 0 where the halves respond alike | `Row::mean`, `Row::difference` |
-//! | X_j | response of the axial moment's weight | `Row::axial` |
+//! | S_j, D_j | their mean and half their difference; D = 0 where the halves respond alike | `SampleRow::mean`, `SampleRow::difference` |
+//! | X_j | response of the axial moment's weight | `SampleRow::axial` |
 
 use crate::search::cost::samples::SampleMatrix;
 
 /// One sample's coefficients, one entry a layer, innermost first.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Row {
+pub(crate) struct SampleRow {
     pub(crate) constant: f64,
     pub(crate) mean: Vec<f64>,
     pub(crate) difference: Vec<f64>,
@@ -31,7 +31,7 @@ pub(crate) struct Range {
     pub(crate) high: f64,
 }
 
-impl Row {
+impl SampleRow {
     /// A sample of a matrix.
     pub(crate) fn of(matrix: &SampleMatrix, sample: usize) -> Self {
         let (layout, columns) = (matrix.layout, &matrix.columns);

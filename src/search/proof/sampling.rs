@@ -5,13 +5,13 @@
 //! full, the samples that refuted it join and the pass is repeated.
 
 use super::beam::promising;
-use super::candidates::{Candidate, Judge};
+use super::candidates::{Judge, PatternCandidate};
 use super::descent::search;
 use super::permutation_tree::PermutationTree;
-use super::rows::Row;
+use super::rows::SampleRow;
 use super::sign_search::SignSearch;
 use super::surrogates::{Lesson, Surrogates};
-use super::{Outcome, RELATIVE_TOLERANCE, Watch};
+use super::{PassOutcome, RELATIVE_TOLERANCE, StopWish};
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::search::cost::signs::{segments_of_signs, signs_of_segments};
@@ -48,7 +48,7 @@ enum Engine {
 
 /// A search over chosen samples.
 #[derive(Debug)]
-pub(crate) struct Proof {
+pub(crate) struct SampledProof {
     class: WindabilityClass,
     mirrored: bool,
     samples: Vec<usize>,
@@ -57,13 +57,13 @@ pub(crate) struct Proof {
     engine: Engine,
 }
 
-impl Proof {
+impl SampledProof {
     /// Learning ends with a rate that is good enough; zero for none.
     pub(crate) fn new(
         class: WindabilityClass,
         judge: &mut Judge,
         starts: &[Pattern],
-        best: &mut Candidate,
+        best: &mut PatternCandidate,
         good_enough_rad_per_s: f64,
     ) -> Self {
         let mirrored = judge.is_mirror_symmetric();
@@ -91,14 +91,14 @@ impl Proof {
     pub(crate) fn look_ahead(
         &mut self,
         judge: &mut Judge,
-        best: &mut Candidate,
+        best: &mut PatternCandidate,
         width: usize,
         good_enough_rad_per_s: f64,
     ) {
         while best.rate_rad_per_s > good_enough_rad_per_s {
             let Engine::PermutationTree(directions) = &self.engine else { break };
             let limit_rad_per_s = best.rate_rad_per_s * (1.0 - RELATIVE_TOLERANCE);
-            let mut outcome = Outcome::default();
+            let mut outcome = PassOutcome::default();
             for orders in directions {
                 let found = promising(orders, limit_rad_per_s, self.mirrored, width);
                 found.iter().for_each(|segments| outcome.consider(judge, segments, limit_rad_per_s));
@@ -115,12 +115,12 @@ impl Proof {
     fn follow(
         &mut self,
         judge: &mut Judge,
-        best: &mut Candidate,
+        best: &mut PatternCandidate,
         mut open: Vec<Vec<usize>>,
         good_enough_rad_per_s: f64,
     ) {
         for _ in 0..LESSONS {
-            let mut outcome = Outcome::default();
+            let mut outcome = PassOutcome::default();
             // The most promising first, so that few are judged by the reference.
             let mut sorted: Vec<(f64, Vec<usize>)> =
                 open.into_iter().map(|segments| (judge.sampled_worst_rad_per_s(&segments), segments)).collect();
@@ -142,7 +142,7 @@ impl Proof {
     }
 
     /// Makes use of a better rate than the engine was made for.
-    pub(crate) fn renew(&mut self, judge: &mut Judge, best: &mut Candidate, good_enough_rad_per_s: f64) {
+    pub(crate) fn renew(&mut self, judge: &mut Judge, best: &mut PatternCandidate, good_enough_rad_per_s: f64) {
         let open = self.make_engine(judge, best.rate_rad_per_s);
         self.follow(judge, best, open, good_enough_rad_per_s);
     }
@@ -155,8 +155,8 @@ impl Proof {
     }
 
     /// Samples in use.
-    pub(crate) fn rows(&self, judge: &Judge) -> Vec<Row> {
-        self.used.iter().map(|&s| Row::of(judge.matrix(), s)).collect()
+    pub(crate) fn rows(&self, judge: &Judge) -> Vec<SampleRow> {
+        self.used.iter().map(|&s| SampleRow::of(judge.matrix(), s)).collect()
     }
 
     /// Judges every pattern whose worst rate may be below the limit.
@@ -165,14 +165,14 @@ impl Proof {
         judge: &mut Judge,
         limit_rad_per_s: f64,
         best_rad_per_s: f64,
-        watch: &mut Watch,
-    ) -> Outcome {
-        let mut whole = Outcome::default();
+        watch: &mut StopWish,
+    ) -> PassOutcome {
+        let mut whole = PassOutcome::default();
         loop {
             let outcome = match &self.engine {
                 Engine::SignSearch(ends) => ends.search(judge, limit_rad_per_s, watch),
                 Engine::PermutationTree(directions) => {
-                    let mut outcome = Outcome::default();
+                    let mut outcome = PassOutcome::default();
                     for orders in directions {
                         outcome.absorb(search(orders, judge, limit_rad_per_s, self.mirrored, watch));
                     }
@@ -198,7 +198,7 @@ impl Proof {
 
     /// Takes in the samples that refuted most, and the instants at which only the reference could; false if there is
     /// no room or nothing new.
-    fn join(&mut self, judge: &mut Judge, outcome: &Outcome) -> bool {
+    fn join(&mut self, judge: &mut Judge, outcome: &PassOutcome) -> bool {
         let first_new = judge.matrix().samples();
         let mut joining: Vec<usize> = Vec::new();
         if judge.add_witnesses(&outcome.between) {
@@ -233,7 +233,7 @@ fn engine(
     mirrored: bool,
     best_rad_per_s: f64,
 ) -> (Engine, Lesson) {
-    let rows: Vec<Row> = samples.iter().map(|&s| Row::of(judge.matrix(), s)).collect();
+    let rows: Vec<SampleRow> = samples.iter().map(|&s| SampleRow::of(judge.matrix(), s)).collect();
     let lengths_m = judge.lengths_m();
     if class == WindabilityClass::Standard {
         let lesson = Lesson { used: samples.to_vec(), open: Vec::new() };

@@ -8,10 +8,10 @@
 
 use rayon::prelude::*;
 
-use super::box_join::{Matching, Step, Target, Tree};
+use super::box_join::{BoxStep, Matching, Target, Tree};
 use super::candidates::Judge;
-use super::rows::{Range, Row};
-use super::{Outcome, Watch};
+use super::rows::{Range, SampleRow};
+use super::{PassOutcome, StopWish};
 use crate::search::cost::signs::segments_of_signs;
 
 /// Sums in either set, as a power of two: 16 samples of them fit 64 MB.
@@ -47,7 +47,7 @@ struct PreparedRow {
 }
 
 impl SignSearch {
-    pub(crate) fn new(rows: &[Row], lengths_m: &[f64], mirrored: bool) -> Self {
+    pub(crate) fn new(rows: &[SampleRow], lengths_m: &[f64], mirrored: bool) -> Self {
         let signs = lengths_m.len() - 1;
         let rows: Vec<PreparedRow> = rows
             .iter()
@@ -72,9 +72,9 @@ impl SignSearch {
     }
 
     /// Every choice of signs that may stay under the limit is judged.
-    pub(crate) fn search(&self, judge: &Judge, limit_rad_per_s: f64, watch: &Watch) -> Outcome {
+    pub(crate) fn search(&self, judge: &Judge, limit_rad_per_s: f64, watch: &StopWish) -> PassOutcome {
         let choices = 1u64 << self.outer_signs.len();
-        let mut outcome = Outcome::default();
+        let mut outcome = PassOutcome::default();
         for choice in 0..choices {
             outcome.absorb(self.search_choice(choice, judge, limit_rad_per_s, watch));
             if watch.report((choice + 1) as f64 / choices as f64).is_break() && choice + 1 < choices {
@@ -87,7 +87,7 @@ impl SignSearch {
         outcome
     }
 
-    fn search_choice(&self, choice: u64, judge: &Judge, limit_rad_per_s: f64, watch: &Watch) -> Outcome {
+    fn search_choice(&self, choice: u64, judge: &Judge, limit_rad_per_s: f64, watch: &StopWish) -> PassOutcome {
         let target = Target::new(self.rows.iter().map(|row| {
             let outer = self.outer_signs.iter().enumerate();
             let sum: f64 =
@@ -97,16 +97,16 @@ impl SignSearch {
             (-reach - known - row.curved.high, reach - known - row.curved.low)
         }));
         let matching = Matching { left: &self.left, right: &self.right };
-        let mut outcome = Outcome::default();
+        let mut outcome = PassOutcome::default();
         let shares = matching.shares(&target, SHARES, &mut outcome.nodes);
-        let found: Vec<Outcome> = shares
+        let found: Vec<PassOutcome> = shares
             .par_iter()
             .map(|&share| {
-                let mut mine = Outcome::default();
+                let mut mine = PassOutcome::default();
                 let mut nodes = 0;
                 let end = matching.search(share, &target, &mut nodes, &mut |step| match step {
-                    Step::Pause => watch.pause(),
-                    Step::Match { left, right } => {
+                    BoxStep::Pause => watch.pause(),
+                    BoxStep::Match { left, right } => {
                         let segments = segments_of_signs(&self.high(choice, left, right));
                         mine.judge(judge, &segments, limit_rad_per_s, watch)
                     }
@@ -134,7 +134,7 @@ impl SignSearch {
 }
 
 /// d_m of one sample's mean responses; entry k belongs to layer index k + 1.
-fn sign_columns(row: &Row, lengths_m: &[f64]) -> Vec<f64> {
+fn sign_columns(row: &SampleRow, lengths_m: &[f64]) -> Vec<f64> {
     let (mut inside_m, mut inside) = (0.0, 0.0);
     let mut columns = Vec::with_capacity(lengths_m.len());
     for (s, l) in row.mean.iter().zip(lengths_m) {

@@ -1,6 +1,6 @@
 //! Bounds of one level of the search, eight side by side in single precision.
 
-use super::rows::{Row, curved_slack, deviations_m};
+use super::rows::{SampleRow, curved_slack, deviations_m};
 
 /// Bounds judged at once.
 pub(crate) const LANES: usize = 8;
@@ -10,7 +10,7 @@ const UNIT_ROUNDING: f64 = 6e-8;
 
 /// What all bounds of a problem have in common.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Shape<'a> {
+pub(crate) struct BoundShape<'a> {
     pub(crate) lengths_m: &'a [f64],
     pub(crate) has_difference: bool,
     pub(crate) has_axial: bool,
@@ -30,7 +30,7 @@ pub(crate) struct Bound {
 }
 
 impl Bound {
-    pub(crate) fn new(row: &Row, open: usize, shape: &Shape) -> Self {
+    pub(crate) fn new(row: &SampleRow, open: usize, shape: &BoundShape) -> Self {
         let lengths_m = shape.lengths_m;
         let row = row.shifted(open);
         let terms = row.factors(lengths_m, shape.has_difference, shape.has_axial);
@@ -57,7 +57,7 @@ impl Bound {
 }
 
 /// Σ_{i<k∈R} |S_i l_i δ_k − S_k l_k δ_i|
-fn pairs_slack(row: &Row, lengths_m: &[f64], deviations_m: &[f64]) -> f64 {
+fn pairs_slack(row: &SampleRow, lengths_m: &[f64], deviations_m: &[f64]) -> f64 {
     let factor = |j: usize| row.mean[j] * lengths_m[j];
     let open = deviations_m.len();
     let mut sum = 0.0;
@@ -71,14 +71,14 @@ fn pairs_slack(row: &Row, lengths_m: &[f64], deviations_m: &[f64]) -> f64 {
 
 /// Eight bounds, lane by lane.
 #[derive(Debug, Clone)]
-pub(crate) struct Block {
+pub(crate) struct BoundLanes {
     pub(crate) constant: [f32; LANES],
     pub(crate) terms: Vec<Vec<[f32; LANES]>>,
     pub(crate) sorted: Vec<Vec<[f32; LANES]>>,
     pub(crate) slack: [f32; LANES],
 }
 
-impl Block {
+impl BoundLanes {
     /// Lanes without a bound refute nothing.
     fn like(bound: &Bound) -> Self {
         let zeros = |terms: &Vec<Vec<f64>>| terms.iter().map(|t| vec![[0.0; LANES]; t.len()]).collect();
@@ -104,20 +104,20 @@ impl Block {
 
 /// All bounds of a level, in the order in which they are tried.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Level {
+pub(crate) struct BoundLevel {
     bounds: Vec<Bound>,
-    blocks: Vec<Block>,
+    blocks: Vec<BoundLanes>,
 }
 
-impl Level {
-    pub(crate) fn blocks(&self) -> &[Block] {
+impl BoundLevel {
+    pub(crate) fn blocks(&self) -> &[BoundLanes] {
         &self.blocks
     }
 
     pub(crate) fn push(&mut self, bound: &Bound) {
         let lane = self.bounds.len() % LANES;
         if lane == 0 {
-            self.blocks.push(Block::like(bound));
+            self.blocks.push(BoundLanes::like(bound));
         }
         self.blocks.last_mut().expect("a block was just added").set(lane, bound);
         self.bounds.push(bound.clone());

@@ -20,7 +20,7 @@
 
 use super::matrix_game;
 use super::permutation_tree::{Node, PermutationTree, Places};
-use super::rows::Row;
+use super::rows::SampleRow;
 
 /// Nodes of a level from which the next level's are made while learning, times the square of the layers.
 const BREADTH_TIMES_LAYERS_SQUARED: usize = 128 * 16 * 16;
@@ -50,12 +50,12 @@ pub(crate) struct Lesson {
 }
 
 /// Signed weights of rows; their sizes add up to one.
-pub(crate) type Weights = Vec<(usize, f64)>;
+pub(crate) type SurrogateWeights = Vec<(usize, f64)>;
 
 /// Finds blends for nodes.
 #[derive(Debug)]
 pub(crate) struct Surrogates<'a> {
-    rows: &'a [Row],
+    rows: &'a [SampleRow],
     /// For each kind of term and layer: the factors of all rows.
     factors: Vec<Vec<Vec<f64>>>,
     layers: usize,
@@ -65,15 +65,15 @@ pub(crate) struct Surrogates<'a> {
 
 /// What the best blend says about a node.
 #[derive(Debug, Clone, PartialEq)]
-enum Verdict {
+enum SurrogateVerdict {
     /// Nothing below the node stays under the limit.
-    Refuted(Weights),
+    Refuted(SurrogateWeights),
     /// The blend that came nearest to it.
-    Open(Weights),
+    Open(SurrogateWeights),
 }
 
 impl<'a> Surrogates<'a> {
-    pub(crate) fn new(rows: &'a [Row], lengths_m: &[f64], has_difference: bool, has_axial: bool) -> Self {
+    pub(crate) fn new(rows: &'a [SampleRow], lengths_m: &[f64], has_difference: bool, has_axial: bool) -> Self {
         let layers = lengths_m.len();
         let of_rows: Vec<Vec<Vec<f64>>> =
             rows.iter().map(|row| row.shifted(layers).factors(lengths_m, has_difference, has_axial)).collect();
@@ -85,8 +85,8 @@ impl<'a> Surrogates<'a> {
     }
 
     /// The row that a choice of weights makes.
-    pub(crate) fn row(&self, weights: &Weights) -> Row {
-        Row::blend(weights.iter().map(|&(s, y)| (&self.rows[s], y)), self.layers)
+    pub(crate) fn row(&self, weights: &SurrogateWeights) -> SampleRow {
+        SampleRow::blend(weights.iter().map(|&(s, y)| (&self.rows[s], y)), self.layers)
     }
 
     /// Gives every level of a search the bounds that refute most.
@@ -94,10 +94,10 @@ impl<'a> Surrogates<'a> {
         let breadth = (BREADTH_TIMES_LAYERS_SQUARED / self.layers.pow(2)).clamp(1, MOST_BREADTH);
         let mut used = vec![false; self.rows.len()];
         let mut places = Places::default();
-        let mut frontier: Vec<(Node, Weights)> = vec![(orders.root(), Vec::new())];
+        let mut frontier: Vec<(Node, SurrogateWeights)> = vec![(orders.root(), Vec::new())];
         for open in (0..self.layers).rev() {
             let mut next = Vec::new();
-            let mut taught: Vec<(usize, Weights)> = Vec::new();
+            let mut taught: Vec<(usize, SurrogateWeights)> = Vec::new();
             for (node, hint) in &mut frontier {
                 for place in 0..self.layers {
                     if !orders.place(node, place, mirrored) {
@@ -107,11 +107,11 @@ impl<'a> Surrogates<'a> {
                     match orders.refuting_bound(node, limit_rad_per_s as f32, &places) {
                         Some(bound) => taught[bound].0 += 1,
                         None => match self.best(&places, hint, limit_rad_per_s) {
-                            Verdict::Refuted(weights) => {
+                            SurrogateVerdict::Refuted(weights) => {
                                 orders.add_bound(open, &self.row(&weights));
                                 taught.push((1, weights));
                             }
-                            Verdict::Open(weights) => next.push((node.clone(), weights)),
+                            SurrogateVerdict::Open(weights) => next.push((node.clone(), weights)),
                         },
                     }
                     node.take_back();
@@ -139,7 +139,7 @@ impl<'a> Surrogates<'a> {
     }
 
     /// The best blend for a node whose places are set.
-    fn best(&self, places: &Places, hint: &Weights, limit_rad_per_s: f64) -> Verdict {
+    fn best(&self, places: &Places, hint: &SurrogateWeights, limit_rad_per_s: f64) -> SurrogateVerdict {
         let known = self.known(places);
         let mut active: Vec<(usize, f64)> = hint.iter().map(|&(s, y)| (s, y.signum())).collect();
         let mut weights = hint.clone();
@@ -154,7 +154,7 @@ impl<'a> Surrogates<'a> {
             let payoffs: Vec<Vec<f64>> =
                 columns.iter().map(|column| active.iter().map(|&(s, sign)| sign * column[s]).collect()).collect();
             let game = matrix_game::solve(&payoffs);
-            let weights: Weights = active
+            let weights: SurrogateWeights = active
                 .iter()
                 .zip(&game.rows)
                 .filter(|(_, y)| **y > 1e-9)
@@ -166,7 +166,7 @@ impl<'a> Surrogates<'a> {
                 best = (value, weights);
             }
             if best.0 >= limit_rad_per_s * (1.0 + MARGIN) {
-                return Verdict::Refuted(best.1);
+                return SurrogateVerdict::Refuted(best.1);
             }
             let is_settled = game.value - value <= TOLERANCE * limit_rad_per_s;
             if !is_settled && game.value >= limit_rad_per_s {
@@ -189,9 +189,9 @@ impl<'a> Surrogates<'a> {
         }
         // The search itself rounds and leaves room for it.
         if best.0 >= limit_rad_per_s * (1.0 + 10.0 * TOLERANCE) {
-            Verdict::Refuted(best.1)
+            SurrogateVerdict::Refuted(best.1)
         } else {
-            Verdict::Open(best.1)
+            SurrogateVerdict::Open(best.1)
         }
     }
 
@@ -219,7 +219,7 @@ impl<'a> Surrogates<'a> {
     }
 
     /// The rows' values under the arrangement of the open layers that is smallest for a blend.
-    fn smallest(&self, places: &Places, known: &[f64], weights: &Weights) -> Vec<f64> {
+    fn smallest(&self, places: &Places, known: &[f64], weights: &SurrogateWeights) -> Vec<f64> {
         let mut column = known.to_vec();
         for (term, (_, open)) in self.factors.iter().zip(self.term_places(places)) {
             let mut order: Vec<(f64, usize)> =
@@ -262,8 +262,8 @@ mod tests {
     const LAYERS: usize = 6;
 
     /// Rows in no particular order, without a constant.
-    fn rows() -> Vec<Row> {
-        let row = |s: usize| Row {
+    fn rows() -> Vec<SampleRow> {
+        let row = |s: usize| SampleRow {
             constant: 0.0,
             mean: (0..LAYERS).map(|j| ((s * s + 3 * s * j + 7 * j) as f64 * 0.9).sin()).collect(),
             difference: vec![0.0; LAYERS],
@@ -272,10 +272,10 @@ mod tests {
         (0..12).map(row).collect()
     }
 
-    fn smallest_by_enumeration(rows: &[Row], places: &mut Vec<usize>) -> f64 {
+    fn smallest_by_enumeration(rows: &[SampleRow], places: &mut Vec<usize>) -> f64 {
         if places.len() == LAYERS {
             let weight = |j: usize| 2.0 * places[j] as f64 + 1.0 - LAYERS as f64;
-            let value = |row: &Row| (0..LAYERS).map(|j| row.mean[j] * weight(j)).sum::<f64>().abs();
+            let value = |row: &SampleRow| (0..LAYERS).map(|j| row.mean[j] * weight(j)).sum::<f64>().abs();
             return rows.iter().map(value).fold(0.0, f64::max);
         }
         let mut smallest = f64::INFINITY;
@@ -324,7 +324,7 @@ mod tests {
         blender.teach(&mut orders, limit, true);
         let found = promising(&orders, limit, true, 48);
         let weight = |p: usize| 2.0 * p as f64 - 1.0 - LAYERS as f64;
-        let value = |row: &Row| (0..LAYERS).map(|j| row.mean[j] * weight(found[0][j])).sum::<f64>().abs();
+        let value = |row: &SampleRow| (0..LAYERS).map(|j| row.mean[j] * weight(found[0][j])).sum::<f64>().abs();
         let worst = rows.iter().map(value).fold(0.0, f64::max);
         assert!(found.len() <= 48 && (worst / best - 1.0).abs() < 1e-6, "{worst} {best}");
         assert_eq!(open(0.9 * best).1, 0);

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use crate::io::files::WriteError;
 use crate::io::json::campaign::{CampaignJson, CellJson};
-use crate::io::read::campaign_file::grid::{Search, SearchGrid};
-use crate::io::read::campaign_file::{Cell, Kind, Work};
+use crate::io::read::campaign_file::grid::{GridSearch, SearchGrid};
+use crate::io::read::campaign_file::{CampaignCell, CampaignKind, CellWork};
 use crate::io::write::campaign_cells::{
     check_kept, forget_unfinished, is_done, read_cell, state_folder, write_cell, write_table,
 };
@@ -22,7 +22,7 @@ use crate::task::{Observer, TaskError};
 use super::coils::judge_block;
 use super::gyros::{diagnose_gyro, measure_gyro};
 use super::search::search_cell;
-use super::{Part, Table};
+use super::{CampaignPart, CampaignTable};
 
 /// More identifiers than these are in the document only.
 const MOST_SHOWN: usize = 20;
@@ -37,7 +37,7 @@ pub trait Face: Observer {
 ///
 /// # Errors
 /// A record that cannot be opened, a result that cannot be written.
-pub fn compute(part: &Part, folder: &Path, face: &dyn Face) -> Result<Option<usize>, TaskError> {
+pub fn compute(part: &CampaignPart, folder: &Path, face: &dyn Face) -> Result<Option<usize>, TaskError> {
     part.check_kept(folder)?;
     let mut computed = 0;
     let cells = part.cells.len();
@@ -45,16 +45,16 @@ pub fn compute(part: &Part, folder: &Path, face: &dyn Face) -> Result<Option<usi
         let within = Within { face, place, cells };
         if !is_done(folder, cell) {
             match (&cell.work, &part.campaign.kind) {
-                (Work::Search(search), Kind::Search(grid)) => {
+                (CellWork::Search(search), CampaignKind::Search(grid)) => {
                     if !searched(grid, cell, search, folder, face)? {
                         return Ok(None);
                     }
                 }
-                (Work::Search(_), _) => {}
+                (CellWork::Search(_), _) => {}
                 _ if !face.goes_on() => return Ok(None),
-                (Work::Tolerance(block), _) => write_cell(folder, &judge_block(&cell.id, block))?,
-                (Work::Metrics(gyro), _) => write_cell(folder, &measure_gyro(&cell.id, gyro, &within)?)?,
-                (Work::Diagnose(gyro), _) => write_cell(folder, &diagnose_gyro(&cell.id, gyro, &within)?)?,
+                (CellWork::Tolerance(block), _) => write_cell(folder, &judge_block(&cell.id, block))?,
+                (CellWork::Metrics(gyro), _) => write_cell(folder, &measure_gyro(&cell.id, gyro, &within)?)?,
+                (CellWork::Diagnose(gyro), _) => write_cell(folder, &diagnose_gyro(&cell.id, gyro, &within)?)?,
             }
             computed += 1;
         }
@@ -67,7 +67,12 @@ pub fn compute(part: &Part, folder: &Path, face: &dyn Face) -> Result<Option<usi
 ///
 /// # Errors
 /// A folder that cannot be written.
-pub fn merge(whole: &Part, folder: &Path, searched: usize, observer: &dyn Observer) -> Result<CampaignJson, TaskError> {
+pub fn merge(
+    whole: &CampaignPart,
+    folder: &Path,
+    searched: usize,
+    observer: &dyn Observer,
+) -> Result<CampaignJson, TaskError> {
     whole.check_kept(folder)?;
     let (answer, table) = whole.merged(folder, searched);
     if let Some(table) = table {
@@ -80,7 +85,7 @@ pub fn merge(whole: &Part, folder: &Path, searched: usize, observer: &dyn Observ
     Ok(answer)
 }
 
-impl Part<'_> {
+impl CampaignPart<'_> {
     /// Refuses a folder in which the campaign's table or pictures would take the place of what it reads.
     ///
     /// # Errors
@@ -103,8 +108,8 @@ pub(crate) fn missing_words(answer: &CampaignJson) -> String {
 /// Searches one cell; false if the work was ended first.
 fn searched(
     grid: &SearchGrid,
-    cell: &Cell,
-    search: &Search,
+    cell: &CampaignCell,
+    search: &GridSearch,
     folder: &Path,
     face: &dyn Face,
 ) -> Result<bool, TaskError> {
@@ -123,9 +128,9 @@ fn searched(
 }
 
 /// The page, and the pictures that stand beside it.
-fn pages(kind: &Kind, answer: &CampaignJson, table: &Table) -> Vec<(String, String)> {
+fn pages(kind: &CampaignKind, answer: &CampaignJson, table: &CampaignTable) -> Vec<(String, String)> {
     let page = match (kind, &answer.fleet) {
-        (Kind::Search(_), _) => campaign_page(answer),
+        (CampaignKind::Search(_), _) => campaign_page(answer),
         (_, Some(fleet)) => fleet_page(&answer.campaign, fleet, &table.gyros),
         (_, None) => built_coils_page(answer),
     };
@@ -158,7 +163,7 @@ impl Observer for Within<'_> {
 
 /// Ends a search as soon as the face wants it or another process has done it; keeps its state from time to time.
 struct Watch<'a> {
-    cell: &'a Cell,
+    cell: &'a CampaignCell,
     folder: &'a Path,
     state_folder: PathBuf,
     face: &'a dyn Face,

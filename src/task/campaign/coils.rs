@@ -4,8 +4,8 @@ use std::path::Path;
 
 use crate::io::json::built_coils::{Blocks, BuiltCoilsJson};
 use crate::io::json::campaign::{BlockJson, BlockPatternJson};
-use crate::io::read::campaign_file::coils::Block;
-use crate::io::read::campaign_file::{Cell, Kind};
+use crate::io::read::campaign_file::coils::CoilBlock;
+use crate::io::read::campaign_file::{CampaignCell, CampaignKind};
 use crate::io::write::campaign_cells::read_cell;
 use crate::numeric::quantiles::QuantileSketch;
 use crate::pattern::Pattern;
@@ -15,19 +15,19 @@ use crate::units::deg_per_h_from_rad_per_s;
 /// Seconds of one thread for a coil and layer: 1.7 ms for the 40 layers of the 998 m coil, whose field is solved anew for each.
 const COIL_S: f64 = 4e-5;
 
-pub(super) fn estimated_s(block: &Block) -> f64 {
+pub(super) fn estimated_s(block: &CoilBlock) -> f64 {
     (block.coils.end - block.coils.start) as f64 * block.file.model.coil.layers() as f64 * COIL_S
 }
 
 /// The worst cases of one block's coils. What a model itself does not permit is a result as well: the block's failure.
-pub(crate) fn judge_block(id: &str, block: &Block) -> BlockJson {
+pub(crate) fn judge_block(id: &str, block: &CoilBlock) -> BlockJson {
     match judged(block) {
         Ok((measure, patterns)) => BlockJson { measure, patterns, ..nothing(id, block) },
         Err(failure) => BlockJson { failure: Some(failure), ..nothing(id, block) },
     }
 }
 
-fn judged(block: &Block) -> Result<(String, Vec<BlockPatternJson>), String> {
+fn judged(block: &CoilBlock) -> Result<(String, Vec<BlockPatternJson>), String> {
     let in_words = |error: ToleranceError| error.to_string();
     let file = &block.file;
     let patterns: Vec<Pattern> = block.patterns.iter().map(|named| named.pattern.clone()).collect();
@@ -55,10 +55,10 @@ fn judged(block: &Block) -> Result<(String, Vec<BlockPatternJson>), String> {
     Ok((measure.to_owned(), block.patterns.iter().enumerate().map(of).collect::<Result<_, String>>()?))
 }
 
-fn nothing(id: &str, block: &Block) -> BlockJson {
+fn nothing(id: &str, block: &CoilBlock) -> BlockJson {
     BlockJson {
         id: id.to_owned(),
-        kind: Kind::TOLERANCE.to_owned(),
+        kind: CampaignKind::TOLERANCE.to_owned(),
         model: block.file.model.name.clone(),
         layers: block.file.model.coil.layers(),
         seed: block.spec.seed,
@@ -72,7 +72,7 @@ fn nothing(id: &str, block: &Block) -> BlockJson {
 }
 
 /// Each model over all its blocks, which are read one after the other; none where blocks failed.
-pub(super) fn merged(folder: &Path, cells: &[&Cell]) -> Vec<BuiltCoilsJson> {
+pub(super) fn merged(folder: &Path, cells: &[&CampaignCell]) -> Vec<BuiltCoilsJson> {
     let mut found = Vec::new();
     let mut open: Option<Blocks> = None;
     for cell in cells {

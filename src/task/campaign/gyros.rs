@@ -2,7 +2,7 @@
 
 use crate::io::json::campaign::GyroJson;
 use crate::io::json::inputs::RecordInputJson;
-use crate::io::read::campaign_file::Kind;
+use crate::io::read::campaign_file::CampaignKind;
 use crate::io::read::campaign_file::fleet::{Gyro, StatedFile};
 use crate::io::read::table_file::Source;
 use crate::task::measurement::GrossErrors;
@@ -38,12 +38,12 @@ pub(crate) fn measure_gyro(id: &str, gyro: &Gyro, observer: &dyn Observer) -> Re
             RecordInputJson { file: file.stated.clone(), sha256: file.sha256.clone(), role: "measured".to_owned() };
         match measure_stream(input, &file.stated, source, &gyro.format, &settings, observer) {
             Ok(found) => measured.push(found),
-            Err(error) => return Ok(failed(id, Kind::METRICS, gyro, &error)),
+            Err(error) => return Ok(failed(id, CampaignKind::METRICS, gyro, &error)),
         }
     }
     Ok(match metrics::document(measured) {
-        Ok(metrics) => GyroJson { metrics: Some(metrics), ..nothing(id, Kind::METRICS, gyro) },
-        Err(error) => failed(id, Kind::METRICS, gyro, &error),
+        Ok(metrics) => GyroJson { metrics: Some(metrics), ..nothing(id, CampaignKind::METRICS, gyro) },
+        Err(error) => failed(id, CampaignKind::METRICS, gyro, &error),
     })
 }
 
@@ -56,7 +56,7 @@ fn failed(id: &str, kind: &str, gyro: &Gyro, error: &TaskError) -> GyroJson {
 
 #[cfg(feature = "report")]
 mod diagnosed {
-    use super::{GyroJson, Kind, Observer, TaskError, failed, nothing};
+    use super::{CampaignKind, GyroJson, Observer, TaskError, failed, nothing};
     use crate::diagnose::Terms;
     use crate::io::read::campaign_file::fleet::{Gyro, StatedFile};
     use crate::io::read::record_file::read_record_named;
@@ -93,8 +93,8 @@ mod diagnosed {
             run(&Request { holdout: &holdout, terms, ..Request::new(file, &measurements) }, observer)
         });
         Ok(match found {
-            Ok(answer) => GyroJson { diagnosis: Some(answer.document), ..nothing(id, Kind::DIAGNOSE, gyro) },
-            Err(error) => failed(id, Kind::DIAGNOSE, gyro, &error),
+            Ok(answer) => GyroJson { diagnosis: Some(answer.document), ..nothing(id, CampaignKind::DIAGNOSE, gyro) },
+            Err(error) => failed(id, CampaignKind::DIAGNOSE, gyro, &error),
         })
     }
 }

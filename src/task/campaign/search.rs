@@ -1,8 +1,8 @@
 //! A campaign's searches: what each costs, and what it finds.
 
 use crate::io::json::campaign::CellJson;
-use crate::io::read::campaign_file::Kind;
-use crate::io::read::campaign_file::grid::{Search, SearchGrid};
+use crate::io::read::campaign_file::CampaignKind;
+use crate::io::read::campaign_file::grid::{GridSearch, SearchGrid};
 use crate::pattern::windability::WindabilityClass;
 use crate::search::anneal::rounds::{DEFAULT_PATIENCE, DEFAULT_RESTARTS_PER_ROUND, Plan, Rules, State};
 use crate::search::answer::{Answer, Ended};
@@ -29,7 +29,7 @@ const BOUNDS_OVER_MOVES: f64 = 10.0;
 /// What a cell takes on one thread, to deal and to group cells by: within a factor of two of what was measured for 8 to 24
 /// layers of the paper's coil (`results/campaigns`) but for the guaranteed rate, of which it says a third; elsewhere an order of
 /// magnitude.
-pub(super) fn estimated_s(grid: &SearchGrid, cell: &Search) -> f64 {
+pub(super) fn estimated_s(grid: &SearchGrid, cell: &GridSearch) -> f64 {
     let layers = cell.file.model.coil.layers();
     let plan = plan(grid, cell);
     let rounds = plan.rules.rounds.min(USUAL_ROUNDS) + FURTHER_ROUNDS;
@@ -39,7 +39,7 @@ pub(super) fn estimated_s(grid: &SearchGrid, cell: &Search) -> f64 {
     BEGINNING_S + moves * layers as f64 * move_s * if is_bounded { BOUNDS_OVER_MOVES } else { 1.0 }
 }
 
-fn plan(grid: &SearchGrid, cell: &Search) -> Plan {
+fn plan(grid: &SearchGrid, cell: &GridSearch) -> Plan {
     let layers = cell.file.model.coil.layers();
     Plan {
         seed: cell.seed,
@@ -56,7 +56,7 @@ fn plan(grid: &SearchGrid, cell: &Search) -> Plan {
 pub(crate) fn search_cell(
     grid: &SearchGrid,
     id: &str,
-    cell: &Search,
+    cell: &GridSearch,
     saved: Option<State>,
     observer: &mut dyn Observer,
 ) -> Option<CellJson> {
@@ -76,7 +76,7 @@ pub(crate) fn search_cell(
     }
 }
 
-fn found(id: &str, cell: &Search, answer: &Answer) -> CellJson {
+fn found(id: &str, cell: &GridSearch, answer: &Answer) -> CellJson {
     let best = &answer.best;
     CellJson {
         worst_rate_deg_per_h: Some(deg_per_h_from_rad_per_s(best.worst.rate_rad_per_s.abs())),
@@ -90,10 +90,10 @@ fn found(id: &str, cell: &Search, answer: &Answer) -> CellJson {
     }
 }
 
-fn nothing(id: &str, cell: &Search) -> CellJson {
+fn nothing(id: &str, cell: &GridSearch) -> CellJson {
     CellJson {
         id: id.to_owned(),
-        kind: Kind::SEARCH.to_owned(),
+        kind: CampaignKind::SEARCH.to_owned(),
         model: cell.file.model.name.clone(),
         layers: cell.file.model.coil.layers(),
         windability: cell.class.to_string(),

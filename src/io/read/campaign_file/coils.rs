@@ -13,7 +13,7 @@ use crate::pattern::classic::Classic;
 use crate::search::cost::tolerance::ToleranceSpec;
 use crate::units::rad_per_s_from_deg_per_h;
 
-use super::{ARRAY_OF_STRINGS, Cell, Kind, Work, id_of, model_address, model_text, read_models};
+use super::{ARRAY_OF_STRINGS, CampaignCell, CampaignKind, CellWork, id_of, model_address, model_text, read_models};
 
 /// Coils to draw of each model, in blocks.
 #[derive(Debug, Clone)]
@@ -31,7 +31,7 @@ pub(crate) struct CoilStudy {
 
 /// Some of the coils of one model, judged with each pattern.
 #[derive(Debug, Clone)]
-pub(crate) struct Block {
+pub(crate) struct CoilBlock {
     pub(crate) file: Arc<ModelFile>,
     pub(crate) patterns: Arc<[NamedPattern]>,
     /// How much is built apart; its number of samples is that of the whole study.
@@ -64,7 +64,7 @@ pub(super) fn read(r: &mut TomlReader, root: &mut TableReader, base: &Path) -> O
 
 impl CoilStudy {
     /// The blocks of each model in their order.
-    pub(super) fn cells(&self) -> Result<Vec<Cell>, Faults> {
+    pub(super) fn cells(&self) -> Result<Vec<CampaignCell>, Faults> {
         let mut cells = Vec::new();
         for path in &self.models {
             let file = parse_model(path, &model_text(path)?)?.for_search();
@@ -86,9 +86,9 @@ impl CoilStudy {
             let all = spec.samples as u64;
             for first in (0..all).step_by(self.coils_per_cell as usize) {
                 let coils = first..(first + self.coils_per_cell).min(all);
-                let id = id_of(Kind::TOLERANCE, &address, &format!("{spreads:?} {patterns:?} {coils:?}"));
+                let id = id_of(CampaignKind::TOLERANCE, &address, &format!("{spreads:?} {patterns:?} {coils:?}"));
                 let (file, patterns, spec) = (Arc::clone(&file), Arc::clone(&patterns), Arc::clone(&spec));
-                cells.push(Cell { id, work: Work::Tolerance(Block { file, patterns, spec, coils }) });
+                cells.push(CampaignCell { id, work: CellWork::Tolerance(CoilBlock { file, patterns, spec, coils }) });
             }
         }
         Ok(cells)

@@ -12,7 +12,7 @@ use crate::io::read::model_file::parse_model;
 use crate::io::read::record_columns::RecordFormat;
 use crate::io::read::toml_reader::{Limits, TableReader, TomlReader};
 
-use super::{ARRAY_OF_STRINGS, Cell, Kind, Work, id_of, model_text};
+use super::{ARRAY_OF_STRINGS, CampaignCell, CampaignKind, CellWork, id_of, model_text};
 
 /// Gyros with their records, and how those are read.
 #[derive(Debug, Clone)]
@@ -118,7 +118,7 @@ pub(super) fn read(r: &mut TomlReader, root: &mut TableReader, base: &Path, with
 
 impl Fleet {
     /// One cell a gyro, in their order.
-    pub(super) fn cells(&self, with_model: bool) -> Result<Vec<Cell>, Faults> {
+    pub(super) fn cells(&self, with_model: bool) -> Result<Vec<CampaignCell>, Faults> {
         let mut models: BTreeMap<PathBuf, Arc<ModelFile>> = BTreeMap::new();
         let mut cells = Vec::with_capacity(self.gyros.len());
         for stated in &self.gyros {
@@ -140,9 +140,9 @@ impl Fleet {
                 file,
             };
             cells.push(if with_model {
-                Cell { id: gyro.id(Kind::DIAGNOSE), work: Work::Diagnose(gyro) }
+                CampaignCell { id: gyro.id(CampaignKind::DIAGNOSE), work: CellWork::Diagnose(gyro) }
             } else {
-                Cell { id: gyro.id(Kind::METRICS), work: Work::Metrics(gyro) }
+                CampaignCell { id: gyro.id(CampaignKind::METRICS), work: CellWork::Metrics(gyro) }
             });
         }
         Ok(cells)

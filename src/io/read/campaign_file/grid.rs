@@ -12,7 +12,7 @@ use crate::io::read::toml_reader::{TableReader, TomlReader, parse};
 use crate::pattern::windability::WindabilityClass;
 use crate::search::cost::objective::Objective;
 
-use super::{ARRAY_OF_STRINGS, Cell, Kind, Work, id_of, model_address, model_text, read_models};
+use super::{ARRAY_OF_STRINGS, CampaignCell, CampaignKind, CellWork, id_of, model_address, model_text, read_models};
 
 /// A grid of searches.
 #[derive(Debug, Clone)]
@@ -29,7 +29,7 @@ pub(crate) struct SearchGrid {
 
 /// One search of a grid.
 #[derive(Debug, Clone)]
-pub(crate) struct Search {
+pub(crate) struct GridSearch {
     pub(crate) file: Arc<ModelFile>,
     pub(crate) class: WindabilityClass,
     pub(crate) objective: Objective,
@@ -106,7 +106,7 @@ impl SearchGrid {
     ///
     /// # Errors
     /// The faults of a model file, also those that another layer count causes.
-    pub(super) fn cells(&self) -> Result<Vec<Cell>, Faults> {
+    pub(super) fn cells(&self) -> Result<Vec<CampaignCell>, Faults> {
         let mut cells = Vec::new();
         let mut seen = BTreeSet::new();
         for path in &self.models {
@@ -131,7 +131,7 @@ impl SearchGrid {
         Ok(cells)
     }
 
-    fn append_cells(&self, file: Arc<ModelFile>, seen: &mut BTreeSet<String>, cells: &mut Vec<Cell>) {
+    fn append_cells(&self, file: Arc<ModelFile>, seen: &mut BTreeSet<String>, cells: &mut Vec<CampaignCell>) {
         let addresses = [false, true].map(|with_tolerance| model_address(&file.source, with_tolerance));
         for &class in &self.classes {
             for &objective in &self.objectives {
@@ -139,10 +139,10 @@ impl SearchGrid {
                     let settings =
                         format!("{class} {} {seed} {:?} {:?}", objective.key(), self.rounds, self.moves_per_restart);
                     let model = &addresses[usize::from(objective == Objective::P95)];
-                    let id = id_of(Kind::SEARCH, model, &settings);
+                    let id = id_of(CampaignKind::SEARCH, model, &settings);
                     if seen.insert(id.clone()) {
-                        let search = Search { file: Arc::clone(&file), class, objective, seed };
-                        cells.push(Cell { id, work: Work::Search(search) });
+                        let search = GridSearch { file: Arc::clone(&file), class, objective, seed };
+                        cells.push(CampaignCell { id, work: CellWork::Search(search) });
                     }
                 }
             }

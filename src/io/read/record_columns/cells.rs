@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{Column, Conversion, Quantity};
+use super::{ColumnQuantity, Conversion, RecordColumn};
 use crate::io::read::stamps::{DATES, STAMPS, seconds_of_date, seconds_of_stamp};
 use crate::units::rad_per_s_from_deg_per_h;
 
@@ -10,7 +10,7 @@ use crate::units::rad_per_s_from_deg_per_h;
 const EPOCH_MS: Range<f64> = 1e11..1e14;
 const EPOCH_US: Range<f64> = 1e14..1e17;
 
-impl Column {
+impl RecordColumn {
     /// A field as a number in SI.
     ///
     /// # Errors
@@ -20,10 +20,10 @@ impl Column {
             true => "nothing".to_owned(),
             false => format!("\"{}\"", field.chars().take(40).collect::<String>()),
         };
-        if self.quantity == Quantity::Date {
+        if self.quantity == ColumnQuantity::Date {
             return seconds_of_date(field).ok_or_else(&found);
         }
-        if self.conversion.is_stamp() || (self.quantity == Quantity::Time && field.contains(':')) {
+        if self.conversion.is_stamp() || (self.quantity == ColumnQuantity::Time && field.contains(':')) {
             let stated = if self.decimal_comma { field.replace(',', ".") } else { field.to_owned() };
             return seconds_of_stamp(&stated).ok_or_else(&found);
         }
@@ -54,7 +54,7 @@ impl Column {
     pub(crate) fn remedy(&self, field: &str) -> &'static str {
         let is_apart = |c: char| ",' \u{a0}\u{202f}\u{2019}".contains(c);
         let joined: String = field.chars().filter(|c| !is_apart(*c)).collect();
-        let is_time = self.quantity == Quantity::Time;
+        let is_time = self.quantity == ColumnQuantity::Time;
         match field.parse::<f64>() {
             Ok(since) if is_time && EPOCH_MS.contains(&since) => {
                 "stamps in milliseconds since 1970? say so: --columns time=its name:epoch_ms"
@@ -75,7 +75,7 @@ impl Column {
     /// What its cells must be, in words.
     pub(crate) fn expected(&self) -> &'static str {
         match self.quantity {
-            Quantity::Date => DATES,
+            ColumnQuantity::Date => DATES,
             _ if self.conversion.is_stamp() => STAMPS,
             _ => "expected a finite number",
         }

@@ -10,8 +10,8 @@ use hdf5_reader::group::Group;
 use hdf5_reader::{Dataset, Datatype, H5Type, Hdf5File, OpenOptions, SliceInfo, SliceInfoElem, dtype_element_size};
 
 use super::Source;
-use super::layout::{Layout, Placed, Shape, laid_out};
-use super::rows::{BLOCK_ROWS, Columns, Values};
+use super::layout::{Placed, VariableLayout, VariableShape, laid_out};
+use super::rows::{BLOCK_ROWS, ColumnValues, TableColumns};
 
 /// Groups in groups; links may go round.
 const DEEPEST: usize = 8;
@@ -52,7 +52,7 @@ enum Holds {
 
 #[derive(Default)]
 struct Found {
-    shapes: Vec<Shape>,
+    shapes: Vec<VariableShape>,
     holds: Vec<Holds>,
     unread: Vec<String>,
     sets: usize,
@@ -89,12 +89,12 @@ impl Found {
         let is_vector = dims.iter().filter(|n| **n > 1).count() == 1;
         match set.dtype() {
             Datatype::FixedPoint { .. } | Datatype::FloatingPoint { size: 4 | 8, .. } if !is_matlabs_text => {
-                self.push(Shape { path, dims, names }, Holds::Numbers(Box::new(set.clone())));
+                self.push(VariableShape { path, dims, names }, Holds::Numbers(Box::new(set.clone())));
             }
             Datatype::Enum { base, .. } if is_vector => {
                 let (of, bytes) = (base.as_ref().clone(), Arc::new(set.read_native_bytes().map_err(said)?));
                 let stride = dtype_element_size(&of).map_err(said)?;
-                self.push(Shape { path, dims, names }, Holds::Field { bytes, stride, offset: 0, of });
+                self.push(VariableShape { path, dims, names }, Holds::Field { bytes, stride, offset: 0, of });
             }
             Datatype::Compound { size, fields } if is_vector && !is_complex(fields.iter().map(|f| f.name.as_str())) => {
                 let bytes = Arc::new(set.read_native_bytes().map_err(said)?);
@@ -109,7 +109,7 @@ impl Found {
                     if is_number {
                         let (stride, offset) = (*size as usize, field.byte_offset as usize);
                         let of = field.datatype.clone();
-                        let shape = Shape { path, dims: dims.clone(), names: Vec::new() };
+                        let shape = VariableShape { path, dims: dims.clone(), names: Vec::new() };
                         self.push(shape, Holds::Field { bytes: bytes.clone(), stride, offset, of });
                     } else {
                         self.unread.push(path.join("."));
@@ -117,7 +117,7 @@ impl Found {
                 }
             }
             Datatype::String { .. } | Datatype::VarLen { .. } if is_vector => match set.read_strings() {
-                Ok(texts) => self.push(Shape { path, dims, names }, Holds::Texts(texts)),
+                Ok(texts) => self.push(VariableShape { path, dims, names }, Holds::Texts(texts)),
                 Err(_) => self.unread.push(path.join(".")),
             },
             _ => self.unread.push(path.join(".")),
@@ -125,7 +125,7 @@ impl Found {
         Ok(())
     }
 
-    fn push(&mut self, shape: Shape, holds: Holds) {
+    fn push(&mut self, shape: VariableShape, holds: Holds) {
         self.shapes.push(shape);
         self.holds.push(holds);
     }
@@ -139,16 +139,16 @@ fn is_complex<'n>(fields: impl Iterator<Item = &'n str>) -> bool {
 
 struct Table {
     holds: Vec<Holds>,
-    layout: Layout,
+    layout: VariableLayout,
     at: u64,
 }
 
-impl Columns for Table {
+impl TableColumns for Table {
     fn names(&self) -> Vec<String> {
         self.layout.columns.iter().map(|c| c.name.clone()).collect()
     }
 
-    fn block(&mut self) -> Result<Option<Vec<Values>>, String> {
+    fn block(&mut self) -> Result<Option<Vec<ColumnValues>>, String> {
         let (from, to) = (self.at, self.layout.rows.min(self.at + BLOCK_ROWS as u64));
         self.at = to;
         if from >= to {
@@ -157,13 +157,13 @@ impl Columns for Table {
         let column = |place: &Placed| {
             let rows = (from as usize)..(to as usize);
             match &self.holds[place.variable] {
-                Holds::Numbers(set) => numbers(set, place, from, to).map(Values::Numbers),
+                Holds::Numbers(set) => numbers(set, place, from, to).map(ColumnValues::Numbers),
                 Holds::Field { bytes, stride, offset, of } => {
                     let value = |row: usize| bytes.get(row * stride + offset..).and_then(|b| number(b, of));
-                    Ok(Values::Numbers(rows.map(|row| value(row).unwrap_or(f64::NAN)).collect()))
+                    Ok(ColumnValues::Numbers(rows.map(|row| value(row).unwrap_or(f64::NAN)).collect()))
                 }
                 Holds::Texts(texts) => {
-                    Ok(Values::Texts(rows.map(|row| texts.get(row).cloned().unwrap_or_default()).collect()))
+                    Ok(ColumnValues::Texts(rows.map(|row| texts.get(row).cloned().unwrap_or_default()).collect()))
                 }
             }
         };

@@ -9,7 +9,7 @@ const MOST_NAMED: usize = 8;
 
 /// What is known of a variable before its values are.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Shape {
+pub(super) struct VariableShape {
     /// The names of what it stands in, outermost first, and its own.
     pub(crate) path: Vec<String>,
     pub(crate) dims: Vec<u64>,
@@ -30,14 +30,14 @@ pub(super) struct Placed {
 }
 
 #[derive(Debug)]
-pub(super) struct Layout {
+pub(super) struct VariableLayout {
     pub(crate) rows: u64,
     pub(crate) columns: Vec<Placed>,
     /// What is in none of the columns, in words.
     pub(crate) remarks: Vec<String>,
 }
 
-impl Shape {
+impl VariableShape {
     /// The lengths that it may have as columns, each with the number of them.
     fn lengths(&self) -> Vec<(u64, u64)> {
         match *self.dims.as_slice() {
@@ -56,7 +56,7 @@ impl Shape {
 ///
 /// # Errors
 /// No two variables of one length.
-pub(super) fn laid_out(shapes: &[Shape], unread: &[String]) -> Result<Layout, String> {
+pub(super) fn laid_out(shapes: &[VariableShape], unread: &[String]) -> Result<VariableLayout, String> {
     let mut votes: BTreeMap<u64, u64> = BTreeMap::new();
     for shape in shapes {
         // Of a matrix the longer side is the rows.
@@ -66,7 +66,8 @@ pub(super) fn laid_out(shapes: &[Shape], unread: &[String]) -> Result<Layout, St
     }
     let most = votes.iter().filter(|(length, _)| **length > 1).max_by_key(|(length, count)| (**count, **length));
     let rows = most.filter(|(_, count)| **count > 1).map(|(length, _)| *length).ok_or_else(|| {
-        let found: Vec<&str> = shapes.iter().map(Shape::leaf).chain(unread.iter().map(String::as_str)).collect();
+        let found: Vec<&str> =
+            shapes.iter().map(VariableShape::leaf).chain(unread.iter().map(String::as_str)).collect();
         format!(
             "expected variables of one length, such as time_s, temperature_c and rate_deg_per_h, found {}",
             if found.is_empty() { "none that holds numbers".to_owned() } else { listed(&found) }
@@ -100,7 +101,7 @@ pub(super) fn laid_out(shapes: &[Shape], unread: &[String]) -> Result<Layout, St
         [] => Vec::new(),
         some => vec![format!("no columns of {rows} rows, and left out: {}", listed(some))],
     };
-    Ok(Layout { rows, columns, remarks })
+    Ok(VariableLayout { rows, columns, remarks })
 }
 
 fn listed(names: &[&str]) -> String {
@@ -112,8 +113,8 @@ fn listed(names: &[&str]) -> String {
 mod tests {
     use super::*;
 
-    fn shape(path: &str, dims: &[u64]) -> Shape {
-        Shape { path: path.split('.').map(str::to_owned).collect(), dims: dims.to_vec(), names: Vec::new() }
+    fn shape(path: &str, dims: &[u64]) -> VariableShape {
+        VariableShape { path: path.split('.').map(str::to_owned).collect(), dims: dims.to_vec(), names: Vec::new() }
     }
 
     #[test]

@@ -12,8 +12,8 @@ use std::path::Path;
 use flate2::read::ZlibDecoder;
 
 use super::Source;
-use super::layout::{Layout, Shape, laid_out};
-use super::rows::{BLOCK_ROWS, Columns, Values};
+use super::layout::{VariableLayout, VariableShape, laid_out};
+use super::rows::{BLOCK_ROWS, ColumnValues, TableColumns};
 
 /// As large as a text may be.
 const LARGEST_BYTES: u64 = 512 * 1024 * 1024;
@@ -38,7 +38,7 @@ pub(super) fn open(path: &Path) -> Result<Source<'static>, String> {
     let bytes = std::fs::read(path).map_err(unreadable)?;
     let mut found = Found { is_big_endian: bytes.get(126..128) == Some(b"MI"), ..Found::default() };
     found.elements(bytes.get(HEAD_BYTES..).unwrap_or_default(), true)?;
-    let shapes: Vec<Shape> = found.variables.iter().map(|v| v.shape.clone()).collect();
+    let shapes: Vec<VariableShape> = found.variables.iter().map(|v| v.shape.clone()).collect();
     let layout = laid_out(&shapes, &found.unread)?;
     let remarks = layout.remarks.clone();
     Ok(Source::table(Table { variables: found.variables, layout, at: 0 }, remarks))
@@ -46,7 +46,7 @@ pub(super) fn open(path: &Path) -> Result<Source<'static>, String> {
 
 #[derive(Debug)]
 struct Variable {
-    shape: Shape,
+    shape: VariableShape,
     /// Column by column.
     values: Vec<f64>,
 }
@@ -136,7 +136,7 @@ impl Found {
             if values.len() as u64 != count {
                 return Err(DAMAGED.to_owned());
             }
-            self.variables.push(Variable { shape: Shape { path, dims, names: Vec::new() }, values });
+            self.variables.push(Variable { shape: VariableShape { path, dims, names: Vec::new() }, values });
         } else if class == STRUCTURE && path.len() <= DEEPEST {
             self.structure(bytes, &path, count)?;
         } else {
@@ -219,16 +219,16 @@ impl Found {
 
 struct Table {
     variables: Vec<Variable>,
-    layout: Layout,
+    layout: VariableLayout,
     at: u64,
 }
 
-impl Columns for Table {
+impl TableColumns for Table {
     fn names(&self) -> Vec<String> {
         self.layout.columns.iter().map(|c| c.name.clone()).collect()
     }
 
-    fn block(&mut self) -> Result<Option<Vec<Values>>, String> {
+    fn block(&mut self) -> Result<Option<Vec<ColumnValues>>, String> {
         let (from, to) = (self.at, self.layout.rows.min(self.at + BLOCK_ROWS as u64));
         self.at = to;
         let column = |place: &super::layout::Placed| {
@@ -236,7 +236,7 @@ impl Columns for Table {
             let high = variable.shape.dims.first().copied().unwrap_or(1);
             let at = |row: u64| if place.axis == 0 { row + place.index * high } else { place.index + row * high };
             let value = |row| usize::try_from(at(row)).ok().and_then(|i| variable.values.get(i)).copied();
-            Values::Numbers((from..to).map(|row| value(row).unwrap_or(f64::NAN)).collect())
+            ColumnValues::Numbers((from..to).map(|row| value(row).unwrap_or(f64::NAN)).collect())
         };
         Ok((from < to).then(|| self.layout.columns.iter().map(column).collect()))
     }

@@ -8,30 +8,30 @@ pub(super) const BLOCK_ROWS: usize = 16_384;
 
 /// Some rows of one column.
 #[derive(Debug)]
-pub(super) enum Values {
+pub(super) enum ColumnValues {
     /// NaN is a missing value.
     Numbers(Vec<f64>),
     Texts(Vec<String>),
 }
 
-impl Values {
+impl ColumnValues {
     fn len(&self) -> usize {
         match self {
-            Values::Numbers(numbers) => numbers.len(),
-            Values::Texts(texts) => texts.len(),
+            ColumnValues::Numbers(numbers) => numbers.len(),
+            ColumnValues::Texts(texts) => texts.len(),
         }
     }
 }
 
 /// A table that is read from its beginning to its end.
-pub(super) trait Columns {
+pub(super) trait TableColumns {
     fn names(&self) -> Vec<String>;
 
     /// The next rows, column by column; none at the end.
     ///
     /// # Errors
     /// A file that is damaged, in words.
-    fn block(&mut self) -> Result<Option<Vec<Values>>, String>;
+    fn block(&mut self) -> Result<Option<Vec<ColumnValues>>, String>;
 }
 
 /// The text of a table.
@@ -42,7 +42,7 @@ pub(super) struct TableText<C> {
     taken: usize,
 }
 
-impl<C: Columns> TableText<C> {
+impl<C: TableColumns> TableText<C> {
     pub(super) fn new(columns: C) -> Self {
         Self { columns, has_begun: false, text: String::new(), taken: 0 }
     }
@@ -59,11 +59,11 @@ impl<C: Columns> TableText<C> {
             return Ok(true);
         }
         let Some(block) = self.columns.block().map_err(io::Error::other)? else { return Ok(false) };
-        let rows = block.iter().map(Values::len).min().unwrap_or(0);
+        let rows = block.iter().map(ColumnValues::len).min().unwrap_or(0);
         for row in 0..rows {
             for (i, values) in block.iter().enumerate() {
                 match values {
-                    Values::Numbers(numbers) => {
+                    ColumnValues::Numbers(numbers) => {
                         if i > 0 {
                             self.text.push(',');
                         }
@@ -72,7 +72,7 @@ impl<C: Columns> TableText<C> {
                             write!(self.text, "{:?}", numbers[row]).map_err(io::Error::other)?;
                         }
                     }
-                    Values::Texts(texts) => push_text(&mut self.text, i, &texts[row]),
+                    ColumnValues::Texts(texts) => push_text(&mut self.text, i, &texts[row]),
                 }
             }
             self.text.push('\n');
@@ -97,7 +97,7 @@ fn push_text(line: &mut String, place: usize, text: &str) {
     line.push('"');
 }
 
-impl<C: Columns> Read for TableText<C> {
+impl<C: TableColumns> Read for TableText<C> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         if self.taken == self.text.len() && !self.fill()? {
             return Ok(0);
@@ -116,15 +116,15 @@ mod tests {
 
     struct Two(usize);
 
-    impl Columns for Two {
+    impl TableColumns for Two {
         fn names(&self) -> Vec<String> {
             vec!["#a;\"b\"".to_owned(), "c".to_owned()]
         }
 
-        fn block(&mut self) -> Result<Option<Vec<Values>>, String> {
+        fn block(&mut self) -> Result<Option<Vec<ColumnValues>>, String> {
             self.0 += 1;
-            let numbers = Values::Numbers(vec![0.1, f64::NAN, 1e-9]);
-            let texts = Values::Texts(vec!["x\ny".into(), "a,b".into(), String::new()]);
+            let numbers = ColumnValues::Numbers(vec![0.1, f64::NAN, 1e-9]);
+            let texts = ColumnValues::Texts(vec!["x\ny".into(), "a,b".into(), String::new()]);
             match self.0 {
                 1 => Ok(Some(vec![numbers, texts])),
                 2 => Ok(None),

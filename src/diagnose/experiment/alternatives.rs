@@ -7,7 +7,7 @@ use crate::record::Record;
 
 /// A candidate, fitted to the records at hand in their chamber.
 #[derive(Debug, Clone)]
-pub(crate) struct Rival {
+pub(crate) struct FittedAlternative {
     pub(crate) name: String,
     pub(super) fit: Fit,
     /// What the records say of its free numbers and of the film.
@@ -18,10 +18,10 @@ pub(crate) struct Rival {
 
 /// The candidates, and what is the same for all of them.
 #[derive(Debug, Clone)]
-pub(crate) struct Contest {
-    pub(super) rivals: Vec<Rival>,
+pub(crate) struct ModelComparison {
+    pub(super) alternatives: Vec<FittedAlternative>,
     /// What they are candidates to be added to.
-    pub(super) without: Option<Rival>,
+    pub(super) without: Option<FittedAlternative>,
     /// The chamber, sensor and gyro of the experiment: as the likeliest candidate found them.
     pub(super) air: Option<Fit>,
     pub(super) noise_rad_per_s: f64,
@@ -29,23 +29,24 @@ pub(crate) struct Contest {
     pub(super) variance: f64,
 }
 
-impl Contest {
+impl ModelComparison {
     /// Of a diagnosis: every candidate is fitted again to the records that it was drawn from.
     ///
     /// # Errors
     /// Records that say nothing, models that cannot be solved.
     pub(in super::super) fn new(request: &Request, diagnosis: &Diagnosis) -> Result<Self, DiagnoseError> {
         let candidates = candidates(request.model, diagnosis);
-        let mut contest = Self { rivals: Vec::new(), without: None, air: None, noise_rad_per_s: 0.0, variance: 1.0 };
+        let mut comparison =
+            Self { alternatives: Vec::new(), without: None, air: None, noise_rad_per_s: 0.0, variance: 1.0 };
         if candidates.is_empty() {
-            return Ok(contest);
+            return Ok(comparison);
         }
         let records: Vec<&Record> = request.records.iter().chain(request.holdout).collect();
         let fitted: Vec<usize> = (0..request.records.len()).collect();
         let held_out: Vec<usize> = (request.records.len()..records.len()).collect();
         let declared = Assumption::new(request.model.clone(), request.pattern.clone());
         let (chamber, mut from) = Chamber::new(request.model, &records)?.settled(&declared, &fitted)?;
-        let mut rival = |(name, model): (String, CoilModel)| -> Result<Rival, DiagnoseError> {
+        let mut alternative = |(name, model): (String, CoilModel)| -> Result<FittedAlternative, DiagnoseError> {
             let free = free_numbers(request.model, &model);
             let assumed = Assumption::new(model, request.pattern.clone());
             let fit = chamber.fit(&assumed, &free, &fitted, Some(&from), Effort::QUICK)?;
@@ -54,37 +55,37 @@ impl Contest {
             for &record in &held_out {
                 deviance -= 2.0 * chamber.held_out(&fit, record)?.log_likelihood;
             }
-            Ok(Rival { name, hold: fit.hold(), fit, deviance })
+            Ok(FittedAlternative { name, hold: fit.hold(), fit, deviance })
         };
         // The likeliest first: its chamber is where the others begin.
-        let mut rivals = Vec::with_capacity(candidates.len());
+        let mut alternatives = Vec::with_capacity(candidates.len());
         for candidate in candidates.into_iter().rev() {
-            rivals.push(rival(candidate)?);
+            alternatives.push(alternative(candidate)?);
         }
-        rivals.reverse();
-        contest.without = Some(rival(without_candidates(request.model, diagnosis))?);
-        let likeliest = rivals.iter().min_by(|a, b| a.deviance.total_cmp(&b.deviance));
+        alternatives.reverse();
+        comparison.without = Some(alternative(without_candidates(request.model, diagnosis))?);
+        let likeliest = alternatives.iter().min_by(|a, b| a.deviance.total_cmp(&b.deviance));
         // The finest record is what the next one will be like.
         let finest = fitted.into_iter().min_by(|&a, &b| records[a].interval_s().total_cmp(&records[b].interval_s()));
         if let (Some(likeliest), Some(finest)) = (likeliest, finest) {
             let whiteness = chamber.noise(&likeliest.fit, finest)?.whiteness;
-            contest.variance = whiteness.powi(2).max(1.0);
-            contest.noise_rad_per_s = likeliest.fit.number(Quantity::RateNoise, finest);
-            contest.air = Some(likeliest.fit.of_record(finest));
+            comparison.variance = whiteness.powi(2).max(1.0);
+            comparison.noise_rad_per_s = likeliest.fit.number(Quantity::RateNoise, finest);
+            comparison.air = Some(likeliest.fit.of_record(finest));
         }
-        contest.rivals = rivals;
-        Ok(contest)
+        comparison.alternatives = alternatives;
+        Ok(comparison)
     }
 
     /// Whether one candidate is a special case of another, so that no data could speak against the latter.
     pub(super) fn is_within(&self, special: usize, general: usize) -> bool {
-        let effects = |rival: usize| &self.rivals[rival].fit.assumed.model.effects;
+        let effects = |alternative: usize| &self.alternatives[alternative].fit.assumed.model.effects;
         let (special, general) = (effects(special), effects(general));
         special.len() < general.len() && special.iter().zip(general).all(|(a, b)| a.kind() == b.kind())
     }
 }
 
-impl Rival {
+impl FittedAlternative {
     /// The experiments that would isolate what is fitted.
     pub(super) fn isolating(&self) -> Vec<&'static str> {
         let mut effects: Vec<usize> = self.fit.free.iter().map(|f| f.effect).collect();
@@ -195,20 +196,20 @@ pub(in crate::diagnose) mod tests {
     pub(crate) const NOISE_RAD_PER_S: f64 = 1e-7;
 
     /// All of whose effects are fitted; no record holds them. The chamber is a usual one, its film 25 W/(m²K).
-    pub(crate) fn rival(name: &str, model: CoilModel) -> Rival {
+    pub(crate) fn alternative(name: &str, model: CoilModel) -> FittedAlternative {
         let free = free_numbers(&super::tests::model(Vec::new()), &model);
         let fit = Fit::to_nothing(Assumption::new(model, pattern()), free, NOISE_RAD_PER_S);
-        Rival { name: name.to_owned(), fit, hold: None, deviance: 0.0 }
+        FittedAlternative { name: name.to_owned(), fit, hold: None, deviance: 0.0 }
     }
 
-    pub(crate) fn contest(rivals: Vec<Rival>) -> Contest {
-        let air = rivals.first().map(|r| r.fit.clone());
-        Contest { rivals, without: None, air, noise_rad_per_s: NOISE_RAD_PER_S, variance: 1.0 }
+    pub(crate) fn comparison(alternatives: Vec<FittedAlternative>) -> ModelComparison {
+        let air = alternatives.first().map(|r| r.fit.clone());
+        ModelComparison { alternatives, without: None, air, noise_rad_per_s: NOISE_RAD_PER_S, variance: 1.0 }
     }
 
     #[test]
     fn a_parameter_with_a_default_is_free_only_where_it_left_it() {
-        let free = |values: &[f64]| rival("", model(vec![effect("spool_mass", values)])).fit.free.len();
+        let free = |values: &[f64]| alternative("", model(vec![effect("spool_mass", values)])).fit.free.len();
         assert_eq!(free(&[800.0, 200.0, 0.0]), 2);
         assert_eq!(free(&[800.0, 200.0, 3.0]), 3);
     }
