@@ -21,7 +21,7 @@ use coilwright::search::anneal::walk::Space;
 use coilwright::search::cost::columns::{Norm, Work};
 use coilwright::search::cost::samples::SampleMatrix;
 use coilwright::search::cost::worst_case::SolvedProfiles;
-use coilwright::thermal::{DEFAULT_CELLS_PER_LAYER, Extent, Location, Material};
+use coilwright::thermal::{DEFAULT_CELLS_PER_LAYER, Extent, Location, PackMaterial};
 use coilwright::units::{deg_per_h_from_rad_per_s, k_per_s_from_c_per_h, percent_from_fraction};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -54,7 +54,7 @@ fn instance() -> SampleMatrix {
         name: "paper, 24 layers".into(),
         coil: Coil::new(spec).expect("the coil is sound"),
         extent: Extent::HalfSpace,
-        material: Material::Diffusivity { m2_per_s: 2.7e-7 },
+        material: PackMaterial::Diffusivity { m2_per_s: 2.7e-7 },
         location: Location::OuterLayer,
         rate_mean_s: 0.0,
         cells_per_layer: DEFAULT_CELLS_PER_LAYER,

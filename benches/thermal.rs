@@ -8,12 +8,12 @@ use coilwright::numeric::tridiagonal::diagonalise;
 use coilwright::profile::ProfileSpec;
 use coilwright::thermal::pack::Pack;
 use coilwright::thermal::{
-    Drive, Extent, Flange, FlangeFilm, HeatPath, Instant, Location, Material, PackShape, Spool, solve,
+    Drive, Extent, Flange, FlangeFilm, HeatPath, Instant, Location, PackMaterial, PackShape, Spool, solve,
 };
 
 fn path(layers: usize) -> HeatPath {
     let shape = PackShape { layers, bore_radius_m: 0.04, radial_pitch_m: 165e-6, height_m: 0.0085 };
-    let material = Material::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 };
+    let material = PackMaterial::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 };
     HeatPath {
         film_w_per_m2_k: Some(20.0),
         spool: Some(Spool { heat_capacity_j_per_m2_k: 4000.0, contact_w_per_m2_k: 300.0, mount_w_per_m2_k: 0.0 }),
@@ -93,7 +93,7 @@ fn records(c: &mut Criterion) {
     let half_space = HeatPath::new(
         linear.shape,
         Extent::HalfSpace,
-        Material::Diffusivity { m2_per_s: 2.06e-7 },
+        PackMaterial::Diffusivity { m2_per_s: 2.06e-7 },
         Location::OuterLayer,
     );
     let mut group = c.benchmark_group("slow");

@@ -34,7 +34,7 @@ use crate::coil::{Coil, CoilError};
 use crate::effect::{DeclaredEffect, Effect, FibrePlace, Lead, PackState, SurplusFibre};
 use crate::numeric::expression::EvaluationError;
 use crate::pattern::{Half, Pattern};
-use crate::thermal::{Extent, HeatPath, Location, Material, PackShape, ThermalHistory};
+use crate::thermal::{Extent, HeatPath, Location, PackMaterial, PackShape, ThermalHistory};
 use crate::units::{LIGHT_SPEED_M_PER_S, REFERENCE_TEMPERATURE_K};
 
 pub use builder::CoilModelBuilder;
@@ -51,7 +51,7 @@ pub struct CoilModel {
     /// Where the pack ends inwards.
     pub extent: Extent,
     /// Of the pack, effective.
-    pub material: Material,
+    pub material: PackMaterial,
     /// Where the sensor is, and so what a profile or a record is the temperature of.
     pub location: Location,
     /// Each recorded rate is the mean over this interval, which ends at its stamp; 0: instantaneous.

@@ -14,7 +14,7 @@ use coilwright::pattern::classic::Classic;
 use coilwright::predict::rates_rad_per_s;
 use coilwright::rate::CoilModel;
 use coilwright::record::{Channel, Record};
-use coilwright::thermal::{self, DEFAULT_CELLS_PER_LAYER, Drive, Extent, Instant, Location, Material};
+use coilwright::thermal::{self, DEFAULT_CELLS_PER_LAYER, Drive, Extent, Instant, Location, PackMaterial};
 use coilwright::units::{kelvin_from_celsius, rad_per_s_from_deg_per_h};
 
 const INTERVAL_S: f64 = 10.0;
@@ -52,7 +52,7 @@ pub fn declared(index: usize, extent: Extent) -> Result<(CoilModel, Pattern), Bo
         name: classic.key().to_owned(),
         coil,
         extent,
-        material: Material::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 },
+        material: PackMaterial::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 },
         location: Location::OuterLayer,
         rate_mean_s: INTERVAL_S,
         cells_per_layer: DEFAULT_CELLS_PER_LAYER,

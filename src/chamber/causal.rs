@@ -4,7 +4,7 @@ use super::fit::Fit;
 use super::learned::Learned;
 use super::parameter::Place;
 use super::prior::{PRIORS, Quantity};
-use super::system::{Gains, Layout, Numbers, Parts, Shows, driven_by_air, dynamics, places, response};
+use super::system::{Layout, Numbers, OutputGains, Parts, Shows, driven_by_air, dynamics, places, response};
 use super::{Chamber, FEWEST_MODES, HALF_SPACE_MODES, MODES_PER_ROW, MOST_MODES};
 use crate::thermal::pack::Pack;
 use crate::thermal::reduced::Reduced;
@@ -145,7 +145,7 @@ impl Causal {
         let reduced = Reduced::new(&driven, path.sensors_part(), modes, row_s, LONGEST_S)?;
         let mut outputs = layer_gains.to_vec();
         outputs.resize(reduced.outputs, 0.0);
-        let gains = Gains { outputs, air: air_gain };
+        let gains = OutputGains { outputs, air: air_gain };
         let parts = Parts { reduced: &reduced, gains: &gains, skin_s, shows, lag_s, drift: false, cycle: false };
         let layout = Layout::with(&parts, false, false);
         let mut numbers = surroundings.numbers;

@@ -17,7 +17,7 @@ pub(super) mod tests {
     use crate::pattern::classic::Classic;
     use crate::rate::CoilModel;
     use crate::record::Record;
-    use crate::thermal::{Extent, Location, Material};
+    use crate::thermal::{Extent, Location, PackMaterial};
 
     pub(crate) fn model(effects: Vec<DeclaredEffect>) -> CoilModel {
         let fibre = Fibre {
@@ -42,7 +42,7 @@ pub(super) mod tests {
             name: "test".into(),
             coil: Coil::new(spec).unwrap(),
             extent: Extent::Pack,
-            material: Material::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 },
+            material: PackMaterial::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 },
             location: Location::OuterLayer,
             rate_mean_s: 10.0,
             cells_per_layer: 2,

@@ -15,7 +15,7 @@
 
 use super::filter::{MEASURED, RATE, Values};
 use super::series::Series;
-use super::system::{Gains, Shows, driven_by_air};
+use super::system::{OutputGains, Shows, driven_by_air};
 use crate::effect::PackState;
 use crate::rate::{Past, RateModel};
 use crate::thermal::reduced::Reduced;
@@ -79,7 +79,7 @@ pub(super) struct Asked<'a> {
     pub(crate) film_w_per_m2_k: f64,
     pub(crate) modes: usize,
     pub(crate) reduced: &'a Reduced,
-    pub(crate) gains: &'a Gains,
+    pub(crate) gains: &'a OutputGains,
     pub(crate) rate: &'a RateModel,
     /// Whether the rate is more than the gains say.
     pub(crate) beyond_linear: bool,

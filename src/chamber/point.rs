@@ -4,7 +4,7 @@ use super::filter::{self, Innovation, Trace, Values};
 use super::known::{Asked, Reference, known, taken_off};
 use super::prior::Quantity;
 use super::series::Series;
-use super::system::{Gains, Layout, Numbers, Parts, Shows, driven_by_air, system};
+use super::system::{Layout, Numbers, OutputGains, Parts, Shows, driven_by_air, system};
 use super::{Assumption, ChamberError};
 use crate::effect::PackState;
 use crate::rate::{Past, RateModel};
@@ -19,7 +19,7 @@ pub(super) struct CoilSide {
     film_w_per_m2_k: f64,
     modes: usize,
     pub(crate) reduced: Reduced,
-    pub(crate) gains: Gains,
+    pub(crate) gains: OutputGains,
     rate: RateModel,
     skin_s: Option<f64>,
     shows: Shows,
@@ -190,7 +190,7 @@ impl CoilSide {
 }
 
 /// Ω by unit rates of each output, at the record's mean temperature.
-fn gains(rate: &RateModel, reduced: &Reduced, observed: &Observed) -> Gains {
+fn gains(rate: &RateModel, reduced: &Reduced, observed: &Observed) -> OutputGains {
     let temperatures = vec![observed.mean_k; reduced.layers];
     let lengths_m = rate.coil().layer_lengths_m();
     let length_m = rate.coil().length_m();
@@ -224,7 +224,7 @@ fn gains(rate: &RateModel, reduced: &Reduced, observed: &Observed) -> Gains {
         outputs.push(0.5 * (up - of(&unit, 0.0)));
         unit[j] = 0.0;
     }
-    Gains { outputs, air: 0.5 * (of(&unit, 1.0) - of(&unit, -1.0)) }
+    OutputGains { outputs, air: 0.5 * (of(&unit, 1.0) - of(&unit, -1.0)) }
 }
 
 /// One record through the filter.

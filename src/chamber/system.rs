@@ -28,7 +28,7 @@ use super::series::{Series, Shape};
 use super::sparse::Sparse;
 use crate::numeric::statistics::median;
 use crate::thermal::reduced::Reduced;
-use crate::thermal::{Extent, HeatPath, Location, Material};
+use crate::thermal::{Extent, HeatPath, Location, PackMaterial};
 
 /// Values of the chamber's quantities, by [`Quantity`]; NaN where a model has none.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,7 +56,7 @@ impl Numbers {
 
 /// What the coil makes of the outputs' rates, and of the air's [rad/s per K/s].
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Gains {
+pub(super) struct OutputGains {
     pub(crate) outputs: Vec<f64>,
     pub(crate) air: f64,
 }
@@ -65,7 +65,7 @@ pub(super) struct Gains {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Parts<'a> {
     pub(crate) reduced: &'a Reduced,
-    pub(crate) gains: &'a Gains,
+    pub(crate) gains: &'a OutputGains,
     /// The drive follows the air with this time [s]; None: the film is in the modes.
     pub(crate) skin_s: Option<f64>,
     pub(crate) shows: Shows,
@@ -103,14 +103,14 @@ pub(super) fn driven_by_air(path: &HeatPath, film_w_per_m2_k: f64) -> (HeatPath,
     driven.conductivity_slope_per_k = 0.0;
     if path.extent == Extent::HalfSpace {
         let capacity = match path.material {
-            Material::Conductivity { heat_capacity_j_per_m3_k, .. } => heat_capacity_j_per_m3_k,
-            Material::Diffusivity { .. } => USUAL_CAPACITY_J_PER_M3_K,
+            PackMaterial::Conductivity { heat_capacity_j_per_m3_k, .. } => heat_capacity_j_per_m3_k,
+            PackMaterial::Diffusivity { .. } => USUAL_CAPACITY_J_PER_M3_K,
         };
         let thickness_m = path.shape.layers as f64 * path.shape.radial_pitch_m;
         return (driven, Some(capacity * thickness_m / film_w_per_m2_k));
     }
-    if let Material::Diffusivity { m2_per_s } = path.material {
-        driven.material = Material::Conductivity {
+    if let PackMaterial::Diffusivity { m2_per_s } = path.material {
+        driven.material = PackMaterial::Conductivity {
             w_per_m_k: m2_per_s * USUAL_CAPACITY_J_PER_M3_K,
             heat_capacity_j_per_m3_k: USUAL_CAPACITY_J_PER_M3_K,
         };

@@ -9,7 +9,7 @@ use crate::predict::{Boundary, PredictError, RecordPrediction};
 use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::thermal::pack::Pack;
-use crate::thermal::{Extent, Location, Material};
+use crate::thermal::{Extent, Location, PackMaterial};
 use crate::units::{c_per_min_from_k_per_s, celsius_from_kelvin};
 
 const WARM_UP_S: f64 = 900.0;
@@ -143,7 +143,7 @@ impl Regimes {
 fn settling_s(model: &CoilModel, boundary: &Boundary) -> Result<f64, PredictError> {
     let mut path = model.heat_path()?;
     path.extent = Extent::Pack;
-    if let (Some((film, _)), Material::Conductivity { .. }) = (boundary.film_w_per_m2_k, path.material) {
+    if let (Some((film, _)), PackMaterial::Conductivity { .. }) = (boundary.film_w_per_m2_k, path.material) {
         path.location = Location::Ambient;
         path.film_w_per_m2_k = Some(film);
     }

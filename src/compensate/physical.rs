@@ -38,7 +38,7 @@ use crate::pattern::Pattern;
 use crate::rate::{CoilModel, RateModel};
 use crate::record::Record;
 use crate::thermal::pack::Pack;
-use crate::thermal::{Extent, HeatPath, Location, Material, ThermalError, ThermalHistory};
+use crate::thermal::{Extent, HeatPath, Location, PackMaterial, ThermalError, ThermalHistory};
 use crate::units::REFERENCE_TEMPERATURE_K;
 
 const USUAL_DELAY_S: f64 = 100.0;
@@ -126,7 +126,7 @@ impl Physical {
         let (model, formulas) = &Formulas::split(model);
         let mut path = model.heat_path()?;
         let is_half_space = path.extent == Extent::HalfSpace;
-        let cannot_be_heated = is_half_space || matches!(path.material, Material::Diffusivity { .. });
+        let cannot_be_heated = is_half_space || matches!(path.material, PackMaterial::Diffusivity { .. });
         let has_no_chain = |p: &HeatPath| p.varies_along() || (p.has_own_course() && cannot_be_heated);
         if has_no_chain(&path) {
             let is_refused = |one: &CoilModel| one.heat_path().is_ok_and(|p| has_no_chain(&p));
@@ -365,8 +365,8 @@ fn linearise(path: &mut HeatPath, range_k: Option<(f64, f64)>) -> Option<Lineari
     let at_k = 0.5 * (low_k + high_k);
     let factor = 1.0 + slope_per_k * (at_k - REFERENCE_TEMPERATURE_K);
     match &mut path.material {
-        Material::Conductivity { w_per_m_k, .. } => *w_per_m_k *= factor,
-        Material::Diffusivity { m2_per_s } => *m2_per_s *= factor,
+        PackMaterial::Conductivity { w_per_m_k, .. } => *w_per_m_k *= factor,
+        PackMaterial::Diffusivity { m2_per_s } => *m2_per_s *= factor,
     }
     Some(Linearised { at_k, conductivity_error: (slope_per_k * 0.5 * (high_k - low_k) / factor).abs() })
 }

@@ -3,7 +3,7 @@
 use super::CoilModel;
 use crate::coil::{Coil, CoilError, CoilSpec, Fibre, LayerLength};
 use crate::effect::DeclaredEffect;
-use crate::thermal::{DEFAULT_CELLS_PER_LAYER, Extent, Location, Material};
+use crate::thermal::{DEFAULT_CELLS_PER_LAYER, Extent, Location, PackMaterial};
 
 /// The fibre of Yan, Lan, Jian (1998), section 4; its Eq. (4) leaves the expansion out.
 const USUAL_FIBRE: Fibre = Fibre {
@@ -16,7 +16,7 @@ const USUAL_FIBRE: Fibre = Fibre {
 };
 
 /// The pack of the same paper, Table 1: 0.3 … 0.36 W/(m K) over 1.22 … 1.54 g/cm³ and 880 J/(kg K).
-const USUAL_MATERIAL: Material = Material::Diffusivity { m2_per_s: 2.7e-7 };
+const USUAL_MATERIAL: PackMaterial = PackMaterial::Diffusivity { m2_per_s: 2.7e-7 };
 
 /// Builds a [`CoilModel`]; what is not stated is as in the table.
 ///
@@ -52,7 +52,7 @@ pub struct CoilModelBuilder {
     turns_per_layer: Option<f64>,
     length_m: Option<f64>,
     extent: Extent,
-    material: Material,
+    material: PackMaterial,
     location: Location,
     rate_mean_s: f64,
     effects: Vec<DeclaredEffect>,
@@ -123,7 +123,7 @@ impl CoilModelBuilder {
     }
 
     /// What the pack is made of, thermally.
-    pub fn material(mut self, material: Material) -> Self {
+    pub fn material(mut self, material: PackMaterial) -> Self {
         self.material = material;
         self
     }

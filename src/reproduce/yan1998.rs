@@ -17,7 +17,7 @@ use crate::pattern::classic::Classic;
 use crate::profile::{Piece, Profile};
 use crate::rate::{CoilModel, RateModel};
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
-use crate::thermal::{DEFAULT_CELLS_PER_LAYER, Drive, Extent, Field, Instant, Location, Material, solve};
+use crate::thermal::{DEFAULT_CELLS_PER_LAYER, Drive, Extent, Field, Instant, Location, PackMaterial, solve};
 use crate::units::{
     REFERENCE_TEMPERATURE_K, k_per_s_from_c_per_h, m_from_mm, m_from_nm, m_from_um, rad_per_s_from_deg_per_h,
 };
@@ -220,7 +220,7 @@ pub fn model_of_layers(length_m: f64, layers: usize) -> Result<CoilModel, CoilEr
         name: format!("paper {length_m} m, {layers} layers"),
         coil,
         extent: Extent::HalfSpace,
-        material: Material::Diffusivity { m2_per_s: DIFFUSIVITY_M2_PER_S },
+        material: PackMaterial::Diffusivity { m2_per_s: DIFFUSIVITY_M2_PER_S },
         location: Location::OuterLayer,
         rate_mean_s: 0.0,
         cells_per_layer: DEFAULT_CELLS_PER_LAYER,

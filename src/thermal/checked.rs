@@ -1,6 +1,6 @@
 //! What a heat path cannot be.
 
-use super::{Extent, HeatPart, HeatPath, Location, Material, ThermalError};
+use super::{Extent, HeatPart, HeatPath, Location, PackMaterial, ThermalError};
 
 /// What a heat path cannot be.
 ///
@@ -23,7 +23,7 @@ pub(crate) fn check(path: &HeatPath) -> Result<(), ThermalError> {
             return Err(ThermalError::NeedsPack { part });
         }
     }
-    if matches!(path.material, Material::Diffusivity { .. }) {
+    if matches!(path.material, PackMaterial::Diffusivity { .. }) {
         let extras = [
             (path.location != Location::OuterLayer && path.film_w_per_m2_k.is_some(), HeatPart::Film),
             (path.spool.is_some(), HeatPart::Spool),

@@ -1,7 +1,7 @@
 //! A pack in a chamber whose air is known: what its layers do, and what the sensor shows.
 
 use super::reduced::Reduced;
-use super::{Drive, Extent, HeatPath, Instant, Location, Material, ThermalError};
+use super::{Drive, Extent, HeatPath, Instant, Location, PackMaterial, ThermalError};
 use crate::numeric::piecewise::PiecewiseLinear;
 
 /// Where only K = k/ρc is known, the film is stated for this heat capacity [J/(m³ K)]; nothing else depends on it.
@@ -26,8 +26,8 @@ const PART_MODES: usize = 24;
 /// A path as a pack in the air, where a film stands in front of it.
 fn behind_film(path: &HeatPath) -> HeatPath {
     let mut path = HeatPath { extent: Extent::Pack, location: Location::Ambient, ..path.clone() };
-    if let Material::Diffusivity { m2_per_s } = path.material {
-        path.material = Material::Conductivity {
+    if let PackMaterial::Diffusivity { m2_per_s } = path.material {
+        path.material = PackMaterial::Conductivity {
             w_per_m_k: m2_per_s * NOMINAL_HEAT_CAPACITY_J_PER_M3_K,
             heat_capacity_j_per_m3_k: NOMINAL_HEAT_CAPACITY_J_PER_M3_K,
         };

@@ -204,13 +204,17 @@ impl HalfSpaceField {
 mod tests {
     use super::*;
     use crate::numeric::piecewise::PiecewiseLinear;
-    use crate::thermal::{Extent, Location, Material, PackShape};
+    use crate::thermal::{Extent, Location, PackMaterial, PackShape};
 
     #[test]
     fn the_temperature_is_the_integral_of_the_rate() {
         let shape = PackShape { layers: 12, bore_radius_m: 0.036, radial_pitch_m: 250e-6, height_m: 0.018 };
-        let path =
-            HeatPath::new(shape, Extent::HalfSpace, Material::Diffusivity { m2_per_s: 2.7e-7 }, Location::OuterLayer);
+        let path = HeatPath::new(
+            shape,
+            Extent::HalfSpace,
+            PackMaterial::Diffusivity { m2_per_s: 2.7e-7 },
+            Location::OuterLayer,
+        );
         let drive = Drive::boundary(PiecewiseLinear::new(vec![0.0, 20.0, 50.0], vec![290.0, 294.0, 291.0]).unwrap());
         let field = HalfSpaceField::new(HalfSpace::new(&path), &drive);
         let steps = 40_000;
@@ -229,8 +233,12 @@ mod tests {
     #[test]
     fn the_memory_of_a_long_record_is_the_superposition_of_all_its_changes() {
         let shape = PackShape { layers: 12, bore_radius_m: 0.036, radial_pitch_m: 250e-6, height_m: 0.018 };
-        let path =
-            HeatPath::new(shape, Extent::HalfSpace, Material::Diffusivity { m2_per_s: 2.7e-7 }, Location::OuterLayer);
+        let path = HeatPath::new(
+            shape,
+            Extent::HalfSpace,
+            PackMaterial::Diffusivity { m2_per_s: 2.7e-7 },
+            Location::OuterLayer,
+        );
         let knots: Vec<f64> = (0..2000).map(|i| 5.0 * f64::from(i)).collect();
         let values = knots.iter().map(|t| 293.0 + 20.0 * (t / 900.0).sin() + 0.005 * (t - 4000.0).max(0.0)).collect();
         let drive = Drive::boundary(PiecewiseLinear::new(knots, values).unwrap());

@@ -33,7 +33,7 @@ pub use history::{Instant, Side, ThermalHistory};
 use modal::{PackField, Prepared};
 use pack::Pack;
 pub use path::{
-    BoreHeat, DEFAULT_CELLS_PER_LAYER, Extent, Flange, FlangeFilm, HeatPath, Housing, LayerGap, Location, Material,
+    BoreHeat, DEFAULT_CELLS_PER_LAYER, Extent, Flange, FlangeFilm, HeatPath, Housing, LayerGap, Location, PackMaterial,
     PackShape, Spool, SpoolFlange, SpoolWall, Start,
 };
 use stepped::SteppedField;

@@ -16,7 +16,7 @@
 use nalgebra::DMatrix;
 
 use super::elements::{Elements, Grading};
-use super::{Flange, FlangeFilm, HeatPath, Location, Material};
+use super::{Flange, FlangeFilm, HeatPath, Location, PackMaterial};
 
 /// The narrowest element, at a surface, in layers …
 const NARROWEST_LAYERS: f64 = 0.5;
@@ -77,9 +77,9 @@ impl Network {
         let shape = &path.shape;
         let pitch_m = shape.radial_pitch_m;
         let (conductivity, heat_capacity) = match path.material {
-            Material::Conductivity { w_per_m_k, heat_capacity_j_per_m3_k } => (w_per_m_k, heat_capacity_j_per_m3_k),
+            PackMaterial::Conductivity { w_per_m_k, heat_capacity_j_per_m3_k } => (w_per_m_k, heat_capacity_j_per_m3_k),
             // Only the ratio matters where nothing else exchanges heat with the pack.
-            Material::Diffusivity { m2_per_s } => (m2_per_s, 1.0),
+            PackMaterial::Diffusivity { m2_per_s } => (m2_per_s, 1.0),
         };
         let edge_m = |layers: f64| shape.bore_radius_m + layers * pitch_m;
         let outer_layer_is_drive = path.location == Location::OuterLayer;

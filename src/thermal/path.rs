@@ -5,7 +5,7 @@ use crate::numeric::piecewise::PiecewiseLinear;
 
 /// What the pack is made of, thermally.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Material {
+pub enum PackMaterial {
     /// Only K = k/ρc is known; effects that exchange heat with something else need both.
     Diffusivity {
         /// K = k/ρc.
@@ -20,20 +20,20 @@ pub enum Material {
     },
 }
 
-impl Material {
+impl PackMaterial {
     pub(crate) fn diffusivity_m2_per_s(&self) -> f64 {
         match *self {
-            Material::Diffusivity { m2_per_s } => m2_per_s,
-            Material::Conductivity { w_per_m_k, heat_capacity_j_per_m3_k } => w_per_m_k / heat_capacity_j_per_m3_k,
+            PackMaterial::Diffusivity { m2_per_s } => m2_per_s,
+            PackMaterial::Conductivity { w_per_m_k, heat_capacity_j_per_m3_k } => w_per_m_k / heat_capacity_j_per_m3_k,
         }
     }
 
     /// The same material conducting `factor` times as well.
     pub(crate) fn scaled(self, factor: f64) -> Self {
         match self {
-            Material::Diffusivity { m2_per_s } => Material::Diffusivity { m2_per_s: m2_per_s * factor },
-            Material::Conductivity { w_per_m_k, heat_capacity_j_per_m3_k } => {
-                Material::Conductivity { w_per_m_k: w_per_m_k * factor, heat_capacity_j_per_m3_k }
+            PackMaterial::Diffusivity { m2_per_s } => PackMaterial::Diffusivity { m2_per_s: m2_per_s * factor },
+            PackMaterial::Conductivity { w_per_m_k, heat_capacity_j_per_m3_k } => {
+                PackMaterial::Conductivity { w_per_m_k: w_per_m_k * factor, heat_capacity_j_per_m3_k }
             }
         }
     }
@@ -200,7 +200,7 @@ pub struct HeatPath {
     /// Where the pack ends inwards.
     pub extent: Extent,
     /// Of the pack, effective.
-    pub material: Material,
+    pub material: PackMaterial,
     /// Where the driving temperature is.
     pub location: Location,
     /// At the outer surface; only used where the drive is the ambient.
@@ -242,7 +242,7 @@ pub const DEFAULT_CELLS_PER_LAYER: usize = 1;
 
 impl HeatPath {
     /// Without anything around the pack.
-    pub fn new(shape: PackShape, extent: Extent, material: Material, location: Location) -> Self {
+    pub fn new(shape: PackShape, extent: Extent, material: PackMaterial, location: Location) -> Self {
         Self {
             shape,
             extent,

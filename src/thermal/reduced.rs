@@ -189,11 +189,11 @@ impl Reduced {
 mod tests {
     use super::*;
     use crate::numeric::piecewise::PiecewiseLinear;
-    use crate::thermal::{Drive, Instant, Location, Material, PackShape, solve};
+    use crate::thermal::{Drive, Instant, Location, PackMaterial, PackShape, solve};
 
     fn path(extent: Extent) -> HeatPath {
         let shape = PackShape { layers: 24, bore_radius_m: 0.04, radial_pitch_m: 165e-6, height_m: 8e-3 };
-        let material = Material::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 };
+        let material = PackMaterial::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 };
         HeatPath::new(shape, extent, material, Location::Ambient)
     }
 

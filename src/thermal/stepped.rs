@@ -35,7 +35,7 @@ use super::bending::{LinearisedPack, Track};
 use super::modal::PackField;
 use super::panel::{DEGREE, Panel, PanelWeights};
 use super::varying::{Shared, Varying, conducting};
-use super::{Drive, HeatPath, Instant, Material, Side, ThermalError, ThermalHistory, WantedColumns};
+use super::{Drive, HeatPath, Instant, PackMaterial, Side, ThermalError, ThermalHistory, WantedColumns};
 use crate::numeric::lobatto::Lobatto;
 use crate::numeric::piecewise::PiecewiseLinear;
 
@@ -200,7 +200,7 @@ fn scale_k_per_s(path: &HeatPath, drive: &Drive) -> f64 {
         |input: &PiecewiseLinear| (0..input.knots().len()).map(|i| input.slope_of(i).abs()).fold(0.0, f64::max);
     let thickness_m = path.shape.layers as f64 * path.shape.radial_pitch_m;
     let by_heat = match (path.bore_heat, path.material) {
-        (Some(heat), Material::Conductivity { heat_capacity_j_per_m3_k, .. }) => {
+        (Some(heat), PackMaterial::Conductivity { heat_capacity_j_per_m3_k, .. }) => {
             heat.power_w_per_m2.abs() / (heat_capacity_j_per_m3_k * thickness_m)
         }
         _ => 0.0,
@@ -394,11 +394,11 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    use crate::thermal::{BoreHeat, Extent, Flange, FlangeFilm, Location, Material, PackShape, Spool};
+    use crate::thermal::{BoreHeat, Extent, Flange, FlangeFilm, Location, PackMaterial, PackShape, Spool};
 
     fn path(location: Location) -> HeatPath {
         let shape = PackShape { layers: 8, bore_radius_m: 0.04, radial_pitch_m: 165e-6, height_m: 0.0085 };
-        let material = Material::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 };
+        let material = PackMaterial::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 };
         HeatPath::new(shape, Extent::Pack, material, location)
     }
 

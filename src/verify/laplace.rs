@@ -205,7 +205,7 @@ pub(super) mod tests {
     use super::*;
     use crate::coil::{Coil, CoilSpec, Fibre, LayerLength};
     use crate::rate::CoilModel;
-    use crate::thermal::{Extent, Location, Material};
+    use crate::thermal::{Extent, Location, PackMaterial};
     use crate::verify::physics::Physics;
 
     pub(crate) fn model() -> CoilModel {
@@ -231,7 +231,7 @@ pub(super) mod tests {
             name: "four".into(),
             coil: Coil::new(spec).unwrap(),
             extent: Extent::Pack,
-            material: Material::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 },
+            material: PackMaterial::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 },
             location: Location::Ambient,
             rate_mean_s: 0.0,
             cells_per_layer: 1,

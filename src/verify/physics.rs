@@ -10,7 +10,7 @@ use crate::effect::Subject;
 use crate::effect::custom::Formula;
 use crate::rate::CoilModel;
 use crate::stress::Materials;
-use crate::thermal::{Extent, Flange, Location, Material};
+use crate::thermal::{Extent, Flange, Location, PackMaterial};
 
 /// What the heat flows through and what the light sees, with every declared effect.
 #[derive(Debug, Clone)]
@@ -126,9 +126,9 @@ impl Physics {
     )]
     pub(crate) fn read(model: &CoilModel) -> Result<Self, &'static str> {
         let (conductivity, heat_capacity) = match model.material {
-            Material::Conductivity { w_per_m_k, heat_capacity_j_per_m3_k } => (w_per_m_k, heat_capacity_j_per_m3_k),
+            PackMaterial::Conductivity { w_per_m_k, heat_capacity_j_per_m3_k } => (w_per_m_k, heat_capacity_j_per_m3_k),
             // Nothing but the ratio can matter then.
-            Material::Diffusivity { m2_per_s } => (m2_per_s, 1.0),
+            PackMaterial::Diffusivity { m2_per_s } => (m2_per_s, 1.0),
         };
         let mut p = Self {
             is_pack: model.extent == Extent::Pack,

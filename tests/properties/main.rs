@@ -16,7 +16,7 @@ use coilwright::rate::{CoilModel, RateModel};
 use coilwright::reproduce::yan1998::model_of_layers;
 use coilwright::search::cost::guaranteed::UnitStep;
 use coilwright::search::cost::worst_case::SolvedProfiles;
-use coilwright::thermal::{DEFAULT_CELLS_PER_LAYER, Extent, Location, Material, ThermalHistory};
+use coilwright::thermal::{DEFAULT_CELLS_PER_LAYER, Extent, Location, PackMaterial, ThermalHistory};
 use proptest::prelude::*;
 use proptest::sample::Index;
 
@@ -82,7 +82,7 @@ fn cases(halves: std::ops::RangeInclusive<usize>) -> impl Strategy<Value = Case>
             name: "random".into(),
             coil: Coil::new(spec).unwrap(),
             extent: Extent::HalfSpace,
-            material: Material::Diffusivity { m2_per_s: 2.7e-7 },
+            material: PackMaterial::Diffusivity { m2_per_s: 2.7e-7 },
             location: Location::OuterLayer,
             rate_mean_s: 0.0,
             cells_per_layer: DEFAULT_CELLS_PER_LAYER,

@@ -164,9 +164,6 @@ fn a_long_body_says_why_and_no_documentation_is_left_out_but_where_messages_say_
 /// Names that many modules have one of, read with their module: what a use case is asked and answers, who watches it, a command's arguments.
 const ROLES: &[&str] = &["Answer", "Arguments", "Observer", "Request", "Unobserved"];
 
-/// Names that still mean two things; none may join them.
-const NAMES_OF_TWO: &[&str] = &["Gains", "Material"];
-
 /// Types that other files can see, by name.
 fn types_seen(sources: impl Iterator<Item = &'static Source>) -> BTreeMap<String, BTreeSet<String>> {
     let mut found: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
@@ -193,13 +190,8 @@ fn a_type_that_other_files_see_has_a_name_of_its_own() {
     // `verify` works the physics out a second time and shares nothing, not even names.
     let seen = types_seen(sources("src").filter(|source| source.module() != "verify"));
     assert!(seen.len() > 500, "{}", seen.len());
-    let doubled: Vec<_> = seen.iter().filter(|(name, at)| at.len() > 1 && !ROLES.contains(&name.as_str())).collect();
-    println!("{} names, {} of two", seen.len(), doubled.len());
-    let joined = doubled.iter().filter(|(name, _)| !NAMES_OF_TWO.contains(&name.as_str()));
-    let faults = joined.map(|(name, at)| format!("{name}: {at:?}"));
-    let is_doubled = |name: &str| doubled.iter().any(|(of, _)| *of == name);
-    let gone = NAMES_OF_TWO.iter().filter(|name| !is_doubled(name));
-    assert_no(gone.map(|name| format!("{name} means one thing now: take it off the list")).chain(faults).collect());
+    let doubled = seen.iter().filter(|(name, at)| at.len() > 1 && !ROLES.contains(&name.as_str()));
+    assert_no(doubled.map(|(name, at)| format!("{name}: {at:?}")).collect());
 }
 
 #[test]

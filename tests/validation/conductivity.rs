@@ -3,14 +3,14 @@
 //! extrapolation leaves, from the printed differences.
 
 use coilwright::numeric::piecewise::PiecewiseLinear;
-use coilwright::thermal::{Drive, Extent, HeatPath, Instant, Location, Material, PackShape, solve};
+use coilwright::thermal::{Drive, Extent, HeatPath, Instant, Location, PackMaterial, PackShape, solve};
 
 const REFERENCE: &str = include_str!("../data/conductivity/lsoda.csv");
 
 #[test]
 fn a_conductivity_that_depends_on_temperature_gives_the_layers_of_an_independent_solver() {
     let shape = PackShape { layers: 28, bore_radius_m: 0.04, radial_pitch_m: 165e-6, height_m: 8e-3 };
-    let material = Material::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 };
+    let material = PackMaterial::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 };
     let air = PiecewiseLinear::new(vec![0.0, 1800.0], vec![293.15, 323.15]).unwrap();
     for (name, location, film_w_per_m2_k) in
         [("ambient", Location::Ambient, Some(20.0)), ("outer_layer", Location::OuterLayer, None)]

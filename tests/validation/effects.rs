@@ -11,7 +11,7 @@ use coilwright::pattern::classic::Classic;
 use coilwright::rate::{CoilModel, Past, RateModel};
 use coilwright::record::TABLE_RATE;
 use coilwright::thermal::{
-    DEFAULT_CELLS_PER_LAYER, Drive, Extent, Field, Instant, Location, Material, ThermalHistory, solve,
+    DEFAULT_CELLS_PER_LAYER, Drive, Extent, Field, Instant, Location, PackMaterial, ThermalHistory, solve,
 };
 use coilwright::units::{REFERENCE_TEMPERATURE_K, kelvin_from_celsius, rad_per_s_from_deg_per_h};
 
@@ -43,7 +43,7 @@ fn model(effects: Vec<DeclaredEffect>) -> CoilModel {
         name: "tactical".into(),
         coil: Coil::new(spec).unwrap(),
         extent: Extent::Pack,
-        material: Material::Conductivity { w_per_m_k: CONDUCTIVITY, heat_capacity_j_per_m3_k: HEAT_CAPACITY },
+        material: PackMaterial::Conductivity { w_per_m_k: CONDUCTIVITY, heat_capacity_j_per_m3_k: HEAT_CAPACITY },
         location: Location::OuterLayer,
         rate_mean_s: 0.0,
         cells_per_layer: DEFAULT_CELLS_PER_LAYER,

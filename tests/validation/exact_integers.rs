@@ -8,7 +8,7 @@ use coilwright::effect::PackState;
 use coilwright::pattern::Pattern;
 use coilwright::pattern::classic::Classic;
 use coilwright::rate::{CoilModel, RateModel};
-use coilwright::thermal::{DEFAULT_CELLS_PER_LAYER, Extent, Location, Material};
+use coilwright::thermal::{DEFAULT_CELLS_PER_LAYER, Extent, Location, PackMaterial};
 
 const LAYER_COUNTS: [usize; 3] = [16, 32, 48];
 
@@ -91,7 +91,7 @@ fn unit_model(layers: usize) -> CoilModel {
         name: "layers of one metre".into(),
         coil: Coil::new(spec).unwrap(),
         extent: Extent::HalfSpace,
-        material: Material::Diffusivity { m2_per_s: 2.7e-7 },
+        material: PackMaterial::Diffusivity { m2_per_s: 2.7e-7 },
         location: Location::OuterLayer,
         rate_mean_s: 0.0,
         cells_per_layer: DEFAULT_CELLS_PER_LAYER,

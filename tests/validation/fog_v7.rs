@@ -6,7 +6,7 @@
 use coilwright::coil::{Coil, CoilSpec, Fibre, LayerLength};
 use coilwright::pattern::classic::Classic;
 use coilwright::rate::{CoilModel, RateModel};
-use coilwright::thermal::{DEFAULT_CELLS_PER_LAYER, Extent, Location, Material, ThermalHistory};
+use coilwright::thermal::{DEFAULT_CELLS_PER_LAYER, Extent, Location, PackMaterial, ThermalHistory};
 use coilwright::units::{deg_per_h_from_rad_per_s, k_per_s_from_c_per_min, kelvin_from_celsius};
 
 const LAYERS: usize = 18;
@@ -46,7 +46,7 @@ fn model() -> CoilModel {
         name: "FOG v7".into(),
         coil: equal.with_turns(turns).unwrap(),
         extent: Extent::HalfSpace,
-        material: Material::Diffusivity { m2_per_s: 1e-7 },
+        material: PackMaterial::Diffusivity { m2_per_s: 1e-7 },
         location: Location::OuterLayer,
         rate_mean_s: 0.0,
         cells_per_layer: DEFAULT_CELLS_PER_LAYER,

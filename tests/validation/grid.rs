@@ -13,7 +13,7 @@ use coilwright::search::cost::grid_margin::GridMargin;
 use coilwright::search::cost::guaranteed::UnitStep;
 use coilwright::search::cost::pointing::{EndlessRamp, worst_pointing};
 use coilwright::search::cost::worst_case::SolvedProfiles;
-use coilwright::thermal::{Extent, Location, Material};
+use coilwright::thermal::{Extent, Location, PackMaterial};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -48,7 +48,7 @@ fn model(coil: Coil, location: Location, cells_per_layer: usize, effects: Vec<De
         name: "random".into(),
         coil,
         extent: Extent::Pack,
-        material: Material::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 },
+        material: PackMaterial::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 },
         location,
         rate_mean_s: 0.0,
         cells_per_layer,

@@ -5,8 +5,8 @@
 
 use coilwright::numeric::piecewise::PiecewiseLinear;
 use coilwright::thermal::{
-    Drive, Extent, Flange, FlangeFilm, HeatPath, Housing, Instant, Location, Material, PackShape, Spool, SpoolFlange,
-    SpoolWall, Start, ThermalHistory, solve,
+    Drive, Extent, Flange, FlangeFilm, HeatPath, Housing, Instant, Location, PackMaterial, PackShape, Spool,
+    SpoolFlange, SpoolWall, Start, ThermalHistory, solve,
 };
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -15,7 +15,7 @@ const BORE_M: f64 = 0.04;
 
 fn path(layers: usize, pitch_m: f64, conductivity: f64) -> HeatPath {
     let shape = PackShape { layers, bore_radius_m: BORE_M, radial_pitch_m: pitch_m, height_m: 0.0085 };
-    let material = Material::Conductivity { w_per_m_k: conductivity, heat_capacity_j_per_m3_k: CAPACITY };
+    let material = PackMaterial::Conductivity { w_per_m_k: conductivity, heat_capacity_j_per_m3_k: CAPACITY };
     let path = HeatPath::new(shape, Extent::Pack, material, Location::Ambient);
     HeatPath { film_w_per_m2_k: Some(20.0), ..path }
 }

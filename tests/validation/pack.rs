@@ -7,14 +7,15 @@ use std::f64::consts::PI;
 
 use coilwright::numeric::piecewise::PiecewiseLinear;
 use coilwright::thermal::{
-    Drive, Extent, HeatPath, Instant, Location, Material, PackShape, Spool, StepResponse, solve,
+    Drive, Extent, HeatPath, Instant, Location, PackMaterial, PackShape, Spool, StepResponse, solve,
 };
 use libm::{j0, j1, y0, y1};
 
 pub const DIFFUSIVITY_M2_PER_S: f64 = 2.7e-7;
 
 pub fn path(shape: PackShape, location: Location, cells_per_layer: usize) -> HeatPath {
-    let material = Material::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 0.35 / DIFFUSIVITY_M2_PER_S };
+    let material =
+        PackMaterial::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 0.35 / DIFFUSIVITY_M2_PER_S };
     HeatPath { cells_per_layer, ..HeatPath::new(shape, Extent::Pack, material, location) }
 }
 
@@ -163,7 +164,8 @@ fn a_thick_pack_has_the_rates_of_the_bessel_series_and_a_finer_grid_comes_closer
 #[test]
 fn the_default_grid_puts_the_layer_rates_of_a_tactical_pack_within_a_hundred_thousandth_of_the_continuum() {
     let shape = shape(24, 0.04, 165e-6);
-    let coarse = HeatPath::new(shape, Extent::Pack, Material::Diffusivity { m2_per_s: 2.06e-7 }, Location::OuterLayer);
+    let coarse =
+        HeatPath::new(shape, Extent::Pack, PackMaterial::Diffusivity { m2_per_s: 2.06e-7 }, Location::OuterLayer);
     let fine = HeatPath { cells_per_layer: 16, ..coarse.clone() };
     let mut worst = 0.0_f64;
     for time_s in [0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 60.0, 100.0] {
@@ -177,7 +179,7 @@ fn the_default_grid_puts_the_layer_rates_of_a_tactical_pack_within_a_hundred_tho
 
 /// Heat in pack and spool per radian and height, in excess of 300 K.
 fn stored_j_per_m(path: &HeatPath, temperatures_k: &[f64]) -> f64 {
-    let Material::Conductivity { heat_capacity_j_per_m3_k, .. } = path.material else { unreachable!() };
+    let PackMaterial::Conductivity { heat_capacity_j_per_m3_k, .. } = path.material else { unreachable!() };
     temperatures_k
         .iter()
         .enumerate()
@@ -228,7 +230,7 @@ fn what_flows_through_the_film_is_stored_in_the_pack() {
 fn a_spool_behind_a_well_conducting_pack_follows_with_its_heat_capacity_over_its_conductances() {
     // With a pack of no resistance and an imposed outer layer the spool is one capacity behind one contact.
     let mut path = path(shape(4, 0.04, 165e-6), Location::OuterLayer, 2);
-    path.material = Material::Conductivity { w_per_m_k: 1e4, heat_capacity_j_per_m3_k: 1.7e6 };
+    path.material = PackMaterial::Conductivity { w_per_m_k: 1e4, heat_capacity_j_per_m3_k: 1.7e6 };
     path.spool = Some(Spool { heat_capacity_j_per_m2_k: 5000.0, contact_w_per_m2_k: 100.0, mount_w_per_m2_k: 0.0 });
     let response = StepResponse::of(&path).unwrap();
     // The slowest mode decays with h/C.

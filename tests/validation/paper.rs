@@ -9,7 +9,7 @@ use coilwright::profile::{Piece, Profile};
 use coilwright::rate::{CoilModel, RateModel};
 use coilwright::search::cost::worst_case::SolvedProfiles;
 use coilwright::thermal::{
-    DEFAULT_CELLS_PER_LAYER, Drive, Extent, Instant, Location, Material, StepResponse, ThermalHistory, solve,
+    DEFAULT_CELLS_PER_LAYER, Drive, Extent, Instant, Location, PackMaterial, StepResponse, ThermalHistory, solve,
 };
 use coilwright::units::{deg_per_h_from_rad_per_s, k_per_s_from_c_per_h};
 
@@ -36,7 +36,7 @@ pub fn paper_model(length_m: f64, diffusivity_m2_per_s: f64) -> CoilModel {
         name: "paper".into(),
         coil: Coil::new(spec).unwrap(),
         extent: Extent::HalfSpace,
-        material: Material::Diffusivity { m2_per_s: diffusivity_m2_per_s },
+        material: PackMaterial::Diffusivity { m2_per_s: diffusivity_m2_per_s },
         location: Location::OuterLayer,
         rate_mean_s: 0.0,
         cells_per_layer: DEFAULT_CELLS_PER_LAYER,

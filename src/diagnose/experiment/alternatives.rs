@@ -149,7 +149,7 @@ pub(in crate::diagnose) mod tests {
     use crate::effect::{self, DeclaredEffect};
     use crate::pattern::Pattern;
     use crate::pattern::classic::Classic;
-    use crate::thermal::{Extent, Location, Material};
+    use crate::thermal::{Extent, Location, PackMaterial};
 
     pub(crate) fn pattern() -> Pattern {
         Classic::Dip.pattern(8).unwrap()
@@ -184,7 +184,7 @@ pub(in crate::diagnose) mod tests {
             name: "test".into(),
             coil: Coil::new(spec).unwrap(),
             extent: Extent::Pack,
-            material: Material::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 },
+            material: PackMaterial::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 },
             location: Location::OuterLayer,
             rate_mean_s: 10.0,
             cells_per_layer: 2,

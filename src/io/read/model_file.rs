@@ -13,7 +13,7 @@ use crate::io::model::{Advice, LOCATIONS, ModelFile, NamedPattern, SearchSetting
 use crate::pattern::windability::WindabilityClass;
 use crate::rate::CoilModel;
 use crate::search::cost::objective::Objective;
-use crate::thermal::{self, DEFAULT_CELLS_PER_LAYER, Extent, Location, Material};
+use crate::thermal::{self, DEFAULT_CELLS_PER_LAYER, Extent, Location, PackMaterial};
 use crate::units::{m_from_mm, m_from_um, um_from_m};
 
 use super::boundary_table::read_boundary;
@@ -325,7 +325,7 @@ fn read_pattern(
 /// Beyond this a grid only costs time.
 const MOST_CELLS_PER_LAYER: i64 = 32;
 
-fn read_thermal(r: &mut TomlReader, table: &mut TableReader) -> Option<(Extent, Material)> {
+fn read_thermal(r: &mut TomlReader, table: &mut TableReader) -> Option<(Extent, PackMaterial)> {
     let extent = table.needed_word(r, "model", &["pack", "half_space"]);
     let conductivity = table.number(r, "conductivity_w_per_m_k", Limits::between(1e-3, 1e3));
     let capacity = table.number(r, "volumetric_heat_capacity_j_per_m3_k", Limits::between(1e3, 1e8));
@@ -338,7 +338,7 @@ fn read_thermal(r: &mut TomlReader, table: &mut TableReader) -> Option<(Extent, 
             r.fault(Fault::new(message, table.span_of("diffusivity_m2_per_s")));
             None
         }
-        (true, false) => diffusivity.map(|m2_per_s| Material::Diffusivity { m2_per_s }),
+        (true, false) => diffusivity.map(|m2_per_s| PackMaterial::Diffusivity { m2_per_s }),
         (false, _) => {
             let pair = ["conductivity_w_per_m_k", "volumetric_heat_capacity_j_per_m3_k"];
             match pair.map(|key| table.has(key)) {
@@ -350,7 +350,7 @@ fn read_thermal(r: &mut TomlReader, table: &mut TableReader) -> Option<(Extent, 
                 }
                 [true, true] => {}
             }
-            conductivity.zip(capacity).map(|(w_per_m_k, heat_capacity_j_per_m3_k)| Material::Conductivity {
+            conductivity.zip(capacity).map(|(w_per_m_k, heat_capacity_j_per_m3_k)| PackMaterial::Conductivity {
                 w_per_m_k,
                 heat_capacity_j_per_m3_k,
             })

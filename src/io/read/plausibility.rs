@@ -8,7 +8,7 @@
 use crate::effect;
 use crate::io::model::{Advice, ModelFile, Unusual};
 use crate::rate::CoilModel;
-use crate::thermal::Material;
+use crate::thermal::PackMaterial;
 use crate::units::{mm_from_m, nm_from_m, um_from_m};
 
 /// A key, the range in which its value usually lies, and its unit.
@@ -62,8 +62,8 @@ const USUAL: [Usual; 8] = [
         high: 3.0,
         unit: " W/(m K)",
         value: |m| match m.material {
-            Material::Conductivity { w_per_m_k, .. } => Some(w_per_m_k),
-            Material::Diffusivity { .. } => None,
+            PackMaterial::Conductivity { w_per_m_k, .. } => Some(w_per_m_k),
+            PackMaterial::Diffusivity { .. } => None,
         },
     },
     Usual {
@@ -72,8 +72,8 @@ const USUAL: [Usual; 8] = [
         high: 4e6,
         unit: " J/(m³ K)",
         value: |m| match m.material {
-            Material::Conductivity { heat_capacity_j_per_m3_k, .. } => Some(heat_capacity_j_per_m3_k),
-            Material::Diffusivity { .. } => None,
+            PackMaterial::Conductivity { heat_capacity_j_per_m3_k, .. } => Some(heat_capacity_j_per_m3_k),
+            PackMaterial::Diffusivity { .. } => None,
         },
     },
     Usual {
@@ -82,8 +82,8 @@ const USUAL: [Usual; 8] = [
         high: 2e-6,
         unit: " m²/s",
         value: |m| match m.material {
-            Material::Conductivity { .. } => None,
-            Material::Diffusivity { m2_per_s } => Some(m2_per_s),
+            PackMaterial::Conductivity { .. } => None,
+            PackMaterial::Diffusivity { m2_per_s } => Some(m2_per_s),
         },
     },
 ];

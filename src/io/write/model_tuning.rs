@@ -9,7 +9,7 @@ use crate::effect::{Address, DeclaredEffect, FILM, SPOOL};
 use crate::io::fault::{Fault, Faults};
 use crate::io::json::explore::SettingsJson;
 use crate::io::model::ModelFile;
-use crate::thermal::{Extent, Material};
+use crate::thermal::{Extent, PackMaterial};
 use crate::units::c_per_h_from_k_per_s;
 
 /// The numbers as the model has them; none where it lacks what they are of.
@@ -55,8 +55,8 @@ pub(crate) fn tuned(file: &ModelFile, set: &SettingsJson) -> Result<String, Faul
         .map_err(|e: toml_edit::TomlError| Faults::one(&path, &source, Fault::new(e.message(), e.span())))?;
     if let Some(m2_per_s) = set.diffusivity_m2_per_s {
         let (key, number) = match file.model.material {
-            Material::Diffusivity { .. } => ("diffusivity_m2_per_s", m2_per_s),
-            Material::Conductivity { heat_capacity_j_per_m3_k, .. } => {
+            PackMaterial::Diffusivity { .. } => ("diffusivity_m2_per_s", m2_per_s),
+            PackMaterial::Conductivity { heat_capacity_j_per_m3_k, .. } => {
                 ("conductivity_w_per_m_k", shortest(m2_per_s * heat_capacity_j_per_m3_k))
             }
         };

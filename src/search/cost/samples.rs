@@ -305,7 +305,7 @@ pub(in crate::search) mod tests {
     use crate::coil::{Coil, CoilSpec, Fibre, LayerLength};
     use crate::effect::{self, DeclaredEffect};
     use crate::profile::{Piece, Profile};
-    use crate::thermal::{DEFAULT_CELLS_PER_LAYER, Extent, Location, Material};
+    use crate::thermal::{DEFAULT_CELLS_PER_LAYER, Extent, Location, PackMaterial};
 
     /// A tactical coil with any effects at their start values.
     pub(crate) fn model(layers: usize, layer_length: LayerLength, effects: &[&str]) -> CoilModel {
@@ -333,7 +333,7 @@ pub(in crate::search) mod tests {
             name: "test".into(),
             coil: Coil::new(spec).unwrap(),
             extent: Extent::Pack,
-            material: Material::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 },
+            material: PackMaterial::Conductivity { w_per_m_k: 0.35, heat_capacity_j_per_m3_k: 1.7e6 },
             location: Location::OuterLayer,
             rate_mean_s: 0.0,
             cells_per_layer: DEFAULT_CELLS_PER_LAYER,
