@@ -15,7 +15,9 @@ use crate::io::json::{
     CheckJson, CompletionsJson, Document, EvaluateJson, ExactJson, PatternsJson, ReportJson, SchemaJson, VerifyJson,
     WrittenJson,
 };
-use crate::io::json::{campaign, comparison, diagnosis, effects, explore, fibres, field, improve, metrics, pareto};
+use crate::io::json::{
+    campaign, comparison, diagnosis, effects, explore, extend, fibres, field, improve, metrics, pareto,
+};
 use crate::io::json::{proposals, schedule, search, stress, temperatures, tolerance, trim};
 use crate::io::write::compensation_file::CompensateJson;
 use crate::report::{thesis2021, yan1998};
