@@ -16,8 +16,9 @@ use crate::io::folder::{HeldFolder, check_file};
 use crate::io::read::model_file::read_model;
 use crate::io::read::record_columns::RecordFormat;
 use crate::io::read::table_file::Source;
-use crate::io::write::compensation_file::{CompensateJson, MeasuresJson, StreamSummary, compensate_lines_from_turn_on};
+use crate::io::write::compensation_file::{CompensateJson, MeasuresJson, compensate_lines_from_turn_on};
 use crate::io::write::leave_one_out::LeaveOneOutJson;
+use crate::io::write::stream_summary::StreamSummary;
 use crate::record::LEAST_INTERVAL_S;
 use crate::report::compensation::compensation_chart;
 use crate::task::compensate::{

@@ -10,11 +10,10 @@ use crate::io::files::{WriteError, folder_of};
 use crate::io::folder::Replacement;
 use crate::io::json::Document;
 use crate::io::model::{ModelFile, NamedPattern};
-use crate::io::write::compensation_file::{
-    BiasLineJson, CompensateJson, MeasuresJson, MethodJson, StreamSummary, scatters_more,
-};
+use crate::io::write::compensation_file::{BiasLineJson, CompensateJson, MeasuresJson, MethodJson};
 use crate::io::write::difference_equation::DifferenceEquation;
 use crate::io::write::empirical_export::EmpiricalExport;
+use crate::io::write::stream_summary::{StreamSummary, scatters_more};
 use crate::metrics::Metrics;
 use crate::numeric::statistics::{RunningDeviation, rms, standard_deviation};
 use crate::predict::noise_floor_rad_per_s;

@@ -22,5 +22,6 @@ pub(crate) mod model_tuning;
 pub mod pareto_parts;
 pub mod run_directory;
 pub(crate) mod sample_table;
+pub mod stream_summary;
 pub mod traveller;
 pub mod workflow;
