@@ -410,8 +410,9 @@ fn sentence(recommended: &Weighed, classic: Option<&Weighed>, profiles: usize) -
 fn facts(weighed: &Weighed, profiles: usize) -> String {
     let shown = deg_per_h_from_rad_per_s;
     let mut parts = weighed.pointing.map_or_else(Vec::new, |pointing| pointing.facts(profiles));
+    let what = if weighed.pointing.is_some() { "worst rate " } else { "" };
     parts.extend([
-        format!("{:.4} °/h on the searched profiles", shown(weighed.judged.worst.rate_rad_per_s.abs())),
+        format!("{what}{:.4} °/h on the searched profiles", shown(weighed.judged.worst.rate_rad_per_s.abs())),
         format!("{:.4} on {profiles} unseen ones", shown(weighed.unseen_rad_per_s)),
     ]);
     parts.extend(weighed.judged.guaranteed_rad_per_s.map(|g| format!("{:.4} guaranteed", shown(g))));
