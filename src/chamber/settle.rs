@@ -328,7 +328,7 @@ mod tests {
     #[test]
     fn a_coil_on_a_spool_needs_fewer_kinks_by_its_own_model_than_by_another() {
         let (bare, pattern) = (model(Vec::new()), Classic::Zyl.pattern(8).unwrap());
-        let spool = model(vec![effect("spool_mass", &[8000.0, 300.0, 0.0])]);
+        let spool = model(vec![effect("spool_mass", &[8000.0, 50.0, 0.0])]);
         let record = kinked(&spool, &pattern);
         let declared = Assumption::new(bare.clone(), pattern.clone());
         let (chamber, base) = Chamber::new(&bare, &[&record]).unwrap().settled(&declared, &[0]).unwrap();

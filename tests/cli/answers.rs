@@ -22,16 +22,25 @@ fn schema(command: &str) -> Value {
     serde_json::from_str(stdout(&output)).unwrap_or_else(|e| panic!("{command}: {e}"))
 }
 
-/// A schema lets readers meet keys that later versions add; here every key must be one of its own.
-fn closed(schema: &mut Value) {
+/// A schema lets readers meet keys that later versions add; here every key must be one of its own. `is_part`: of an object that has
+/// keys beside these, which closes over both.
+fn closed(schema: &mut Value, is_part: bool) {
     match schema {
         Value::Object(map) => {
-            if map.contains_key("properties") && !map.contains_key("additionalProperties") {
+            let has_keys = map.contains_key("properties");
+            for (key, inner) in map.iter_mut() {
+                match inner {
+                    Value::Array(parts) if has_keys && ["allOf", "anyOf", "oneOf"].contains(&key.as_str()) => {
+                        parts.iter_mut().for_each(|part| closed(part, true));
+                    }
+                    inner => closed(inner, false),
+                }
+            }
+            if has_keys && !is_part && !map.contains_key("additionalProperties") {
                 map.insert("unevaluatedProperties".to_owned(), false.into());
             }
-            map.values_mut().for_each(closed);
         }
-        Value::Array(list) => list.iter_mut().for_each(closed),
+        Value::Array(list) => list.iter_mut().for_each(|inner| closed(inner, false)),
         _ => {}
     }
 }
@@ -42,7 +51,7 @@ fn validator(command: &str) -> Arc<Validator> {
     let mut made = MADE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let new = || {
         let mut schema = schema(command);
-        closed(&mut schema);
+        closed(&mut schema, false);
         Arc::new(jsonschema::validator_for(&schema).unwrap_or_else(|e| panic!("{command}: {e}")))
     };
     Arc::clone(made.entry(command.to_owned()).or_insert_with(new))

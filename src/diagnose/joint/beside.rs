@@ -56,7 +56,7 @@ pub(crate) fn beside(question: &Question, null: &Fit, wandering: &Fit) -> Outcom
         fitted(question, &[], vec![member], &begin, &null.fit, Effort::QUICK)
     });
     let mut fits: Vec<Explanation> = fits.collect();
-    fits.retain(|there| there.members.iter().any(|m| !there.is_no_news(question, *m)));
+    fits.retain(|there| there.members.iter().any(|m| !there.is_no_news(question.model.effects.len(), *m)));
     take_off(question, &null.fit, &mut fits);
     let found = fits.into_iter().map(|there| {
         let candidate = match there.members[..] {

@@ -100,12 +100,12 @@ impl Explanation {
         })
     }
 
-    /// Whether a member corrects declared numbers, all of them by less than they are known to.
-    pub(super) fn is_no_news(&self, question: &Question, member: Member) -> bool {
+    /// Whether a member corrects declared numbers, all of them by less than they are known to; the model declares so many effects.
+    pub(super) fn is_no_news(&self, declared: usize, member: Member) -> bool {
         let effect = match member {
             Member::Effect(_) => {
                 let effects = self.members.iter().filter(|m| matches!(m, Member::Effect(_)));
-                question.model.effects.len() + effects.take_while(|m| **m != member).count()
+                declared + effects.take_while(|m| **m != member).count()
             }
             Member::Refitted(effect) => effect,
             _ => return false,
@@ -229,4 +229,36 @@ pub(in crate::diagnose) fn fitted(
 ) -> Option<Explanation> {
     let fit = question.chamber.fit(assumed, free, &question.fitted, Some(from), effort).ok()?;
     Some(Explanation::new(question, windings, members, fit))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::experiment::fixtures::{effect, model, pattern};
+
+    /// With one effect of the catalogue, its first parameter as given.
+    fn explanation(kind: &str, values: &[f64], scale: Scale) -> Explanation {
+        let assumed = Assumption::new(model(vec![effect(kind, values)]), pattern());
+        let mut fit = Fit::to_nothing(assumed, Vec::new(), 1e-7);
+        if let Some(value) = values.first() {
+            let place = Place::Effect { effect: 0, parameter: 0 };
+            let (lower, upper) = (f64::NEG_INFINITY, f64::INFINITY);
+            fit.parameters.push(Parameter { place, scale, mean: 0.0, deviation: 0.3, lower, upper });
+            fit.coordinates.push(if scale == Scale::Logarithm { value.ln() } else { *value });
+        }
+        let members = vec![Member::Effect(3)];
+        Explanation { members, fit, merit: 0.0, held_out: None, in_readings: 0.0, probability: 0.0 }
+    }
+
+    #[test]
+    fn a_factor_within_a_hundredth_is_no_news_and_an_effect_without_a_number_is() {
+        let no_news =
+            |kind: &str, values: &[f64], scale| explanation(kind, values, scale).is_no_news(0, Member::Effect(3));
+        assert!(no_news("diffusivity", &[1.0015], Scale::Logarithm));
+        assert!(no_news("diffusivity", &[0.992], Scale::Logarithm));
+        assert!(!no_news("diffusivity", &[1.02], Scale::Logarithm));
+        // Nothing was declared of these.
+        assert!(!no_news("midpoint_offset", &[0.001], Scale::Linear));
+        assert!(!no_news("finite_pack", &[], Scale::Linear));
+    }
 }

@@ -84,7 +84,7 @@ pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mu
                 let (a, b) = (&explanations[small], &explanations[large]);
                 let no_news = || {
                     let mut more = b.members.iter().filter(|m| !a.members.contains(m));
-                    more.all(|m| b.is_no_news(question, *m))
+                    more.all(|m| b.is_no_news(question.model.effects.len(), *m))
                 };
                 a.members.len() < b.members.len()
                     && a.members.iter().all(|m| b.members.contains(m))
