@@ -28,7 +28,7 @@ pub struct ImproveJson {
     #[cfg_attr(feature = "cli", schemars(with = "Option<super::search::UncertaintyJson>"))]
     pub(crate) uncertainty: Value,
     /// What the measured winding costs under the model as it is now.
-    #[cfg_attr(feature = "cli", schemars(with = "Option<super::PatternJson>"))]
+    #[cfg_attr(feature = "cli", schemars(with = "Option<super::search::FormerJson>"))]
     pub(crate) measured_pattern_under_new_model: Value,
     pub(crate) predicted_gain: GainJson,
     pub(crate) predicted_record: String,
