@@ -204,3 +204,12 @@ fn causes_of_failures_are_let_go_in_no_more_places_than_before() {
     println!("{found} causes let go");
     assert!(found <= MOST_CAUSES_LET_GO, "{found} times `.ok()`, at most {MOST_CAUSES_LET_GO}: keep the cause");
 }
+
+/// The rules have a program of their own: without a word `cargo run` would not know which one the README means.
+#[test]
+fn cargo_run_runs_the_program() {
+    let manifest = read("Cargo.toml");
+    let package = manifest.split("[package]").nth(1).and_then(|rest| rest.split("\n[").next());
+    let says = package.expect("the root is a package").lines().any(|line| line == "default-run = \"coilwright\"");
+    assert!(says, "Cargo.toml: [package] lacks default-run = \"coilwright\"");
+}
