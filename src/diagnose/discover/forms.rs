@@ -25,6 +25,13 @@ pub(crate) struct FormulaVariable {
     pub(crate) high: f64,
 }
 
+impl FormulaVariable {
+    /// How far it goes from its middle: that is free for a column.
+    pub(crate) fn reach(&self) -> f64 {
+        if self.class == Column { 0.5 * (self.high - self.low) } else { self.low.abs().max(self.high.abs()) }
+    }
+}
+
 /// A number within a form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Inner {
@@ -54,11 +61,10 @@ impl Inner {
     /// Where to look for it first.
     pub(crate) fn grid(self, x: &FormulaVariable, longest_s: f64) -> Vec<f64> {
         let range = x.high - x.low;
-        let largest = x.low.abs().max(x.high.abs());
         match self {
             Inner::TimeConstant => spaced(40.0, longest_s.max(80.0), 12),
             Inner::HalfWidth => spaced(0.02 * range, 0.4 * range, 8),
-            Inner::Knee => spaced(0.05 * largest, largest, 6),
+            Inner::Knee => spaced(0.05 * x.reach(), x.reach(), 6),
             Inner::At => [0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9].iter().map(|q| x.low + q * range).collect(),
             Inner::Width => vec![0.03 * range, 0.1 * range],
         }
@@ -94,6 +100,7 @@ const RELAXATION: &str = "a relaxation: potting or coating that creeps after a c
 const SQUARE: &str = "the square of a current: Joule heating, or the magnetic field of a pair of leads; it does not know the current's sign";
 const SIZE: &str = "the size of a current or flow, whichever its sign: heating by a bridge or a fan";
 const THRESHOLD: &str = "a threshold: a transition of a polymer, condensation, or a regulator that sets in";
+const SATURATION: &str = "saturates: slip beyond a limit of friction, an amplifier or a regulator at its limit";
 const LAG: &str = "a lagged input: a shield, a housing or a mass that follows it";
 const CREEP_SOURCE: Option<&str> =
     Some("Ferry, Viscoelastic Properties of Polymers (1980), chapter 1: stress relaxation of a polymer after a step");
@@ -169,14 +176,9 @@ pub(crate) const FORMS: &[Form] = &[
         "acts in one direction only: a contact that opens, a valve",
         None,
     ),
-    form(
-        "saturation",
-        "tanh({x}/knee)",
-        &[Knee],
-        &[Difference, Rate, Centred],
-        "saturates: slip beyond a limit of friction, an amplifier or a regulator at its limit",
-        None,
-    ),
+    form("saturation", "tanh({x}/knee)", &[Knee], &[Difference, Rate], SATURATION, None),
+    // A difference or a rate is nothing in the middle; where the middle of a column is, nobody knows.
+    form("saturation", "tanh(({x} - at)/knee)", &[At, Knee], &[Column], SATURATION, None),
     form("threshold", "max({x} - at, 0)", &[At], &[Temperature, Column], THRESHOLD, None),
     form("threshold", "max(at - {x}, 0)", &[At], &[Temperature, Column], THRESHOLD, None),
     form(

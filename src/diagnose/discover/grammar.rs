@@ -167,11 +167,10 @@ impl Family {
     /// Bounds of an inner number.
     pub(crate) fn bounds(&self, place: usize, longest_s: f64) -> (f64, f64) {
         let range = self.x.high - self.x.low;
-        let largest = self.x.low.abs().max(self.x.high.abs());
         match self.form.inner[place] {
             TimeConstant => (10.0, 3.0 * longest_s),
             HalfWidth => (0.005 * range, 0.5 * range),
-            Knee => (0.01 * largest, 5.0 * largest),
+            Knee => (0.01 * self.x.reach(), 5.0 * self.x.reach()),
             At => (self.x.low, self.x.high),
             Width => (0.003 * range, 0.3 * range),
         }
@@ -206,9 +205,9 @@ impl Family {
 impl Term {
     /// The formula with its amplitude: what a custom effect declares.
     pub(crate) fn formula_text(&self) -> String {
-        let sum = self.family.form.template.contains(" - ") && !self.family.text.starts_with("max(");
         let bare = &self.family.text;
-        if sum && !bare.starts_with("width") { format!("a*({bare})") } else { format!("a*{bare}") }
+        let is_whole = ["max(", "tanh(", "width"].iter().any(|start| bare.starts_with(start));
+        if self.family.form.template.contains(" - ") && !is_whole { format!("a*({bare})") } else { format!("a*{bare}") }
     }
 
     /// Names of its parameters, the amplitude first.
@@ -342,6 +341,7 @@ mod tests {
             "heater_a^2",
             "max(fan_a - at, 0)",
             "ln(1 + t/tau_s)",
+            "tanh((heater_a - at)/knee)",
         ] {
             assert!(texts.contains(&wanted), "{wanted} is not among {texts:?}");
         }
@@ -360,6 +360,10 @@ mod tests {
         let term = Term { family: relaxation, inner: vec![900.0] };
         assert_eq!(term.formula_text(), "a*(T_mean - lag(T_mean, tau_s))");
         assert_eq!(term.in_numbers(0.012), "0.012*(T_mean - lag(T_mean, 900))");
+        let saturation = families.iter().find(|f| f.text == "tanh((fan_a - at)/knee)").unwrap().clone();
+        let term = Term { family: saturation, inner: vec![-0.2, 0.5] };
+        println!("{}", term.in_numbers(3.0));
+        assert_eq!(term.formula_text(), "a*tanh((fan_a - at)/knee)");
     }
 
     #[test]

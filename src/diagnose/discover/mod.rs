@@ -295,6 +295,29 @@ mod tests {
     }
 
     #[test]
+    fn the_middle_of_a_columns_saturation_is_found_with_it() {
+        let (declared, pattern) = (model(Vec::new()), pattern());
+        let day = |seed: u64| {
+            let mut fan = 2.0;
+            day_of(seed, |noise| {
+                fan += -0.02 * (fan - 2.0) + noise(0.2);
+                (fan, 0.4 * ((fan - 2.5) / 0.6).tanh())
+            })
+        };
+        let (records, holdout) = ([day(5)], [day(6)]);
+        let request =
+            Request { model: &declared, pattern: &pattern, records: &records, holdout: &holdout, terms: Terms::All };
+        let found = diagnose(&request, &|_| ()).unwrap();
+        let best = &found.proposals[0];
+        println!("{} {:?}", best.formula, best.terms[0].parameters);
+        assert_eq!((best.terms.len(), best.terms[0].form), (1, "saturation"));
+        let value = |key: &str| best.terms[0].parameters.iter().find(|p| p.key == key).unwrap().value;
+        for (key, truth) in [("a", 0.4), ("at", 2.5), ("knee", 0.6)] {
+            assert!((value(key) / truth - 1.0).abs() < 0.15, "{key} {}", value(key));
+        }
+    }
+
+    #[test]
     fn the_lagged_size_of_a_current_is_found_with_its_numbers_and_a_record_without_it_shows_nothing() {
         let (declared, pattern) = (model(Vec::new()), pattern());
         let asked = |gain: f64, terms: Terms| {
