@@ -42,12 +42,9 @@ impl Chamber<'_> {
     pub(crate) fn prediction(&self, fit: &Fit, record: usize) -> Result<Prediction, ChamberError> {
         let observed = &self.observed[record];
         let numbers = self.numbers_for(fit, record);
-        let (assumed, film) = (&fit.assumed, numbers.get(Quantity::Film));
-        let side = CoilSide::new(assumed, film, self.modes, observed)?;
-        let mut course = smoothed(&side, assumed, &numbers, observed, record, None, Rates::Unseen)?;
-        if side.needs_reference() {
-            course = smoothed(&side, assumed, &numbers, observed, record, Some(&course), Rates::Unseen)?;
-        }
+        let assumed = &fit.assumed;
+        let side = CoilSide::new(assumed, numbers.get(Quantity::Film), self.modes, observed)?;
+        let course = self.course_by_readings(fit, record)?;
         let rows = self.times_s(record).len();
         let mut prediction = Prediction {
             rate_rad_per_s: side.rates(assumed, observed, record, &course)?,
@@ -65,6 +62,19 @@ impl Chamber<'_> {
         }
         prediction.fit_offset();
         Ok(prediction)
+    }
+
+    /// The air and the layers of a record as its readings alone imply them, by what a fit assumes.
+    ///
+    /// # Errors
+    /// A model that cannot be solved.
+    pub(crate) fn course_by_readings(&self, fit: &Fit, record: usize) -> Result<Reference, ChamberError> {
+        let observed = &self.observed[record];
+        let numbers = self.numbers_for(fit, record);
+        let side = CoilSide::new(&fit.assumed, numbers.get(Quantity::Film), self.modes, observed)?;
+        let course = |before| smoothed(&side, &fit.assumed, &numbers, observed, record, before, Rates::Unseen);
+        let first = course(None)?;
+        if side.needs_reference() { course(Some(&first)) } else { Ok(first) }
     }
 
     /// The numbers for a record: its own where it was fitted, the first fitted record's elsewhere.

@@ -282,7 +282,13 @@ pub(super) mod tests {
         assert!(record.gross_errors().is_empty(), "what neighbours say is not enough here");
         let model = model(Vec::new());
         let course = record.times_s().iter().map(|t| steep(*t)).collect();
-        let input = Input { name: "sine".into(), rate_rad_per_s: vec![course], amplitude: 3e-6, deviation: 1e-5 };
+        let input = Input {
+            name: "sine".into(),
+            rate_rad_per_s: vec![course],
+            amplitude: 3e-6,
+            deviation: 1e-5,
+            follows: Vec::new(),
+        };
         let assumed = Assumption { inputs: vec![input], ..Assumption::new(model.clone(), dip()) };
         let (chamber, _) = Chamber::new(&model, &[&record]).unwrap().settled(&assumed, &[0]).unwrap();
         assert!(chamber.spikes(0) <= spikes.len() + 1, "{}", chamber.spikes(0));
@@ -315,7 +321,13 @@ pub(super) mod tests {
         let model = model(vec![effect("strain_mismatch", &[0.004])]);
         let chamber = Chamber::new(&model, &[&record]).unwrap();
         let step = (0..300).map(|k| f64::from(k > 150)).collect();
-        let input = Input { name: "step".into(), rate_rad_per_s: vec![step], amplitude: 1e-7, deviation: 1e-6 };
+        let input = Input {
+            name: "step".into(),
+            rate_rad_per_s: vec![step],
+            amplitude: 1e-7,
+            deviation: 1e-6,
+            follows: Vec::new(),
+        };
         let assumed = Assumption { inputs: vec![input], ..Assumption::new(model, dip()) };
         let free = [Free { effect: 0, parameter: 0, stated_within: None }];
         let fit =

@@ -113,6 +113,37 @@ pub(crate) struct Input {
     pub(crate) amplitude: f64,
     /// Prior standard deviation of the amplitude about zero; 0: the amplitude is known, and no fit moves it.
     pub(crate) deviation: f64,
+    /// Where the course goes with numbers of the model.
+    pub(crate) follows: Vec<Follow>,
+}
+
+/// How a course at unit amplitude moves with a parameter of one of the model's effects, to first order about where it was made.
+///
+/// # Shapes
+/// As the input's own course; empty for records in which it is held.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Follow {
+    pub(crate) effect: usize,
+    pub(crate) parameter: usize,
+    /// The parameter's value that the course was made with; SI.
+    pub(crate) about: f64,
+    /// Per unit of the parameter.
+    pub(crate) slope_rad_per_s: Vec<Vec<f64>>,
+}
+
+impl Input {
+    /// What it adds to a record's rates with a model's numbers; None where it says nothing of the record.
+    pub(crate) fn added_rad_per_s(&self, model: &CoilModel, place: usize) -> Option<Vec<f64>> {
+        let course = self.rate_rad_per_s.get(place)?;
+        let mut added: Vec<f64> = course.iter().map(|c| self.amplitude * c).collect();
+        for follow in &self.follows {
+            let Some(slope) = follow.slope_rad_per_s.get(place).filter(|s| !s.is_empty()) else { continue };
+            let value = model.effects.get(follow.effect).and_then(|e| e.values().get(follow.parameter));
+            let moved = self.amplitude * (value? - follow.about);
+            added.iter_mut().zip(slope).for_each(|(a, s)| *a += moved * s);
+        }
+        Some(added)
+    }
 }
 
 /// Records, ready to be explained.

@@ -114,8 +114,8 @@ impl CoilSide {
             None => Values { of: observed.series.values.clone() },
         };
         for input in &assumed.inputs {
-            let Some(course) = input.rate_rad_per_s.get(place) else { continue };
-            values.of[filter::RATE].iter_mut().zip(course).for_each(|(v, c)| *v -= input.amplitude * c);
+            let Some(added) = input.added_rad_per_s(&assumed.model, place) else { continue };
+            values.of[filter::RATE].iter_mut().zip(added).for_each(|(v, a)| *v -= a);
         }
         Ok(values)
     }
@@ -143,8 +143,8 @@ impl CoilSide {
             super::known::beyond_linear(&self.asked(), series, course, &mut rates);
         }
         for input in &assumed.inputs {
-            let Some(own) = input.rate_rad_per_s.get(place) else { continue };
-            rates.iter_mut().zip(own).for_each(|(r, c)| *r += input.amplitude * c);
+            let Some(added) = input.added_rad_per_s(&assumed.model, place) else { continue };
+            rates.iter_mut().zip(added).for_each(|(r, a)| *r += a);
         }
         rates[0] = f64::NAN;
         Ok(rates)

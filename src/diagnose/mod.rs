@@ -41,6 +41,7 @@ use crate::record::Record;
 use crate::units::Unit;
 
 pub use caution::{Caution, Refusal};
+use discover::Beyond;
 use experiment::ModelComparison;
 use joint::Question;
 pub(crate) use plain::{Plain, ResidualShape};
@@ -441,7 +442,14 @@ fn beyond(
         Terms::Among(words) => discover::Allowed { words: words.to_vec() },
         Terms::None => return Ok(()),
     };
-    let Some((discovered, elsewhere)) = discover::discover(question, found, &allowed, progress)? else { return Ok(()) };
+    let (discovered, elsewhere) = match discover::discover(question, found, &allowed, progress)? {
+        Beyond::Nothing => return Ok(()),
+        Beyond::Alike(alike) => {
+            discover::share_with(question, &alike, diagnosis);
+            return Ok(());
+        }
+        Beyond::Found(discovered, elsewhere) => (discovered, elsewhere),
+    };
     let own = match &elsewhere {
         Some(chamber) => {
             Some(answer::with_timed_kinks(&Question { chamber, ..question.clone() }, Some(discovered.fit()))?)

@@ -1,12 +1,13 @@
 //! Reference: two records with a term that no list has, from an independent simulator, copied to `tests/data/records-beyond`:
 //! b1 hides 0.012 °/h (T_m − lag(T_m, 900 s)), b3 hides 0.016 °/h · dT_m/dt [K/min] · (T_m − 20 °C); `test.csv` (steps of a
-//! thermoelectric stage) is for judging only.
+//! thermoelectric stage) is for judging only. The others are drawn formula trials (`results/formula-trials`): a one-sided relaxation of the
+//! layers' mean, and −3.563e-6 °/h (T_m − 20 °C)³ beside a `stress_gradient` of −0.186.
 //! Tolerance: the form, its numbers within 10 %, and the third record within 1.15 of its noise.
 
 use std::path::{Path, PathBuf};
 
 use coilwright::compare::compare;
-use coilwright::diagnose::{Request, Terms, diagnose};
+use coilwright::diagnose::{Diagnosis, Request, Terms, diagnose};
 use coilwright::io::read::model_file::read_model;
 use coilwright::io::read::record_file::read_record;
 
@@ -14,7 +15,7 @@ fn folder(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/records-beyond").join(name)
 }
 
-fn assert_found(name: &str, form: &str, numbers: &[(&str, f64)], noise_deg_per_h: f64) {
+fn assert_found(name: &str, form: &str, numbers: &[(&str, f64)], noise_deg_per_h: f64) -> Diagnosis {
     let file = read_model(&folder(name).join("coil.toml")).unwrap();
     let pattern = file.pattern.unwrap().pattern;
     let record = |part: &str| read_record(&folder(name).join(part)).unwrap();
@@ -33,6 +34,11 @@ fn assert_found(name: &str, form: &str, numbers: &[(&str, f64)], noise_deg_per_h
     let noises = coilwright::units::deg_per_h_from_rad_per_s(judged.rmse_rad_per_s) / noise_deg_per_h;
     println!("{name}: the third record within {noises:.3} noises");
     assert!(noises < 1.15, "{name}: {noises}");
+    found
+}
+
+fn listed(found: &Diagnosis) -> Vec<String> {
+    found.effects.iter().map(|f| f.effect.kind()).collect()
 }
 
 #[test]
@@ -51,4 +57,10 @@ fn a_terms_numbers_are_those_of_the_pack_that_it_is_found_in() {
     // A spool stood in the place of the term at first, and its layers' mean in the term: a was −0.0743.
     let numbers = [("a", -0.0652), ("tau_s", 289.0)];
     assert_found("one-sided-relaxation", "one_sided_relaxation", &numbers, 0.024);
+}
+
+#[test]
+fn a_bend_is_found_where_a_straight_line_with_a_wander_stood_in_its_place_beside_another_effect() {
+    let found = assert_found("cubic-beside-stress-gradient", "cubic", &[("a", -3.563e-6)], 0.024);
+    assert_eq!(listed(&found), ["stress_gradient"]);
 }

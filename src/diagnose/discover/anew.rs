@@ -8,6 +8,8 @@
 //! ½ [(M_term − M_listed | kinks by the listed) + (M_term − M_listed | kinks by the term)] ≥ what a set with terms must be better by
 //! ```
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use super::grammar::Allowed;
@@ -38,8 +40,9 @@ pub(crate) fn anew<'a>(
         .filter_map(|e| again(&there, found, e))
         .collect();
     let Some(declared) = listed.iter().find(|e| e.members.is_empty()) else { return Ok(None) };
-    let Some(tools) = tools(&there, &found.windings, &set.explanation.fit, allowed)? else { return Ok(None) };
-    let mut begun = tools.judged(tools.refitted(set).ok_or(ChamberError::Unsolvable)?);
+    let Some(tools) = tools(&there, found, &declared.fit, &set.explanation.fit, allowed)? else { return Ok(None) };
+    let there = Set { grounds: Arc::clone(&tools.grounds), ..set.clone() };
+    let mut begun = tools.judged(tools.refitted(&there).ok_or(ChamberError::Unsolvable)?);
     begun.held_out_gain = begun.held_out.zip(declared.held_out).map(|(with, without)| with - without);
     let sets = tools.search(begun, MOST_TERMS, &|_| ());
     let totals: Vec<f64> = listed.iter().map(Explanation::total).collect();
@@ -59,5 +62,6 @@ fn again(question: &Question, found: &Found, known: &Explanation) -> Option<Expl
     if !question.held_out.is_empty() {
         own.held_out = Some(question.held_out_evidence(&own.fit));
     }
+    own.in_readings = known.in_readings;
     Some(own)
 }

@@ -37,7 +37,7 @@ impl Courses {
                 records.push(Course::default());
                 continue;
             };
-            let course = chamber.prediction(of, record)?.course;
+            let course = chamber.course_by_readings(of, record)?;
             records.push(Course::new(&chamber.states(of, record, &course)?, lengths_m));
         }
         let fitted = fit.records.clone();

@@ -3,8 +3,8 @@
 
 use rayon::prelude::*;
 
-use super::search::{Set, Tools, WITHIN_REACH, WORTH_LISTED};
-use crate::diagnose::joint::proposals;
+use super::grounds::Sought;
+use super::search::{Set, TRIED, Tools, WITHIN_REACH, WORTH_LISTED};
 
 /// Effects of the catalogue that follow the pack's mean rate and so look alike in ramps: mismatch, surplus at either end with either lead, the
 /// empirical ones.
@@ -14,10 +14,14 @@ impl Tools<'_, '_> {
     /// The set with each of its listed effects exchanged for what else promises much in its place.
     pub(crate) fn exchanged(&self, set: &Set) -> Vec<Set> {
         let mut all = Vec::new();
+        if set.grounds.moves() {
+            // Terms that were chosen before the coil was found that they belong to.
+            all.extend(self.other_terms(set, set));
+        }
         for place in 0..set.explanation.members.len() {
             let Some(fewer) = self.without(set, place) else { continue };
             all.extend(self.other_terms(set, &fewer));
-            let Ok(mut others) = proposals(self.question, &fewer.explanation) else { continue };
+            let Ok(mut others) = self.listed_beside(&fewer, Sought::Everything) else { continue };
             others.retain(|p| p.gain > WORTH_LISTED && p.member != set.explanation.members[place]);
             others.sort_by(|a, b| b.gain.total_cmp(&a.gain));
             others.truncate(ALIKE);
@@ -26,7 +30,7 @@ impl Tools<'_, '_> {
             all.extend(
                 near.collect::<Vec<_>>()
                     .into_par_iter()
-                    .map(|s| self.as_confirmed_as(set, self.judged(self.followed(s))))
+                    .map(|s| self.as_confirmed_as(set, self.judged(self.settled(s))))
                     .collect::<Vec<_>>(),
             );
         }
@@ -45,8 +49,10 @@ impl Tools<'_, '_> {
             other.held_out_gain = other.held_out.zip(bare.held_out).map(|(with, without)| with - without);
             other
         };
-        let near = |s: &Set| s.terms.len() == 1 && s.merit > set.merit - WITHIN_REACH;
-        self.onwards(&bare).into_iter().filter(near).map(confirmed).collect()
+        let Ok(regression) = self.question.chamber.regression(&bare.explanation.fit) else { return Vec::new() };
+        let mut others = self.with_terms(&bare, &regression, TRIED);
+        others.retain(|s| s.merit > set.merit - WITHIN_REACH);
+        self.foremost(others).into_iter().map(confirmed).collect()
     }
 
     /// What the held-out records gained with the other set's last member, and what they gained or lost by the exchange.

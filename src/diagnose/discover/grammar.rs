@@ -176,6 +176,11 @@ impl Family {
         }
     }
 
+    /// Whether it reads a temperature of the pack, a rate or a difference.
+    pub(crate) fn is_of_coil(&self) -> bool {
+        std::iter::once(&self.x).chain(&self.y).any(|v| matches!(v.class, Temperature | Difference | Rate))
+    }
+
     /// Whether it depends on nothing but time.
     pub(crate) fn is_of_time_alone(&self) -> bool {
         self.x.class == Time

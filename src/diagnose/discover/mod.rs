@@ -12,18 +12,23 @@ mod courses;
 mod exchange;
 mod forms;
 mod grammar;
+mod grounds;
+mod inner;
 mod own_courses;
 mod proposal;
 mod search;
+mod shadows;
+
+use std::sync::{Arc, OnceLock};
 
 use crate::chamber::{Chamber, ChamberError, Effort, Fit};
-use crate::diagnose::joint::{Explanation, Found, Member, Question, Winding};
+use crate::diagnose::joint::{Explanation, Found, Member, Question};
 
 pub(crate) use grammar::Allowed;
-pub(in crate::diagnose) use proposal::amend;
 pub(crate) use proposal::{FormulaProposal, NO_WINDING, ProposedTerm, Shown, TermParameter};
+pub(in crate::diagnose) use proposal::{amend, share_with};
 
-use courses::Courses;
+use grounds::Grounds;
 use search::{MOST_TERMS, Set, Tools};
 
 /// What won against everything that is listed.
@@ -39,7 +44,6 @@ pub(in crate::diagnose) struct Discovered {
     pub(crate) alternatives: Vec<(Set, f64)>,
     /// What all records that are not fitted have in common with the best set, frozen.
     pub(crate) days: Vec<Fit>,
-    pub(crate) courses: Courses,
 }
 
 impl Discovered {
@@ -49,12 +53,21 @@ impl Discovered {
     }
 }
 
+/// What came of the search for formulas.
+#[derive(Debug)]
+pub(in crate::diagnose) enum Beyond<'a> {
+    Nothing,
+    /// Sets with a formula that do as well as the listed effects that are named, each with what it holds of the posterior mass.
+    Alike(Vec<(Set, f64)>),
+    /// … better; where they were judged in another chamber than the question's, that comes with them.
+    Found(Box<Discovered>, Option<Chamber<'a>>),
+}
+
 /// A set with terms must be better than everything listed by so much (natural logarithm).
 const BEATS: f64 = 3.0;
 /// Sets within so much of the best stay beside it.
 const NEAR: f64 = 6.0;
-/// Looks for terms beside what the search over listed effects found; None where nothing beats it. Where they were judged in
-/// another chamber than the question's, that comes with them.
+/// Looks for terms beside what the search over listed effects found.
 ///
 /// # Errors
 /// A declared model that cannot be solved for these records.
@@ -63,10 +76,10 @@ pub(in crate::diagnose) fn discover<'a>(
     found: &Found,
     allowed: &Allowed,
     progress: &(dyn Fn(f64) + Sync),
-) -> Result<Option<(Discovered, Option<Chamber<'a>>)>, ChamberError> {
-    let Some(declared) = found.declared() else { return Ok(None) };
+) -> Result<Beyond<'a>, ChamberError> {
+    let Some(declared) = found.declared() else { return Ok(Beyond::Nothing) };
     let fit = &found.explanations.first().unwrap_or(declared).fit;
-    let Some(tools) = tools(question, &found.windings, fit, allowed)? else { return Ok(None) };
+    let Some(tools) = tools(question, found, &declared.fit, fit, allowed)? else { return Ok(Beyond::Nothing) };
     let is_listed = |e: &&Explanation| {
         !e.members.is_empty() && e.members.iter().all(|m| matches!(m, Member::Effect(_) | Member::Refitted(_)))
     };
@@ -75,13 +88,22 @@ pub(in crate::diagnose) fn discover<'a>(
     let mut sets: Vec<Set> = Vec::new();
     // Where a listed set is the answer, leaves nothing, a formula in its place has to do the same for more.
     let is_answer = |e: &Explanation| !e.is_outside() && e.total() > best_listed - NEAR;
+    let beside = tools.without_shadows(found, best_listed);
     if let Some(listed) = listed.filter(|e| is_answer(e)) {
         sets = tools.search(tools.plain(listed), MOST_TERMS, &|share| progress(0.4 * share));
-        if sets.len() < 2 && !tools.may_replace(umbrella(&tools, found, declared), best_listed) {
-            return Ok(None);
+        // A wander takes up a slow term before a term is tried.
+        let may_replace = || {
+            tools.may_replace(umbrella(&tools, found, declared), best_listed)
+                || tools.may_replace(tools.plain(declared), best_listed)
+        };
+        if sets.len() < 2 && beside.is_none() && !may_replace() {
+            return Ok(Beyond::Nothing);
         }
     }
     let from_listed = !sets.is_empty();
+    if let Some(beside) = beside {
+        sets.extend(tools.search(beside, MOST_TERMS, &|_| ()));
+    }
     let beneath = umbrella(&tools, found, declared);
     let wanders = beneath.explanation.is_outside();
     sets.extend(tools.search(beneath, MOST_TERMS, &|share| progress(0.4 + 0.4 * share)));
@@ -100,19 +122,42 @@ pub(in crate::diagnose) fn discover<'a>(
     let exchanged = sets.first().map(|best| tools.exchanged(best)).unwrap_or_default();
     sets.extend(exchanged.into_iter().filter(|s| s.total().is_finite()));
     sets.sort_by(|a, b| b.total().total_cmp(&a.total()));
-    let (sets, own) = own_courses::with_own_courses(&tools, sets, allowed)?;
-    let tools = own.unwrap_or(tools);
+    let sets = own_courses::with_own_courses(&tools, sets);
     let listed: Vec<f64> = found.explanations.iter().map(Explanation::total).collect();
     let contender = sets.iter().max_by(|a, b| a.merit.total_cmp(&b.merit)).cloned();
+    let alike = alike(question, found, &sets, &listed);
     if let Some(discovered) = concluded(&tools, sets, &listed, BEATS)? {
         progress(1.0);
-        return Ok(Some((discovered, None)));
+        return Ok(Beyond::Found(Box::new(discovered), None));
     }
+    let alike = if alike.is_empty() { Beyond::Nothing } else { Beyond::Alike(alike) };
     let fitted = found.explanations.iter().map(|e| e.merit).fold(f64::NEG_INFINITY, f64::max);
-    let Some(contender) = contender.filter(|set| set.merit > fitted + BEATS) else { return Ok(None) };
+    let Some(contender) = contender.filter(|set| set.merit > fitted + BEATS) else { return Ok(alike) };
     // A chamber that cannot be looked through with the set speaks against the set alone.
     let anew = anew::anew(question, found, allowed, &contender, best_listed - contender.total()).unwrap_or_default();
-    Ok(anew.map(|(discovered, chamber)| (discovered, Some(chamber))))
+    Ok(anew.map_or(alike, |(discovered, chamber)| Beyond::Found(Box::new(discovered), Some(chamber))))
+}
+
+/// Where listed effects are named, the sets with a formula that the records hardly tell from them: a name that a formula equals is one
+/// of two.
+fn alike(question: &Question, found: &Found, sets: &[Set], listed: &[f64]) -> Vec<(Set, f64)> {
+    let names = |e: &Explanation| !e.is_outside() && e.members.iter().any(|m| matches!(m, Member::Effect(_)));
+    let Some(named) = found.explanations.first().filter(|e| names(e)) else { return Vec::new() };
+    // With all that is named and a formula besides, no name is in question.
+    let replaces = |s: &Set| !named.members.iter().all(|m| s.explanation.members.contains(m));
+    let best_listed = listed.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let is_confirmed = |s: &Set| question.held_out.is_empty() || s.held_out_gain.is_none_or(|gain| gain > 0.0);
+    let mut near: Vec<Set> = Vec::new();
+    let is_near = |s: &Set| !s.terms.is_empty() && s.total() > best_listed - NEAR;
+    for set in sets.iter().filter(|s| is_near(s) && replaces(s) && is_confirmed(s)) {
+        if !near.iter().any(|other| other.says_the_same(set)) {
+            near.push(set.clone());
+        }
+    }
+    let mass = |total: f64| (total - best_listed).exp();
+    let sum: f64 = listed.iter().map(|t| mass(*t)).chain(near.iter().map(|s| mass(s.total()))).sum();
+    let shares: Vec<f64> = near.iter().map(|s| mass(s.total()) / sum).collect();
+    near.into_iter().zip(shares).collect()
 }
 
 /// The best of sets in their order, if it is better than everything listed by at least so much and the held-out records confirm it.
@@ -126,12 +171,7 @@ fn concluded(tools: &Tools, sets: Vec<Set>, listed: &[f64], least: f64) -> Resul
     }
     let mut near: Vec<Set> = Vec::new();
     for set in sets.into_iter().filter(|s| !s.terms.is_empty() && s.total() > best.total() - NEAR) {
-        let same = |o: &Set| {
-            o.explanation.key() == set.explanation.key()
-                && o.terms.len() == set.terms.len()
-                && o.terms.iter().all(|t| set.terms.iter().any(|u| u.is_sister_of(t)))
-        };
-        if !near.iter().any(same) {
+        if !near.iter().any(|other| other.says_the_same(&set)) {
             near.push(set);
         }
     }
@@ -145,25 +185,26 @@ fn concluded(tools: &Tools, sets: Vec<Set>, listed: &[f64], least: f64) -> Resul
     frozen.assumed.inputs.iter_mut().for_each(|i| i.deviation = 0.0);
     let days: Result<Vec<Fit>, ChamberError> =
         question.held_out.iter().map(|&r| question.chamber.held_out(&frozen, r)).collect();
-    let courses = tools.courses.clone();
-    Ok(Some(Discovered { best, refined, errors, probability, alternatives, days: days?, courses }))
+    Ok(Some(Discovered { best, refined, errors, probability, alternatives, days: days? }))
 }
 
 /// The variables are those of a fit; None where no term can be made of these records.
 fn tools<'q, 'a>(
     question: &'q Question<'a>,
-    windings: &'q [Winding],
+    found: &'q Found,
+    declared: &'q Fit,
     fit: &Fit,
     allowed: &Allowed,
 ) -> Result<Option<Tools<'q, 'a>>, ChamberError> {
     let day = |&r: &usize| question.chamber.held_out(fit, r);
     let days: Result<Vec<Fit>, ChamberError> = question.held_out.iter().map(day).collect();
-    let coil = fit.assumed.model.wound_coil()?;
-    let courses = Courses::new(question.chamber, fit, &days?, coil.layer_lengths_m())?;
-    let families = grammar::families(&grammar::variables(&courses), allowed);
-    let longest_s = courses.longest_s();
+    let days = days?;
+    let grounds = Arc::new(Grounds::new(question, fit, &days)?);
+    let families = grammar::families(&grammar::variables(&grounds.courses), allowed);
+    let longest_s = grounds.courses.longest_s();
     let candidates = families.iter().map(|f| f.grid(longest_s).len()).sum();
-    let tools = Tools { question, windings, courses, families, candidates };
+    let (windings, readings) = (found.windings.as_slice(), OnceLock::new());
+    let tools = Tools { question, windings, declared, readings, grounds, days, families, candidates };
     Ok((candidates > 0).then_some(tools))
 }
 
@@ -193,7 +234,10 @@ fn refined(tools: &Tools, best: &Set) -> (Set, Vec<Vec<f64>>) {
     let all = Tools {
         question: &everything,
         windings: tools.windings,
-        courses: tools.courses.clone(),
+        declared: tools.declared,
+        readings: OnceLock::new(),
+        grounds: Arc::clone(&best.grounds),
+        days: Vec::new(),
         families: Vec::new(),
         candidates: tools.candidates,
     };
@@ -202,7 +246,7 @@ fn refined(tools: &Tools, best: &Set) -> (Set, Vec<Vec<f64>>) {
     let set = match again {
         Some(fit) => {
             let explanation = Explanation::new(&everything, tools.windings, best.explanation.members.clone(), fit);
-            all.followed(all.set(explanation, best.terms.clone()))
+            all.settled(all.set(explanation, best.terms.clone(), &best.grounds))
         }
         None => best.clone(),
     };
@@ -216,6 +260,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use statrs::distribution::{ContinuousCDF, Normal};
 
+    use super::courses::Courses;
     use super::*;
     use crate::chamber::{Assumption, Chamber, Input};
     use crate::diagnose::experiment::fixtures::{model, pattern};
@@ -367,6 +412,7 @@ mod tests {
                 rate_rad_per_s: column.rate_rad_per_s,
                 amplitude: 0.0,
                 deviation: 1e3 * amplitude.abs(),
+                follows: Vec::new(),
             });
             let full = chamber.fit(&with, &[], &[0], Some(&fit), Effort::FULL).unwrap();
             println!("{:40} {gain:8.2} {:8.2}", family.text, full.log_likelihood - fit.log_likelihood);

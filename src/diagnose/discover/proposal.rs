@@ -7,6 +7,7 @@ use crate::chamber::Fit;
 use crate::diagnose::answer::{ScoredExplanation, names, noises};
 use crate::diagnose::describe::{findings, unexplained};
 use crate::diagnose::joint::{Explanation, Found};
+use crate::diagnose::standing::CERTAIN;
 use crate::diagnose::{DiagnoseError, Diagnosis, Rung, Share, Verdict};
 use crate::effect::DeclaredEffect;
 use crate::numeric::statistics::rms;
@@ -138,15 +139,9 @@ pub(in crate::diagnose) fn amend(
     diagnosis.noise = noise;
     diagnosis.unexplained = Some(unexplained(question, &first, &best.explanation)?);
     let proposal = proposal(question, discovered, diagnosis)?;
-    let share = |set: &Set, formula: String, probability: f64| Share {
-        effects: names(question, &set.explanation).into_iter().chain([formula]).collect(),
-        probability,
-        members: set.explanation.fit.assumed.model.effects.clone(),
-        estimates: set.explanation.fit.effect_estimates(),
-    };
-    let mut posterior = vec![share(best, proposal.formula.clone(), discovered.probability)];
+    let mut posterior = vec![share(question, best, proposal.formula.clone(), discovered.probability)];
     let others = discovered.alternatives.iter();
-    posterior.extend(others.map(|(set, probability)| share(set, formula_in_numbers(set), *probability)));
+    posterior.extend(others.map(|(set, probability)| share(question, set, formula_in_numbers(set), *probability)));
     let left: f64 = (1.0 - posterior.iter().map(|s| s.probability).sum::<f64>()).max(0.0);
     posterior.extend(
         diagnosis
@@ -159,6 +154,28 @@ pub(in crate::diagnose) fn amend(
     diagnosis.extended = best.explanation.fit.assumed.model.clone();
     diagnosis.proposals = vec![proposal];
     Ok(())
+}
+
+fn share(question: &Question, set: &Set, formula: String, probability: f64) -> Share {
+    Share {
+        effects: names(question, &set.explanation).into_iter().chain([formula]).collect(),
+        probability,
+        members: set.explanation.fit.assumed.model.effects.clone(),
+        estimates: set.explanation.fit.effect_estimates(),
+    }
+}
+
+/// Puts formulas beside the listed effects that do no better than they.
+pub(in crate::diagnose) fn share_with(question: &Question, alike: &[(Set, f64)], diagnosis: &mut Diagnosis) {
+    let left = 1.0 - alike.iter().map(|(_, probability)| probability).sum::<f64>();
+    let named = diagnosis.posterior.first().map_or(0.0, |s| s.probability) * left;
+    diagnosis.posterior.iter_mut().for_each(|s| s.probability *= left);
+    let shares = alike.iter().map(|(set, probability)| share(question, set, formula_in_numbers(set), *probability));
+    diagnosis.posterior.extend(shares);
+    diagnosis.posterior.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    if diagnosis.verdict == Verdict::Missing && named < CERTAIN {
+        diagnosis.verdict = Verdict::Indistinguishable;
+    }
 }
 
 /// What a fit leaves of a record, and how much of it is a term.
@@ -300,15 +317,15 @@ fn shown(question: &Question, discovered: &Discovered, place: usize) -> Result<V
     let set = &discovered.refined;
     let fit = &set.explanation.fit;
     let term = &set.terms[place];
-    let column = discovered.courses.column(term);
+    let column = set.grounds.courses.column(term);
     let name = term.family.x.name.clone();
     let mut all = Vec::new();
     for record in question.fitted.iter().chain(&question.held_out).copied() {
         let residual = left(question, fit, record)?;
         let of = |row: usize| set.amplitude(place) * column.rate_rad_per_s[record][row];
         let x = |row: usize| match name.split_once(" - ") {
-            Some((a, b)) => discovered.courses.of(a, record)[row] - discovered.courses.of(b, record)[row],
-            None => discovered.courses.of(&name, record)[row],
+            Some((a, b)) => set.grounds.courses.of(a, record)[row] - set.grounds.courses.of(b, record)[row],
+            None => set.grounds.courses.of(&name, record)[row],
         };
         let rows: Vec<usize> = (1..residual.len()).filter(|&k| residual[k].is_finite()).collect();
         all.push(Shown {

@@ -11,14 +11,17 @@
 //! # Source
 //! As [`super`]; variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973) 413.
 
+use std::sync::{Arc, OnceLock};
+
 use rayon::prelude::*;
 
 use super::NEAR;
 use super::courses::Courses;
 use super::grammar::{Family, Term};
-use crate::chamber::{Assumption, Column, Effort, Fit, Input, Place, Scored, Scorer};
+use super::grounds::{Grounds, Sought};
+use crate::chamber::{Assumption, Effort, Fit, Input, Scored, Scorer};
 use crate::diagnose::joint::{
-    EFFECT, Explanation, Member, Proposal, Question, Winding, fitted, proposals, rates, with, without,
+    EFFECT, Explanation, Member, Proposal, Question, Readings, Winding, changes_readings, fitted, rates, with, without,
 };
 use crate::numeric::maximise::golden_section_within;
 
@@ -31,13 +34,17 @@ pub(crate) struct Set {
     /// Prices of the terms included.
     pub(crate) merit: f64,
     pub(crate) held_out: Option<f64>,
+    /// Whether its held-out records, and what of it is gained in the readings alone, were looked at.
+    pub(super) is_judged: bool,
     /// By how much the held-out records gained with the last member.
     pub(crate) held_out_gain: Option<f64>,
+    /// What its terms are made of.
+    pub(crate) grounds: Arc<Grounds>,
 }
 
 impl Set {
     pub(crate) fn total(&self) -> f64 {
-        self.merit + self.held_out.unwrap_or(0.0)
+        self.merit + self.held_out.unwrap_or(0.0) - self.explanation.in_readings
     }
 
     /// °/h per unit of the term's form.
@@ -49,6 +56,13 @@ impl Set {
         self.explanation.fit.assumed.inputs.len() - self.terms.len()
     }
 
+    /// Whether another has the same listed effects and the same formulas.
+    pub(crate) fn says_the_same(&self, other: &Self) -> bool {
+        self.explanation.key() == other.explanation.key()
+            && self.terms.len() == other.terms.len()
+            && self.terms.iter().all(|t| other.terms.iter().any(|u| u.is_sister_of(t)))
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.explanation.members.len() + self.terms.len()
     }
@@ -58,7 +72,12 @@ impl Set {
 pub(crate) struct Tools<'q, 'a> {
     pub(crate) question: &'q Question<'a>,
     pub(crate) windings: &'q [Winding],
-    pub(crate) courses: Courses,
+    /// The declared model's, and what readings alone say by it, once that is asked for.
+    pub(crate) declared: &'q Fit,
+    pub(crate) readings: OnceLock<Readings>,
+    /// Of the fit that the search began with, and the chambers of the held-out records by it.
+    pub(crate) grounds: Arc<Grounds>,
+    pub(crate) days: Vec<Fit>,
     pub(crate) families: Vec<Family>,
     /// All points of all grids.
     pub(crate) candidates: usize,
@@ -68,7 +87,7 @@ pub(crate) struct Tools<'q, 'a> {
 pub(crate) const MOST_TERMS: usize = 4;
 /// Families that are refined after each score test, and fitted as far as they promise enough.
 const REFINED: usize = 12;
-const TRIED: usize = 4;
+pub(crate) const TRIED: usize = 4;
 /// A share of a grid's step that is less than the numbers' errors; fits follow them further.
 const REFINED_SHARE: f64 = 0.02;
 /// Listed effects that are fitted beside them.
@@ -85,12 +104,6 @@ const WORTH_A_STEP: f64 = 2.0;
 pub(crate) const WITHIN_REACH: f64 = 20.0;
 /// An amplitude is likely to make a term of so many of the record's noises.
 const LIKELY_NOISES: f64 = 10.0;
-/// Rounds in which inner numbers follow the fitted amplitude; a step below this share of its error ends them.
-const POLISHED: usize = 2;
-const SETTLED_SHARE: f64 = 0.15;
-/// Relative step of a derivative by an inner number.
-const STEP_SHARE: f64 = 0.02;
-
 /// A term that promises something at a fit.
 #[derive(Debug, Clone)]
 pub(crate) struct PromisingTerm {
@@ -118,15 +131,16 @@ impl Tools<'_, '_> {
         PromisingTerm { term, gain, amplitude, worth }
     }
 
-    /// The most that any point of any grid is worth at a fit.
-    fn most_worth(&self, scorer: &Scorer, fit: &Fit) -> f64 {
-        let rows = self.rows(fit);
-        let longest_s = self.courses.longest_s();
+    /// The most that any point of any grid is worth at a set.
+    fn most_worth(&self, scorer: &Scorer, set: &Set) -> f64 {
+        let rows = self.rows(&set.explanation.fit);
+        let courses = &set.grounds.courses;
+        let longest_s = courses.longest_s();
         let of = |family: &Family| {
             let points = family.grid(longest_s).into_iter().map(|inner| Term { family: family.clone(), inner });
             points
                 .map(|term| {
-                    let scored = scorer.score(&self.courses.column(&term));
+                    let scored = scorer.score(&courses.column(&term));
                     self.promise(term, &scored, rows).worth
                 })
                 .fold(f64::NEG_INFINITY, f64::max)
@@ -134,17 +148,18 @@ impl Tools<'_, '_> {
         self.families.par_iter().map(of).reduce(|| f64::NEG_INFINITY, f64::max)
     }
 
-    /// The best of each family at a fit, refined; most worth first.
-    pub(crate) fn promises(&self, scorer: &Scorer, fit: &Fit) -> Vec<PromisingTerm> {
-        let rows = self.rows(fit);
-        let longest_s = self.courses.longest_s();
+    /// The best of each family at a set, refined; most worth first.
+    pub(crate) fn promises(&self, scorer: &Scorer, set: &Set) -> Vec<PromisingTerm> {
+        let rows = self.rows(&set.explanation.fit);
+        let courses = &set.grounds.courses;
+        let longest_s = courses.longest_s();
         let mut best: Vec<PromisingTerm> = self
             .families
             .par_iter()
             .filter_map(|family| {
                 let points = family.grid(longest_s).into_iter().map(|inner| Term { family: family.clone(), inner });
                 let scored = points.map(|term| {
-                    let scored = scorer.score(&self.courses.column(&term));
+                    let scored = scorer.score(&courses.column(&term));
                     self.promise(term, &scored, rows)
                 });
                 scored.max_by(|a, b| a.gain.total_cmp(&b.gain))
@@ -156,13 +171,14 @@ impl Tools<'_, '_> {
         order(&mut best);
         best.truncate(REFINED);
         let mut refined: Vec<PromisingTerm> =
-            best.into_par_iter().map(|promise| self.refined(scorer, promise, rows, longest_s)).collect();
+            best.into_par_iter().map(|promise| self.refined(scorer, courses, promise, rows)).collect();
         order(&mut refined);
         refined
     }
 
     /// Inner numbers where the gain is largest, one after the other.
-    fn refined(&self, scorer: &Scorer, promise: PromisingTerm, rows: f64, longest_s: f64) -> PromisingTerm {
+    fn refined(&self, scorer: &Scorer, courses: &Courses, promise: PromisingTerm, rows: f64) -> PromisingTerm {
+        let longest_s = courses.longest_s();
         let count = promise.term.inner.len();
         let mut best = promise;
         for _ in 0..if count > 1 { 2 } else { count } {
@@ -179,11 +195,11 @@ impl Tools<'_, '_> {
                     term.inner[place] = back(v);
                     term
                 };
-                let gain = |v: f64| scorer.score(&self.courses.column(&moved(v))).gain().0;
+                let gain = |v: f64| scorer.score(&courses.column(&moved(v))).gain().0;
                 let (from, to) = ((here - width).max(to(low)), (here + width).min(to(high)));
                 let at = golden_section_within(gain, from, to, REFINED_SHARE).at;
                 let term = moved(at);
-                let scored = scorer.score(&self.courses.column(&term));
+                let scored = scorer.score(&courses.column(&term));
                 let there = self.promise(term, &scored, rows);
                 if there.gain > best.gain {
                     best = there;
@@ -194,8 +210,8 @@ impl Tools<'_, '_> {
     }
 
     /// A column as an input of unknown amplitude.
-    fn input(&self, term: &Term, amplitude: f64) -> Input {
-        let column = self.courses.column(term);
+    pub(super) fn input(&self, grounds: &Grounds, term: &Term, amplitude: f64) -> Input {
+        let (column, follows) = grounds.column(term);
         let (mut squares, mut count) = (0.0, 0usize);
         for &r in &self.question.fitted {
             let own = &column.rate_rad_per_s[r];
@@ -206,19 +222,34 @@ impl Tools<'_, '_> {
         let size = (squares / count.max(1) as f64).sqrt().max(f64::MIN_POSITIVE);
         let noises = self.question.fitted.iter().map(|&r| self.question.chamber.noise_floor_rad_per_s(r));
         let deviation = LIKELY_NOISES * noises.fold(0.0, f64::max) / size;
-        Input { name: term.family.text.clone(), rate_rad_per_s: column.rate_rad_per_s, amplitude, deviation }
+        Input { name: term.family.text.clone(), rate_rad_per_s: column.rate_rad_per_s, amplitude, deviation, follows }
     }
 
     /// The prices of terms taken off what their fit is worth.
-    pub(crate) fn set(&self, explanation: Explanation, terms: Vec<Term>) -> Set {
+    pub(crate) fn set(&self, explanation: Explanation, terms: Vec<Term>, grounds: &Arc<Grounds>) -> Set {
         let rows = self.rows(&explanation.fit);
         let merit = explanation.merit - terms.iter().map(|t| self.price(t, rows)).sum::<f64>();
-        Set { explanation, terms, merit, held_out: None, held_out_gain: None }
+        Set {
+            explanation,
+            terms,
+            merit,
+            held_out: None,
+            is_judged: false,
+            held_out_gain: None,
+            grounds: Arc::clone(grounds),
+        }
     }
 
     /// A set without any term.
     pub(crate) fn plain(&self, explanation: &Explanation) -> Set {
-        Set { merit: explanation.merit, held_out: explanation.held_out, ..self.set(explanation.clone(), Vec::new()) }
+        let grounds = if changes_readings(self.question, explanation) {
+            self.grounds_of(&explanation.fit)
+        } else {
+            Arc::clone(&self.grounds)
+        };
+        let set = self.set(explanation.clone(), Vec::new(), &grounds);
+        let is_judged = explanation.held_out.is_some();
+        Set { merit: explanation.merit, held_out: explanation.held_out, is_judged, ..set }
     }
 
     /// A set with one more term, fitted from the set's own chamber.
@@ -226,7 +257,7 @@ impl Tools<'_, '_> {
         let mut assumed = set.explanation.fit.assumed.clone();
         assumed.drift = false;
         assumed.cycle = false;
-        assumed.inputs.push(self.input(&promise.term, promise.amplitude));
+        assumed.inputs.push(self.input(&set.grounds, &promise.term, promise.amplitude));
         let mut terms = set.terms.clone();
         terms.push(promise.term.clone());
         let members: Vec<Member> = set.explanation.members.iter().copied().filter(|m| !m.is_outside()).collect();
@@ -234,8 +265,16 @@ impl Tools<'_, '_> {
         // From a quiet gyro: what the term does not explain shows as wander again.
         let mut start = set.explanation.fit.clone();
         self.question.chamber.quieten(&mut start);
-        let found = fitted(self.question, self.windings, members, &begin, &start, Effort::QUICK)?;
-        Some(self.set(found, terms))
+        let from = |start: &Fit| {
+            let found = fitted(self.question, self.windings, members.clone(), &begin, start, Effort::QUICK)?;
+            Some(self.set(found, terms.clone(), &set.grounds))
+        };
+        let found = from(&start)?;
+        // With one term more nothing is less likely: an ascent that ended there has lost its way, among whatever else is missing.
+        if found.explanation.fit.posterior() > set.explanation.fit.posterior() || set.explanation.is_outside() {
+            return Some(found);
+        }
+        from(&set.explanation.fit).into_iter().chain([found]).max_by(|a, b| a.merit.total_cmp(&b.merit))
     }
 
     /// A set that was fitted in another chamber, in this one.
@@ -243,146 +282,65 @@ impl Tools<'_, '_> {
         let fit = &set.explanation.fit;
         let begin = (self.assumed_with(set, &set.terms), fit.free.clone());
         let found = fitted(self.question, self.windings, set.explanation.members.clone(), &begin, fit, Effort::FULL)?;
-        Some(self.followed(self.set(found, set.terms.clone())))
+        Some(self.followed(self.set(found, set.terms.clone(), &set.grounds)))
     }
 
     /// What the set's fit assumes, with the courses of these terms as its inputs and the amplitudes as they were found.
-    fn assumed_with(&self, set: &Set, terms: &[Term]) -> Assumption {
+    pub(super) fn assumed_with(&self, set: &Set, terms: &[Term]) -> Assumption {
         let mut assumed = set.explanation.fit.assumed.clone();
         let first = set.first_input();
         for (place, term) in terms.iter().enumerate() {
-            assumed.inputs[first + place] = self.input(term, set.amplitude(place));
+            assumed.inputs[first + place] = self.input(&set.grounds, term, set.amplitude(place));
         }
         assumed
     }
 
+    /// A set with one more listed effect, and with what that makes of the variables of its terms.
     pub(crate) fn with_listed(&self, set: &Set, proposal: &Proposal) -> Option<Set> {
         let begin = with(self.question, self.windings, &set.explanation.fit, proposal.member, proposal.values.clone())?;
         let mut members = set.explanation.members.clone();
         members.push(proposal.member);
-        let fit = &set.explanation.fit;
-        let found = fitted(self.question, self.windings, members, &begin, fit, Effort::QUICK)?;
-        Some(self.set(found, set.terms.clone()))
-    }
-
-    /// With inner numbers that follow the fit.
-    pub(crate) fn followed(&self, mut best: Set) -> Set {
-        for _ in 0..POLISHED {
-            let Some((next, share)) = self.polished(&best) else { break };
-            if next.merit > best.merit {
-                best = next;
-            } else {
-                break;
-            }
-            if share < SETTLED_SHARE {
-                break;
-            }
-        }
-        best
-    }
-
-    /// Derivatives of the terms' columns by their inner numbers, as columns: of the term, and the place of the number.
-    fn inner_columns(&self, set: &Set) -> Vec<(usize, usize, Column)> {
-        let mut all = Vec::new();
-        for (place, term) in set.terms.iter().enumerate() {
-            let amplitude = set.amplitude(place);
-            for inner in 0..term.inner.len() {
-                let step = self.step(term, inner);
-                let at = |sign: f64| {
-                    let mut moved = term.clone();
-                    moved.inner[inner] += sign * step;
-                    self.courses.column(&moved)
-                };
-                let (up, down) = (at(1.0), at(-1.0));
-                let slope = |r: usize| {
-                    let pairs = up.rate_rad_per_s[r].iter().zip(&down.rate_rad_per_s[r]);
-                    pairs.map(|(u, d)| amplitude * (u - d) / (2.0 * step)).collect()
-                };
-                let rate_rad_per_s = (0..up.rate_rad_per_s.len()).map(slope).collect();
-                all.push((place, inner, Column { rate_rad_per_s }));
-            }
-        }
-        all
-    }
-
-    fn step(&self, term: &Term, inner: usize) -> f64 {
-        if term.family.form.inner[inner].is_size() {
-            STEP_SHARE * term.inner[inner]
-        } else {
-            0.5 * STEP_SHARE * (term.family.x.high - term.family.x.low)
-        }
-    }
-
-    /// Standard errors of each term's amplitude and then of its inner numbers, cleared of all else that was fitted. Amplitude and
-    /// inner numbers of a term go together: an amplitude is known as well as they are.
-    pub(crate) fn errors(&self, set: &Set) -> Vec<Vec<f64>> {
-        let fit = &set.explanation.fit;
-        let first = set.first_input();
-        let coordinate =
-            |term: usize| fit.parameters.iter().position(|p| p.place == Place::Input { input: first + term });
-        let mut errors: Vec<Vec<f64>> = set.terms.iter().map(|t| vec![f64::NAN; 1 + t.inner.len()]).collect();
-        for (term, errors) in errors.iter_mut().enumerate() {
-            errors[0] = coordinate(term).map_or(f64::NAN, |k| fit.standard_errors[k]);
-        }
-        let Ok(scorer) = self.question.chamber.scorer(fit) else { return errors };
-        let columns = self.inner_columns(set);
-        let scored: Vec<Scored> = columns.iter().map(|(_, _, c)| scorer.score(c)).collect();
-        let count = scored.len();
-        let information = nalgebra::DMatrix::from_fn(count, count, |i, k| scored[i].information_with(&scored[k]));
-        let Some(factor) = information.cholesky() else { return errors };
-        let covariance = factor.inverse();
-        for (i, (term, inner, _)) in columns.iter().enumerate() {
-            errors[*term][1 + inner] = covariance[(i, i)].sqrt();
-        }
-        for (term, errors) in errors.iter_mut().enumerate() {
-            let Some(k) = coordinate(term) else { continue };
-            let weights = nalgebra::DVector::from_iterator(count, scored.iter().map(|s| s.weight(k)));
-            errors[0] = errors[0].hypot(weights.dot(&(&covariance * &weights)).max(0.0).sqrt());
-        }
-        errors
-    }
-
-    /// Inner numbers one Newton step further, fitted again; and the longest step in units of its error.
-    fn polished(&self, set: &Set) -> Option<(Set, f64)> {
-        if set.terms.iter().all(|t| t.inner.is_empty()) {
-            return None;
-        }
-        let scorer = self.question.chamber.scorer(&set.explanation.fit).ok()?;
-        let columns = self.inner_columns(set);
-        let scored: Vec<Scored> = columns.iter().map(|(_, _, c)| scorer.score(c)).collect();
-        let count = scored.len();
-        let information = nalgebra::DMatrix::from_fn(count, count, |i, k| scored[i].information_with(&scored[k]));
-        let score = nalgebra::DVector::from_iterator(count, scored.iter().map(|s| s.score));
-        let factor = information.cholesky()?;
-        let change = factor.solve(&score);
-        let covariance = factor.inverse();
-        let mut terms = set.terms.clone();
-        let mut longest: f64 = 0.0;
-        for (i, (term, inner, _)) in columns.iter().enumerate() {
-            let family = &terms[*term].family;
-            let (low, high) = family.bounds(*inner, self.courses.longest_s());
-            let here = terms[*term].inner[*inner];
-            let reach = if family.form.inner[*inner].is_size() { 0.4 * here } else { 0.1 * (high - low) };
-            let moved = (here + change[i].clamp(-reach, reach)).clamp(low, high);
-            longest = longest.max((moved - here).abs() / covariance[(i, i)].sqrt());
-            terms[*term].inner[*inner] = moved;
-        }
-        let begin = (self.assumed_with(set, &terms), set.explanation.fit.free.clone());
-        let members = set.explanation.members.clone();
-        let fit = &set.explanation.fit;
-        let found = fitted(self.question, self.windings, members, &begin, fit, Effort::QUICK)?;
-        Some((self.set(found, terms), longest))
+        self.with_coil(set, members, begin)
     }
 
     /// With the held-out records looked at, amplitudes and effects as they were fitted.
     pub(crate) fn judged(&self, mut set: Set) -> Set {
-        if self.question.held_out.is_empty() || set.held_out.is_some() {
+        if set.is_judged {
             return set;
         }
-        let mut frozen = set.explanation.fit.clone();
-        frozen.assumed.inputs.iter_mut().for_each(|input| input.deviation = 0.0);
-        set.held_out = Some(self.question.held_out_evidence(&frozen));
+        if !self.question.held_out.is_empty() {
+            let mut frozen = set.explanation.fit.clone();
+            frozen.assumed.inputs.iter_mut().for_each(|input| input.deviation = 0.0);
+            set.held_out = Some(self.question.held_out_evidence(&frozen));
+        }
+        if changes_readings(self.question, &set.explanation) {
+            let readings = self.readings.get_or_init(|| Readings::new(self.question, self.declared));
+            set.explanation.in_readings = readings.gain(self.question, &set.explanation.fit);
+        }
+        set.is_judged = true;
         set
+    }
+
+    /// A set with each of the terms that promise most, fitted.
+    pub(crate) fn with_terms(&self, set: &Set, regression: &Scorer, most: usize) -> Vec<Set> {
+        let promises = self.promises(regression, set);
+        let first = promises.first().map_or(0.0, |p| p.gain);
+        let worthy = promises.iter().filter(|p| p.worth > 0.0 && p.gain > WORTH_BESIDE * first).take(ALIKE_TRIED);
+        let tried = worthy.enumerate().filter(|(place, p)| *place < most || p.gain > first - NEAR);
+        let tried: Vec<&PromisingTerm> = tried.map(|(_, p)| p).collect();
+        tried.par_iter().filter_map(|promise| self.with_term(set, promise)).collect()
+    }
+
+    /// The foremost of sets in the order of their merits, and those that the fitted records hardly tell from it, with numbers and variables
+    /// that follow their fits and the held-out records looked at.
+    pub(crate) fn foremost(&self, mut sets: Vec<Set>) -> Vec<Set> {
+        sets.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+        let near = sets.first().map_or(f64::NEG_INFINITY, |best| best.merit - NEAR);
+        let alike = sets.iter().take(ALIKE_TRIED).filter(|s| s.merit > near).count();
+        sets.truncate(alike.max(HELD_OUT_TRIED));
+        let mut sets: Vec<Set> = sets.into_par_iter().map(|s| self.judged(self.settled(s))).collect();
+        sets.sort_by(|a, b| b.total().total_cmp(&a.total()));
+        sets
     }
 
     /// The next sets from one, best first; all of them were fitted. None beyond the set itself is worth more: empty.
@@ -392,32 +350,19 @@ impl Tools<'_, '_> {
         let (Ok(scorer), Ok(regression)) = (chamber.scorer(fit), chamber.regression(fit)) else { return Vec::new() };
         // Whether there is anything is asked beneath the wander that was fitted, what it is without it. Where the gyro wanders more than gyros
         // do there is something, and a slow term looks like that wander until it is fitted.
-        if !set.explanation.is_outside() && self.most_worth(&scorer, fit) < 0.0 {
+        let is_anything = set.explanation.is_outside() || self.most_worth(&scorer, set) >= 0.0;
+        if !is_anything && set.terms.is_empty() {
             return Vec::new();
         }
-        let promises = self.promises(&regression, fit);
-        let first = promises.first().map_or(0.0, |p| p.gain);
-        let listed: Vec<Proposal> = match proposals(self.question, &set.explanation) {
-            Ok(mut all) => {
-                all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-                all.retain(|p| p.gain > WORTH_LISTED);
-                all.truncate(LISTED_TRIED);
-                all
-            }
-            Err(_) => Vec::new(),
-        };
-        let worthy = promises.iter().filter(|p| p.worth > 0.0 && p.gain > WORTH_BESIDE * first).take(ALIKE_TRIED);
-        let tried = worthy.enumerate().filter(|(place, p)| *place < TRIED || p.gain > first - NEAR);
-        let tried: Vec<&PromisingTerm> = tried.map(|(_, p)| p).collect();
-        let mut next: Vec<Set> = tried.par_iter().filter_map(|promise| self.with_term(set, promise)).collect();
+        // No formula is left to be found; an effect that moves the variables of those that were may be.
+        let sought = if is_anything { Sought::Everything } else { Sought::WhatMoves };
+        let mut listed = self.listed_beside(set, sought).unwrap_or_default();
+        listed.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        listed.retain(|p| p.gain > WORTH_LISTED);
+        listed.truncate(LISTED_TRIED);
+        let mut next = if is_anything { self.with_terms(set, &regression, TRIED) } else { Vec::new() };
         next.extend(listed.par_iter().filter_map(|p| self.with_listed(set, p)).collect::<Vec<_>>());
-        next.sort_by(|a, b| b.merit.total_cmp(&a.merit));
-        let near = next.first().map_or(f64::NEG_INFINITY, |best| best.merit - NEAR);
-        let alike = next.iter().take(ALIKE_TRIED).filter(|s| s.merit > near).count();
-        next.truncate(alike.max(HELD_OUT_TRIED));
-        let mut next: Vec<Set> = next.into_par_iter().map(|s| self.judged(self.followed(s))).collect();
-        next.sort_by(|a, b| b.total().total_cmp(&a.total()));
-        next
+        self.foremost(next)
     }
 
     /// Whether one term in the place of all that is listed comes near what the listed effects are worth.
@@ -441,7 +386,15 @@ impl Tools<'_, '_> {
             }
             let gains =
                 |s: &Set| s.total() > best.total() + WORTH_A_STEP && s.held_out_gain.is_none_or(|gain| gain > 0.0);
-            let chosen = next.iter().find(|s| gains(s)).cloned();
+            let mut chosen = next.iter().find(|s| gains(s)).cloned();
+            if chosen.is_none() && best.terms.is_empty() {
+                let mut pairs = self.paired(&best, &next);
+                for set in &mut pairs {
+                    set.held_out_gain = set.held_out.zip(best.held_out).map(|(a, b)| a - b);
+                }
+                chosen = pairs.iter().filter(|s| gains(s)).max_by(|a, b| a.total().total_cmp(&b.total())).cloned();
+                all.extend(pairs);
+            }
             all.extend(next);
             let Some(chosen) = chosen else { break };
             best = self.look_back(chosen, &mut all);
@@ -456,7 +409,7 @@ impl Tools<'_, '_> {
             let places: Vec<usize> = (0..best.len()).collect();
             let smaller: Vec<Set> = places.par_iter().filter_map(|&place| self.without(&best, place)).collect();
             let smaller: Vec<Set> = smaller.into_iter().filter(|s| s.merit > best.merit - WORTH_A_STEP).collect();
-            let judged: Vec<Set> = smaller.into_par_iter().map(|s| self.judged(s)).collect();
+            let judged: Vec<Set> = smaller.into_par_iter().map(|s| self.judged(self.grounded(s))).collect();
             let Some(least) = judged.iter().max_by(|a, b| a.total().total_cmp(&b.total())).cloned() else { break };
             all.extend(judged);
             if least.total() < best.total() {
@@ -471,18 +424,17 @@ impl Tools<'_, '_> {
     pub(crate) fn without(&self, set: &Set, place: usize) -> Option<Set> {
         let listed = set.explanation.members.len();
         let fit = &set.explanation.fit;
-        let (begin, members, terms) = if place < listed {
+        if place < listed {
             let mut members = set.explanation.members.clone();
             members.remove(place);
-            (without(self.question, &set.explanation, place), members, set.terms.clone())
-        } else {
-            let mut assumed = fit.assumed.clone();
-            assumed.inputs.remove(set.first_input() + place - listed);
-            let mut terms = set.terms.clone();
-            terms.remove(place - listed);
-            ((assumed, fit.free.clone()), set.explanation.members.clone(), terms)
-        };
+            return self.with_coil(set, members, without(self.question, &set.explanation, place));
+        }
+        let mut assumed = fit.assumed.clone();
+        assumed.inputs.remove(set.first_input() + place - listed);
+        let mut terms = set.terms.clone();
+        terms.remove(place - listed);
+        let (begin, members) = ((assumed, fit.free.clone()), set.explanation.members.clone());
         let found = fitted(self.question, self.windings, members, &begin, fit, Effort::QUICK)?;
-        Some(self.set(found, terms))
+        Some(self.set(found, terms, &set.grounds))
     }
 }

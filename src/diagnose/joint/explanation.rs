@@ -215,6 +215,7 @@ fn step(question: &Question, record: usize, row: usize) -> Input {
         rate_rad_per_s: (0..chamber.records()).map(course).collect(),
         amplitude: 0.0,
         deviation: 10.0 * chamber.noise_floor_rad_per_s(record),
+        follows: Vec::new(),
     }
 }
 

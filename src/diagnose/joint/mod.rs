@@ -26,7 +26,8 @@ pub(crate) use beside::beside;
 pub(crate) use explanation::{Explanation, Member};
 pub(in crate::diagnose) use explanation::{fitted, with, without};
 pub(in crate::diagnose) use odds::EFFECT;
-pub(in crate::diagnose) use screen::{Proposal, proposals};
+pub(in crate::diagnose) use readings::{Readings, changes_readings, is_seen};
+pub(in crate::diagnose) use screen::{Proposal, proposals_along};
 pub(crate) use search::{again, promise, refit_without, search, settle_one};
 pub(crate) use winding::Winding;
 

@@ -22,22 +22,43 @@ pub(super) fn take_off(question: &Question, declared: &Fit, explanations: &mut [
     if changing.is_empty() {
         return;
     }
-    let chamber = question.chamber.without_rates();
+    let readings = Readings::new(question, declared);
+    changing.par_iter_mut().for_each(|e| e.in_readings = readings.gain(question, &e.fit));
+}
+
+/// The readings alone by the declared model, which sets are compared with.
+#[derive(Debug, Clone)]
+pub(in crate::diagnose) struct Readings {
+    /// Of the fitted and of the held-out records.
+    declared: [f64; 2],
+}
+
+impl Readings {
+    pub(in crate::diagnose) fn new(question: &Question, declared: &Fit) -> Self {
+        let chamber = question.chamber.without_rates();
+        let blind = blind(question, &chamber);
+        let (there, own) = (alone(&blind, declared), own_kinks(&blind, declared));
+        Self { declared: [there[0].max(own[0]), there[1].max(own[1])] }
+    }
+
+    /// What a fit gains beside it.
+    pub(in crate::diagnose) fn gain(&self, question: &Question, fit: &Fit) -> f64 {
+        let chamber = question.chamber.without_rates();
+        let own = alone(&blind(question, &chamber), fit);
+        let gains = own.iter().zip(&self.declared).map(|(own, none)| (own - none).max(0.0));
+        gains.filter(|gain| gain.is_finite()).sum()
+    }
+}
+
+/// The question of the records that have one thermometer, in a chamber that sees readings only.
+fn blind<'q>(question: &Question<'q>, chamber: &'q crate::chamber::Chamber<'q>) -> Question<'q> {
     let has_one_thermometer = |place: &usize| {
         let record = chamber.record(*place);
         record.inner_k().is_none() && record.ambient_k().is_none()
     };
     let of = |places: &[usize]| places.iter().copied().filter(has_one_thermometer).collect();
     let (fitted, held_out) = (of(&question.fitted), of(&question.held_out));
-    let blind = Question { chamber: &chamber, fitted, held_out, ..question.clone() };
-    let none = alone(&blind, declared);
-    let own = own_kinks(&blind, declared);
-    let none: Vec<f64> = none.into_iter().zip(own).map(|(there, own)| there.max(own)).collect();
-    changing.par_iter_mut().for_each(|e| {
-        let own = alone(&blind, &e.fit);
-        let gains = own.iter().zip(&none).map(|(own, none)| (own - none).max(0.0)).filter(|gain| gain.is_finite());
-        e.in_readings = gains.sum();
-    });
+    Question { chamber, fitted, held_out, ..question.clone() }
 }
 
 /// Log evidence of the readings of the records that were fitted, and of those held out.
@@ -65,8 +86,8 @@ fn own_kinks(blind: &Question, declared: &Fit) -> [f64; 2] {
     }
 }
 
-/// What readings depend on.
-fn is_seen(model: &CoilModel, without: &CoilModel) -> bool {
+/// Whether readings are others by one model than by another.
+pub(in crate::diagnose) fn is_seen(model: &CoilModel, without: &CoilModel) -> bool {
     match (model.heat_path(), without.heat_path()) {
         (Ok(a), Ok(b)) => a != b || model.sensor_lag_s() != without.sensor_lag_s(),
         _ => true,
@@ -74,7 +95,7 @@ fn is_seen(model: &CoilModel, without: &CoilModel) -> bool {
 }
 
 /// Whether readings would be others with a set's members.
-pub(super) fn changes_readings(question: &Question, explanation: &Explanation) -> bool {
+pub(in crate::diagnose) fn changes_readings(question: &Question, explanation: &Explanation) -> bool {
     explanation.members.iter().any(|member| match member {
         Member::Effect(candidate) => {
             is_seen(&question.model.with_effect(question.candidates[*candidate].effect.clone()), question.model)

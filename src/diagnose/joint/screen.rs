@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::explanation::with;
 use super::{Explanation, Member, Outcome, Question};
 use crate::chamber::{Assumption, Effort};
+use crate::diagnose::candidate::Candidate;
 use crate::effect::DeclaredEffect;
 use crate::units::Unit;
 
@@ -31,13 +32,23 @@ pub(in crate::diagnose) struct Proposal {
 
 /// The score test of every candidate from each of its starts; of what every layer has one for, the best layer's.
 pub(in crate::diagnose) fn proposals(question: &Question, best: &Explanation) -> Outcome<Vec<Proposal>> {
-    Ok(best_layers(question, scored(question, best)?, 1))
+    proposals_along(question, best, &|_, _| true)
+}
+
+/// The same, where an assumption with a candidate differs by more than that effect: `along` changes the rest, and says
+/// whether it is looked at.
+pub(in crate::diagnose) fn proposals_along(
+    question: &Question,
+    best: &Explanation,
+    along: &(dyn Fn(&Candidate, &mut Assumption) -> bool + Sync),
+) -> Outcome<Vec<Proposal>> {
+    Ok(best_layers(question, scored(question, best, along)?, 1))
 }
 
 /// The same, and where something large is missing a short fit of what promises most: the score test then says alike of
 /// whatever follows the mean rate, because the gyro's wander stands for all of it.
 pub(super) fn looked_at(question: &Question, best: &Explanation) -> Outcome<Vec<Proposal>> {
-    let mut all = scored(question, best)?;
+    let mut all = scored(question, best, &|_, _| true)?;
     all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let least = LARGE.max(CLOSE * all.first().map_or(0.0, |p| p.gain));
     let mut seen = BTreeSet::new();
@@ -57,7 +68,11 @@ pub(super) fn looked_at(question: &Question, best: &Explanation) -> Outcome<Vec<
     Ok(best_layers(question, all, LAYERS_TRIED))
 }
 
-fn scored(question: &Question, best: &Explanation) -> Outcome<Vec<Proposal>> {
+fn scored(
+    question: &Question,
+    best: &Explanation,
+    along: &(dyn Fn(&Candidate, &mut Assumption) -> bool + Sync),
+) -> Outcome<Vec<Proposal>> {
     let mut asked: Vec<(usize, Vec<f64>)> = Vec::new();
     for (place, candidate) in question.candidates.iter().enumerate() {
         let there = best.members.iter().any(|m| match m {
@@ -71,14 +86,15 @@ fn scored(question: &Question, best: &Explanation) -> Outcome<Vec<Proposal>> {
         }
     }
     let changed: Vec<Option<Assumption>> = asked
-        .iter()
+        .par_iter()
         .map(|(place, start)| {
             let candidate = &question.candidates[*place];
             let values = match is_sized(&candidate.effect, &candidate.free) {
                 true => scaled(&candidate.effect, &candidate.free, start, TESTED_SHARE),
                 false => start.clone(),
             };
-            with(question, &[], &best.fit, Member::Effect(*place), Some(values)).map(|a| a.0)
+            let (mut assumed, _) = with(question, &[], &best.fit, Member::Effect(*place), Some(values))?;
+            along(candidate, &mut assumed).then_some(assumed)
         })
         .collect();
     let places: Vec<usize> = (0..asked.len()).filter(|&i| changed[i].is_some()).collect();
