@@ -5,8 +5,8 @@ use rayon::prelude::*;
 use super::explanation::{fitted, without};
 use super::odds::{CERTAIN, WINDOW};
 use super::readings::take_off;
-use super::{Explanation, Question, Winding};
-use crate::chamber::Effort;
+use super::{Explanation, Member, Outcome, Question, Winding};
+use crate::chamber::{Effort, Fit};
 
 /// Sets that are judged by held-out records at most.
 const JUDGED: usize = 8;
@@ -73,7 +73,9 @@ pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mu
     for (e, mass) in explanations.iter_mut().zip(masses) {
         e.probability = mass / sum;
     }
-    // From the largest set on: its mass goes to the best set within it that is as good, or that lacks no news.
+    let errors: Vec<Option<[f64; 2]>> = explanations.par_iter().map(|e| errors(question, e).unwrap_or(None)).collect();
+    // From the largest set on: its mass goes to the best set within it that is as good, that lacks no news, or that predicts
+    // rates better.
     let mut places: Vec<usize> = (0..explanations.len()).collect();
     places.sort_by_key(|&i| std::cmp::Reverse(explanations[i].members.len()));
     for &large in &places {
@@ -86,9 +88,14 @@ pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mu
                     let mut more = b.members.iter().filter(|m| !a.members.contains(m));
                     more.all(|m| b.is_no_news(question.model.effects.len(), *m))
                 };
+                let worsens = || {
+                    let mut more = b.members.iter().filter(|m| !a.members.contains(m));
+                    more.all(|m| matches!(m, Member::Effect(_) | Member::Refitted(_)))
+                        && errors[small].zip(errors[large]).is_some_and(|(a, b)| is_worse(b, a))
+                };
                 a.members.len() < b.members.len()
                     && a.members.iter().all(|m| b.members.contains(m))
-                    && (a.total() > b.total() - CERTAIN.log || no_news())
+                    && (a.total() > b.total() - CERTAIN.log || no_news() || worsens())
             })
             .max_by(|&a, &b| explanations[a].total().total_cmp(&explanations[b].total()));
         if let Some(small) = within {
@@ -97,4 +104,43 @@ pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mu
         }
     }
     explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(b.total().total_cmp(&a.total())));
+}
+
+/// A share of the mass below which nothing is named.
+const LOOKED_AT: f64 = 0.01;
+
+/// Whether the first leaves more of fitted and of held-out rates than the second: what is missing in a coil lowers one of them.
+fn is_worse(errors: [f64; 2], than: [f64; 2]) -> bool {
+    errors[0] > than[0] && errors[1] >= than[1]
+}
+
+/// Mean squares that readings and a set leave of the rates of fitted and of held-out records.
+fn errors(question: &Question, explanation: &Explanation) -> Outcome<Option<[f64; 2]>> {
+    if explanation.probability < LOOKED_AT && !explanation.members.is_empty() {
+        return Ok(None);
+    }
+    let of = |fit: &Fit, records: &[usize]| -> Outcome<f64> {
+        let mut squares: Vec<f64> = Vec::new();
+        for &r in records {
+            let residuals = question.chamber.prediction(fit, r)?.residual_rad_per_s;
+            squares.extend(residuals.iter().filter(|v| v.is_finite()).map(|v| v * v));
+        }
+        Ok(squares.iter().sum::<f64>() / squares.len().max(1) as f64)
+    };
+    let days = question.held_out.iter().map(|&r| of(&question.chamber.held_out(&explanation.fit, r)?, &[r]));
+    let days: Outcome<Vec<f64>> = days.collect();
+    Ok(Some([of(&explanation.fit, &question.fitted)?, days?.iter().sum()]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_raises_both_errors_is_worse_and_what_lowers_either_is_not() {
+        assert!(is_worse([1.1, 2.1], [1.0, 2.0]));
+        assert!(!is_worse([1.1, 1.9], [1.0, 2.0]) && !is_worse([0.9, 2.1], [1.0, 2.0]));
+        // Nothing held out.
+        assert!(is_worse([1.1, 0.0], [1.0, 0.0]) && !is_worse([1.0, 0.0], [1.0, 0.0]));
+    }
 }
