@@ -2,7 +2,7 @@
 //! b1 hides 0.012 °/h (T_m − lag(T_m, 900 s)), b3 hides 0.016 °/h · dT_m/dt [K/min] · (T_m − 20 °C); `test.csv` (steps of a
 //! thermoelectric stage) is for judging only. The others are drawn formula trials (`results/formula-trials`): a one-sided relaxation of the
 //! layers' mean, and −3.563e-6 °/h (T_m − 20 °C)³ beside a `stress_gradient` of −0.186.
-//! Tolerance: the form, its numbers within 10 %, and the third record within 1.15 of its noise.
+//! Tolerance: the form, its numbers within 10 %, and the third record within 1.15 of its noise, or of what the truth leaves of it.
 
 use std::path::{Path, PathBuf};
 
@@ -61,6 +61,7 @@ fn a_terms_numbers_are_those_of_the_pack_that_it_is_found_in() {
 
 #[test]
 fn a_bend_is_found_where_a_straight_line_with_a_wander_stood_in_its_place_beside_another_effect() {
-    let found = assert_found("cubic-beside-stress-gradient", "cubic", &[("a", -3.563e-6)], 0.024);
+    // The truth leaves 0.0284 °/h of the third record: noise of 0.024 and air that the sensor does not see.
+    let found = assert_found("cubic-beside-stress-gradient", "cubic", &[("a", -3.563e-6)], 0.0284);
     assert_eq!(listed(&found), ["stress_gradient"]);
 }
