@@ -42,6 +42,11 @@ struct Moved {
 /// error of an amplitude.
 const GROUNDED: usize = 2;
 pub(super) const SAME: f64 = 1e-3;
+/// Starts of effects of the coil that are fitted with a formula at once.
+const PAIRED: usize = 4;
+/// Relative step of a derivative by a number of the coil.
+const STEP_SHARE: f64 = 0.02;
+
 /// Which listed effects are scored beside a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Sought {
@@ -49,11 +54,6 @@ pub(crate) enum Sought {
     /// Those of the coil and of the sensor that move the variables of its terms.
     WhatMoves,
 }
-
-/// Starts of effects of the coil that are fitted with a formula at once.
-const PAIRED: usize = 4;
-/// Relative step of a derivative by a number of the coil.
-const STEP_SHARE: f64 = 0.02;
 
 impl Grounds {
     /// By a fit; `days` have the chambers of records that were not fitted.
