@@ -4,9 +4,7 @@
 //! family that reaches 95 %, all of it. *Unexplained*: sets with wander, a cycle or an estimate beyond what is physical
 //! hold half, or the coil is wound or connected otherwise.
 
-use rayon::prelude::*;
-
-use super::describe::{contenders, findings, ladder, unexplained};
+use super::describe::{ScoredExplanation, contenders, findings, ladder, names, unexplained};
 use super::joint::{Explanation, Found, Member, Question};
 use super::standing::CERTAIN;
 use super::{Caution, DiagnoseError, Diagnosis, Hypothesis, OffsetStep, RecordNoise, Refitted, Share, Verdict};
@@ -15,21 +13,6 @@ use crate::record::Record;
 
 /// What sets with something unknown in them must hold for that to be the answer.
 const HALF: f64 = 0.5;
-
-/// An explanation with the fits of the held-out records.
-pub(super) struct ScoredExplanation<'e> {
-    pub(crate) explanation: &'e Explanation,
-    /// One a held-out record, in their order.
-    pub(crate) held_out: Vec<Fit>,
-}
-
-impl<'e> ScoredExplanation<'e> {
-    pub(crate) fn new(question: &Question, explanation: &'e Explanation) -> Result<Self, DiagnoseError> {
-        let fits: Result<Vec<Fit>, _> =
-            question.held_out.par_iter().map(|&r| question.chamber.held_out(&explanation.fit, r)).collect();
-        Ok(Self { explanation, held_out: fits? })
-    }
-}
 
 /// The chamber with every record's kinks at the times that a fit, if there is one, has them at: what is said of predictions
 /// needs them sharper than the search does.
@@ -135,19 +118,6 @@ fn distinct(question: &Question, family: &[&Explanation]) -> usize {
     seen.sort();
     seen.dedup();
     seen.len()
-}
-
-/// The kinds of a set; of what is no effect, a word.
-pub(super) fn names(question: &Question, explanation: &Explanation) -> Vec<String> {
-    let word = |m: &Member| match m {
-        Member::Effect(candidate) => question.candidates[*candidate].kind(),
-        Member::Refitted(effect) => format!("{} (refitted)", question.model.effects[*effect].kind()),
-        Member::Winding(_) => "another winding".to_owned(),
-        Member::Step { .. } => "offset step".to_owned(),
-        Member::Drift => "unexplained wander".to_owned(),
-        Member::Cycle => "unexplained cycle".to_owned(),
-    };
-    explanation.members.iter().map(word).collect()
 }
 
 pub(super) fn posterior(question: &Question, found: &Found) -> Vec<Share> {

@@ -2,13 +2,40 @@
 
 use rayon::prelude::*;
 
-use super::answer::{ScoredExplanation, names};
 use super::joint::{Explanation, Found, Member, Question, refit_without};
 use super::plain::{Plain, ResidualShape};
 use super::{Contender, DiagnoseError, Equivalent, Finding, FittedParameter, RecordNoise, Rung, Unexplained};
 use crate::chamber::{Fit, Place, Quantity};
 use crate::effect::DeclaredEffect;
 use crate::numeric::statistics::{correlation, rms};
+
+/// An explanation with the fits of the held-out records.
+pub(super) struct ScoredExplanation<'e> {
+    pub(crate) explanation: &'e Explanation,
+    /// One a held-out record, in their order.
+    pub(crate) held_out: Vec<Fit>,
+}
+
+impl<'e> ScoredExplanation<'e> {
+    pub(crate) fn new(question: &Question, explanation: &'e Explanation) -> Result<Self, DiagnoseError> {
+        let fits: Result<Vec<Fit>, _> =
+            question.held_out.par_iter().map(|&r| question.chamber.held_out(&explanation.fit, r)).collect();
+        Ok(Self { explanation, held_out: fits? })
+    }
+}
+
+/// The kinds of a set; of what is no effect, a word.
+pub(super) fn names(question: &Question, explanation: &Explanation) -> Vec<String> {
+    let word = |m: &Member| match m {
+        Member::Effect(candidate) => question.candidates[*candidate].kind(),
+        Member::Refitted(effect) => format!("{} (refitted)", question.model.effects[*effect].kind()),
+        Member::Winding(_) => "another winding".to_owned(),
+        Member::Step { .. } => "offset step".to_owned(),
+        Member::Drift => "unexplained wander".to_owned(),
+        Member::Cycle => "unexplained cycle".to_owned(),
+    };
+    explanation.members.iter().map(word).collect()
+}
 
 /// Every effect that a set adds.
 pub(super) fn findings(
