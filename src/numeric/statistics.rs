@@ -64,6 +64,14 @@ pub(crate) fn median_in_place(values: &mut [f64]) -> f64 {
     if n % 2 == 1 { upper } else { 0.5 * (upper + below.iter().copied().fold(f64::NEG_INFINITY, f64::max)) }
 }
 
+/// The value that a share of ascending values does not exceed, between the order statistics.
+pub(crate) fn quantile(ascending: &[f64], share: f64) -> f64 {
+    let place = share.clamp(0.0, 1.0) * (ascending.len() - 1) as f64;
+    let (below, above) = (place.floor() as usize, place.ceil() as usize);
+    let (a, b) = (ascending[below], ascending[above]);
+    a + (b - a) * (place - below as f64)
+}
+
 /// Median absolute deviation about the median, scaled to a Gaussian's standard deviation.
 pub(crate) fn robust_deviation(values: &[f64]) -> f64 {
     let centre = median(values);

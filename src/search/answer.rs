@@ -2,15 +2,15 @@
 
 use super::anneal::rounds::{State, Stop};
 use super::aside::{GridCheck, PointingResolution};
-use super::cost::objective::Objective;
-use super::cutting::Cuts;
-use super::end_turns::WithEnds;
-use super::evaluator::Judged;
+use super::end_turns::BestEndTurns;
+use super::evaluator::{Judged, name_of};
+use super::optimality::Proof;
 use super::outlook::OtherBoundary;
-use super::proof::{Certificate, Status};
-use super::prospect::{Gain, Prospect};
+use super::prospect::Outlook;
 use super::recommendation::Recommendation;
 use super::validation::Validation;
+use crate::pattern::Pattern;
+use crate::profile::Profile;
 
 /// How a search came to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,47 +57,6 @@ impl FoundBy {
     }
 }
 
-/// What is proved about the best pattern.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Proof {
-    pub(crate) status: Status,
-    /// No pattern of the class is below this; zero where nothing is proved.
-    pub(crate) lower_bound_rad_per_s: f64,
-    /// By how much the grid may put the best pattern's rate, and that of any other, off the continuum's.
-    pub(crate) grid_margin_rad_per_s: f64,
-    /// The time was over before the proof was.
-    pub(crate) was_cut_short: bool,
-}
-
-impl Proof {
-    pub(crate) const NONE: Proof =
-        Proof { status: Status::None, lower_bound_rad_per_s: 0.0, grid_margin_rad_per_s: 0.0, was_cut_short: false };
-
-    pub(crate) fn of(certificate: &Certificate) -> Self {
-        let Certificate { status, lower_bound_rad_per_s, .. } = *certificate;
-        Self { status, lower_bound_rad_per_s, grid_margin_rad_per_s: 0.0, was_cut_short: status != Status::Optimal }
-    }
-
-    /// With what the grid may be off for any pattern: the lower bound then holds for the continuum.
-    pub(crate) fn beside_grid(self, grid_margin_rad_per_s: f64) -> Self {
-        let lower_bound_rad_per_s = (self.lower_bound_rad_per_s - grid_margin_rad_per_s).max(0.0);
-        Self { lower_bound_rad_per_s, grid_margin_rad_per_s, ..self }
-    }
-
-    /// To be said after how good the best pattern is under the objective.
-    pub(crate) fn words(&self, objective: Objective) -> String {
-        let what = objective.title();
-        match self.status {
-            Status::Optimal => format!(" Proved: no pattern of the class has a smaller {what} at any time."),
-            Status::Gap => format!(
-                " Proved: no pattern of the class has a {what} below {}.",
-                objective.shown(self.lower_bound_rad_per_s)
-            ),
-            Status::None => String::new(),
-        }
-    }
-}
-
 /// A former pattern under the model of this search.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Former {
@@ -107,15 +66,26 @@ pub(crate) struct Former {
     pub(crate) statement: String,
 }
 
-/// What patterns promise where the model is not known for certain.
+/// Sampled and guaranteed agree when they are this close.
+pub(crate) const AGREE: f64 = 0.01;
+
+/// What cutting planes have come to.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Outlook {
-    /// Models that may be the true one.
-    pub(crate) models: usize,
-    /// By their names; the best first.
-    pub(crate) prospects: Vec<(String, Prospect)>,
-    /// Of the recommended pattern over the former one, or over QUA where there is none.
-    pub(crate) gain: Option<Gain>,
+pub(crate) struct Cuts {
+    /// Worst admissible profiles that joined the searched ones.
+    pub(crate) joined: Vec<Profile>,
+    /// The best pattern's worst rate over the searched profiles and those that joined.
+    pub(crate) sampled_rad_per_s: f64,
+    /// Over all admissible profiles, or over those drawn to stand for them.
+    pub(crate) worst_rad_per_s: f64,
+    /// Whether the model has a guaranteed worst rate.
+    pub(crate) is_guaranteed: bool,
+}
+
+impl Cuts {
+    pub(crate) fn agree(&self) -> bool {
+        self.worst_rad_per_s <= self.sampled_rad_per_s * (1.0 + AGREE)
+    }
 }
 
 /// The answer of [`super::run()`].
@@ -154,12 +124,21 @@ pub struct Answer {
     /// None unless worst admissible profiles were to join the searched ones.
     pub(crate) cuts: Option<Cuts>,
     /// None unless turns at the ends were to be chosen, and where the search was interrupted.
-    pub(crate) ends: Option<WithEnds>,
+    pub(crate) ends: Option<BestEndTurns>,
 }
 
 impl Answer {
     /// Whether the same request ends here on every machine.
     pub(crate) fn is_reproducible(&self) -> bool {
         matches!(self.ended, Ended::Rule(_)) && !self.proof.was_cut_short
+    }
+    /// What else than the best pattern may be worth winding, by its name, likeliest first: the recommended one, the classics, what the search found.
+    pub(crate) fn others(&self) -> impl Iterator<Item = (String, Pattern)> {
+        let recommended = self.recommendation.iter().map(|r| (r.name.clone(), r.pattern.clone()));
+        let mut classics: Vec<&Judged> = self.baselines.iter().collect();
+        classics.sort_by(|a, b| a.objective_rad_per_s.total_cmp(&b.objective_rad_per_s));
+        let classics = classics.into_iter().map(|judged| (judged.name.clone(), judged.pattern.clone()));
+        let found = self.state.found.iter().filter_map(|found| Pattern::new(found.segments.clone()).ok());
+        recommended.chain(classics).chain(found.map(|pattern| (name_of(&pattern), pattern)))
     }
 }

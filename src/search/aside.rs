@@ -3,8 +3,8 @@
 use crate::pattern::Pattern;
 use crate::rate::CoilModel;
 use crate::search::cost::grid_margin::GridMargin;
-use crate::search::cost::objective::{Objective, POINTING_S};
-use crate::search::cost::pointing::{EndlessRamp, largest_change_rad, worst_pointing};
+use crate::search::cost::objective::Objective;
+use crate::search::cost::pointing::{EndlessRamp, POINTING_S, largest_change_rad, worst_pointing};
 use crate::search::cost::tolerance::with_middle_moved;
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
 use crate::units::{mm_from_m, percent_from_fraction};

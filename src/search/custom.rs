@@ -19,7 +19,7 @@ use super::answer::Ended;
 use super::cost::columns::Work;
 use super::cost::samples::SampleMatrix;
 use super::cost::{Cost, InFull, MoveProposal, Pace, Position};
-use super::run::{Halt, Observer};
+use super::request::{Halt, Observer};
 use crate::pattern::classic::Classic;
 
 /// Layers that a caller's array or function may have.
@@ -260,7 +260,7 @@ mod tests {
     use crate::pattern::windability::WindabilityClass;
     use crate::search::anneal::sample_cost::SampleCost;
     use crate::search::cost::columns::Norm;
-    use crate::search::run::Unobserved;
+    use crate::search::request::Unobserved;
 
     const LAYERS: usize = 6;
 

@@ -12,18 +12,15 @@
 use std::ops::ControlFlow;
 
 use super::anneal::rounds::Rounds;
-use super::answer::{Answer, Ended};
+use super::answer::{AGREE, Answer, Cuts, Ended};
 use super::cost::guaranteed::UnitStep;
 use super::cost::worst_case::SolvedProfiles;
 use super::evaluator::{Evaluator, JudgeError};
-use super::run::{Halt, Observer, Request, RunError, run};
+use super::request::{Halt, Observer, Request, RunError};
 use super::validation::Draw;
 use crate::pattern::Pattern;
 use crate::profile::{Profile, ProfileSpec};
 use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
-
-/// Sampled and guaranteed agree when they are this close.
-pub(crate) const AGREE: f64 = 0.01;
 
 /// Short searches, each of which lets the worst profiles of what it found join.
 const SHORT_SEARCHES: usize = 12;
@@ -36,25 +33,6 @@ const PATTERNS: usize = 3;
 
 /// Sets of profiles that stand for all where nothing is guaranteed.
 const SETS: usize = 8;
-
-/// What cutting planes have come to.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Cuts {
-    /// Worst admissible profiles that joined the searched ones.
-    pub(crate) joined: Vec<Profile>,
-    /// The best pattern's worst rate over the searched profiles and those that joined.
-    pub(crate) sampled_rad_per_s: f64,
-    /// Over all admissible profiles, or over those drawn to stand for them.
-    pub(crate) worst_rad_per_s: f64,
-    /// Whether the model has a guaranteed worst rate.
-    pub(crate) is_guaranteed: bool,
-}
-
-impl Cuts {
-    pub(crate) fn agree(&self) -> bool {
-        self.worst_rad_per_s <= self.sampled_rad_per_s * (1.0 + AGREE)
-    }
-}
 
 /// The worst of all admissible profiles for a pattern.
 enum Adversary {
@@ -93,11 +71,18 @@ impl Observer for Quiet<'_> {
     }
 }
 
-/// As [`run`], over profiles that are joined by the worst admissible ones.
+/// A whole search over the profiles that its request states.
+type Search = fn(&Request, &mut dyn Observer) -> Result<Option<Answer>, RunError>;
+
+/// As the search itself, over profiles that are joined by the worst admissible ones.
 ///
 /// # Errors
-/// As [`run`].
-pub(crate) fn run_with_cuts(request: &Request, observer: &mut dyn Observer) -> Result<Option<Answer>, RunError> {
+/// As the search's.
+pub(crate) fn run_with_cuts(
+    request: &Request,
+    observer: &mut dyn Observer,
+    search: Search,
+) -> Result<Option<Answer>, RunError> {
     let mut spec = request.profiles.clone();
     let own = spec.listed.len();
     let adversary = adversary(request)?;
@@ -117,7 +102,7 @@ pub(crate) fn run_with_cuts(request: &Request, observer: &mut dyn Observer) -> R
         }
         let saved = request.saved.clone().filter(|_| is_first);
         let within = Request { profiles: &spec, plan, saved, cuts: false, ..request.clone() };
-        let answer = if is_first { run(&within, observer)? } else { run(&within, &mut Quiet(observer))? };
+        let answer = if is_first { search(&within, observer)? } else { search(&within, &mut Quiet(observer))? };
         let Some(mut answer) = answer else { return Ok(whole) };
         if let Some(first) = whole.take() {
             answer.evaluations += first.evaluations;

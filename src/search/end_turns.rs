@@ -11,9 +11,8 @@
 
 use std::collections::HashMap;
 
-use super::answer::Answer;
 use super::cost::objective::Objective;
-use super::evaluator::{EQUALLY_GOOD, Evaluator, JudgeError, Judged, name_of};
+use super::evaluator::{EQUALLY_GOOD, Evaluator, JudgeError, Judged};
 use crate::pattern::windability::WindabilityClass;
 use crate::pattern::{EndTurns, Half, Pattern};
 use crate::rate::RateError;
@@ -31,7 +30,7 @@ pub struct EndChoice {
 
 /// The best pattern with turns of its own at the ends.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct WithEnds {
+pub(crate) struct BestEndTurns {
     pub(crate) choice: EndChoice,
     /// Without such turns where none make it better.
     pub(crate) judged: Judged,
@@ -58,26 +57,21 @@ impl EndChoice {
 }
 
 impl Evaluator<'_> {
-    /// The best that turns at the ends make of what a search found; `goes_on` is asked between patterns.
+    /// The best that turns at the ends make of what a search came to and of `others`, likeliest first; `goes_on` is asked between patterns.
     ///
     /// # Errors
     /// None that a model which could be solved would cause.
-    pub(crate) fn with_ends(
+    pub(crate) fn best_with_end_turns(
         &self,
         choice: EndChoice,
         class: WindabilityClass,
-        answer: &Answer,
+        of_search: &Judged,
+        others: impl Iterator<Item = (String, Pattern)>,
         goes_on: &dyn Fn() -> bool,
-    ) -> Result<WithEnds, JudgeError> {
+    ) -> Result<BestEndTurns, JudgeError> {
         let most = if self.objective == Objective::P95 { PATTERNS_OVER_COILS } else { PATTERNS };
-        let mut known: Vec<(String, Pattern)> = vec![(answer.best.name.clone(), answer.best.pattern.clone())];
-        let recommended = answer.recommendation.iter().map(|r| (r.name.clone(), r.pattern.clone()));
-        let mut classics: Vec<&Judged> = answer.baselines.iter().collect();
-        classics.sort_by(|a, b| a.objective_rad_per_s.total_cmp(&b.objective_rad_per_s));
-        let classics = classics.into_iter().map(|judged| (judged.name.clone(), judged.pattern.clone()));
-        let found = answer.state.found.iter().filter_map(|found| Pattern::new(found.segments.clone()).ok());
-        let found = found.map(|pattern| (name_of(&pattern), pattern));
-        for (name, pattern) in recommended.chain(classics).chain(found) {
+        let mut known: Vec<(String, Pattern)> = vec![(of_search.name.clone(), of_search.pattern.clone())];
+        for (name, pattern) in others {
             if known.len() < most && class.admits(&pattern) && known.iter().all(|(_, other)| *other != pattern) {
                 known.push((name, pattern));
             }
@@ -87,7 +81,7 @@ impl Evaluator<'_> {
             if best.is_some() && !goes_on() {
                 break;
             }
-            let (judged, whole_rad_per_s) = self.best_ends(choice, class, &name, &pattern)?;
+            let (judged, whole_rad_per_s) = self.best_end_turns(choice, class, &name, &pattern)?;
             let is_better = best
                 .as_ref()
                 .is_none_or(|(best, _)| judged.objective_rad_per_s < best.objective_rad_per_s * (1.0 - EQUALLY_GOOD));
@@ -96,15 +90,15 @@ impl Evaluator<'_> {
             }
         }
         let (judged, whole) = best.expect("the best pattern of the search is tried first");
-        let statement = self.words_on_ends(&judged, &answer.best);
-        Ok(WithEnds { choice, judged, whole, statement })
+        let statement = self.words_on_end_turns(&judged, of_search);
+        Ok(BestEndTurns { choice, judged, whole, statement })
     }
 
     /// The best turns at the ends of one pattern, and its objective with whole layers.
     ///
     /// # Errors
     /// None that a model which could be solved would cause.
-    pub(crate) fn best_ends(
+    pub(crate) fn best_end_turns(
         &self,
         choice: EndChoice,
         class: WindabilityClass,
@@ -147,7 +141,7 @@ impl Evaluator<'_> {
         Ok((judged, whole_rad_per_s))
     }
 
-    fn words_on_ends(&self, judged: &Judged, best: &Judged) -> String {
+    fn words_on_end_turns(&self, judged: &Judged, best: &Judged) -> String {
         let (what, unit) = (self.objective.title(), self.objective.unit());
         let shown = |judged: &Judged| format!("{:.4} {unit}", deg_per_h_from_rad_per_s(judged.objective_rad_per_s));
         let ends = judged.pattern.end_turns();
@@ -277,7 +271,7 @@ mod tests {
                     EndChoice { most_left_off: 0, shares_outermost: true },
                     EndChoice { most_left_off: 2, shares_outermost: true },
                 ] {
-                    let (found, whole) = evaluator.best_ends(choice, class, "x", &pattern).unwrap();
+                    let (found, whole) = evaluator.best_end_turns(choice, class, "x", &pattern).unwrap();
                     let most = model.coil.turns()[0].ceil() as i32;
                     let mut least = f64::INFINITY;
                     for (a, b) in (-most..=most).flat_map(|a| (-most..=most).map(move |b| (a, b))) {

@@ -16,9 +16,11 @@ use rayon::prelude::*;
 use super::anneal::quantile::{QuantileCost, default_moves_per_restart};
 use super::anneal::rounds::{DEFAULT_RESTARTS_PER_ROUND, Optimisation, Plan, Rounds, Rules};
 use super::cost::guaranteed::{GuaranteedError, UnitStep};
-use super::cost::sampled_coils::{SHARE, SampledCoils, quantile};
+use super::cost::sampled_coils::SampledCoils;
+use super::cost::tolerance::SHARE;
 use super::cost::worst_case::{SearchError, SolvedProfiles};
 use super::evaluator::{Evaluator, JudgeError};
+use crate::numeric::statistics::quantile;
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::profile::ProfileSpec;
@@ -43,6 +45,17 @@ pub(crate) struct Gain {
     /// 5 and 95 % of the drawn models lie below.
     pub(crate) low: f64,
     pub(crate) high: f64,
+}
+
+/// What patterns promise where the model is not known for certain.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Outlook {
+    /// Models that may be the true one.
+    pub(crate) models: usize,
+    /// By their names; the best first.
+    pub(crate) prospects: Vec<(String, Prospect)>,
+    /// Of the recommended pattern over the former one, or over QUA where there is none.
+    pub(crate) gain: Option<Gain>,
 }
 
 /// The worst rate of each pattern under a model: guaranteed where it has that, else over the profiles.

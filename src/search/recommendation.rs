@@ -21,13 +21,13 @@
 //! smallest climb, then the fewest long crossovers.
 
 use super::anneal::rounds::FoundPattern;
-use super::answer::{Outlook, Proof};
 use super::cost::objective::Objective;
 use super::cost::tolerance::ToleranceError;
 use super::evaluator::{Evaluator, JudgeError, Judged, name_of};
+use super::optimality::Proof;
 use super::outlook::OtherBoundary;
 use super::proof::Status;
-use super::prospect::{Prospect, predicted_gain, prospects};
+use super::prospect::{Outlook, Prospect, predicted_gain, prospects};
 use super::validation::{Unseen, UnseenPointing, Validation};
 use super::weighed_pointing::PointingFigures;
 use super::weighing::{TIE, Weighed, chosen, over_least};

@@ -2,111 +2,21 @@
 
 use std::ops::ControlFlow;
 
-use thiserror::Error;
-
-use super::anneal::rounds::{Plan, Rounds, State, Stop};
-use super::answer::{Answer, Ended, Former, FoundBy, Proof};
+use super::anneal::rounds::{Rounds, State, Stop};
+use super::answer::{Answer, Ended, Former, FoundBy};
 use super::aside::{Aside, PointingResolution};
 use super::cost::guaranteed::UnitStep;
 use super::cost::objective::Objective;
-use super::cost::tolerance::ToleranceSpec;
-use super::cost::worst_case::{SearchError, SolvedProfiles};
+use super::cost::worst_case::SolvedProfiles;
 use super::cutting::run_with_cuts;
-use super::end_turns::{EndChoice, WithEnds};
-use super::evaluator::{EQUALLY_GOOD, Evaluator, JudgeError, Judged, improvement_over_qua};
-use super::proof::{self, Progress, Status, prove};
+use super::end_turns::BestEndTurns;
+use super::evaluator::{EQUALLY_GOOD, Evaluator, Judged, improvement_over_qua};
+use super::optimality::Proof;
+use super::proof::{self, Status, prove};
 use super::recommendation::{Advised, Context};
+pub use super::request::{Halt, Observer, Request, RunError, Unobserved};
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
-use crate::profile::ProfileSpec;
-use crate::rate::CoilModel;
-
-/// What is to be searched.
-#[derive(Debug, Clone)]
-pub struct Request<'a> {
-    /// The coil.
-    pub model: &'a CoilModel,
-    /// The temperature profiles that windings are judged on.
-    pub profiles: &'a ProfileSpec,
-    /// How much what is built spreads; needed for the objective P95.
-    pub tolerance: Option<&'a ToleranceSpec>,
-    /// What is made small.
-    pub objective: Objective,
-    /// What the winding shop can wind.
-    pub class: WindabilityClass,
-    /// How it is searched.
-    pub plan: Plan,
-    /// Where an interrupted search of the same request was.
-    pub saved: Option<State>,
-    /// A pattern to compare with, by its name.
-    pub former: Option<(String, Pattern)>,
-    /// Whether to prove that the best pattern is the best of its class, for as long as the observer lets it.
-    pub prove: bool,
-    /// Whether to judge what was found on unseen profiles and say what to wind.
-    pub recommend: bool,
-    /// Whether worst admissible profiles join the searched ones ([`super::cutting`]).
-    pub cuts: bool,
-    /// Models that may be the true one, all as likely; empty: the model is known.
-    pub uncertain: &'a [CoilModel],
-    /// Turns at the ends of the fibre that may be chosen beside the order of whole layers.
-    pub ends: EndChoice,
-}
-
-/// Why an observer ends a search.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Halt {
-    /// Its time is over.
-    Clock,
-    /// Someone asked for it.
-    Signal,
-}
-
-/// Told how a search goes; the only one who knows the time. Every method's default is to let it go on.
-pub trait Observer: Sync {
-    /// Before the first slice.
-    fn begun(&mut self, _search: &dyn Rounds) {}
-
-    /// After each slice.
-    fn advanced(&mut self, _search: &dyn Rounds) -> ControlFlow<Halt> {
-        ControlFlow::Continue(())
-    }
-
-    /// After the last slice; the state is then what a later run goes on from.
-    fn ended(&mut self, _search: &dyn Rounds) {}
-
-    /// Whether work besides the search's own slices may go on.
-    fn goes_on(&self) -> bool {
-        true
-    }
-
-    /// From time to time during the proof.
-    fn proving(&self, _at: Progress) -> ControlFlow<()> {
-        ControlFlow::Continue(())
-    }
-}
-
-/// Lets everything go on to its end.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Unobserved;
-
-impl Observer for Unobserved {}
-
-/// Why a search cannot run.
-#[derive(Debug, Error, Clone, PartialEq)]
-#[allow(missing_docs, reason = "its messages say what each means")]
-#[non_exhaustive]
-pub enum RunError {
-    #[error(transparent)]
-    Judge(#[from] JudgeError),
-    #[error("the saved state is of another search: begin anew")]
-    Resume,
-}
-
-impl From<SearchError> for RunError {
-    fn from(error: SearchError) -> Self {
-        Self::Judge(error.into())
-    }
-}
 
 /// Searches; `None` if the observer ended it before anything was found.
 ///
@@ -130,7 +40,7 @@ impl From<SearchError> for RunError {
 #[expect(clippy::too_many_lines, reason = "the steps of a search in their order, each one call")]
 pub fn run(request: &Request, observer: &mut dyn Observer) -> Result<Option<Answer>, RunError> {
     if request.cuts {
-        return run_with_cuts(request, observer);
+        return run_with_cuts(request, observer, run);
     }
     let solved = SolvedProfiles::new(request.model, &request.profiles.profiles())?;
     let unit_step = UnitStep::new(request.model, request.profiles.max_rate_k_per_s).ok();
@@ -230,39 +140,14 @@ pub fn run(request: &Request, observer: &mut dyn Observer) -> Result<Option<Answ
         baselines,
     };
     if request.ends.is_any() && !is_over {
-        let ends = evaluator.with_ends(request.ends, class, &answer, &|| observer.goes_on())?;
-        answer.ends = Some(WithEnds { judged: evaluator.completed(&aside, ends.judged)?, ..ends });
+        let ends = evaluator
+            .best_with_end_turns(request.ends, class, &answer.best, answer.others(), &|| observer.goes_on())?;
+        answer.ends = Some(BestEndTurns { judged: evaluator.completed(&aside, ends.judged)?, ..ends });
     }
     Ok(Some(answer))
 }
 
-impl<'a> Request<'a> {
-    /// As the program searches where nothing else is asked for: the smallest worst rate that needs no captive reel, by the usual effort,
-    /// with the seed 1; nothing proved, nothing judged on unseen profiles.
-    pub fn new(model: &'a CoilModel, profiles: &'a ProfileSpec) -> Self {
-        Self {
-            model,
-            profiles,
-            tolerance: None,
-            objective: Objective::WorstRate,
-            class: WindabilityClass::Standard,
-            plan: Plan::usual(model.coil.layers(), 1),
-            saved: None,
-            former: None,
-            prove: false,
-            recommend: false,
-            cuts: false,
-            uncertain: &[],
-            ends: EndChoice::default(),
-        }
-    }
-
-    /// What the request's patterns are judged by.
-    pub fn evaluator(&self, solved: &'a SolvedProfiles, unit_step: Option<&'a UnitStep>) -> Evaluator<'a> {
-        let Request { model, profiles, tolerance, objective, .. } = *self;
-        Evaluator { model, solved, objective, unit_step, profiles, tolerance }
-    }
-
+impl Request<'_> {
     /// A largest value over samples has its working set instead, and bounds where the class has them.
     fn is_refined(&self) -> bool {
         !matches!(self.objective, Objective::WorstRate | Objective::WorstPhase)

@@ -4,12 +4,12 @@
 use rayon::prelude::*;
 
 use super::aside::PointingResolution;
-use super::cost::objective::{Objective, POINTING_S};
-use super::cost::pointing::{EndlessRamp, pointing_as_rate};
-use super::cost::sampled_coils::{SHARE, quantile};
-use super::cost::tolerance::{Coils, ToleranceError, ToleranceSpec};
+use super::cost::objective::Objective;
+use super::cost::pointing::{EndlessRamp, POINTING_S, pointing_as_rate};
+use super::cost::tolerance::{Coils, SHARE, ToleranceError, ToleranceSpec};
 use super::cost::worst_case::{SearchError, SolvedProfiles};
 use super::evaluator::{Evaluator, JudgeError};
+use crate::numeric::statistics::quantile;
 use crate::pattern::Pattern;
 use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;

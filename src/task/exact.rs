@@ -10,12 +10,12 @@ use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
 use crate::pattern::windability::WindabilityClass;
 use crate::rate::{RateError, RateModel};
-use crate::search::answer::Proof;
 use crate::search::aside::Aside;
 use crate::search::cost::guaranteed::UnitStep;
 use crate::search::cost::objective::Objective;
 use crate::search::cost::worst_case::SolvedProfiles;
 use crate::search::evaluator::{Evaluator, JudgeError};
+use crate::search::optimality::Proof;
 use crate::search::proof::{Certificate, Goal, Progress, Status, Task, prove, starting_patterns};
 use crate::units::deg_per_h_from_rad_per_s;
 

@@ -33,9 +33,9 @@ use serde::{Deserialize, Serialize};
 use crate::io::fault::{Fault, Faults};
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindingGraph;
-use crate::search::answer::Proof;
 use crate::search::aside::PointingError;
 use crate::search::cost::worst_case::WorstCase;
+use crate::search::optimality::Proof;
 use crate::search::proof::Status;
 use crate::units::{deg_from_rad, deg_per_h_from_rad_per_s};
 

@@ -5,13 +5,12 @@ use serde::{Deserialize, Serialize};
 use super::{PatternJson, ProofJson};
 use crate::profile::Piece;
 use crate::search::Request;
-use crate::search::answer::{Answer, Former, FoundBy, Outlook};
+use crate::search::answer::{Answer, Cuts, Former, FoundBy};
 use crate::search::aside::{GridCheck, GridFigure};
-use crate::search::cutting::Cuts;
-use crate::search::end_turns::WithEnds;
+use crate::search::end_turns::BestEndTurns;
 use crate::search::evaluator::Judged;
 use crate::search::outlook::OtherBoundary;
-use crate::search::prospect::{Gain, Prospect};
+use crate::search::prospect::{Gain, Outlook, Prospect};
 use crate::search::recommendation::Recommendation;
 use crate::search::validation::Validation;
 use crate::units::{c_per_h_from_k_per_s, deg_from_rad, deg_per_h_from_rad_per_s, mm_from_m, percent_from_fraction};
@@ -70,7 +69,7 @@ pub struct OptimiseJson {
     pub(crate) cutting_planes: Option<CutsJson>,
     /// Absent unless turns at the ends were to be chosen.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) ends: Option<EndsJson>,
+    pub(crate) ends: Option<EndTurnsJson>,
     pub(crate) evaluations: u64,
     /// On the screen only: files don't depend on the clock.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -89,7 +88,7 @@ pub struct OptimiseJson {
 /// The best with turns of its own at the ends of the fibre.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-pub(crate) struct EndsJson {
+pub(crate) struct EndTurnsJson {
     /// What might be chosen.
     pub(crate) most_left_off_turns: u32,
     pub(crate) shares_outermost_layer: bool,
@@ -102,9 +101,9 @@ pub(crate) struct EndsJson {
     pub(crate) statement: String,
 }
 
-impl EndsJson {
-    pub(crate) fn of(ends: &WithEnds) -> Self {
-        let WithEnds { choice, judged, whole, statement } = ends;
+impl EndTurnsJson {
+    pub(crate) fn of(ends: &BestEndTurns) -> Self {
+        let BestEndTurns { choice, judged, whole, statement } = ends;
         Self {
             most_left_off_turns: choice.most_left_off,
             shares_outermost_layer: choice.shares_outermost,
@@ -430,7 +429,7 @@ impl OptimiseJson {
             compared_with: answer.compared_with.as_ref().map(|former| FormerJson::of(former, &answer.best)),
             proof: ProofJson::of(&answer.proof),
             cutting_planes: answer.cuts.as_ref().map(CutsJson::of),
-            ends: answer.ends.as_ref().map(EndsJson::of),
+            ends: answer.ends.as_ref().map(EndTurnsJson::of),
             evaluations: answer.evaluations,
             evaluations_per_s: Some(answer.evaluations_now as f64 / seconds),
             seconds: Some(seconds),

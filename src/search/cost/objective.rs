@@ -2,10 +2,10 @@
 
 use crate::rate::{CoilModel, RateModel};
 use crate::search::cost::columns::Norm;
-use crate::search::cost::pointing::pointing_samples;
+use crate::search::cost::pointing::{POINTING_S, pointing_samples};
 use crate::search::cost::samples::SampleMatrix;
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
-use crate::units::{SECONDS_PER_HOUR, deg_per_h_from_rad_per_s};
+use crate::units::deg_per_h_from_rad_per_s;
 
 /// What a search makes small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -25,9 +25,6 @@ pub enum Objective {
     /// what is a degree an hour of the others is a degree here.
     Pointing,
 }
-
-/// One hour: the unit of time by which a pointing error counts as a rate.
-pub(crate) const POINTING_S: f64 = SECONDS_PER_HOUR;
 
 impl Objective {
     /// All of them, in the order in which they are shown.

@@ -20,7 +20,6 @@
 use rayon::prelude::*;
 
 use super::guaranteed::is_linear;
-use super::objective::POINTING_S;
 use super::samples::{SampleMatrix, any_rate_model};
 use super::worst_case::{PEAK_SHARE, SearchError, SolvedProfile, SolvedProfiles, WorstCase};
 use crate::numeric::lobatto::gauss;
@@ -29,7 +28,10 @@ use crate::numeric::piecewise::PiecewiseLinear;
 use crate::pattern::Pattern;
 use crate::rate::{CoilModel, RateModel, WeightResponse};
 use crate::thermal::{Drive, Instant, StepResponse, ThermalHistory, solve};
-use crate::units::REFERENCE_TEMPERATURE_K;
+use crate::units::{REFERENCE_TEMPERATURE_K, SECONDS_PER_HOUR};
+
+/// One hour: the unit of time by which a pointing error counts as a rate.
+pub(crate) const POINTING_S: f64 = SECONDS_PER_HOUR;
 
 /// Ratio of successive times at which the bound over all profiles is summed.
 const RATIO: f64 = 1.03;

@@ -23,18 +23,16 @@
 
 use rayon::prelude::*;
 
+use crate::numeric::statistics::quantile;
 use crate::pattern::{Pattern, axial_direction};
 use crate::profile::ProfileSpec;
 use crate::rate::{CoilModel, WeightResponse, segment_weights_m2};
 use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
 use crate::search::cost::samples::{SampleMatrix, any_rate_model};
-use crate::search::cost::tolerance::{Coils, Measure, ToleranceError};
+use crate::search::cost::tolerance::{Coils, Measure, SHARE, ToleranceError};
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
 use crate::thermal::{Drive, Instant, solve};
 use crate::units::REFERENCE_TEMPERATURE_K;
-
-/// The quantile that is made small.
-pub(crate) const SHARE: f64 = 0.95;
 
 /// Every so many-th time of a unit step's grid is compiled: neighbours are then 9 % apart, and the quantile falls short by
 /// at most 0.04 % (all 128 standard patterns of eight layers under a film, a test allows 0.2 %).
@@ -465,14 +463,6 @@ impl QuantileWorst {
         let worst = &self.worst;
         self.order.sort_by(|&a, &b| worst[b].total_cmp(&worst[a]).then(a.cmp(&b)));
     }
-}
-
-/// The value that a share of ascending values does not exceed, between the order statistics.
-pub(in crate::search) fn quantile(ascending: &[f64], share: f64) -> f64 {
-    let place = share.clamp(0.0, 1.0) * (ascending.len() - 1) as f64;
-    let (below, above) = (place.floor() as usize, place.ceil() as usize);
-    let (a, b) = (ascending[below], ascending[above]);
-    a + (b - a) * (place - below as f64)
 }
 
 fn quantile_of(worst: &[f64], share: f64) -> f64 {

@@ -34,17 +34,19 @@ use thiserror::Error;
 
 use crate::coil::CoilError;
 use crate::effect;
+use crate::numeric::statistics::quantile;
 use crate::pattern::Pattern;
 use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;
 use crate::search::cost::deviates::Deviates;
 use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
-use crate::search::cost::sampled_coils::quantile;
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
 use built::built;
 pub(in crate::search) use built::with_middle_moved;
 
-/// Spreads of what is built, as standard deviations; zero: exact.
+/// The quantile that is made small.
+pub(crate) const SHARE: f64 = 0.95;
+
 /// What winding and trimming leave, beside the spreads of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct AsBuilt {
@@ -58,6 +60,7 @@ pub(crate) struct AsBuilt {
     pub(crate) trim_residue_m: f64,
 }
 
+/// Spreads of what is built, as standard deviations; zero: exact.
 #[derive(Clone, PartialEq)]
 pub struct ToleranceSpec {
     /// Turns, independent from layer to layer.
@@ -165,7 +168,7 @@ impl Distribution {
     }
 
     pub(crate) fn p95_rad_per_s(&self) -> f64 {
-        self.quantile_rad_per_s(crate::search::cost::sampled_coils::SHARE)
+        self.quantile_rad_per_s(SHARE)
     }
 
     pub(crate) fn p99_rad_per_s(&self) -> f64 {
@@ -342,7 +345,7 @@ impl<'a> Coils<'a> {
             let mut ascending: Vec<f64> = worst.iter().map(|coil| coil[p]).collect();
             ascending.sort_by(f64::total_cmp);
             let within = |limit: f64| ascending.partition_point(|w| *w <= limit) as f64 / ascending.len() as f64;
-            (quantile(&ascending, super::sampled_coils::SHARE), self.spec.limit_rad_per_s.map(within))
+            (quantile(&ascending, SHARE), self.spec.limit_rad_per_s.map(within))
         };
         Ok((0..patterns.len()).map(of).collect())
     }

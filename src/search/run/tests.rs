@@ -2,12 +2,15 @@
 
 use super::*;
 use crate::coil::LayerLength;
-use crate::search::anneal::rounds::Rules;
-use crate::search::cost::objective::POINTING_S;
-use crate::search::cost::pointing::pointing_as_rate;
+use crate::profile::ProfileSpec;
+use crate::rate::CoilModel;
+use crate::search::anneal::rounds::{Plan, Rules};
+use crate::search::cost::objective::Objective;
+use crate::search::cost::pointing::{POINTING_S, pointing_as_rate};
 use crate::search::cost::samples::tests::{model, profiles};
 use crate::search::cost::signs::segments_of_signs;
-use crate::search::cost::tolerance::AsBuilt;
+use crate::search::cost::tolerance::{AsBuilt, ToleranceSpec};
+use crate::search::end_turns::EndChoice;
 use crate::units::deg_per_h_from_rad_per_s;
 
 fn request<'a>(
