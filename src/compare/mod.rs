@@ -24,10 +24,10 @@
 //! NRMSE fit as in Ljung, System Identification (1999), section 16.4; whiteness after Ljung and Box (1978); noise floor as
 //! in [`crate::predict`].
 
+pub mod adequacy;
 pub mod regimes;
 pub(crate) mod sensors;
 pub(crate) mod suspicion;
-pub mod verdict;
 
 use crate::diagnose::{Standing, standing};
 use crate::numeric::statistics::{LjungBox, autocorrelation, autocorrelation_band_99, correlation, rms};
@@ -37,9 +37,9 @@ use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::thermal::GivenField;
 use crate::units::percent_from_fraction;
+use adequacy::{Adequacy, ResidualFinding};
 use regimes::{RecordPart, Regime, Regimes};
 use sensors::SensorMisfit;
-use verdict::{Adequacy, ResidualFinding};
 
 /// Everything that was found out about one record and one model.
 #[derive(Debug, Clone)]
@@ -227,7 +227,7 @@ fn judged(
         sensors: sensors::misfits(model, record, boundary)?,
         prediction,
     };
-    (found.verdict, found.findings) = verdict::judge(&found, cut.transient_s);
+    (found.verdict, found.findings) = adequacy::judge(&found, cut.transient_s);
     Ok(found)
 }
 

@@ -1,12 +1,12 @@
 //! Winding patterns: which segment of the fibre lies in which layer.
 
 pub mod classic;
-pub(crate) mod ends;
+pub(crate) mod end_turns;
 pub mod windability;
 
 use thiserror::Error;
 
-pub use ends::{EndTurns, WoundPiece};
+pub use end_turns::{EndTurns, WoundPiece};
 
 /// A permutation layer → segment, innermost layer first.
 ///

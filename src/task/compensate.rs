@@ -10,19 +10,17 @@ use crate::io::files::{WriteError, folder_of};
 use crate::io::folder::Replacement;
 use crate::io::json::Document;
 use crate::io::model::{ModelFile, NamedPattern};
-use crate::io::write::compensation_file::{BiasLineJson, CompensateJson, MeasuresJson, MethodJson};
+use crate::io::write::compensation_file::{BiasLineJson, CompensateJson, MethodJson};
 use crate::io::write::difference_equation::DifferenceEquation;
 use crate::io::write::empirical_export::EmpiricalExport;
 use crate::io::write::stream_summary::{StreamSummary, scatters_more};
-use crate::metrics::Metrics;
 use crate::numeric::statistics::{RunningDeviation, rms, standard_deviation};
 use crate::predict::noise_floor_rad_per_s;
 use crate::record::Record;
 use crate::units::{celsius_from_kelvin, deg_per_h_from_rad_per_s, percent_from_fraction};
 
-use super::leave_one_out::{Trial, leave_one_out};
+use super::leave_one_out::{Curves, Trial, leave_one_out, measures};
 use super::measurement::{GrossErrors, Measurement};
-use super::metrics::DEFAULT_AVERAGE_S;
 use super::{Observer, TaskError, pattern_or_own};
 
 /// How to compensate.
@@ -242,9 +240,6 @@ pub fn compensate_record(compensator: &Compensator, record: &Record) -> Result<C
     Ok(found)
 }
 
-/// A rate before compensation, and what each method leaves of it, row by row.
-pub(crate) type Curves = Vec<(&'static str, Vec<f64>)>;
-
 /// Every method, fitted to some records and tried on others.
 #[derive(Debug)]
 pub struct AllMethods {
@@ -323,12 +318,6 @@ pub fn all_methods(
         return Err(TaskError::NoHoldout);
     }
     Ok(AllMethods { document, curves, times_s })
-}
-
-/// What is left of a record, measured.
-pub(super) fn measures(record: &Record, rates: Vec<f64>) -> Result<MeasuresJson, TaskError> {
-    let left = Record::new("left", record.times_s().to_vec(), record.temperature_k().to_vec(), rates)?;
-    Ok(MeasuresJson::new(&Metrics::of(&left, DEFAULT_AVERAGE_S)?))
 }
 
 /// That a method leaves more than there was.

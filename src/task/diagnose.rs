@@ -7,19 +7,19 @@ use crate::diagnose::discover::Allowed;
 use crate::diagnose::experiment::{ChamberCapability, Experiment, design};
 use crate::diagnose::{self, Diagnosis, Terms, Verdict};
 use crate::effect;
-use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow, FindingJson};
+use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow};
 use crate::io::json::inputs::InputsJson;
 use crate::io::json::schedule::{RATE_DECIMALS, rounded};
 use crate::io::model::{ModelFile, NamedPattern};
 use crate::io::read::profile_file::print_profile;
 use crate::io::write::boundary_edit::with_boundary;
 use crate::io::write::measurement_folder::{DIAGNOSIS_FILE, MeasurementFiles, PROPOSED_FILE, before_and_after_name};
-use crate::io::write::model_edit::{Remark, with_effect};
+use crate::io::write::model_edit::with_effect;
 use crate::pattern::Pattern;
 use crate::predict::{noise_floor_rad_per_s, predict};
 use crate::rate::CoilModel;
 use crate::record::Record;
-use crate::report::diagnosis::{before_and_after_chart, before_and_after_name as picture_name, value_in_words};
+use crate::report::diagnosis::{before_and_after_chart, before_and_after_name as picture_name};
 use crate::report::ladder::ladder_chart;
 use crate::report::noise::noise_chart;
 use crate::text::sink::TomlComment;
@@ -27,7 +27,7 @@ use crate::units::deg_per_h_from_rad_per_s;
 
 use super::measurement::Measurement;
 use super::page::{REPORT_FILE, write_report};
-use super::proposal::term_remarks;
+use super::remarks::{remarks, term_remarks};
 use super::{Observer, TaskError, pattern_or_own};
 
 /// What is to be diagnosed.
@@ -138,12 +138,6 @@ fn noise_of(records: &[Record]) -> f64 {
     let square = |r: &Record| noise_floor_rad_per_s(r).powi(2) * r.rows() as f64;
     let rows: usize = records.iter().map(Record::rows).sum();
     (records.iter().map(square).sum::<f64>() / rows as f64).sqrt()
-}
-
-/// What stands behind an effect's values in a model file.
-pub(super) fn remarks(effect: &FindingJson) -> Vec<Remark> {
-    let fitted = effect.parameters.iter().filter(|(_, p)| p.fitted);
-    fitted.map(|(key, p)| Remark { key: key.clone(), text: TomlComment::of(value_in_words(p)) }).collect()
 }
 
 impl Answer {

@@ -28,11 +28,11 @@ use super::evaluate::{COLUMNS, Groundwork, cells};
 /// The model that is looked at, with what was worked out for it so far.
 #[derive(Debug, Default)]
 pub struct Session {
-    bench: Option<Bench>,
+    open: Option<OpenModel>,
 }
 
 #[derive(Debug)]
-struct Bench {
+struct OpenModel {
     file: ModelFile,
     ground: Ground,
     /// What exchanges are judged on.
@@ -58,7 +58,7 @@ impl Session {
     fn respond(&mut self, ask: AskJson) -> Result<AnswerJson, TaskError> {
         match ask {
             AskJson::Open { file, source, settings } => self.open(&file, &source, &settings),
-            other => self.bench.as_mut().ok_or_else(|| refused("ask", "no model is open"))?.respond(other),
+            other => self.open.as_mut().ok_or_else(|| refused("ask", "no model is open"))?.respond(other),
         }
     }
 
@@ -87,12 +87,12 @@ impl Session {
             classics: classics.collect(),
             columns: COLUMNS.to_vec(),
         };
-        self.bench = Some(Bench { file, ground: Ground::Fields(Some(solved)), matrix: None });
+        self.open = Some(OpenModel { file, ground: Ground::Fields(Some(solved)), matrix: None });
         Ok(answer)
     }
 }
 
-impl Bench {
+impl OpenModel {
     fn respond(&mut self, ask: AskJson) -> Result<AnswerJson, TaskError> {
         match ask {
             AskJson::Open { .. } => Err(refused("ask", "a model is open already")),

@@ -21,8 +21,8 @@ use crate::rate::CoilModel;
 use crate::record::Record;
 
 use super::compare::check_columns;
-use super::diagnose::remarks;
 use super::measurement::{GrossErrors, Measurement, Noticed};
+use super::remarks::remarks;
 use super::{Observer, TaskError, pattern_or_own};
 
 /// What is to be added, and what it is fitted to.

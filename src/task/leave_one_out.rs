@@ -1,15 +1,26 @@
 //! Leave-one-out validation of compensators: each record in turn is compensated by what was fitted to the others.
 
-use super::compensate::{Curves, measures};
+use super::metrics::DEFAULT_AVERAGE_S;
 use super::{Observer, TaskError};
 use crate::compensate::learned::ONLY_FITS;
 use crate::compensate::{CompensateError, Compensator, Day, Method};
 use crate::io::write::leave_one_out::{LeaveOneOutJson, LeftOutJson, LeftOutMethodJson, LeftOutRecordJson};
+use crate::io::write::measures::MeasuresJson;
+use crate::metrics::Metrics;
 use crate::numeric::statistics::{mean, rms, standard_deviation};
 use crate::pattern::Pattern;
 use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::units::deg_per_h_from_rad_per_s;
+
+/// A rate before compensation, and what each method leaves of it, row by row.
+pub(crate) type Curves = Vec<(&'static str, Vec<f64>)>;
+
+/// What is left of a record, measured.
+pub(super) fn measures(record: &Record, rates: Vec<f64>) -> Result<MeasuresJson, TaskError> {
+    let left = Record::new("left", record.times_s().to_vec(), record.temperature_k().to_vec(), rates)?;
+    Ok(MeasuresJson::new(&Metrics::of(&left, DEFAULT_AVERAGE_S)?))
+}
 
 /// Records that methods are fitted to, of one gyro.
 pub(super) struct Trial<'t> {

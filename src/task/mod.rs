@@ -36,6 +36,8 @@ pub mod page;
 #[cfg(feature = "report")]
 pub mod proposal;
 #[cfg(feature = "report")]
+mod remarks;
+#[cfg(feature = "report")]
 pub mod reproduce;
 #[cfg(feature = "report")]
 mod steps;

@@ -10,17 +10,16 @@ use crate::io::files::{read_text, write_atomically};
 use crate::io::json::comparison::{CompareJson, RecordComparisonJson};
 use crate::io::json::diagnosis::FindingJson;
 use crate::io::json::inputs::{InputsJson, RecordInputJson};
-use crate::io::json::proposals::{ProposalExtendJson, TermJson, TermParameterJson};
+use crate::io::json::proposals::ProposalExtendJson;
 use crate::io::model::{ModelFile, NamedPattern};
 use crate::io::read::proposal_file::parse_proposal;
 use crate::io::write::model_edit::{Remark, with_effect};
 use crate::rate::CoilModel;
 use crate::record::Record;
-use crate::text::sink::TomlComment;
 
 use super::compare::check_columns;
-use super::diagnose::remarks;
 use super::measurement::{GrossErrors, Measurement, Noticed};
+use super::remarks::{remarks, term_remarks};
 use super::{Observer, TaskError, pattern_or_own};
 
 /// An effect to declare, with what stands behind its values.
@@ -69,15 +68,6 @@ impl Answer {
     pub fn write(&self, path: &Path) -> Result<(), TaskError> {
         Ok(write_atomically(path, self.source.as_bytes())?)
     }
-}
-
-/// What stands behind a proposed term's values in a model file.
-pub(super) fn term_remarks(term: &TermJson) -> Vec<Remark> {
-    let words = |p: &TermParameterJson| match p.standard_error {
-        Some(error) => format!("{:.4e} ± {error:.1e} {}", p.value, p.unit),
-        None => format!("{:.4e} {}", p.value, p.unit),
-    };
-    term.parameters.iter().map(|(key, p)| Remark { key: key.clone(), text: TomlComment::of(words(p)) }).collect()
 }
 
 /// What a diagnosis proposed, listed effects first.

@@ -1,39 +1,8 @@
 //! Works a winding out again from nothing but the order of the segments, and compares.
 
-use super::physics::wound_turns;
 use super::winding::{Piece, Winding};
 use super::{Claim, Findings, Printed, Row, Truth};
-use crate::coil::LayerLength;
 use crate::units::{nm_from_m, um_from_m};
-
-/// l_j again: from radius and turns, or equal shares.
-pub(super) fn layer_lengths_m(truth: &Truth) -> Vec<f64> {
-    let raw = &truth.model.coil;
-    let wound = wound_turns(truth.model);
-    let layers = raw.layers();
-    let (share_m, crossover) = (raw.length_m() / layers as f64, raw.crossover_turns());
-    (0..layers)
-        .map(|j| match raw.layer_length() {
-            LayerLength::Equal => share_m * (wound[j] + crossover) / (raw.turns()[j] + crossover),
-            LayerLength::Actual => {
-                let radius_m = raw.bore_radius_m() + raw.radial_pitch_m() * (j as f64 + 0.5);
-                2.0 * std::f64::consts::PI * radius_m * (wound[j] + crossover)
-            }
-        })
-        .collect()
-}
-
-/// Whether arclength grows from the first flange to the second, a layer: segments alternate along the fibre.
-pub(super) fn runs_outbound(segments: &[usize]) -> Vec<bool> {
-    let count = segments.len();
-    let first_from_low_end = begins_low(segments[0], count);
-    segments.iter().map(|s| ((s % 2) == (segments[0] % 2)) == first_from_low_end).collect()
-}
-
-/// A segment that continues nothing begins with the fibre's own end, else with the end nearer to the middle.
-pub(super) fn begins_low(segment: usize, count: usize) -> bool {
-    segment == 1 || (segment < count && 2 * segment > count)
-}
 
 /// A reel as it comes into use: (name, before which step, from which reel, first and last segment).
 type Loaded = (String, usize, Option<String>, usize, usize);

@@ -5,6 +5,7 @@
 mod conversions;
 mod materials;
 mod promises;
+mod rooms;
 mod source;
 mod surface;
 

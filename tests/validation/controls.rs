@@ -4,8 +4,8 @@
 
 use std::path::Path;
 
+use coilwright::compare::adequacy::Adequacy as Compared;
 use coilwright::compare::compare;
-use coilwright::compare::verdict::Adequacy as Compared;
 use coilwright::diagnose::{Diagnosis, Request, Terms, Verdict, diagnose};
 use coilwright::io::read::model_file::read_model;
 use coilwright::io::read::record_file::read_record;

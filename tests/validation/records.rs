@@ -6,8 +6,8 @@
 
 use std::path::{Path, PathBuf};
 
+use coilwright::compare::adequacy::{Adequacy, ResidualFinding};
 use coilwright::compare::regimes::Regime;
-use coilwright::compare::verdict::{Adequacy, ResidualFinding};
 use coilwright::compare::{Comparison, Covariate, compare};
 use coilwright::io::model::ModelFile;
 use coilwright::io::read::model_file::read_model;

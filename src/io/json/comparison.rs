@@ -4,9 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::chamber::Noise;
 use crate::compare::Comparison;
+use crate::compare::adequacy::Adequacy;
 use crate::compare::regimes::RecordPart;
 use crate::compare::sensors::SensorMisfit;
-use crate::compare::verdict::Adequacy;
 use crate::units::deg_per_h_from_rad_per_s;
 
 use super::inputs::InputsJson;

@@ -6,9 +6,8 @@ use crate::io::fault::Faults;
 use crate::io::files::{read_text, sha256_hex};
 use crate::io::json::campaign::KINDS;
 
-use super::kind_of_file::FileKind;
+use super::kind_of_file::{FileKind, states_any};
 use super::model_file::looks_like_a_record;
-use super::pattern_file::states_any;
 use super::toml_reader::{TableReader, TomlReader, parse};
 
 pub(crate) mod coils;

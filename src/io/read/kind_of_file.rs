@@ -2,7 +2,14 @@
 
 use crate::io::fault::Faults;
 
-use super::pattern_file::states_any;
+/// Whether a line of a text begins with one of such keys, be it a table's or a value's, and whatever else is wrong with it.
+pub(super) fn states_any(source: &str, keys: &[&str]) -> bool {
+    let states = |line: &str, key: &str| {
+        let rest = line.trim_start().trim_start_matches('[').trim_start().strip_prefix(key);
+        rest.is_some_and(|rest| rest.trim_start().starts_with(['=', ']', '.']))
+    };
+    source.lines().any(|line| keys.iter().any(|key| states(line, key)))
+}
 
 /// A file that people write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -11,7 +11,7 @@ use crate::pattern::classic::{Classic, ClassicError};
 use crate::pattern::{EndTurns, Pattern};
 use crate::text::sink::TomlComment;
 
-use super::kind_of_file::FileKind;
+use super::kind_of_file::{FileKind, states_any};
 use super::toml_reader::{TomlReader, parse};
 
 /// Why a name leads to no pattern.
@@ -77,15 +77,6 @@ pub fn resolve_pattern(stated: &str, layers: usize, base: Option<&Path>) -> Resu
 /// Whether a text says at least one of the things that a pattern file says, on a line of its own.
 fn looks_like_a_pattern(source: &str) -> bool {
     states_any(source, &["layers", "segments"])
-}
-
-/// Whether a line of a text begins with one of such keys, be it a table's or a value's, and whatever else is wrong with it.
-pub(super) fn states_any(source: &str, keys: &[&str]) -> bool {
-    let states = |line: &str, key: &str| {
-        let rest = line.trim_start().trim_start_matches('[').trim_start().strip_prefix(key);
-        rest.is_some_and(|rest| rest.trim_start().starts_with(['=', ']', '.']))
-    };
-    source.lines().any(|line| keys.iter().any(|key| states(line, key)))
 }
 
 /// Reads and checks a pattern file.

@@ -1,6 +1,7 @@
 //! The physical compensator for an embedded target: coefficients as JSON and as a C header that needs nothing else.
 
 use super::formulas_in_c::FormulasInC;
+use super::header_template::filled;
 use serde::Serialize;
 
 use crate::compensate::filter::{FORGOTTEN_ROWS, Filter, FilterGains, LEAST_LOG_WEIGHT};
@@ -146,21 +147,6 @@ impl DifferenceEquation {
             None => header,
         }
     }
-}
-
-/// The template with every `@key@` replaced, in one pass: what a value holds is not looked at again.
-pub(super) fn filled(template: &str, values: &[(&str, String)]) -> String {
-    let mut out = String::with_capacity(2 * template.len());
-    let mut parts = template.split('@');
-    out.push_str(parts.next().unwrap_or_default());
-    while let Some(key) = parts.next() {
-        match values.iter().find(|(k, _)| *k == key) {
-            Some((_, value)) => out.push_str(value),
-            None => out.push_str(&format!("@{key}@")),
-        }
-        out.push_str(parts.next().unwrap_or_default());
-    }
-    out
 }
 
 const HEADER: &str = include_str!("difference_equation.h");

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::difference_equation::filled;
+use super::header_template::filled;
 use crate::compensate::Compensator;
 use crate::compensate::empirical::{BiasLine, PiecewiseBias, Regression};
 use crate::compensate::learned::{LONGEST_GAP, LearnedCoefficients};

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::difference_equation::filled;
+use super::header_template::filled;
 use crate::compensate::formulas::{AtWork, Formulas};
 use crate::effect::Subject;
 use crate::effect::custom::OfLayer;

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::compensation_file::MeasuresJson;
+use super::measures::MeasuresJson;
 
 /// Each record in turn, compensated by what was fitted to the others.
 #[derive(Debug, Serialize)]

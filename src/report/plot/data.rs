@@ -4,8 +4,7 @@
 use plotters::style::RGBColor;
 use serde_json::{Value, json};
 
-use super::draw::{FINE, colour};
-use super::layout::ChartLayout;
+use super::layout::{ChartLayout, FINE, colour};
 use super::{Along, Chart, ChartSeries, Shape};
 use crate::text::sink::JsonText;
 

@@ -6,34 +6,17 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::axis::three_digits;
-use super::layout::{ChartLayout, LegendShape, MARK_ROW_PX, ROW_PX, TEXT_PX, text_width_px};
+use super::layout::{ChartLayout, FINE, LegendShape, MARK_ROW_PX, PALETTE, ROW_PX, TEXT_PX, colour, text_width_px};
 use super::{Along, Chart, ChartSeries, Shape};
 use super::{data, labels};
 use crate::text::sink::Markup;
 
-/// The backend counts whole pixels; drawing on a finer grid and shrinking the picture keeps slopes smooth.
-pub(super) const FINE: i32 = 4;
 /// Stands for the reader's own text colour until the picture is done.
 const INK: RGBColor = RGBColor(1, 2, 3);
 const INK_CODE: &str = "#010203";
-/// Legible on white and on near-black.
-pub(super) const PALETTE: [RGBColor; 8] = [
-    RGBColor(0x2f, 0x7f, 0xd6),
-    RGBColor(0xd9, 0x73, 0x0d),
-    RGBColor(0x1a, 0x98, 0x50),
-    RGBColor(0x9b, 0x5f, 0xc0),
-    RGBColor(0xd6, 0x45, 0x50),
-    RGBColor(0x17, 0x9a, 0xa2),
-    RGBColor(0xa5, 0x74, 0x4a),
-    RGBColor(0x7d, 0x85, 0x90),
-];
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
-
-pub(super) fn colour(index: usize) -> RGBColor {
-    PALETTE[index % PALETTE.len()]
-}
 
 /// Blue below zero, red above; −1 and 1 are the strongest.
 fn tint(share: f64) -> ShapeStyle {

@@ -1,13 +1,33 @@
 //! Where the parts of a chart go, in pixels of its natural size.
 
+use plotters::style::RGBColor;
+
 use super::axis::{Ruler, three_digits};
 use super::{Along, Axis, Chart, Shape};
 
+/// The backend counts whole pixels; drawing on a finer grid and shrinking the picture keeps slopes smooth.
+pub(super) const FINE: i32 = 4;
 pub(super) const TEXT_PX: i32 = 13;
 pub(super) const ROW_PX: i32 = 19;
 pub(super) const MARK_ROW_PX: i32 = 17;
 /// Widest glyphs of common sans-serif fonts, on average, per pixel of height.
 const GLYPH: f64 = 0.58;
+
+/// Legible on white and on near-black.
+pub(super) const PALETTE: [RGBColor; 8] = [
+    RGBColor(0x2f, 0x7f, 0xd6),
+    RGBColor(0xd9, 0x73, 0x0d),
+    RGBColor(0x1a, 0x98, 0x50),
+    RGBColor(0x9b, 0x5f, 0xc0),
+    RGBColor(0xd6, 0x45, 0x50),
+    RGBColor(0x17, 0x9a, 0xa2),
+    RGBColor(0xa5, 0x74, 0x4a),
+    RGBColor(0x7d, 0x85, 0x90),
+];
+
+pub(super) fn colour(index: usize) -> RGBColor {
+    PALETTE[index % PALETTE.len()]
+}
 
 /// Width of a text at the chart's font size [px].
 pub(super) fn text_width_px(text: &str) -> i32 {

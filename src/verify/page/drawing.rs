@@ -1,7 +1,7 @@
 //! The cross-section on a traveller's page, drawn again from the segments: every bar, arrow, arc and word.
 
 use super::Expected;
-use crate::verify::expected::runs_outbound;
+use crate::verify::winding::runs_outbound;
 
 const WIDTH: f64 = 560.0;
 const ROW: f64 = 17.0;
