@@ -166,11 +166,11 @@ fn no_rooms_of_a_folder_reach_each_other_but_those_that_did() {
             let is_known = |known: &&(&str, &[&str])| {
                 known.0 == name && circle.iter().all(|room| known.1.contains(&room.as_str()))
             };
-            if let Some(known) = STILL_CIRCLES.iter().find(is_known) {
-                if known.1.len() == circle.len() {
-                    seen.push(known);
-                    continue;
-                }
+            if let Some(known) = STILL_CIRCLES.iter().find(is_known)
+                && known.1.len() == circle.len()
+            {
+                seen.push(known);
+                continue;
             }
             let within = arrows.iter().filter(|(from, to)| circle.contains(from) && circle.contains(to));
             let shown: Vec<String> = within.map(|(from, to)| format!("{from} -> {to}")).collect();
