@@ -132,6 +132,7 @@ impl Answer {
     pub(crate) fn is_reproducible(&self) -> bool {
         matches!(self.ended, Ended::Rule(_)) && !self.proof.was_cut_short
     }
+
     /// What else than the best pattern may be worth winding, by its name, likeliest first: the recommended one, the classics, what the search found.
     pub(crate) fn others(&self) -> impl Iterator<Item = (String, Pattern)> {
         let recommended = self.recommendation.iter().map(|r| (r.name.clone(), r.pattern.clone()));
