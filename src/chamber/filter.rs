@@ -452,7 +452,12 @@ fn doubts_of<const N: usize>(system: &System, rows: &[Row], trace: &Trace) -> Do
             match movement {
                 Move::Step(step) => spread = system.steps[step as usize].phi_turned.surround(&spread),
                 Move::Keep(slot) => forget_window(system, slot, &mut spread),
-                Move::Kink => found.kinks[k] = kink(&r, &spread),
+                Move::Kink => {
+                    let here = kink(&r, &spread);
+                    if here.0.abs() > found.kinks[k].0.abs() {
+                        found.kinks[k] = here;
+                    }
+                }
             }
         }
         if !row.is_kinked_within() {

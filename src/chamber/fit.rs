@@ -1,8 +1,11 @@
-//! The maximum of the posterior over the numbers of chamber, gyro and effects, by Fisher scoring with damping.
+//! The maximum of the posterior over the numbers of chamber, gyro and effects ([`super::ascent`]), and what it is worth.
 
-use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
+use super::ascent::Sensitivities;
 use super::derivative::{DerivativeColumn, Derivatives};
 use super::filter::{Innovation, Values};
 use super::known::Reference;
@@ -15,6 +18,7 @@ use super::{Assumption, Chamber, ChamberError};
 /// How much work a fit may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Effort {
+    /// Times that derivatives are taken.
     pub(crate) iterations: usize,
     /// A step that gains less ends the fit.
     pub(crate) tolerance: f64,
@@ -28,7 +32,7 @@ impl Effort {
     /// To half a unit: enough to rank sets.
     pub(crate) const QUICK: Self = Self { iterations: 10, tolerance: 0.7, rounds: 1 };
     /// Enough to rank starts.
-    pub(crate) const SHORT: Self = Self { iterations: 3, tolerance: 3.0, rounds: 1 };
+    pub(crate) const SHORT: Self = Self { iterations: 1, tolerance: 3.0, rounds: 1 };
     /// Whether what is fitted so far is only compared.
     fn is_for_ranking(self) -> bool {
         self.tolerance > Self::QUICK.tolerance
@@ -63,6 +67,10 @@ pub(crate) struct Fit {
     pub(super) information: DMatrix<f64>,
     /// Whether its ascent was that of [`Effort::FULL`], from whatever start.
     pub(super) is_full: bool,
+    /// At its end, for fits that begin there.
+    pub(super) sensitivities: Option<Arc<Sensitivities>>,
+    /// Records that were not fitted, as this fit or one that it began with found them: where [`Chamber::held_out`] begins.
+    pub(crate) days: Arc<Vec<Fit>>,
     /// Of every record of the chamber.
     pub(super) numbers: Vec<Numbers>,
     /// The smoothed course of every fitted record; None elsewhere.
@@ -100,21 +108,25 @@ impl Chamber<'_> {
         courses.resize(self.records(), None);
         let parameters = self.parameters(assumed, free, records)?;
         self.settle_courses(assumed, &numbers, records, &mut courses, Wanted::WhereNeeded)?;
-        let mut state = self.scored(assumed, &parameters, &numbers, records, &courses, effort)?;
+        let known = from.and_then(|f| f.sensitivities.as_deref());
+        let mut state = self.ascended(assumed, &parameters, &numbers, records, &courses, effort, known)?;
         let curved = records.iter().any(|&r| state.place.sides[r].as_ref().is_some_and(CoilSide::needs_reference));
         for _ in 1..if curved { effort.rounds.max(1) } else { 1 } {
             let (assumed, numbers) = (state.place.assumed.clone(), state.place.numbers.clone());
+            let known = state.sensitivities.take();
             self.settle_courses(&assumed, &numbers, records, &mut courses, Wanted::WhereNeeded)?;
-            state = self.scored(&assumed, &parameters, &numbers, records, &courses, effort)?;
+            state = self.ascended(&assumed, &parameters, &numbers, records, &courses, effort, known.as_ref())?;
         }
         let (assumed, numbers) = (state.place.assumed.clone(), state.place.numbers.clone());
         let (coordinates, log_likelihood, information) = (state.coordinates, state.log_likelihood, state.information);
+        let sensitivities = state.sensitivities.map(Arc::new);
         let wanted = if effort.is_for_ranking() { Wanted::WhereNeeded } else { Wanted::Everywhere };
         self.settle_courses(&assumed, &numbers, records, &mut courses, wanted)?;
         let is_full = effort == Effort::FULL;
         let fit =
             finished(assumed, free, records, parameters, coordinates, log_likelihood, information, numbers, courses);
-        Ok(Fit { is_full, ..fit })
+        let days = from.map_or_else(Arc::default, |f| f.days.clone());
+        Ok(Fit { is_full, sensitivities, days, ..fit })
     }
 
     /// Numbers for all records: those that were not fitted take the first fitted one's, their air as it was found to be where
@@ -279,148 +291,12 @@ impl Chamber<'_> {
         }
         Ok(all)
     }
-
-    fn scored<'c>(
-        &self,
-        assumed: &Assumption,
-        parameters: &[Parameter],
-        numbers: &[Numbers],
-        records: &[usize],
-        courses: &'c [Option<Reference>],
-        effort: Effort,
-    ) -> Result<State<'c>, ChamberError> {
-        let coordinates: Vec<f64> = parameters
-            .iter()
-            .map(|p| {
-                let read = p.read(assumed, numbers);
-                if read.is_finite() { read.clamp(p.lower, p.upper) } else { p.mean }
-            })
-            .collect();
-        let mut state = self.state(assumed, numbers, parameters, coordinates, records, courses)?;
-        let mut damping = 1e-3;
-        let mut iteration = 0;
-        loop {
-            let (score, information) = self.slope(&state, parameters, records)?;
-            state.information = information.clone();
-            if iteration >= effort.iterations {
-                return Ok(state);
-            }
-            iteration += 1;
-            let mut gain = 0.0;
-            for _ in 0..7 {
-                let Some(next) = step(parameters, &state.coordinates, &score, &information, damping) else {
-                    damping = f64::max(10.0 * damping, 1e-3);
-                    continue;
-                };
-                let there = self.state(&state.place.assumed, &state.place.numbers, parameters, next, records, courses);
-                match there {
-                    Ok(there) if there.posterior > state.posterior - 1e-9 => {
-                        gain = there.posterior - state.posterior;
-                        state = State { information: information.clone(), ..there };
-                        damping = f64::max(0.1 * damping, 1e-6);
-                        break;
-                    }
-                    _ => damping = f64::max(10.0 * damping, 1e-3),
-                }
-            }
-            if gain < effort.tolerance {
-                if gain > 0.0 && effort.tolerance <= Effort::FULL.tolerance {
-                    let (_, information) = self.slope(&state, parameters, records)?;
-                    state.information = information;
-                }
-                return Ok(state);
-            }
-        }
-    }
-
-    fn state<'c>(
-        &self,
-        assumed: &Assumption,
-        numbers: &[Numbers],
-        parameters: &[Parameter],
-        coordinates: Vec<f64>,
-        records: &[usize],
-        courses: &'c [Option<Reference>],
-    ) -> Result<State<'c>, ChamberError> {
-        let (mut assumed, mut numbers) = (assumed.clone(), numbers.to_vec());
-        if !write(parameters, &coordinates, &mut assumed, &mut numbers) {
-            return Err(ChamberError::Unsolvable);
-        }
-        let place = self.place(assumed, numbers, records, courses)?;
-        let innovations: Result<Vec<_>, _> = records.par_iter().map(|&r| self.innovations(&place, r)).collect();
-        let innovations = innovations?;
-        let log_likelihood: f64 = innovations.iter().map(|i| log_likelihood(i)).sum();
-        let log_prior: f64 = parameters.iter().zip(&coordinates).map(|(p, &c)| p.log_prior(c)).sum();
-        if !log_likelihood.is_finite() {
-            return Err(ChamberError::Unsolvable);
-        }
-        let posterior = log_likelihood + log_prior;
-        let information = DMatrix::zeros(0, 0);
-        Ok(State { place, coordinates, innovations, log_likelihood, posterior, information })
-    }
-
-    /// Gradient and information of the posterior.
-    fn slope(
-        &self,
-        state: &State,
-        parameters: &[Parameter],
-        records: &[usize],
-    ) -> Result<(DVector<f64>, DMatrix<f64>), ChamberError> {
-        let derivatives =
-            self.derivatives(&state.place, parameters, &state.coordinates, records, &state.innovations)?;
-        let count = parameters.len();
-        let mut score = DVector::zeros(count);
-        let mut information = DMatrix::zeros(count, count);
-        for (own, base) in derivatives.iter().zip(&state.innovations) {
-            own.add_to(base, &mut score, &mut information);
-        }
-        for (i, p) in parameters.iter().enumerate() {
-            let precision = p.deviation.powi(-2);
-            score[i] -= (state.coordinates[i] - p.mean) * precision;
-            information[(i, i)] += precision;
-        }
-        Ok((score, information))
-    }
-}
-
-struct State<'c> {
-    place: Place0<'c>,
-    coordinates: Vec<f64>,
-    innovations: Vec<Vec<Innovation>>,
-    log_likelihood: f64,
-    posterior: f64,
-    information: DMatrix<f64>,
 }
 
 pub(super) fn log_likelihood(innovations: &[Innovation]) -> f64 {
     let sum: f64 =
         innovations.iter().map(|i| i.value * i.value / i.variance + (std::f64::consts::TAU * i.variance).ln()).sum();
     -0.5 * sum
-}
-
-/// The damped step, within bounds and strides; None where the information is not positive.
-fn step(
-    parameters: &[Parameter],
-    coordinates: &[f64],
-    score: &DVector<f64>,
-    information: &DMatrix<f64>,
-    damping: f64,
-) -> Option<Vec<f64>> {
-    let mut damped = information.clone();
-    for i in 0..parameters.len() {
-        damped[(i, i)] *= 1.0 + damping;
-    }
-    let mut change = damped.cholesky()?.solve(score);
-    let share = parameters.iter().zip(change.iter()).map(|(p, c)| p.stride() / c.abs().max(1e-300)).fold(1.0, f64::min);
-    change *= share;
-    Some(
-        parameters
-            .iter()
-            .zip(coordinates)
-            .zip(change.iter())
-            .map(|((p, x), c)| (x + c).clamp(p.lower, p.upper))
-            .collect(),
-    )
 }
 
 #[allow(clippy::too_many_arguments)]
@@ -458,6 +334,8 @@ fn finished(
         evidence,
         information,
         is_full: false,
+        sensitivities: None,
+        days: Arc::default(),
         numbers,
         courses,
     }

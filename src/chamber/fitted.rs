@@ -89,6 +89,13 @@ impl Fit {
         }
     }
 
+    /// Begins where another fit of these records ended, with what was known there; what is assumed of the coil stays.
+    pub(crate) fn begin_beside(&mut self, other: &Fit) {
+        self.is_full = false;
+        self.sensitivities.clone_from(&other.sensitivities);
+        self.days.clone_from(&other.days);
+    }
+
     /// Another value of a number of the chamber, for a fit to begin with.
     pub(crate) fn set_number(&mut self, quantity: Quantity, value: f64) {
         self.is_full = false;

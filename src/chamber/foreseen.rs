@@ -56,6 +56,8 @@ impl Fit {
             evidence: 0.0,
             information: DMatrix::zeros(0, 0),
             is_full: false,
+            sensitivities: None,
+            days: std::sync::Arc::default(),
             numbers: vec![numbers],
             courses: vec![None],
         }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::filter::{self, Move};
 use super::fit::{Effort, Fit};
-use super::series::Series;
+use super::series::{SHORT_ROW_S, Series};
 use super::system::system;
 use super::{Assumption, Chamber, ChamberError};
 
@@ -52,7 +52,7 @@ impl Chamber<'_> {
         }
         let slopes = self.slopes(fit, record)?;
         let mut base = self.observed[record].series.clone();
-        base.rows.iter_mut().for_each(|row| row.kink = 0.0);
+        base.straighten();
         let mut kinks: Vec<Bend> = windows.into_iter().map(|window| centre(&base.times_s, &slopes, window)).collect();
         let numbers = self.numbers_for(fit, record);
         let (side, values) = self.side_and_values(fit, record, &numbers)?;
@@ -196,14 +196,60 @@ impl Series {
         self.times_s.partition_point(|t| *t <= time_s).clamp(1, self.rows.len() - 1)
     }
 
-    /// The time of a row's kink.
+    /// The time of a row's kink: the middle of where it may be.
     fn kink_s(&self, row: usize) -> f64 {
-        let before_s = self.times_s[row.max(1) - 1];
-        let moves = &self.rows[row].moves;
-        let Some(kink) = moves.iter().position(|m| *m == Move::Kink) else { return before_s };
-        let passed =
-            moves[..kink].iter().map(|m| if let Move::Step(step) = m { self.steps_s[*step as usize] } else { 0.0 });
-        before_s + passed.sum::<f64>()
+        let mut at_s = self.times_s[row.max(1) - 1];
+        if !self.rows[row].is_kinked_within() {
+            return at_s;
+        }
+        let (mut sum_s, mut count) = (0.0, 0.0);
+        for movement in &self.rows[row].moves {
+            match movement {
+                Move::Step(step) => at_s += self.steps_s[*step as usize],
+                Move::Keep(_) => {}
+                Move::Kink => {
+                    sum_s += at_s;
+                    count += 1.0;
+                }
+            }
+        }
+        sum_s / count
+    }
+
+    /// Takes all kinks out, and the places within rows where they may be.
+    pub(super) fn straighten(&mut self) {
+        for row in &mut self.rows {
+            row.kink = 0.0;
+            row.moves.retain(|m| *m != Move::Kink);
+        }
+        self.kinks = 0;
+    }
+
+    /// Lets rows have a kink of this size, wherever it is in them: in a row that is long beside what the coil's outer layers
+    /// take to follow, a rate tells when.
+    pub(super) fn kink_within(&mut self, rows: Range<usize>, size_k_per_s: f64) {
+        for k in rows {
+            self.rows[k].kink += size_k_per_s * size_k_per_s;
+            if self.rows[k].moves.contains(&Move::Kink) {
+                continue;
+            }
+            let mut moves = Vec::new();
+            for movement in std::mem::take(&mut self.rows[k].moves) {
+                let Move::Step(step) = movement else {
+                    moves.push(movement);
+                    continue;
+                };
+                let step_s = self.steps_s[step as usize];
+                let parts = (step_s / SHORT_ROW_S).ceil().max(1.0);
+                let part = if parts > 1.0 { self.step_of(step_s / parts) } else { step };
+                (0..parts as usize).for_each(|_| moves.extend([Move::Kink, Move::Step(part)]));
+            }
+            // One place alone is where the steps begin.
+            if moves.iter().filter(|m| **m == Move::Kink).count() == 1 {
+                moves.retain(|m| *m != Move::Kink);
+            }
+            self.rows[k].moves = moves;
+        }
     }
 
     /// Kinks at these times; of rows that have none so far.

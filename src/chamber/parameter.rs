@@ -32,6 +32,23 @@ pub(crate) struct Free {
     /// Some: the model states the value, which is wrong by this share at the most (one standard deviation); None: the
     /// prior is that of the effect's description.
     pub(crate) stated_within: Option<f64>,
+    /// Of a number whose unit is a logged column's, so that no description knows how large it may be: the prior's standard deviation
+    /// about zero; SI.
+    pub(crate) deviation: Option<f64>,
+}
+
+impl Free {
+    /// A parameter of an effect that has been fitted before.
+    pub(crate) fn again(effect: usize, parameter: usize, fitted: &DeclaredEffect) -> Self {
+        let is_per_unit = fitted.spec().parameters.get(parameter).is_some_and(|p| p.unit == Unit::DegPerHourPerUnit);
+        let deviation = STARTS * fitted.values()[parameter].abs();
+        Self {
+            effect,
+            parameter,
+            stated_within: None,
+            deviation: (is_per_unit && deviation > 0.0).then_some(deviation),
+        }
+    }
 }
 
 /// How a number becomes the coordinate in which its prior is normal.
@@ -61,6 +78,7 @@ pub(crate) struct Parameter {
 /// | a factor (1 in the middle of its bounds' ratio) | log-normal about 1, 0.3 | it corrects a declared number |
 /// | positive, with a start | log-normal about its start, 1.0 | only its order is known |
 /// | a temperature in °C | normal about its start, 30 K | the range of a chamber |
+/// | per unit of a logged column | normal about 0, what would make all that the rate does | the unit is whatever was logged |
 /// | positive or zero | half of a normal of a hundredth of its bound | zero unless something is there |
 /// | anything else | normal about 0, four starts | its start is what matters in practice |
 const FACTOR_DEVIATION: f64 = 0.3;
@@ -112,6 +130,9 @@ impl Parameter {
             } else {
                 linear(value, (share * value.abs()).max(1e-3 * STARTS * value.abs().max(f64::MIN_POSITIVE)))
             };
+        }
+        if let Some(deviation) = free.deviation {
+            return linear(0.0, deviation);
         }
         let Some(spec) = effect.spec().parameters.get(free.parameter) else {
             // A formula's own: nothing is known of it but the value it was given, and of a size that it is one.

@@ -95,6 +95,7 @@ impl Chamber<'_> {
         let mut information = DMatrix::zeros(count, count);
         let mut cross = DMatrix::zeros(count, fitted);
         let mut slope = DVector::zeros(fitted);
+        let mut own_information = DMatrix::zeros(fitted, fitted);
         for &record in &fit.records {
             let (Some(side), Some(values)) = (&place.sides[record], &place.values[record]) else {
                 return Err(ChamberError::Unsolvable);
@@ -121,13 +122,15 @@ impl Chamber<'_> {
             score += responses.tr_mul(&v);
             information += responses.tr_mul(&responses);
             let own = &derivatives[0];
-            own.add_to(&trace.innovations, &mut slope, &mut DMatrix::zeros(fitted, fitted));
+            own.add_to(&trace.innovations, &mut slope, &mut own_information);
             add_cross(own, &trace.innovations, &responses, &mut cross);
         }
         for (i, p) in fit.parameters.iter().enumerate() {
-            slope[i] -= (fit.coordinates[i] - p.mean) * p.deviation.powi(-2);
+            let precision = p.deviation.powi(-2);
+            slope[i] -= (fit.coordinates[i] - p.mean) * precision;
+            own_information[(i, i)] += precision;
         }
-        if let Some(factor) = fit.information.clone().cholesky() {
+        if let Some(factor) = own_information.cholesky() {
             // The innovations fall by V per unit of amplitude: their derivative is −V.
             let weights = factor.solve(&cross.transpose());
             score += weights.transpose() * slope;

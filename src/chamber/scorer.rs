@@ -131,7 +131,7 @@ impl<'a> Chamber<'a> {
             let innovations = DVector::from_iterator(deviations.len(), innovations);
             let derivatives = scaled(own, &deviations, fitted);
             if whole {
-                own.add_to(&trace.innovations, &mut slope, &mut DMatrix::zeros(fitted, fitted));
+                own.add_to(&trace.innovations, &mut slope, &mut information);
             } else {
                 slope -= derivatives.tr_mul(&innovations);
                 information += derivatives.tr_mul(&derivatives);
@@ -143,7 +143,6 @@ impl<'a> Chamber<'a> {
             slope[i] -= (coordinates[i] - p.mean) * precision;
             information[(i, i)] += precision;
         }
-        let information = if whole { fit.information.clone() } else { information };
         let factor = information.cholesky().ok_or(ChamberError::Unsolvable)?;
         Ok(Scorer { chamber: self, records, factor, slope })
     }

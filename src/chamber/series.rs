@@ -67,7 +67,7 @@ pub(super) struct Shape {
 /// Rows are averaged while they are shorter than this share of the pack's own time …
 const TIME_SHARE: f64 = 0.5;
 /// … and to at most so many seconds, unless there are more rows than this, and then to at most so many.
-const SHORT_ROW_S: f64 = 10.0;
+pub(super) const SHORT_ROW_S: f64 = 10.0;
 const MANY_ROWS: f64 = 3000.0;
 const LONG_ROW_S: f64 = 60.0;
 /// More distinct steps than this are put together from binary fractions of the usual one.
@@ -155,6 +155,15 @@ impl Series {
 
     pub(crate) fn shape_of(&self, row: usize) -> usize {
         self.shape_of[row] as usize
+    }
+
+    /// The step of this length, which may be a new one.
+    pub(super) fn step_of(&mut self, length_s: f64) -> u16 {
+        let known = self.steps_s.iter().position(|l| (l - length_s).abs() < SAME_S);
+        known.unwrap_or_else(|| {
+            self.steps_s.push(length_s);
+            self.steps_s.len() - 1
+        }) as u16
     }
 
     /// The usual time between rows [s].

@@ -1,6 +1,7 @@
 //! What may be missing: the effects that a model lacks, as things to fit.
 
 use crate::effect::{Acts, CATALOGUE, DeclaredEffect, EffectSpec, NOT_SOUGHT, Subject};
+use crate::numeric::statistics::standard_deviation;
 use crate::rate::CoilModel;
 use crate::record::{Record, TABLE_RATE};
 use crate::units::Unit;
@@ -13,6 +14,8 @@ pub(crate) struct Candidate {
     pub(crate) free: Vec<usize>,
     /// All parameters in SI, one vector a start.
     pub(crate) starts: Vec<Vec<f64>>,
+    /// Of what is per unit of a column: how large it may be ([`crate::chamber::Free::deviation`]).
+    pub(crate) deviation: Option<f64>,
 }
 
 /// Starts a candidate has at most.
@@ -81,14 +84,24 @@ fn all_candidates(model: &CoilModel, records: &[&Record]) -> Vec<Candidate> {
             let declared = present.contains(&format!("channel:{}", channel.name));
             // What follows the table's rate has effects of its own.
             if varies && shared && !declared && channel.name != TABLE_RATE {
-                let start = crate::effect::CHANNEL.parameters[0];
-                let effect = DeclaredEffect::channel(channel.name.clone(), start.unit.to_si(start.start));
+                // As much as would make of the column all that the rate does.
+                let Some(gain) = spread(first.rate_rad_per_s()).zip(spread(&channel.values)).map(|(r, c)| r / c) else {
+                    continue;
+                };
+                let effect = DeclaredEffect::channel(channel.name.clone(), gain);
                 let starts = vec![effect.values().to_vec()];
-                all.push(Candidate { effect, free: vec![0], starts });
+                all.push(Candidate { effect, free: vec![0], starts, deviation: Some(gain) });
             }
         }
     }
     all
+}
+
+/// Standard deviation of what is finite; None where it does not change.
+fn spread(values: &[f64]) -> Option<f64> {
+    let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    let spread = standard_deviation(&finite);
+    (spread > 0.0).then_some(spread)
 }
 
 /// Whether a table turned the gyro at several rates in every record.
@@ -106,7 +119,12 @@ fn turned(records: &[&Record]) -> bool {
 pub(super) fn of_kind(model: &CoilModel, records: &[&Record], effect: &DeclaredEffect) -> Vec<Candidate> {
     if let Subject::Formula(_) = effect.subject() {
         let free = (0..effect.values().len()).collect();
-        return vec![Candidate { effect: effect.clone(), free, starts: vec![effect.values().to_vec()] }];
+        return vec![Candidate {
+            effect: effect.clone(),
+            free,
+            starts: vec![effect.values().to_vec()],
+            deviation: None,
+        }];
     }
     all_candidates(model, records).into_iter().filter(|c| c.kind() == effect.kind()).collect()
 }
@@ -160,7 +178,7 @@ fn of_spec(spec: &'static EffectSpec, choices: Vec<usize>, temperatures_k: &[f64
                     .collect();
             }
             starts.truncate(MAX_STARTS);
-            Some(Candidate { effect, free, starts })
+            Some(Candidate { effect, free, starts, deviation: None })
         })
         .collect()
 }
@@ -179,7 +197,7 @@ fn of_each_layer(candidate: &Candidate, layers: usize) -> Vec<Candidate> {
             let effect = candidate.effect.with_values(there(candidate.effect.values())).ok()?;
             effect.check_layers(layers).ok()?;
             let starts = candidate.starts.iter().map(|s| there(s)).collect();
-            Some(Candidate { effect, free: candidate.free.clone(), starts })
+            Some(Candidate { effect, free: candidate.free.clone(), starts, deviation: None })
         })
         .collect()
 }

@@ -46,7 +46,7 @@ pub(crate) fn extend_together(request: &Request, effects: &[DeclaredEffect]) -> 
         .flat_map(|(place, effect)| {
             let parameters = effect.parameters().into_iter().enumerate();
             let numbers = parameters.filter(|(_, p)| p.unit != Unit::Layer);
-            numbers.map(move |(parameter, _)| Free { effect: first + place, parameter, stated_within: None })
+            numbers.map(move |(parameter, _)| Free::again(first + place, parameter, effect))
         })
         .collect();
     let assumed = Assumption::new(with, request.pattern.clone());

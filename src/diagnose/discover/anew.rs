@@ -37,7 +37,7 @@ pub(crate) fn anew<'a>(
         .explanations
         .par_iter()
         .filter(|e| e.members.is_empty() || e.total() > least)
-        .filter_map(|e| again(&there, found, e))
+        .filter_map(|e| refitted_from(&there, found, e, &e.fit))
         .collect();
     let Some(declared) = listed.iter().find(|e| e.members.is_empty()) else { return Ok(None) };
     let Some(tools) = tools(&there, found, &declared.fit, &set.explanation.fit, allowed)? else { return Ok(None) };
@@ -55,12 +55,23 @@ fn looked_through<'a>(question: &Question<'a>, fit: &Fit) -> Result<Chamber<'a>,
     Ok(Chamber::new(question.model, &records)?.settled_from(fit.clone(), &question.fitted)?.0)
 }
 
-/// A listed set fitted in another chamber, with its held-out records.
-fn again(question: &Question, found: &Found, known: &Explanation) -> Option<Explanation> {
+/// What listed sets are worth where a set with a formula was found: what it found of the air may be better for them, too.
+pub(crate) fn worth_beside(question: &Question, found: &Found, set: &Set) -> Vec<f64> {
+    let least = set.total() - WITHIN_REACH;
+    let worth = |e: &Explanation| {
+        let is_asked = e.total() > least && e.total() < set.total();
+        let there = if is_asked { refitted_from(question, found, e, &set.explanation.fit) } else { None };
+        there.map_or(e.total(), |there| there.total().max(e.total()))
+    };
+    found.explanations.par_iter().map(worth).collect()
+}
+
+/// A listed set fitted again from another fit's chamber, with its held-out records.
+fn refitted_from(question: &Question, found: &Found, known: &Explanation, from: &Fit) -> Option<Explanation> {
     let begin = (known.fit.assumed.clone(), known.fit.free.clone());
-    let mut own = fitted(question, &found.windings, known.members.clone(), &begin, &known.fit, Effort::FULL)?;
+    let mut own = fitted(question, &found.windings, known.members.clone(), &begin, from, Effort::FULL)?;
     if !question.held_out.is_empty() {
-        own.held_out = Some(question.held_out_evidence(&own.fit));
+        own.held_out = Some(question.held_out_evidence(&mut own.fit));
     }
     own.in_readings = known.in_readings;
     Some(own)

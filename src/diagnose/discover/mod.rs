@@ -123,7 +123,10 @@ pub(in crate::diagnose) fn discover<'a>(
     sets.extend(exchanged.into_iter().filter(|s| s.total().is_finite()));
     sets.sort_by(|a, b| b.total().total_cmp(&a.total()));
     let sets = own_courses::with_own_courses(&tools, sets);
-    let listed: Vec<f64> = found.explanations.iter().map(Explanation::total).collect();
+    let listed = match sets.iter().max_by(|a, b| a.total().total_cmp(&b.total())) {
+        Some(best) => anew::worth_beside(question, found, best),
+        None => Vec::new(),
+    };
     let contender = sets.iter().max_by(|a, b| a.merit.total_cmp(&b.merit)).cloned();
     let alike = alike(question, found, &sets, &listed);
     if let Some(discovered) = concluded(&tools, sets, &listed, BEATS)? {

@@ -311,7 +311,8 @@ impl Tools<'_, '_> {
         if !self.question.held_out.is_empty() {
             let mut frozen = set.explanation.fit.clone();
             frozen.assumed.inputs.iter_mut().for_each(|input| input.deviation = 0.0);
-            set.held_out = Some(self.question.held_out_evidence(&frozen));
+            set.held_out = Some(self.question.held_out_evidence(&mut frozen));
+            set.explanation.fit.days = frozen.days;
         }
         if changes_readings(self.question, &set.explanation) {
             let readings = self.readings.get_or_init(|| Readings::new(self.question, self.declared));

@@ -109,7 +109,7 @@ fn free_numbers(declared: &CoilModel, model: &CoilModel) -> Vec<Free> {
             if fitted.is_empty() && !effect.values().is_empty() {
                 fitted.push(0);
             }
-            fitted.into_iter().map(move |parameter| Free { effect: place, parameter, stated_within: None })
+            fitted.into_iter().map(move |parameter| Free::again(place, parameter, effect))
         })
         .collect()
 }

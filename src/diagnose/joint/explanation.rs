@@ -74,6 +74,10 @@ impl Explanation {
         explanation
     }
 
+    pub(super) fn has_winding(&self) -> bool {
+        self.members.iter().any(|m| matches!(m, Member::Winding(_)))
+    }
+
     /// The members in an order of their own.
     pub(crate) fn key(&self) -> Vec<Member> {
         let mut key = self.members.clone();
@@ -158,6 +162,7 @@ pub(in crate::diagnose) fn with(
                 effect: effect_place,
                 parameter,
                 stated_within: None,
+                deviation: candidate.deviation,
             }));
         }
         Member::Refitted(effect) => {
@@ -166,6 +171,7 @@ pub(in crate::diagnose) fn with(
                 effect,
                 parameter,
                 stated_within: Some(STATED_WITHIN),
+                deviation: None,
             }));
         }
         Member::Winding(winding) => assumed.pattern = windings[winding].pattern.clone(),

@@ -50,7 +50,7 @@ pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mu
         kept += 1;
         e.members.is_empty() || (e.merit > least && kept <= JUDGED)
     });
-    explanations.par_iter_mut().for_each(|e| {
+    let judged = |e: &mut Explanation| {
         // What was only ranked is fitted in full before it is judged.
         let begin = (e.fit.assumed.clone(), e.fit.free.clone());
         if !e.fit.is_full()
@@ -60,9 +60,17 @@ pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mu
             *e = again;
         }
         if !question.held_out.is_empty() {
-            e.held_out = Some(question.held_out_evidence(&e.fit));
+            e.held_out = Some(question.held_out_evidence(&mut e.fit));
         }
-    });
+    };
+    // The first finds what the held-out records' days were; the others begin there.
+    if let Some((first, others)) = explanations.split_first_mut() {
+        judged(first);
+        others.par_iter_mut().for_each(|e| {
+            e.fit.days.clone_from(&first.fit.days);
+            judged(e);
+        });
+    }
     if let Some(declared) = explanations.iter().find(|e| e.members.is_empty()).map(|e| e.fit.clone()) {
         take_off(question, &declared, explanations);
     }
@@ -127,7 +135,7 @@ fn errors(question: &Question, explanation: &Explanation) -> Outcome<Option<[f64
         }
         Ok(squares.iter().sum::<f64>() / squares.len().max(1) as f64)
     };
-    let days = question.held_out.iter().map(|&r| of(&question.chamber.held_out(&explanation.fit, r)?, &[r]));
+    let days = question.held_out.iter().zip(&*explanation.fit.days).map(|(&r, day)| of(day, &[r]));
     let days: Outcome<Vec<f64>> = days.collect();
     Ok(Some([of(&explanation.fit, &question.fitted)?, days?.iter().sum()]))
 }

@@ -18,6 +18,8 @@ mod screen;
 mod search;
 mod winding;
 
+use std::sync::Arc;
+
 use crate::chamber::{Chamber, ChamberError, Fit};
 use crate::diagnose::candidate::Candidate;
 use crate::pattern::Pattern;
@@ -46,11 +48,14 @@ pub(crate) struct Question<'a> {
 }
 
 impl Question<'_> {
-    /// Log evidence of the held-out records with the coil's numbers as a fit has them; −∞ where one cannot be solved.
-    pub(crate) fn held_out_evidence(&self, fit: &Fit) -> f64 {
-        let scores: Outcome<Vec<f64>> =
-            self.held_out.iter().map(|&r| self.chamber.held_out(fit, r).map(|day| day.evidence)).collect();
-        scores.map_or(f64::NEG_INFINITY, |s| s.iter().sum())
+    /// Log evidence of the held-out records with the coil's numbers as a fit has them; −∞ where one cannot be solved. The fit keeps
+    /// what their days were.
+    pub(crate) fn held_out_evidence(&self, fit: &mut Fit) -> f64 {
+        let days: Outcome<Vec<Fit>> = self.held_out.iter().map(|&r| self.chamber.held_out(fit, r)).collect();
+        let Ok(days) = days else { return f64::NEG_INFINITY };
+        let evidence = days.iter().map(|day| day.evidence).sum();
+        fit.days = Arc::new(days);
+        evidence
     }
 }
 

@@ -9,6 +9,8 @@
 //! likelier under this guess has said nothing of the coil. So sets are judged by the rates, given the readings. Where a record
 //! has a second thermometer, at the bore or in the air, the two together do show the pack, and nothing is taken off.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use super::{Explanation, Member, Question};
@@ -31,20 +33,22 @@ pub(super) fn take_off(question: &Question, declared: &Fit, explanations: &mut [
 pub(in crate::diagnose) struct Readings {
     /// Of the fitted and of the held-out records.
     declared: [f64; 2],
+    /// Its fit: where those of sets begin.
+    fit: Option<Fit>,
 }
 
 impl Readings {
     pub(in crate::diagnose) fn new(question: &Question, declared: &Fit) -> Self {
         let chamber = question.chamber.without_rates();
         let blind = blind(question, &chamber);
-        let (there, own) = (alone(&blind, declared), own_kinks(&blind, declared));
-        Self { declared: [there[0].max(own[0]), there[1].max(own[1])] }
+        let ((there, fit), own) = (alone(&blind, declared, None), own_kinks(&blind, declared));
+        Self { declared: [there[0].max(own[0]), there[1].max(own[1])], fit }
     }
 
     /// What a fit gains beside it.
     pub(in crate::diagnose) fn gain(&self, question: &Question, fit: &Fit) -> f64 {
         let chamber = question.chamber.without_rates();
-        let own = alone(&blind(question, &chamber), fit);
+        let (own, _) = alone(&blind(question, &chamber), fit, self.fit.as_ref());
         let gains = own.iter().zip(&self.declared).map(|(own, none)| (own - none).max(0.0));
         gains.filter(|gain| gain.is_finite()).sum()
     }
@@ -61,24 +65,34 @@ fn blind<'q>(question: &Question<'q>, chamber: &'q crate::chamber::Chamber<'q>) 
     Question { chamber, fitted, held_out, ..question.clone() }
 }
 
-/// Log evidence of the readings of the records that were fitted, and of those held out.
-fn alone(blind: &Question, fit: &Fit) -> [f64; 2] {
-    let start = reduced(blind, fit);
+/// Log evidence of the readings of the records that were fitted, and of those held out; and the fit of the former.
+fn alone(blind: &Question, fit: &Fit, beside: Option<&Fit>) -> ([f64; 2], Option<Fit>) {
+    let mut start = reduced(blind, fit);
+    match beside {
+        Some(beside) => start.begin_beside(beside),
+        // Days that rates were seen on are no beginning for days without.
+        None => start.days = Arc::default(),
+    }
+    let mut own = None;
     let fitted = match &blind.fitted[..] {
         [] => 0.0,
         records => {
-            let fit = blind.chamber.fit(&start.assumed, &[], records, Some(&start), Effort::FULL);
-            fit.map_or(f64::NEG_INFINITY, |fit| fit.merit_of_chamber())
+            own = blind.chamber.fit(&start.assumed, &[], records, Some(&start), Effort::FULL).ok();
+            own.as_ref().map_or(f64::NEG_INFINITY, Fit::merit_of_chamber)
         }
     };
-    [fitted, blind.held_out_evidence(&start)]
+    let held_out = blind.held_out_evidence(&mut start);
+    if let Some(own) = &mut own {
+        own.days = start.days;
+    }
+    ([fitted, held_out], own)
 }
 
 /// … of the declared model with the kinks that the readings have by it; those of the chamber may be another's.
 fn own_kinks(blind: &Question, declared: &Fit) -> [f64; 2] {
     match blind.chamber.with_own_kinks(&reduced(blind, declared), Effort::QUICK) {
         Ok(Some((chamber, fit, prices))) => {
-            let [fitted, held_out] = alone(&Question { chamber: &chamber, ..blind.clone() }, &fit);
+            let ([fitted, held_out], _) = alone(&Question { chamber: &chamber, ..blind.clone() }, &fit, None);
             let price = |records: &[usize]| records.iter().map(|&r| prices[r]).sum::<f64>();
             [fitted - price(&blind.fitted), held_out - price(&blind.held_out)]
         }

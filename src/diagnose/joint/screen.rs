@@ -46,7 +46,8 @@ pub(in crate::diagnose) fn proposals_along(
 }
 
 /// The same, and where something large is missing a short fit of what promises most: the score test then says alike of
-/// whatever follows the mean rate, because the gyro's wander stands for all of it.
+/// whatever follows the mean rate, because the gyro's wander stands for all of it. What has no number that could be small (a pack
+/// that ends) is no direction, so it is fitted whatever it promises.
 pub(super) fn looked_at(question: &Question, best: &Explanation) -> Outcome<Vec<Proposal>> {
     let mut all = scored(question, best, &|_, _| true)?;
     all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -54,8 +55,12 @@ pub(super) fn looked_at(question: &Question, best: &Explanation) -> Outcome<Vec<
     let mut seen = BTreeSet::new();
     let mut calm = best.fit.clone();
     calm.calm(&question.fitted);
-    let close: Vec<usize> =
-        (0..all.len()).filter(|&i| all[i].gain > least && seen.insert(all[i].member)).take(LOOKED_AT).collect();
+    let is_whole =
+        |p: &Proposal| matches!(p.member, Member::Effect(place) if question.candidates[place].free.is_empty());
+    let close: Vec<usize> = (0..all.len())
+        .filter(|&i| (all[i].gain > least || is_whole(&all[i])) && seen.insert(all[i].member))
+        .take(LOOKED_AT)
+        .collect();
     let gains: Vec<(usize, f64)> = close
         .into_par_iter()
         .filter_map(|i| {

@@ -8,7 +8,7 @@ use super::explanation::{fitted, with, without};
 use super::judge::judge;
 use super::own_kinks::best_by_own_kinks;
 use super::screen::{Proposal, foremost, looked_at, proposals};
-use super::winding::promising;
+use super::winding::{promises, promising};
 use super::{Explanation, Found, Member, Outcome, Question, Winding};
 use crate::chamber::{Assumption, Effort, Fit, Free, Quantity};
 
@@ -55,6 +55,10 @@ pub(crate) fn search(question: &Question, null: Fit, progress: &(dyn Fn(f64) + S
                 windings = promising(&here, &best.fit)?;
             }
             promised = foremost(&proposals);
+        } else if !best.has_winding() {
+            // Beside what has been found since, another winding is worth something else.
+            let there = promises(&here, &best.fit, &windings);
+            windings.iter_mut().zip(there).for_each(|(winding, promised)| winding.promised = promised);
         }
         proposals.extend(discrete(&here, &windings, &best));
         let found = tried(&here, &windings, &best, proposals);
@@ -167,7 +171,7 @@ fn discrete(question: &Question, windings: &[Winding], best: &Explanation) -> Ve
             all.push(Proposal { member, values: None, gain });
         }
     };
-    if !best.members.iter().any(|m| matches!(m, Member::Winding(_))) {
+    if !best.has_winding() {
         windings.iter().enumerate().for_each(|(w, winding)| add(Member::Winding(w), winding.promised));
     }
     for (effect, declared) in question.model.effects.iter().enumerate() {

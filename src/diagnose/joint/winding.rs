@@ -85,18 +85,24 @@ fn classics(question: &Question, fit: &Fit) -> Vec<Winding> {
     all
 }
 
-/// Another winding is no small change: the likelihood says what each does, with a gyro that does not wander, before anything
-/// else is fitted.
 fn most_likely(question: &Question, fit: &Fit, mut all: Vec<Winding>) -> Vec<Winding> {
-    let mut start = fit.clone();
-    start.calm(&question.fitted);
-    all.par_iter_mut().for_each(|winding| {
-        let mut assumed = fit.assumed.clone();
-        assumed.pattern = winding.pattern.clone();
-        let there = question.chamber.fit(&assumed, &fit.free, &question.fitted, Some(&start), Effort::SHORT);
-        winding.promised = there.map_or(f64::NEG_INFINITY, |there| there.posterior() - fit.posterior());
-    });
+    let promised = promises(question, fit, &all);
+    all.iter_mut().zip(promised).for_each(|(winding, promised)| winding.promised = promised);
     all.sort_by(|a, b| b.promised.total_cmp(&a.promised));
     all.truncate(TRIED);
     all
+}
+
+/// Another winding is no small change: the likelihood says what each does beside a fit, with a gyro that does not wander, before
+/// anything else is fitted.
+pub(super) fn promises(question: &Question, fit: &Fit, windings: &[Winding]) -> Vec<f64> {
+    let mut start = fit.clone();
+    start.calm(&question.fitted);
+    let promise = |winding: &Winding| {
+        let mut assumed = fit.assumed.clone();
+        assumed.pattern = winding.pattern.clone();
+        let there = question.chamber.fit(&assumed, &fit.free, &question.fitted, Some(&start), Effort::SHORT);
+        there.map_or(f64::NEG_INFINITY, |there| there.posterior() - fit.posterior())
+    };
+    windings.par_iter().map(promise).collect()
 }
