@@ -15,7 +15,7 @@
 //! ```
 //!
 //! They are taken anew where they no longer foretell what a step gains, and before an ascent to the top ends. For the same reason
-//! those of one fit serve the next that begins where it ended, with one effect more or one less ([`Sensitivities`]).
+//! those of one fit serve the next that begins where it ended, with one effect more or one less ([`KnownDerivatives`]).
 //!
 //! # Source
 //! Conn, Gould, Toint, Trust-Region Methods (2000), chapters 6 and 7.7 (boxes); Nocedal and Wright, Numerical Optimization
@@ -26,9 +26,9 @@ use rayon::prelude::*;
 
 use super::derivative::{DerivativeColumn, Derivatives};
 use super::filter::Innovation;
-use super::fit::{Effort, Place0, log_likelihood};
 use super::known::Reference;
 use super::parameter::{Parameter, write};
+use super::place::{Place0, log_likelihood};
 use super::system::Numbers;
 use super::{Assumption, Chamber, ChamberError};
 
@@ -42,9 +42,33 @@ const FAILURES: usize = 5;
 const POOR: f64 = 0.25;
 const GOOD: f64 = 0.7;
 
+/// How much work a fit may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Effort {
+    /// Times that derivatives are taken.
+    pub(crate) iterations: usize,
+    /// A step that gains less ends the fit.
+    pub(crate) tolerance: f64,
+    /// Times that the course is smoothed again where the model is not linear.
+    pub(crate) rounds: usize,
+}
+
+impl Effort {
+    /// To a tenth of a unit of log likelihood.
+    pub(crate) const FULL: Self = Self { iterations: 25, tolerance: 0.1, rounds: 2 };
+    /// To half a unit: enough to rank sets.
+    pub(crate) const QUICK: Self = Self { iterations: 10, tolerance: 0.7, rounds: 1 };
+    /// Enough to rank starts.
+    pub(crate) const SHORT: Self = Self { iterations: 1, tolerance: 3.0, rounds: 1 };
+    /// Whether what is fitted so far is only compared.
+    pub(super) fn is_for_ranking(self) -> bool {
+        self.tolerance > Self::QUICK.tolerance
+    }
+}
+
 /// Derivatives of innovations at a place, for ascents that begin there or nearby.
 #[derive(Debug, Clone)]
-pub(super) struct Sensitivities {
+pub(super) struct KnownDerivatives {
     parameters: Vec<Parameter>,
     records: Vec<usize>,
     /// Of each record, in the order of `records`.
@@ -52,7 +76,7 @@ pub(super) struct Sensitivities {
     variances: Vec<Vec<f64>>,
 }
 
-impl Sensitivities {
+impl KnownDerivatives {
     fn new(
         parameters: &[Parameter],
         records: &[usize],
@@ -80,7 +104,7 @@ impl Sensitivities {
 }
 
 /// A place on the way.
-pub(super) struct State<'c> {
+pub(super) struct Ascent<'c> {
     pub(super) place: Place0<'c>,
     pub(super) coordinates: Vec<f64>,
     innovations: Vec<Vec<Innovation>>,
@@ -88,7 +112,7 @@ pub(super) struct State<'c> {
     posterior: f64,
     /// Of data and prior.
     pub(super) information: DMatrix<f64>,
-    pub(super) sensitivities: Option<Sensitivities>,
+    pub(super) sensitivities: Option<KnownDerivatives>,
 }
 
 impl Chamber<'_> {
@@ -105,8 +129,8 @@ impl Chamber<'_> {
         records: &[usize],
         courses: &'c [Option<Reference>],
         effort: Effort,
-        known: Option<&Sensitivities>,
-    ) -> Result<State<'c>, ChamberError> {
+        known: Option<&KnownDerivatives>,
+    ) -> Result<Ascent<'c>, ChamberError> {
         let begin: Vec<f64> = parameters
             .iter()
             .map(|p| {
@@ -117,7 +141,10 @@ impl Chamber<'_> {
         let mut state = self.state(assumed, numbers, parameters, begin, records, courses)?;
         let (mut derivatives, mut is_fresh) = self.derivatives_beside(&state, parameters, records, known)?;
         let (mut taken, mut served, mut failures, mut share) = (usize::from(is_fresh), 0, 0, 1.0);
-        while effort.iterations > 0 {
+        loop {
+            if effort.iterations == 0 {
+                break;
+            }
             let (score, information) = slope(&derivatives, &state, parameters);
             let step = Step::new(parameters, &state.coordinates, &score, &information, share);
             let next = state.coordinates.iter().zip(step.change.iter()).map(|(x, d)| x + d).collect();
@@ -144,17 +171,17 @@ impl Chamber<'_> {
             }
         }
         let (_, information) = slope(&derivatives, &state, parameters);
-        let sensitivities = Some(Sensitivities::new(parameters, records, derivatives, &state.innovations));
-        Ok(State { information, sensitivities, ..state })
+        let sensitivities = Some(KnownDerivatives::new(parameters, records, derivatives, &state.innovations));
+        Ok(Ascent { information, sensitivities, ..state })
     }
 
     /// Derivatives at a place: those that are known of one nearby, and the rest taken here; whether all are of the very place.
     fn derivatives_beside(
         &self,
-        state: &State,
+        state: &Ascent,
         parameters: &[Parameter],
         records: &[usize],
-        known: Option<&Sensitivities>,
+        known: Option<&KnownDerivatives>,
     ) -> Result<(Vec<Derivatives>, bool), ChamberError> {
         let column = |p: usize, i: usize| known?.column(&parameters[p], records[i], &state.innovations[i]);
         let of_records = |p: usize| -> Option<Vec<(usize, DerivativeColumn)>> {
@@ -185,7 +212,7 @@ impl Chamber<'_> {
         coordinates: Vec<f64>,
         records: &[usize],
         courses: &'c [Option<Reference>],
-    ) -> Result<State<'c>, ChamberError> {
+    ) -> Result<Ascent<'c>, ChamberError> {
         let (mut assumed, mut numbers) = (assumed.clone(), numbers.to_vec());
         if !write(parameters, &coordinates, &mut assumed, &mut numbers) {
             return Err(ChamberError::Unsolvable);
@@ -200,12 +227,12 @@ impl Chamber<'_> {
         }
         let posterior = log_likelihood + log_prior;
         let information = DMatrix::zeros(0, 0);
-        Ok(State { place, coordinates, innovations, log_likelihood, posterior, information, sensitivities: None })
+        Ok(Ascent { place, coordinates, innovations, log_likelihood, posterior, information, sensitivities: None })
     }
 }
 
 /// Gradient and information of the posterior.
-fn slope(derivatives: &[Derivatives], state: &State, parameters: &[Parameter]) -> (DVector<f64>, DMatrix<f64>) {
+fn slope(derivatives: &[Derivatives], state: &Ascent, parameters: &[Parameter]) -> (DVector<f64>, DMatrix<f64>) {
     let count = parameters.len();
     let mut score = DVector::zeros(count);
     let mut information = DMatrix::zeros(count, count);

@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use super::ascent::Effort;
 use super::filter::{Innovation, RATE};
-use super::fit::{Effort, Fit};
+use super::fit::Fit;
 use super::known::Reference;
 use super::noise::Remedy;
 use super::point::{BLIND_RAD2_PER_S2, CoilSide, Rates, smoothed};

@@ -344,7 +344,7 @@ pub(super) mod tests {
                 let moved = fit.coordinates[i] + 0.3 * sign * parameter.step();
                 assert!(crate::chamber::parameter::write(&[*parameter], &[moved], &mut assumed, &mut numbers));
                 let there = chamber.place(assumed, numbers, &[0], &fit.courses).unwrap();
-                crate::chamber::fit::log_likelihood(&chamber.innovations(&there, 0).unwrap())
+                crate::chamber::place::log_likelihood(&chamber.innovations(&there, 0).unwrap())
             };
             let slope = (at(1.0) - at(-1.0)) / (0.6 * parameter.step());
             // One-sided differences of the innovations: off by half a step's worth of curvature.

@@ -5,39 +5,13 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::ascent::Sensitivities;
-use super::derivative::{DerivativeColumn, Derivatives};
-use super::filter::{Innovation, Values};
+use super::ascent::{Effort, KnownDerivatives};
 use super::known::Reference;
-use super::parameter::{Free, Parameter, write};
-use super::point::{CoilSide, Rates, quantities, run, smoothed};
+use super::parameter::{Free, Parameter};
+use super::point::{CoilSide, Rates, quantities, smoothed};
 use super::prior::Quantity;
 use super::system::Numbers;
 use super::{Assumption, Chamber, ChamberError};
-
-/// How much work a fit may be.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Effort {
-    /// Times that derivatives are taken.
-    pub(crate) iterations: usize,
-    /// A step that gains less ends the fit.
-    pub(crate) tolerance: f64,
-    /// Times that the course is smoothed again where the model is not linear.
-    pub(crate) rounds: usize,
-}
-
-impl Effort {
-    /// To a tenth of a unit of log likelihood.
-    pub(crate) const FULL: Self = Self { iterations: 25, tolerance: 0.1, rounds: 2 };
-    /// To half a unit: enough to rank sets.
-    pub(crate) const QUICK: Self = Self { iterations: 10, tolerance: 0.7, rounds: 1 };
-    /// Enough to rank starts.
-    pub(crate) const SHORT: Self = Self { iterations: 1, tolerance: 3.0, rounds: 1 };
-    /// Whether what is fitted so far is only compared.
-    fn is_for_ranking(self) -> bool {
-        self.tolerance > Self::QUICK.tolerance
-    }
-}
 
 /// Which courses are smoothed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,22 +42,13 @@ pub(crate) struct Fit {
     /// Whether its ascent was that of [`Effort::FULL`], from whatever start.
     pub(super) is_full: bool,
     /// At its end, for fits that begin there.
-    pub(super) sensitivities: Option<Arc<Sensitivities>>,
+    pub(super) sensitivities: Option<Arc<KnownDerivatives>>,
     /// Records that were not fitted, as this fit or one that it began with found them: where [`Chamber::held_out`] begins.
     pub(crate) days: Arc<Vec<Fit>>,
     /// Of every record of the chamber.
     pub(super) numbers: Vec<Numbers>,
     /// The smoothed course of every fitted record; None elsewhere.
     pub(super) courses: Vec<Option<Reference>>,
-}
-
-/// All that a likelihood is computed from.
-pub(super) struct Place0<'a> {
-    pub(crate) assumed: Assumption,
-    pub(crate) numbers: Vec<Numbers>,
-    pub(crate) sides: Vec<Option<CoilSide>>,
-    pub(crate) values: Vec<Option<Values>>,
-    pub(crate) courses: &'a [Option<Reference>],
 }
 
 impl Chamber<'_> {
@@ -200,103 +165,6 @@ impl Chamber<'_> {
         }
         Ok(())
     }
-
-    /// Everything at one point; only the `records` are computed.
-    pub(super) fn place<'c>(
-        &self,
-        assumed: Assumption,
-        numbers: Vec<Numbers>,
-        records: &[usize],
-        courses: &'c [Option<Reference>],
-    ) -> Result<Place0<'c>, ChamberError> {
-        let mut sides: Vec<Option<CoilSide>> = (0..self.records()).map(|_| None).collect();
-        let mut values: Vec<Option<Values>> = (0..self.records()).map(|_| None).collect();
-        for &r in records {
-            let observed = &self.observed[r];
-            let side = CoilSide::new(&assumed, numbers[r].get(Quantity::Film), self.modes, observed)?;
-            let reference = if side.needs_reference() {
-                courses[r].as_ref().filter(|c| c.outputs == side.reduced.outputs)
-            } else {
-                None
-            };
-            values[r] = Some(side.values(&assumed, observed, r, reference)?);
-            sides[r] = Some(side);
-        }
-        Ok(Place0 { assumed, numbers, sides, values, courses })
-    }
-
-    pub(super) fn innovations(&self, place: &Place0, record: usize) -> Result<Vec<Innovation>, ChamberError> {
-        let (Some(side), Some(values)) = (&place.sides[record], &place.values[record]) else {
-            return Err(ChamberError::Unsolvable);
-        };
-        Ok(run(side, &place.assumed, &place.numbers[record], &self.observed[record], values))
-    }
-
-    /// The innovations of one record with one coordinate moved.
-    fn moved(
-        &self,
-        place: &Place0,
-        parameter: &Parameter,
-        coordinate: f64,
-        record: usize,
-    ) -> Result<Vec<Innovation>, ChamberError> {
-        let mut numbers = place.numbers.clone();
-        let mut assumed = place.assumed.clone();
-        if !write(std::slice::from_ref(parameter), &[coordinate], &mut assumed, &mut numbers) {
-            return Err(ChamberError::Unsolvable);
-        }
-        if parameter.leaves_coil() {
-            let (Some(side), Some(values)) = (&place.sides[record], &place.values[record]) else {
-                return Err(ChamberError::Unsolvable);
-            };
-            return Ok(run(side, &place.assumed, &numbers[record], &self.observed[record], values));
-        }
-        let there = self.place(assumed, numbers, &[record], place.courses)?;
-        self.innovations(&there, record)
-    }
-
-    /// Score and information of the likelihood at a place whose innovations are known.
-    pub(super) fn derivatives(
-        &self,
-        place: &Place0,
-        parameters: &[Parameter],
-        coordinates: &[f64],
-        records: &[usize],
-        base: &[Vec<Innovation>],
-    ) -> Result<Vec<Derivatives>, ChamberError> {
-        let tasks: Vec<(usize, usize)> = (0..records.len())
-            .flat_map(|i| (0..parameters.len()).map(move |p| (i, p)))
-            .filter(|&(i, p)| parameters[p].concerns(records[i]))
-            .collect();
-        let columns: Vec<Result<(usize, usize, DerivativeColumn), ChamberError>> = tasks
-            .into_par_iter()
-            .map(|(i, p)| {
-                let parameter = &parameters[p];
-                let mut step = parameter.step();
-                if coordinates[p] + step > parameter.upper {
-                    step = -step;
-                }
-                let there = self.moved(place, parameter, coordinates[p] + step, records[i]).or_else(|_| {
-                    step = -step;
-                    self.moved(place, parameter, coordinates[p] + step, records[i])
-                })?;
-                Ok((i, p, DerivativeColumn::new(&base[i], &there, step)))
-            })
-            .collect();
-        let mut all: Vec<Derivatives> = (0..records.len()).map(|_| Derivatives::default()).collect();
-        for column in columns {
-            let (i, p, column) = column?;
-            all[i].parameters.push(p);
-            all[i].columns.push(column);
-        }
-        Ok(all)
-    }
-}
-
-pub(super) fn log_likelihood(innovations: &[Innovation]) -> f64 {
-    let sum: f64 =
-        innovations.iter().map(|i| i.value * i.value / i.variance + (std::f64::consts::TAU * i.variance).ln()).sum();
-    -0.5 * sum
 }
 
 #[allow(clippy::too_many_arguments)]

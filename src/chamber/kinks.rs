@@ -8,8 +8,9 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use super::ascent::Effort;
 use super::filter::{self, Move};
-use super::fit::{Effort, Fit};
+use super::fit::Fit;
 use super::series::{SHORT_ROW_S, Series};
 use super::system::system;
 use super::{Assumption, Chamber, ChamberError};

@@ -5,8 +5,9 @@
 
 use rayon::prelude::*;
 
+use super::ascent::Effort;
 use super::filter::{self, RATE};
-use super::fit::{Effort, Fit};
+use super::fit::Fit;
 use super::kinks::Bend;
 use super::point::{BLIND_RAD2_PER_S2, CoilSide, run_kept};
 use super::prior::{GROSS_FACTOR, GROSS_SHARE, KINKS_PER_ROW, Quantity};

@@ -7,7 +7,7 @@
 
 use super::anneal::rounds::{FoundPattern, Plan, Rounds, Rules};
 use super::cost::objective::Objective;
-use super::evaluator::{Evaluator, JudgeError};
+use super::evaluator::{Evaluator, FEWEST_LAYERS, JudgeError, name_of};
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 
@@ -25,6 +25,9 @@ const SHARED: usize = 8;
 
 /// Patterns from which a search is refined at its end.
 const REFINED: usize = 4;
+
+/// Patterns that a proof begins with.
+const BEGUN_WITH: usize = 6;
 
 /// A refinement takes this part of a restart's moves.
 const REFINING_SHARE: u64 = 2;
@@ -66,6 +69,27 @@ impl<'a> Evaluator<'a> {
         Ok(shared)
     }
 
+    /// The best of [`Evaluator::companions`], for a proof to begin with; none where the proof itself comes upon the best at once.
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn best_companions(
+        &self,
+        class: WindabilityClass,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Result<Vec<Pattern>, JudgeError> {
+        let layers = self.model.coil.layers();
+        if class == WindabilityClass::Standard || layers < FEWEST_LAYERS || self.is_provable(class) {
+            return Ok(Vec::new());
+        }
+        let shared = self.companions(class, &Plan::usual(layers, COMMON_SEED), goes_on)?;
+        let admitted = shared.into_iter().filter(|pattern| class.admits(pattern));
+        let named: Vec<(String, Pattern)> = admitted.map(|pattern| (name_of(&pattern), pattern)).collect();
+        let mut judged = self.judge_all(&named)?;
+        judged.sort_by(|a, b| a.objective_rad_per_s.total_cmp(&b.objective_rad_per_s));
+        Ok(judged.into_iter().take(BEGUN_WITH).map(|judged| judged.pattern).collect())
+    }
+
     /// What a short search finds, the best of it improved by bounds.
     pub(super) fn short(
         &self,
@@ -96,7 +120,7 @@ impl<'a> Evaluator<'a> {
     }
 
     /// What a search found and what was shared with it, the best refined from where they are; best first.
-    pub(super) fn gathered(
+    pub(crate) fn gathered(
         &self,
         search: &dyn Rounds,
         class: WindabilityClass,

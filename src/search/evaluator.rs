@@ -16,6 +16,7 @@ use crate::search::cost::tolerance::{Coils, ToleranceError, ToleranceSpec};
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles, WorstCase};
 use crate::search::proof::compound::compounded;
 use crate::search::proof::permutation_tree::MOST_LAYERS;
+use crate::search::proof::stretches::rearranged;
 use crate::search::proof::{Goal, Improvement, ProofEffort, Task, improve};
 use crate::thermal::{Extent, Location};
 use crate::units::percent_from_fraction;
@@ -78,7 +79,7 @@ const PREFERENCE: [Classic; 7] =
     [Classic::Qua, Classic::Oct, Classic::Hex, Classic::Dip, Classic::SymText, Classic::Sym, Classic::Zyl];
 
 /// Below this there is nothing to improve that the annealer would not find.
-const FEWEST_LAYERS: usize = 4;
+pub(super) const FEWEST_LAYERS: usize = 4;
 
 /// Up to here, with equal layers, the best permutation is proved within [`PROVING_NODES`]: seconds.
 const PROVABLE_LAYERS: usize = 16;
@@ -314,8 +315,12 @@ impl Evaluator<'_> {
             Improvement { pattern: best.pattern.clone(), is_optimal: false }
         };
         if self.objective == Objective::Pointing && !is_optimal {
-            let starts: Vec<Pattern> = std::iter::once(pattern).chain(starts).collect();
+            let starts: Vec<Pattern> = std::iter::once(pattern).chain(starts.iter().cloned()).collect();
             pattern = compounded(&task, &starts, COMPOUND_SEED)?;
+        }
+        if self.can_improve(class) && !is_optimal {
+            let starts: Vec<Pattern> = std::iter::once(pattern).chain(starts).collect();
+            pattern = rearranged(&task, &starts, COMPOUND_SEED)?;
         }
         if pattern == best.pattern {
             return Ok((best, is_optimal));

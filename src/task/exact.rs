@@ -135,10 +135,6 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
     let own = file.pattern.iter().map(|named| named.pattern.clone());
     let mut starts: Vec<Pattern> = own.chain(request.starts.iter().cloned()).collect();
     starts.extend(starting_patterns(&task, request.seed)?);
-
-    let certificate = watched(request.objective, observer, |watcher| prove(&task, &starts, watcher))?;
-
-    let pattern = &certificate.pattern;
     let evaluator = Evaluator {
         model,
         solved: &solved,
@@ -147,6 +143,11 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
         profiles: &file.profiles,
         tolerance: None,
     };
+    starts.extend(evaluator.best_companions(request.class, &|| observer.goes_on())?);
+
+    let certificate = watched(request.objective, observer, |watcher| prove(&task, &starts, watcher))?;
+
+    let pattern = &certificate.pattern;
     let worst = solved.worst_case(model, pattern)?;
     let phase_rad = RateModel::new(model, pattern, &[])?.phase_rad(worst.rate_rad_per_s);
     let bound = evaluator.unit_step.and_then(|step| step.guaranteed(model, pattern).ok());

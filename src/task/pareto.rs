@@ -204,10 +204,10 @@ fn candidates(
             return Ok(None);
         }
     }
-    let found = &search.state().found;
-    let mut patterns = patterns(found);
-    if let Some(best) = evaluator.best(class, found, &[])? {
-        patterns.push(evaluator.improved(class, best, found, None)?.0.pattern);
+    let mut patterns = patterns(&search.state().found);
+    let found = evaluator.gathered(search.as_ref(), class, &shared, false);
+    if let Some(best) = evaluator.best(class, &found, &[])? {
+        patterns.push(evaluator.improved(class, best, &found, None)?.0.pattern);
     }
     patterns.extend(shared);
     Ok(observer.goes_on().then_some(patterns))

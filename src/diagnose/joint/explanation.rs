@@ -1,6 +1,6 @@
 //! One set of explanations, fitted.
 
-use super::odds::{EFFECT, EXCHANGE, KNOWN_WITHIN, OUTSIDE, PHYSICAL, REFITTED, STATED_WITHIN, STEP, WINDING};
+use super::odds::{EFFECT, KNOWN_WITHIN, OUTSIDE, PHYSICAL, REFITTED, STATED_WITHIN, STEP};
 use super::{Question, Winding, rates};
 use crate::chamber::{Assumption, Effort, Fit, Free, Input, Parameter, Place, Scale, is_factor};
 use crate::effect::DeclaredEffect;
@@ -56,11 +56,7 @@ impl Explanation {
                 }
                 Member::Effect(_) => EFFECT.log,
                 Member::Refitted(_) => REFITTED.log,
-                Member::Winding(w) if windings[*w].exchanged.is_some() => {
-                    let n = windings[*w].pattern.layers() as f64;
-                    EXCHANGE.log - (0.5 * n * (n - 1.0)).ln()
-                }
-                Member::Winding(_) => WINDING.log,
+                Member::Winding(w) => windings[*w].log_prior(),
                 Member::Step { record, .. } => STEP.log - (question.chamber.times_s(*record).len() as f64).ln(),
                 Member::Drift | Member::Cycle => OUTSIDE.log,
             })

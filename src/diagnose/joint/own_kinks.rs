@@ -12,7 +12,6 @@
 
 use rayon::prelude::*;
 
-use super::readings::changes_readings;
 use super::{Explanation, Question, Winding};
 use crate::chamber::{Chamber, Effort};
 
@@ -27,16 +26,14 @@ pub(super) struct OwnKinks<'a> {
     pub(crate) merit: f64,
 }
 
-/// The best of the foremost sets with which readings would be others, or from which a film is found that another winding had wrong;
-/// None where no air is straight. `found` is in order.
+/// The best of the foremost sets, each with its own kinks; None where no air is straight. `found` is in order.
 pub(super) fn best_by_own_kinks<'a>(
     chamber: &Chamber<'a>,
     question: &Question,
     windings: &[Winding],
     found: &[Explanation],
 ) -> Option<OwnKinks<'a>> {
-    let may_turn = |e: &&Explanation| !e.is_beyond_physical() && (e.has_winding() || changes_readings(question, e));
-    let foremost: Vec<&Explanation> = found.iter().filter(may_turn).take(LOOKED_AT).collect();
+    let foremost: Vec<&Explanation> = found.iter().filter(|e| !e.is_beyond_physical()).take(LOOKED_AT).collect();
     let own = foremost.into_par_iter().filter_map(|e| {
         let (chamber, fit, prices) = chamber.with_own_kinks(&e.fit, Effort::QUICK).ok()??;
         let price: f64 = question.fitted.iter().map(|&r| prices[r]).sum();

@@ -6,9 +6,10 @@ use rayon::prelude::*;
 
 use super::explanation::{fitted, with, without};
 use super::judge::judge;
+use super::odds::{CERTAIN, WINDING};
 use super::own_kinks::best_by_own_kinks;
 use super::screen::{Proposal, foremost, looked_at, proposals};
-use super::winding::{promises, promising};
+use super::winding::{promise_beside, promising};
 use super::{Explanation, Found, Member, Outcome, Question, Winding};
 use crate::chamber::{Assumption, Effort, Fit, Free, Quantity};
 
@@ -19,6 +20,8 @@ const WORTH_A_FIT: f64 = 3.0;
 const WORTH_BESIDE: f64 = 0.08;
 /// An effect that gains so much needs no comparison with a mere wander yet.
 const PLAIN: f64 = 25.0;
+/// … and one that gains so much may stand for another winding: what that costs beforehand, and what makes it certain.
+const MAY_BE_WOUND: f64 = CERTAIN.log - WINDING.log;
 /// Another winding that promises less than this share of the most is not fitted from several chambers.
 const MAY_WIN: f64 = 1.0 / 3.0;
 /// A set must be better by so much to go on from.
@@ -50,15 +53,14 @@ pub(crate) fn search(question: &Question, null: Fit, progress: &(dyn Fn(f64) + S
         let here = Question { chamber: &chamber, ..question.clone() };
         let mut proposals = looked_at(&here, &best)?;
         if stage == 0 {
-            // Where a gyro that wanders as gyros do is enough, nothing is wound otherwise.
-            if best.is_outside() || proposals.iter().any(|p| p.gain > PLAIN) {
+            // Where nothing promises what would make another winding certain, nothing is wound otherwise.
+            if best.is_outside() || proposals.iter().any(|p| p.gain > MAY_BE_WOUND) {
                 windings = promising(&here, &best.fit)?;
             }
             promised = foremost(&proposals);
         } else if !best.has_winding() {
             // Beside what has been found since, another winding is worth something else.
-            let there = promises(&here, &best.fit, &windings);
-            windings.iter_mut().zip(there).for_each(|(winding, promised)| winding.promised = promised);
+            promise_beside(&here, &best.fit, &mut windings);
         }
         proposals.extend(discrete(&here, &windings, &best));
         let found = tried(&here, &windings, &best, proposals);
@@ -231,10 +233,12 @@ fn choose(mut proposals: Vec<Proposal>) -> Vec<Proposal> {
         }
         let times = seen.entry(p.member).or_insert(0);
         *times += 1;
-        if p.gain.is_finite() && *times == 1 {
+        // Other windings were chosen before, by a fit each.
+        let is_scored = p.gain.is_finite() && !matches!(p.member, Member::Winding(_));
+        if is_scored && *times == 1 {
             scored += 1;
         }
-        *times == 1 && (!p.gain.is_finite() || scored <= TRIED)
+        *times == 1 && (!is_scored || scored <= TRIED)
     });
     proposals
 }

@@ -3,6 +3,7 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
+use super::odds::{EXCHANGE, WINDING};
 use super::{Outcome, Question};
 use crate::chamber::{Effort, Fit};
 use crate::pattern::Pattern;
@@ -21,6 +22,17 @@ pub(crate) struct Winding {
     pub(crate) exchanged: Option<(usize, usize)>,
     /// Rise of the log posterior in a short fit with it; until then what the score test promises.
     pub(crate) promised: f64,
+}
+
+impl Winding {
+    /// What is held likely of it before any record is read: an exchange might be of any two layers.
+    pub(super) fn log_prior(&self) -> f64 {
+        let layers = self.pattern.layers() as f64;
+        match self.exchanged {
+            Some(_) => EXCHANGE.log - (0.5 * layers * (layers - 1.0)).ln(),
+            None => WINDING.log,
+        }
+    }
 }
 
 /// Exchanges of two layers that are looked at more closely, if the score test promises so much of them.
@@ -86,16 +98,16 @@ fn classics(question: &Question, fit: &Fit) -> Vec<Winding> {
 }
 
 fn most_likely(question: &Question, fit: &Fit, mut all: Vec<Winding>) -> Vec<Winding> {
-    let promised = promises(question, fit, &all);
-    all.iter_mut().zip(promised).for_each(|(winding, promised)| winding.promised = promised);
-    all.sort_by(|a, b| b.promised.total_cmp(&a.promised));
+    promise_beside(question, fit, &mut all);
+    let worth = |w: &Winding| w.promised + w.log_prior();
+    all.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
     all.truncate(TRIED);
     all
 }
 
 /// Another winding is no small change: the likelihood says what each does beside a fit, with a gyro that does not wander, before
 /// anything else is fitted.
-pub(super) fn promises(question: &Question, fit: &Fit, windings: &[Winding]) -> Vec<f64> {
+pub(super) fn promise_beside(question: &Question, fit: &Fit, windings: &mut [Winding]) {
     let mut start = fit.clone();
     start.calm(&question.fitted);
     let promise = |winding: &Winding| {
@@ -104,5 +116,5 @@ pub(super) fn promises(question: &Question, fit: &Fit, windings: &[Winding]) -> 
         let there = question.chamber.fit(&assumed, &fit.free, &question.fitted, Some(&start), Effort::SHORT);
         there.map_or(f64::NEG_INFINITY, |there| there.posterior() - fit.posterior())
     };
-    windings.par_iter().map(promise).collect()
+    windings.par_iter_mut().for_each(|winding| winding.promised = promise(winding));
 }

@@ -171,8 +171,9 @@ pub(crate) fn set_broken_aside(folder: &Path) -> Result<bool, WriteError> {
     if !path.exists() {
         return Ok(false);
     }
-    let read = std::fs::read_to_string(&path).ok().and_then(|text| serde_json::from_str::<CheckpointJson>(&text).ok());
-    if read.is_some_and(|document| document.is_whole()) {
+    // What cannot be read may be whole.
+    let bytes = std::fs::read(&path).map_err(|source| WriteError::File { path: path.clone(), source })?;
+    if serde_json::from_slice::<CheckpointJson>(&bytes).is_ok_and(|document| document.is_whole()) {
         return Ok(false);
     }
     let aside = folder.join(BROKEN_FILE);

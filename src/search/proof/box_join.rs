@@ -21,6 +21,15 @@ const LANES: usize = 8;
 /// Points at a leaf of a tree.
 const LEAF_BITS: u32 = 3;
 
+/// Where points stand that only fill a tree up: no sum with one of them is within any box.
+const FAR: f32 = f32::MAX / 4.0;
+
+/// Points that are filled in one piece of work.
+const POINTS_AT_ONCE: usize = 256;
+
+/// Of sums that are matched once and not again, so many of a part say which direction is its widest.
+const SAMPLED: usize = 64;
+
 /// 2^b points in a balanced tree of boxes.
 #[derive(Debug)]
 pub(crate) struct Tree {
@@ -65,15 +74,47 @@ impl Tree {
                 *p = v as f32;
             }
         });
-        Self::new(bits, width, &points)
+        Self::new(bits, width, &points, usize::MAX)
     }
 
-    fn new(bits: u32, width: usize, given: &[f32]) -> Self {
+    /// The sums of one vector of each set, added to `start`; a set has its vectors one after the other.
+    ///
+    /// Point number `i` has vector `i mod n` of the first set, which has n, and so on with `i div n` and the next set.
+    pub(crate) fn of_sums(start: &[f64], sets: &[Vec<f64>]) -> Self {
+        let samples = start.len();
+        let width = samples.next_multiple_of(LANES);
+        let count: usize = sets.iter().map(|set| set.len() / samples).product();
+        let bits = count.next_power_of_two().ilog2();
+        let mut points = vec![0.0_f32; width << bits];
+        points.par_chunks_mut(width * POINTS_AT_ONCE).enumerate().for_each(|(chunk, points)| {
+            let mut sum = vec![0.0; samples];
+            for (index, point) in points.chunks_exact_mut(width).enumerate() {
+                let number = chunk * POINTS_AT_ONCE + index;
+                if number >= count {
+                    point.fill(FAR);
+                    continue;
+                }
+                sum.copy_from_slice(start);
+                let mut rest = number;
+                for set in sets {
+                    let vectors = set.len() / samples;
+                    let vector = &set[rest % vectors * samples..(rest % vectors + 1) * samples];
+                    sum.iter_mut().zip(vector).for_each(|(v, d)| *v += d);
+                    rest /= vectors;
+                }
+                point.iter_mut().zip(&sum).for_each(|(p, v)| *p = *v as f32);
+            }
+        });
+        Self::new(bits, width, &points, SAMPLED)
+    }
+
+    /// `measured` points of a part at most say which direction is its widest.
+    fn new(bits: u32, width: usize, given: &[f32], measured: usize) -> Self {
         let count = 1usize << bits;
         let mut names: Vec<u32> = (0..count as u32).collect();
         let levels = bits.saturating_sub(LEAF_BITS);
         for level in 0..levels {
-            names.par_chunks_mut(count >> level).for_each(|part| split_at_median(part, width, given));
+            names.par_chunks_mut(count >> level).for_each(|part| split_at_median(part, width, given, measured));
         }
         let mut points = vec![0.0; given.len()];
         points.par_chunks_mut(width).zip(&names).for_each(|(to, &name)| {
@@ -134,10 +175,10 @@ impl Tree {
 }
 
 /// Puts the half with the smaller coordinates first, along the widest direction.
-fn split_at_median(part: &mut [u32], width: usize, given: &[f32]) {
+fn split_at_median(part: &mut [u32], width: usize, given: &[f32], measured: usize) {
     let mut low = vec![f32::INFINITY; width];
     let mut high = vec![f32::NEG_INFINITY; width];
-    for &name in part.iter() {
+    for &name in part.iter().step_by(part.len().div_ceil(measured)) {
         let point = &given[name as usize * width..(name as usize + 1) * width];
         for ((l, h), p) in low.iter_mut().zip(high.iter_mut()).zip(point) {
             *l = l.min(*p);
@@ -337,6 +378,46 @@ fn point_within(a: &[f32], b: &[f32], target: &Target) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sums_of_sets_of_any_sizes_are_matched_as_corners_are() {
+        let set = |first: usize, vectors: usize| -> Vec<f64> {
+            (0..2 * vectors).map(|i| ((2 * first + i) as f64 * 1.3).sin()).collect()
+        };
+        let (left, right) = ([set(0, 5), set(5, 6)], [set(11, 24)]);
+        let at = |sets: &[Vec<f64>], number: usize, i: usize| -> f64 {
+            let mut rest = number;
+            sets.iter()
+                .map(|set| {
+                    let vectors = set.len() / 2;
+                    let value = set[rest % vectors * 2 + i];
+                    rest /= vectors;
+                    value
+                })
+                .sum()
+        };
+        let start = [0.2, -0.1];
+        let mut expected = Vec::new();
+        for a in 0..30 {
+            for b in 0..24 {
+                if (0..2).all(|i| (start[i] + at(&left, a, i) + at(&right, b, i)).abs() <= 0.3) {
+                    expected.push((a as u32, b as u32));
+                }
+            }
+        }
+        let trees = (Tree::of_sums(&start, &left), Tree::of_sums(&[0.0; 2], &right));
+        let matching = Matching { left: &trees.0, right: &trees.1 };
+        let (mut nodes, mut found) = (0, Vec::new());
+        let _ = matching.visit_all(&Target::new([(-0.3, 0.3); 2].into_iter()), &mut nodes, &mut |step| {
+            if let BoxStep::Match { left, right } = step {
+                found.push((left, right));
+            }
+            ControlFlow::Continue(())
+        });
+        found.sort_unstable();
+        assert!(!expected.is_empty());
+        assert_eq!(found, expected);
+    }
 
     #[test]
     fn every_sum_within_the_box_and_no_other_is_visited_with_fewer_pairs_than_sums() {

@@ -141,6 +141,11 @@ impl<'a> Judge<'a> {
         &self.matrix
     }
 
+    /// Whether patterns bring samples of their own, without end.
+    pub(super) fn is_of_norm(&self) -> bool {
+        matches!(self.of, Largest::Norm(..))
+    }
+
     pub(crate) fn lengths_m(&self) -> &[f64] {
         self.matrix.lengths_m()
     }
@@ -321,6 +326,21 @@ impl<'a> Judge<'a> {
             columns.constant()[s] + coefficients.iter().enumerate().map(|(k, x)| x * columns.column(k)[s]).sum::<f64>()
         };
         samples.iter().map(|&s| at(s)).collect()
+    }
+
+    /// What one layer of a pattern adds at the samples of a selection.
+    pub(super) fn layer_values(&self, selected: &SampleMatrix, segments: &[usize], layer: usize) -> Vec<f64> {
+        let coefficients = self.coefficients_of(segments);
+        let layout = selected.layout;
+        let mut columns = vec![layout.column_a(layer)];
+        if !layout.halves_alike {
+            columns.push(layout.column_b(layer));
+        }
+        if layout.axial {
+            columns.push(layout.column_axial(layer));
+        }
+        let at = |s: usize| columns.iter().map(|&k| coefficients[k] * selected.columns.column(k)[s]).sum();
+        (0..selected.samples()).map(at).collect()
     }
 
     fn coefficients(&self, pattern: &Pattern) -> Vec<f64> {

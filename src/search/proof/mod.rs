@@ -33,12 +33,14 @@ pub(crate) mod compound;
 mod course;
 pub(crate) mod descent;
 pub(crate) mod matrix_game;
+mod neighbourhood;
 pub(crate) mod permutation_tree;
 pub(crate) mod rows;
 mod sampling;
 pub(crate) mod sign_search;
 pub(crate) mod simd_bounds;
 mod starts;
+pub(crate) mod stretches;
 pub(crate) mod support;
 pub(crate) mod surrogates;
 #[cfg(test)]

@@ -3,8 +3,10 @@
 use std::ops::ControlFlow;
 
 use super::compound::compounded;
+use super::stretches::rearranged;
 use super::*;
 use crate::coil::LayerLength;
+use crate::pattern::classic::Classic;
 use crate::search::cost::columns::Norm;
 use crate::search::cost::pointing::{POINTING_S, worst_pointing};
 use crate::search::cost::samples::SampleMatrix;
@@ -263,6 +265,48 @@ fn many_moves_at_once_stay_in_their_class_and_find_what_few_patterns_beat_also_w
             let some: Vec<&Pattern> = all.iter().step_by(all.len().div_ceil(MOST_WEIGHED)).collect();
             let better = some.iter().filter(|p| cost(p) < reached * (1.0 - RELATIVE_TOLERANCE)).count();
             assert!(better <= some.len() / 50, "{class} {effects:?}: {better} of {} are better", some.len());
+        }
+    }
+}
+
+/// What a pattern costs by the reference.
+fn cost_of(task: &Task, pattern: &Pattern) -> f64 {
+    checked_judge(task).unwrap().candidate_and_witness(pattern).unwrap().0.rate_rad_per_s
+}
+
+#[test]
+fn stretches_in_every_order_end_on_the_best_of_every_pattern_of_8_layers_from_a_poor_one() {
+    for effects in [&["surface_film"][..], &["strain_mismatch"], &["midpoint_offset"]] {
+        let model = model(8, LayerLength::Actual, effects);
+        let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
+        let class = WindabilityClass::Any;
+        let task = Task { model: &model, solved: &solved, class, goal: Goal::WorstRate };
+        let start = Pattern::new((1..=8).collect()).unwrap();
+        let found = rearranged(&task, &[start], 1).unwrap();
+        let (reached, smallest) = (cost_of(&task, &found), smallest_by_enumeration(&task));
+        assert!((reached / smallest - 1.0).abs() < 1e-8, "{effects:?}: {reached} {smallest}");
+    }
+}
+
+#[test]
+fn stretches_stay_in_their_class_are_never_worse_than_their_starts_and_the_same_on_any_number_of_threads() {
+    let model = model(12, LayerLength::Actual, &["surface_film"]);
+    let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
+    let step = UnitStep::new(&model, 60.0 / 3600.0).unwrap();
+    let qua = Classic::Qua.pattern(12).unwrap();
+    for class in [WindabilityClass::Captive(1), WindabilityClass::Any] {
+        for goal in [Goal::WorstRate, Goal::Pointing, Goal::RootMeanSquare, Goal::Guaranteed(&step)] {
+            let task = Task { model: &model, solved: &solved, class, goal };
+            let on = |threads: usize| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| rearranged(&task, std::slice::from_ref(&qua), 1).unwrap())
+            };
+            let found = on(1);
+            assert_eq!(found, on(3));
+            assert!(class.admits(&found));
+            let (reached, started) = (cost_of(&task, &found), cost_of(&task, &qua));
+            // From the cheapest winding that shops know there is always a way down where more is allowed.
+            assert!(reached < started, "{class} {goal:?}: {reached} {started}");
         }
     }
 }
