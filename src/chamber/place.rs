@@ -45,6 +45,7 @@ impl Chamber<'_> {
         Ok(Place0 { assumed, numbers, sides, values, courses })
     }
 
+    /// Of one record that was computed for the place.
     pub(super) fn innovations(&self, place: &Place0, record: usize) -> Result<Vec<Innovation>, ChamberError> {
         let (Some(side), Some(values)) = (&place.sides[record], &place.values[record]) else {
             return Err(ChamberError::Unsolvable);
@@ -75,7 +76,7 @@ impl Chamber<'_> {
         self.innovations(&there, record)
     }
 
-    /// Score and information of the likelihood at a place whose innovations are known.
+    /// Derivatives of each record's innovations by its coordinates, at a place whose innovations (`base`) are known.
     pub(super) fn derivatives(
         &self,
         place: &Place0,
