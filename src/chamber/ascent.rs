@@ -96,8 +96,7 @@ impl KnownDerivatives {
         let column = derivatives.parameters.iter().position(|p| *p == own)?;
         (variances.len() == base.len()).then(|| {
             let mut column = derivatives.columns[column].clone();
-            let ratios = variances.iter().zip(base).map(|(before, b)| b.variance / before);
-            column.variance.iter_mut().zip(ratios).for_each(|(d, ratio)| *d *= ratio);
+            carry_variance(&mut column, variances.iter().zip(base).map(|(before, b)| b.variance / before));
             column
         })
     }
@@ -247,12 +246,17 @@ fn slope(derivatives: &[Derivatives], state: &Ascent, parameters: &[Parameter]) 
     (score, information)
 }
 
-/// Takes derivatives along to another place: of variances the relative ones stay.
+/// Takes a variance's derivative along to another place, by what the variance is there of what it was: the relative one stays.
+fn carry_variance(column: &mut DerivativeColumn, ratios: impl Iterator<Item = f64>) {
+    column.variance.iter_mut().zip(ratios).for_each(|(d, ratio)| *d *= ratio);
+}
+
+/// Takes all derivatives along to another place.
 fn carry(derivatives: &mut [Derivatives], from: &[Vec<Innovation>], to: &[Vec<Innovation>]) {
     for ((own, from), to) in derivatives.iter_mut().zip(from).zip(to) {
         let ratios: Vec<f64> = from.iter().zip(to).map(|(a, b)| b.variance / a.variance).collect();
         for column in &mut own.columns {
-            column.variance.iter_mut().zip(&ratios).for_each(|(d, ratio)| *d *= ratio);
+            carry_variance(column, ratios.iter().copied());
         }
     }
 }
