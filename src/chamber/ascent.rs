@@ -140,11 +140,12 @@ impl Chamber<'_> {
         let mut state = self.state(assumed, numbers, parameters, begin, records, courses)?;
         let (mut derivatives, mut is_fresh) = self.derivatives_beside(&state, parameters, records, known)?;
         let (mut taken, mut served, mut failures, mut share) = (usize::from(is_fresh), 0, 0, 1.0);
+        let mut information = information_of(&derivatives, &state, parameters);
         loop {
             if effort.iterations == 0 {
                 break;
             }
-            let (score, information) = slope(&derivatives, &state, parameters);
+            let score = score_of(&derivatives, &state, parameters);
             let step = Step::new(parameters, &state.coordinates, &score, &information, share);
             let next = state.coordinates.iter().zip(step.change.iter()).map(|(x, d)| x + d).collect();
             let there = self.state(&state.place.assumed, &state.place.numbers, parameters, next, records, courses);
@@ -166,10 +167,11 @@ impl Chamber<'_> {
                 }
                 derivatives =
                     self.derivatives(&state.place, parameters, &state.coordinates, records, &state.innovations)?;
+                information = information_of(&derivatives, &state, parameters);
                 (taken, served, failures, is_fresh) = (taken + 1, 0, 0, true);
             }
         }
-        let (_, information) = slope(&derivatives, &state, parameters);
+        let information = information_of(&derivatives, &state, parameters);
         let sensitivities = Some(KnownDerivatives::new(parameters, records, derivatives, &state.innovations));
         Ok(Ascent { information, sensitivities, ..state })
     }
@@ -230,20 +232,24 @@ impl Chamber<'_> {
     }
 }
 
-/// Gradient and information of the posterior.
-fn slope(derivatives: &[Derivatives], state: &Ascent, parameters: &[Parameter]) -> (DVector<f64>, DMatrix<f64>) {
-    let count = parameters.len();
-    let mut score = DVector::zeros(count);
-    let mut information = DMatrix::zeros(count, count);
-    for (own, base) in derivatives.iter().zip(&state.innovations) {
-        own.add_to(base, &mut score, &mut information);
-    }
+/// Gradient of the posterior.
+fn score_of(derivatives: &[Derivatives], state: &Ascent, parameters: &[Parameter]) -> DVector<f64> {
+    let mut score = DVector::zeros(parameters.len());
+    derivatives.iter().zip(&state.innovations).for_each(|(own, base)| own.add_score_to(base, &mut score));
     for (i, p) in parameters.iter().enumerate() {
-        let precision = p.deviation.powi(-2);
-        score[i] -= (state.coordinates[i] - p.mean) * precision;
-        information[(i, i)] += precision;
+        score[i] -= (state.coordinates[i] - p.mean) * p.deviation.powi(-2);
     }
-    (score, information)
+    score
+}
+
+/// Information of the posterior.
+fn information_of(derivatives: &[Derivatives], state: &Ascent, parameters: &[Parameter]) -> DMatrix<f64> {
+    let mut information = DMatrix::zeros(parameters.len(), parameters.len());
+    derivatives.iter().zip(&state.innovations).for_each(|(own, base)| own.add_information_to(base, &mut information));
+    for (i, p) in parameters.iter().enumerate() {
+        information[(i, i)] += p.deviation.powi(-2);
+    }
+    information
 }
 
 /// Takes a variance's derivative along to another place, by what the variance is there of what it was: the relative one stays.

@@ -5,12 +5,13 @@
 pub(super) mod tests {
     use nalgebra::{DMatrix, DVector};
 
+    use crate::chamber::abreast;
     use crate::chamber::filter::{self, Move, System};
     use crate::chamber::kinks::Bend;
     use crate::chamber::point::{CoilSide, Observed};
     use crate::chamber::prior::Quantity;
     use crate::chamber::series::{Origin, Series};
-    use crate::chamber::system::{Numbers, system};
+    use crate::chamber::system::{Numbers, Parts, system};
     use crate::chamber::{Assumption, Chamber, Effort, Free, Input};
     use crate::coil::{Coil, CoilSpec, Fibre, LayerLength};
     use crate::effect::{DeclaredEffect, find};
@@ -179,6 +180,27 @@ pub(super) mod tests {
         check_on(assumed, &if averaged { one_hertz() } else { record(48) }, averaged);
     }
 
+    /// Systems that go abreast find what each finds by itself.
+    fn abreast_is_one_by_one(parts: &Parts, numbers: &Numbers, series: &Series) {
+        let with = |quantity: Quantity, factor: f64| {
+            let mut moved = *numbers;
+            moved.set(quantity, factor * numbers.get(quantity));
+            system(parts, &moved, series)
+        };
+        let systems =
+            [with(Quantity::RateNoise, 1.0), with(Quantity::RipplePeriod, 0.7), with(Quantity::TurbulenceSize, 0.0)];
+        let values = filter::Values { of: series.values.clone() };
+        let found = abreast::forward(&systems, &series.rows, &[&values; 3]);
+        for (own, system) in found.iter().zip(&systems) {
+            let alone = filter::forward(system, &series.rows, &values, false).innovations;
+            assert_eq!(own.len(), alone.len());
+            for (a, b) in own.iter().zip(&alone) {
+                let apart = (a.value - b.value).abs() / b.variance.sqrt();
+                assert!(apart < 1e-8 && (a.variance / b.variance - 1.0).abs() < 1e-8, "{a:?} for {b:?}");
+            }
+        }
+    }
+
     fn check_on(assumed: &Assumption, record: &Record, averaged: bool) {
         let (mut series, mean_k) = observed(&assumed.model, record);
         series.rows[9].kink = 1e-6;
@@ -201,6 +223,7 @@ pub(super) mod tests {
         let exact = -0.5 * (apart.dot(&solved) + determinant + apart.len() as f64 * std::f64::consts::TAU.ln());
         println!("{} measurements, log likelihood {} and {exact}", apart.len(), trace.log_likelihood);
         assert!((trace.log_likelihood - exact).abs() < 1e-8 * exact.abs());
+        abreast_is_one_by_one(&side.parts(assumed), &numbers, &seen.series);
         let inverse = factor.inverse();
         let doubts = filter::doubts(&system, &seen.series.rows, &trace);
         for (i, found) in doubts.values.iter().enumerate() {

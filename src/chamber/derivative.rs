@@ -20,6 +20,14 @@ impl DerivativeColumn {
         let over = |f: fn(&Innovation) -> f64| base.iter().zip(there).map(|(b, t)| (f(t) - f(b)) / step).collect();
         Self { value: over(|i| i.value), variance: over(|i| i.variance) }
     }
+
+    /// Slope of the log likelihood along it.
+    pub(crate) fn score(&self, base: &[Innovation]) -> f64 {
+        let of = |(b, (dv, ds)): (&Innovation, (&f64, &f64))| {
+            (0.5 * ds / b.variance * (b.value * b.value / b.variance - 1.0)) - dv * b.value / b.variance
+        };
+        base.iter().zip(self.value.iter().zip(&self.variance)).map(of).sum()
+    }
 }
 
 /// The derivatives of one record's innovations.
@@ -44,25 +52,19 @@ impl Derivatives {
     }
 
     pub(crate) fn add_to(&self, base: &[Innovation], score: &mut DVector<f64>, information: &mut DMatrix<f64>) {
-        let weighted: Vec<(Vec<f64>, Vec<f64>)> = self
-            .columns
-            .iter()
-            .map(|c| {
-                let value = c.value.iter().zip(base).map(|(d, i)| d / i.variance).collect();
-                let variance = c.variance.iter().zip(base).map(|(d, i)| 0.5 * d / (i.variance * i.variance)).collect();
-                (value, variance)
-            })
-            .collect();
+        self.add_score_to(base, score);
+        self.add_information_to(base, information);
+    }
+
+    pub(crate) fn add_score_to(&self, base: &[Innovation], score: &mut DVector<f64>) {
+        self.parameters.iter().zip(&self.columns).for_each(|(&p, column)| score[p] += column.score(base));
+    }
+
+    pub(crate) fn add_information_to(&self, base: &[Innovation], information: &mut DMatrix<f64>) {
+        let weighted: Vec<WeightedColumn> = self.columns.iter().map(|c| WeightedColumn::new(c, base)).collect();
         for (i, &p) in self.parameters.iter().enumerate() {
-            let (value, variance) = &weighted[i];
-            score[p] += base
-                .iter()
-                .zip(value.iter().zip(variance))
-                .map(|(b, (dv, ds))| -dv * b.value + ds * (b.value * b.value - b.variance))
-                .sum::<f64>();
             for (k, &q) in self.parameters.iter().enumerate().take(i + 1) {
-                let other = &self.columns[k];
-                let sum = dot(value, &other.value) + dot(variance, &other.variance);
+                let sum = weighted[i].dot(&self.columns[k]);
                 information[(p, q)] += sum;
                 if p != q {
                     information[(q, p)] += sum;
@@ -70,28 +72,45 @@ impl Derivatives {
             }
         }
     }
-}
 
-impl Derivatives {
-    /// Score of the last column, and its information with all.
-    pub(crate) fn last_row(&self, base: &[Innovation], size: usize) -> (f64, DVector<f64>) {
-        let mut row = DVector::zeros(size);
-        let mut score = 0.0;
-        if let Some(last) = self.columns.last() {
-            let value: Vec<f64> = last.value.iter().zip(base).map(|(d, i)| d / i.variance).collect();
-            let variance: Vec<f64> =
-                last.variance.iter().zip(base).map(|(d, i)| 0.5 * d / (i.variance * i.variance)).collect();
-            for (b, (dv, ds)) in base.iter().zip(value.iter().zip(&variance)) {
-                score += -dv * b.value + ds * (b.value * b.value - b.variance);
-            }
-            for (&p, column) in self.parameters.iter().zip(&self.columns) {
-                row[p] += dot(&value, &column.value) + dot(&variance, &column.variance);
-            }
-        }
-        (score, row)
+    /// Information of a further column by itself, and with those that there are.
+    pub(crate) fn beside(&self, further: &DerivativeColumn, base: &[Innovation], cross: &mut DVector<f64>) -> f64 {
+        let weighted = WeightedColumn::new(further, base);
+        self.parameters.iter().zip(&self.columns).for_each(|(&p, column)| cross[p] += weighted.dot(column));
+        weighted.dot(further)
     }
 }
 
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+/// A column over the innovations' variances: v'/S and S'/2S².
+struct WeightedColumn {
+    value: Vec<f64>,
+    variance: Vec<f64>,
 }
+
+impl WeightedColumn {
+    fn new(column: &DerivativeColumn, base: &[Innovation]) -> Self {
+        let value = column.value.iter().zip(base).map(|(d, i)| d / i.variance).collect();
+        let variance = column.variance.iter().zip(base).map(|(d, i)| 0.5 * d / (i.variance * i.variance)).collect();
+        Self { value, variance }
+    }
+
+    fn dot(&self, other: &DerivativeColumn) -> f64 {
+        dot(&self.value, &other.value) + dot(&self.variance, &other.variance)
+    }
+}
+
+/// Σ a b, in as many sums at a time as a processor has room for.
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let (a, b) = (a.chunks_exact(SUMS), b.chunks_exact(SUMS));
+    let mut rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();
+    let mut sums = [0.0; SUMS];
+    for (a, b) in a.zip(b) {
+        for i in 0..SUMS {
+            sums[i] += a[i] * b[i];
+        }
+    }
+    sums.iter().for_each(|s| rest += s);
+    rest
+}
+
+const SUMS: usize = 8;

@@ -28,8 +28,8 @@ use super::sparse::{Sparse, Square};
 
 /// Relative change of every S from row to row below which a row counts as settled, and how many of them freeze the gains:
 /// together they cost less than 0.2 of log likelihood on 1 500 rows (a test).
-const SETTLED: f64 = 5e-7;
-const SETTLED_ROWS: usize = 4;
+pub(super) const SETTLED: f64 = 5e-7;
+pub(super) const SETTLED_ROWS: usize = 4;
 
 /// One step of time.
 #[derive(Debug, Clone)]

@@ -28,6 +28,7 @@
 //! Durbin and Koopman, Time Series Analysis by State Space Methods (2012), chapters 4 and 7 (filter, smoother, score); Kass
 //! and Raftery, J. Am. Stat. Assoc. 90 (1995) 773 (Laplace's evidence); Rao, Proc. Camb. Phil. Soc. 44 (1948) 50 (score test).
 
+mod abreast;
 mod ascent;
 mod causal;
 mod course;

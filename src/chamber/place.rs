@@ -2,13 +2,14 @@
 
 use rayon::prelude::*;
 
+use super::abreast;
 use super::derivative::{DerivativeColumn, Derivatives};
-use super::filter::{Innovation, Values};
+use super::filter::{Innovation, System, Values};
 use super::known::Reference;
 use super::parameter::{Parameter, write};
 use super::point::{CoilSide, run};
 use super::prior::Quantity;
-use super::system::Numbers;
+use super::system::{Numbers, system};
 use super::{Assumption, Chamber, ChamberError};
 
 /// All that a likelihood is computed from.
@@ -53,27 +54,31 @@ impl Chamber<'_> {
         Ok(run(side, &place.assumed, &place.numbers[record], &self.observed[record], values))
     }
 
-    /// The innovations of one record with one coordinate moved.
+    /// One record with one coordinate moved.
     fn moved(
         &self,
         place: &Place0,
         parameter: &Parameter,
         coordinate: f64,
         record: usize,
-    ) -> Result<Vec<Innovation>, ChamberError> {
+    ) -> Result<MovedRecord, ChamberError> {
         let mut numbers = place.numbers.clone();
         let mut assumed = place.assumed.clone();
         if !write(std::slice::from_ref(parameter), &[coordinate], &mut assumed, &mut numbers) {
             return Err(ChamberError::Unsolvable);
         }
+        let series = &self.observed[record].series;
         if parameter.leaves_coil() {
-            let (Some(side), Some(values)) = (&place.sides[record], &place.values[record]) else {
-                return Err(ChamberError::Unsolvable);
-            };
-            return Ok(run(side, &place.assumed, &numbers[record], &self.observed[record], values));
+            let Some(side) = &place.sides[record] else { return Err(ChamberError::Unsolvable) };
+            let system = system(&side.parts(&place.assumed), &numbers[record], series);
+            return Ok(MovedRecord { system, values: None });
         }
-        let there = self.place(assumed, numbers, &[record], place.courses)?;
-        self.innovations(&there, record)
+        let mut there = self.place(assumed, numbers, &[record], place.courses)?;
+        let (Some(side), values) = (&there.sides[record], there.values[record].take()) else {
+            return Err(ChamberError::Unsolvable);
+        };
+        let system = system(&side.parts(&there.assumed), &there.numbers[record], series);
+        Ok(MovedRecord { system, values })
     }
 
     /// Derivatives of each record's innovations by its coordinates, at a place whose innovations (`base`) are known.
@@ -85,33 +90,72 @@ impl Chamber<'_> {
         records: &[usize],
         base: &[Vec<Innovation>],
     ) -> Result<Vec<Derivatives>, ChamberError> {
-        let tasks: Vec<(usize, usize)> = (0..records.len())
-            .flat_map(|i| (0..parameters.len()).map(move |p| (i, p)))
-            .filter(|&(i, p)| parameters[p].concerns(records[i]))
-            .collect();
-        let columns: Vec<Result<(usize, usize, DerivativeColumn), ChamberError>> = tasks
-            .into_par_iter()
-            .map(|(i, p)| {
-                let parameter = &parameters[p];
-                let mut step = parameter.step();
-                if coordinates[p] + step > parameter.upper {
-                    step = -step;
-                }
-                let there = self.moved(place, parameter, coordinates[p] + step, records[i]).or_else(|_| {
-                    step = -step;
-                    self.moved(place, parameter, coordinates[p] + step, records[i])
-                })?;
-                Ok((i, p, DerivativeColumn::new(&base[i], &there, step)))
+        let mut tasks: Vec<(usize, Vec<usize>)> = Vec::new();
+        for (i, &record) in records.iter().enumerate() {
+            // What moves the coil takes longer to work out, and may have another number of states.
+            let mut own: Vec<usize> = (0..parameters.len()).filter(|&p| parameters[p].concerns(record)).collect();
+            own.sort_by_key(|&p| parameters[p].leaves_coil());
+            tasks.extend(own.chunks(abreast::LANES).map(|chunk| (i, chunk.to_vec())));
+        }
+        let columns: Vec<Result<Vec<DerivativeColumn>, ChamberError>> = tasks
+            .par_iter()
+            .map(|(i, own)| {
+                let moved: Result<Vec<(f64, MovedRecord)>, ChamberError> = own
+                    .iter()
+                    .map(|&p| self.moved_a_step(place, &parameters[p], coordinates[p], records[*i]))
+                    .collect();
+                let (steps, moved): (Vec<f64>, Vec<MovedRecord>) = moved?.into_iter().unzip();
+                let there = self.innovations_abreast(place, moved, records[*i])?;
+                Ok(there.iter().zip(steps).map(|(t, step)| DerivativeColumn::new(&base[*i], t, step)).collect())
             })
             .collect();
         let mut all: Vec<Derivatives> = (0..records.len()).map(|_| Derivatives::default()).collect();
-        for column in columns {
-            let (i, p, column) = column?;
-            all[i].parameters.push(p);
-            all[i].columns.push(column);
+        for ((i, own), columns) in tasks.into_iter().zip(columns) {
+            all[i].parameters.extend(own);
+            all[i].columns.extend(columns?);
         }
         Ok(all)
     }
+
+    /// One record with one coordinate moved by a step, up or, where that is out of bounds, down; and the step.
+    fn moved_a_step(
+        &self,
+        place: &Place0,
+        parameter: &Parameter,
+        coordinate: f64,
+        record: usize,
+    ) -> Result<(f64, MovedRecord), ChamberError> {
+        let step = if coordinate + parameter.step() > parameter.upper { -parameter.step() } else { parameter.step() };
+        let by = |step: f64| Ok((step, self.moved(place, parameter, coordinate + step, record)?));
+        by(step).or_else(|_| by(-step))
+    }
+
+    /// The innovations of one record by several systems, those of one structure at once.
+    pub(super) fn innovations_abreast(
+        &self,
+        place: &Place0,
+        moved: Vec<MovedRecord>,
+        record: usize,
+    ) -> Result<Vec<Vec<Innovation>>, ChamberError> {
+        let Some(unmoved) = &place.values[record] else { return Err(ChamberError::Unsolvable) };
+        let rows = &self.observed[record].series.rows;
+        let (systems, values): (Vec<System>, Vec<Option<Values>>) =
+            moved.into_iter().map(|m| (m.system, m.values)).unzip();
+        let values: Vec<&Values> = values.iter().map(|v| v.as_ref().unwrap_or(unmoved)).collect();
+        let mut found = Vec::with_capacity(systems.len());
+        while found.len() < systems.len() {
+            let from = found.len();
+            let alike = systems[from..].iter().take_while(|s| s.size == systems[from].size).count();
+            found.extend(abreast::forward(&systems[from..from + alike], rows, &values[from..from + alike]));
+        }
+        Ok(found)
+    }
+}
+
+/// A record's system somewhere beside a place, and its values where they are others there.
+pub(super) struct MovedRecord {
+    pub(super) system: System,
+    pub(super) values: Option<Values>,
 }
 
 pub(super) fn log_likelihood(innovations: &[Innovation]) -> f64 {

@@ -172,13 +172,9 @@ impl Chamber<'_> {
                 let there = self.place(assumed.clone(), fit.numbers.clone(), &fit.records, &fit.courses).ok()?;
                 for (i, &record) in fit.records.iter().enumerate() {
                     let moved = self.innovations(&there, record).ok()?;
-                    let mut joint = derivatives[i].clone();
-                    joint.parameters.push(fitted);
-                    joint.columns.push(DerivativeColumn::new(&base[i], &moved, 1.0));
-                    let (g, row) = joint.last_row(&base[i], fitted + 1);
-                    score += g;
-                    information += row[fitted];
-                    cross += row.rows(0, fitted);
+                    let column = DerivativeColumn::new(&base[i], &moved, 1.0);
+                    score += column.score(&base[i]);
+                    information += derivatives[i].beside(&column, &base[i], &mut cross);
                 }
                 let weights = factor.solve(&cross);
                 let (score, information) = (score - weights.dot(&slope), information - weights.dot(&cross));

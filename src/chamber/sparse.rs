@@ -36,8 +36,9 @@ impl Sparse {
         self.starts.len() - 1
     }
 
+    /// Columns and values of one row's entries.
     #[inline(always)]
-    fn row(&self, row: usize) -> &[(usize, f64)] {
+    pub(crate) fn row(&self, row: usize) -> &[(usize, f64)] {
         &self.entries[self.starts[row]..self.starts[row + 1]]
     }
 
