@@ -50,6 +50,7 @@ mod place;
 mod point;
 pub(crate) mod prior;
 mod readings;
+mod ripple;
 mod row;
 mod score;
 mod scorer;

@@ -196,6 +196,10 @@ impl Parameter {
         matches!(self.place, Place::Quantity { .. })
     }
 
+    pub(super) fn is_quantity(&self, asked: Quantity) -> bool {
+        matches!(self.place, Place::Quantity { quantity, .. } if quantity == asked)
+    }
+
     /// Whether a record's likelihood depends on it.
     pub(super) fn concerns(&self, record: usize) -> bool {
         !matches!(self.place, Place::Quantity { record: Some(own), .. } if own != record)

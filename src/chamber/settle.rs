@@ -269,26 +269,44 @@ impl<'a> Chamber<'a> {
         Ok(peaks(&sizes, beside).filter(|&k| worth(sizes[k])).map(|k| (k, doubts.kinks[k].1)).collect())
     }
 
-    /// The best of several starts, and what it has become.
+    /// The best of several chambers: without a ripple, and with those that each record seems to have beside it.
     pub(super) fn best_start(
         &self,
         assumed: &Assumption,
         free: &[super::Free],
         records: &[usize],
     ) -> Result<Fit, ChamberError> {
-        let mut best: Option<Fit> = None;
-        let base = self.fit(assumed, free, records, None, Effort { iterations: 0, tolerance: 0.0, rounds: 1 })?;
-        let tried: Vec<Result<Fit, ChamberError>> = self
-            .starts(&base)
-            .into_par_iter()
-            .map(|start| self.fit(assumed, free, records, Some(&start), Effort::SHORT))
-            .collect();
-        for fit in tried.into_iter().flatten() {
-            if best.as_ref().is_none_or(|b| fit.posterior() > b.posterior()) {
-                best = Some(fit);
+        let mut base = self.fit(assumed, free, records, None, Effort { iterations: 0, tolerance: 0.0, rounds: 1 })?;
+        base.courses = vec![None; self.records()];
+        let begin_at = |starts: Vec<Fit>| {
+            let fit = |start: Fit| self.fit(assumed, free, records, Some(&start), Effort::QUICK);
+            let fits: Vec<Result<Fit, ChamberError>> = starts.into_par_iter().map(fit).collect();
+            fits.into_iter().flatten().reduce(|best, fit| if fit.posterior() > best.posterior() { fit } else { best })
+        };
+        let with_noise = |noise: &f64| {
+            let mut start = base.clone();
+            for numbers in &mut start.numbers {
+                numbers.set(Quantity::RippleSize, SMALL_RIPPLE_K);
+                numbers.set(Quantity::RateNoise, noise * numbers.get(Quantity::RateNoise));
             }
-        }
-        best.ok_or(ChamberError::Unsolvable)
+            start
+        };
+        let still = begin_at(RATE_NOISES.iter().map(with_noise).collect()).ok_or(ChamberError::Unsolvable)?;
+        let ripples: Result<Vec<_>, ChamberError> = records.iter().map(|&r| self.ripples(&still, r)).collect();
+        let ripples = ripples?;
+        let with_ripple = |rank: usize| {
+            let mut start = still.clone();
+            for (&r, own) in records.iter().zip(&ripples) {
+                let Some(ripple) = own.get(rank).or(own.first()) else { continue };
+                start.numbers[r].set(Quantity::RipplePeriod, ripple.period_s);
+                start.numbers[r].set(Quantity::RippleSize, ripple.size_k);
+                start.numbers[r].set(Quantity::RippleCoherence, Quantity::RippleCoherence.prior().median);
+            }
+            start
+        };
+        let most = ripples.iter().map(Vec::len).max().unwrap_or(0).min(RIPPLES);
+        let rippled = begin_at((0..most).map(with_ripple).collect());
+        Ok(rippled.filter(|fit| fit.posterior() > still.posterior()).unwrap_or(still))
     }
 
     /// As [`Chamber::fit`] from several chambers that differ in their ripple; the best goes on.
@@ -304,29 +322,12 @@ impl<'a> Chamber<'a> {
         let best = self.best_start(assumed, free, records)?;
         self.fit(&best.assumed.clone(), free, records, Some(&best), Effort::FULL)
     }
-
-    fn starts(&self, base: &Fit) -> Vec<Fit> {
-        let mut base = base.clone();
-        base.courses = vec![None; self.records()];
-        let each = |&(period_s, size_k): &(f64, f64)| {
-            let base = &base;
-            RATE_NOISES.iter().map(move |noise| {
-                let mut start = base.clone();
-                for numbers in &mut start.numbers {
-                    numbers.set(Quantity::RipplePeriod, period_s);
-                    numbers.set(Quantity::RippleSize, size_k);
-                    numbers.set(Quantity::RateNoise, noise * numbers.get(Quantity::RateNoise));
-                }
-                start
-            })
-        };
-        RIPPLES.iter().flat_map(each).collect()
-    }
 }
 
-/// Ripples to begin with: period [s] and size [K]; and shares of the noise floor.
-const RIPPLES: [(f64, f64); 4] = [(90.0, 0.08), (160.0, 0.08), (300.0, 0.08), (200.0, 0.005)];
+/// Shares of the noise floor that a fit may begin with, and a ripple that does not lead it [K]; and how many of a record's are tried.
 const RATE_NOISES: [f64; 2] = [1.0, 0.2];
+const SMALL_RIPPLE_K: f64 = 0.005;
+const RIPPLES: usize = 3;
 /// Rows over which one kink may be spread.
 const KINK_ROWS: usize = 3;
 
@@ -355,7 +356,8 @@ mod tests {
         let mut chamber = Chamber::new(&bare, &[&record]).unwrap();
         let base = chamber.best_start(&declared, &[], &[0]).unwrap();
         // By itself the record would rather have its air bend than be straight by a model that is not its own.
-        chamber.place_kinks(&base, 0).unwrap();
+        chamber.observed[0].series.rows.iter_mut().for_each(|row| row.bend = 0.0);
+        chamber.pass_for_kinks(&base, 0).unwrap();
         let base = chamber.fit(&declared, &[], &[0], Some(&base), Effort::QUICK).unwrap();
         let own = Assumption::new(spool, pattern);
         let there = chamber.fit(&own, &[], &[0], Some(&base), Effort::QUICK).unwrap();
