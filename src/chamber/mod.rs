@@ -29,6 +29,7 @@
 //! and Raftery, J. Am. Stat. Assoc. 90 (1995) 773 (Laplace's evidence); Rao, Proc. Camb. Phil. Soc. 44 (1948) 50 (score test).
 
 mod abreast;
+mod adjustment;
 mod ascent;
 mod causal;
 mod course;
@@ -71,6 +72,7 @@ use point::Observed;
 use series::{Origin, Series};
 use system::driven_by_air;
 
+pub(crate) use adjustment::DifferenceVariance;
 pub(crate) use ascent::Effort;
 pub(crate) use causal::{Causal, Surroundings};
 pub(crate) use filter::Innovation;

@@ -42,6 +42,8 @@ pub(crate) struct Explanation {
     pub(crate) held_out: Option<f64>,
     /// What of both is gained in the readings alone, and says nothing of the coil.
     pub(crate) in_readings: f64,
+    /// What its difference from the best is not worth, because the records' air is not quite as it is taken to be.
+    pub(crate) understated: f64,
     pub(crate) probability: f64,
 }
 
@@ -62,7 +64,8 @@ impl Explanation {
             })
             .sum();
         let merit = fit.merit(rates(question.chamber, &fit)) + prior;
-        let mut explanation = Self { members, fit, merit, held_out: None, in_readings: 0.0, probability: 0.0 };
+        let mut explanation =
+            Self { members, fit, merit, held_out: None, in_readings: 0.0, understated: 0.0, probability: 0.0 };
         if explanation.is_beyond_physical() {
             // Whatever it is, it is not what it is called.
             explanation.merit += OUTSIDE.log;
@@ -82,7 +85,12 @@ impl Explanation {
     }
 
     pub(crate) fn total(&self) -> f64 {
-        self.merit + self.held_out.unwrap_or(0.0) - self.in_readings
+        self.merit + self.held_out.unwrap_or(0.0) - self.in_readings + self.understated
+    }
+
+    /// Of all rates, given the readings: what of its total the records say, and not priors and prices.
+    pub(super) fn log_likelihood(&self) -> f64 {
+        self.fit.log_likelihood + self.held_out.unwrap_or(0.0) - self.in_readings
     }
 
     /// Whether something is in it that no known effect explains: a member that says so, an estimate beyond what is physical.
@@ -250,7 +258,7 @@ mod tests {
             fit.coordinates.push(if scale == Scale::Logarithm { value.ln() } else { *value });
         }
         let members = vec![Member::Effect(3)];
-        Explanation { members, fit, merit: 0.0, held_out: None, in_readings: 0.0, probability: 0.0 }
+        Explanation { members, fit, merit: 0.0, held_out: None, in_readings: 0.0, understated: 0.0, probability: 0.0 }
     }
 
     #[test]

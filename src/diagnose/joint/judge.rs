@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::adjust::adjust;
 use super::explanation::{fitted, without};
 use super::odds::{CERTAIN, WINDOW};
 use super::readings::take_off;
@@ -14,11 +15,14 @@ const JUDGED: usize = 8;
 const LOOKED_INTO: usize = 3;
 
 /// Held-out records, posterior masses, and what is as good without some of its members.
+///
+/// # Errors
+/// A set that was fitted and cannot be solved any more.
 #[expect(
     clippy::too_many_lines,
     reason = "the steps of one judgement: each orders or weighs what the step before left"
 )]
-pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mut Vec<Explanation>) {
+pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mut Vec<Explanation>) -> Outcome<()> {
     let order = |list: &mut Vec<Explanation>| {
         list.sort_by(|a, b| b.total().total_cmp(&a.total()).then_with(|| a.key().cmp(&b.key())))
     };
@@ -75,6 +79,8 @@ pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mu
         take_off(question, &declared, explanations);
     }
     order(explanations);
+    adjust(question, explanations)?;
+    order(explanations);
     let top = explanations.first().map_or(0.0, Explanation::total);
     let masses: Vec<f64> = explanations.iter().map(|e| (e.total() - top).exp()).collect();
     let sum: f64 = masses.iter().sum();
@@ -112,6 +118,7 @@ pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mu
         }
     }
     explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(b.total().total_cmp(&a.total())));
+    Ok(())
 }
 
 /// A share of the mass below which nothing is named.

@@ -8,6 +8,7 @@
 //! # Source
 //! Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773; Madigan and Raftery, ibid. 89 (1994) 1535 (Occam's window).
 
+mod adjust;
 mod beside;
 mod explanation;
 mod judge;

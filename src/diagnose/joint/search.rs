@@ -101,7 +101,7 @@ pub(crate) fn search(question: &Question, null: Fit, progress: &(dyn Fn(f64) + S
     let here = Question { chamber: &chamber, ..question.clone() };
     complete(&here, &windings, &best, &mut cache);
     let mut explanations: Vec<Explanation> = cache.into_values().collect();
-    judge(&here, &windings, &mut explanations);
+    judge(&here, &windings, &mut explanations)?;
     progress(1.0);
     Ok(Found { explanations, promised, windings, is_elsewhere })
 }
@@ -119,7 +119,7 @@ pub(crate) fn again(question: &Question, found: Found) -> Outcome<Found> {
             fitted(question, &windings, e.members, &begin, &e.fit, Effort::FULL)
         })
         .collect();
-    judge(question, &windings, &mut explanations);
+    judge(question, &windings, &mut explanations)?;
     let has_declared = explanations.iter().any(|e| e.members.is_empty());
     has_declared
         .then_some(Found { explanations, promised, windings, is_elsewhere: false })
@@ -314,7 +314,15 @@ pub(crate) fn refit_without(question: &Question, from: &Explanation, place: usiz
     members.remove(place);
     let begin = without(question, from, place);
     let fit = question.chamber.fit(&begin.0, &begin.1, &question.fitted, Some(&from.fit), Effort::QUICK).ok()?;
-    Some(Explanation { members, fit, merit: f64::NEG_INFINITY, held_out: None, in_readings: 0.0, probability: 0.0 })
+    Some(Explanation {
+        members,
+        fit,
+        merit: f64::NEG_INFINITY,
+        held_out: None,
+        in_readings: 0.0,
+        understated: 0.0,
+        probability: 0.0,
+    })
 }
 
 /// Leaves out what the rest does not need.
