@@ -145,7 +145,8 @@ impl Chamber<'_> {
         let mut found = Vec::with_capacity(systems.len());
         while found.len() < systems.len() {
             let from = found.len();
-            let alike = systems[from..].iter().take_while(|s| s.size == systems[from].size).count();
+            let alike =
+                systems[from..].iter().take(abreast::LANES).take_while(|s| s.size == systems[from].size).count();
             found.extend(abreast::forward(&systems[from..from + alike], rows, &values[from..from + alike]));
         }
         Ok(found)

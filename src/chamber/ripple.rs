@@ -51,6 +51,7 @@ impl Chamber<'_> {
             .unzip();
         let derivatives = self.derivatives(&place, &parameters, &coordinates, &[record], &base)?;
         let count = parameters.len();
+        // A prior of one deviation on each, so that what the record says nothing of is no matter.
         let (mut slope, mut own) = (DVector::zeros(count), DMatrix::identity(count, count));
         derivatives[0].add_to(&base[0], &mut slope, &mut own);
         let Some(factor) = own.cholesky() else { return Err(ChamberError::Unsolvable) };
