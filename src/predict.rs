@@ -386,7 +386,8 @@ fn integral(times_s: &[f64], rates: &[f64]) -> Vec<f64> {
 const SAME_S: f64 = 1e-6;
 
 impl Course {
-    /// Value and, if asked for, slope at a time; straight on before the first row and behind the last.
+    /// Value and, if asked for, slope at a time; behind the last row straight on, before the first with the slope of the first interval:
+    /// what dies away in it need not have been there before.
     fn at(&self, time_s: f64, values: &mut [f64], slopes: Option<&mut [f64]>) {
         let last = self.times_s.len() - 1;
         let right = self.times_s.partition_point(|&t| t < time_s).clamp(1, last);
@@ -408,7 +409,7 @@ impl Course {
             let (p, q) = (length_s * self.slope(right - 1, j), length_s * self.slope(right, j));
             // Hermite's cubic.
             let (c, d) = (3.0 * (b - a) - 2.0 * p - q, 2.0 * (a - b) + p + q);
-            let slope = (p + inside * (2.0 * c + 3.0 * d * inside)) / length_s;
+            let slope = if x < 0.0 { b - a } else { p + inside * (2.0 * c + 3.0 * d * inside) } / length_s;
             *value = a + inside * (p + inside * (c + d * inside)) + if out { beyond_s * slope } else { 0.0 };
             if let Some(slopes) = slopes.as_deref_mut() {
                 slopes[j] = slope;

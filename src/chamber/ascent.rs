@@ -395,7 +395,8 @@ mod tests {
         ] {
             let apart = known.posterior() - far.posterior();
             println!("{apart}");
-            assert!(apart.abs() < 0.3, "{apart}");
+            // Less than what a fit that ranks sets stops at.
+            assert!(apart.abs() < 0.5, "{apart}");
         }
     }
 

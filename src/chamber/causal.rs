@@ -5,8 +5,7 @@ use super::learned::Learned;
 use super::parameter::Place;
 use super::prior::{PRIORS, Quantity};
 use super::system::{Layout, Numbers, OutputGains, Parts, Shows, driven_by_air, dynamics, places, response};
-use super::{Chamber, FEWEST_MODES, HALF_SPACE_MODES, MODES_PER_ROW, MOST_MODES};
-use crate::thermal::pack::Pack;
+use super::{Chamber, HALF_SPACE_MODES, modes_of_pack};
 use crate::thermal::reduced::Reduced;
 use crate::thermal::{Extent, HeatPath, ThermalError};
 
@@ -136,12 +135,7 @@ impl Causal {
         let own = path.film_w_per_m2_k.unwrap_or(f64::INFINITY);
         let film = if path.film_is_unknown() { surroundings.film_w_per_m2_k } else { own };
         let (driven, skin_s) = driven_by_air(path, film);
-        let modes = if path.extent == Extent::HalfSpace {
-            HALF_SPACE_MODES
-        } else {
-            let slow = Pack::new(&driven)?.decays_per_s().iter().filter(|l| *l * row_s < MODES_PER_ROW).count();
-            slow.clamp(FEWEST_MODES, MOST_MODES)
-        };
+        let modes = if path.extent == Extent::HalfSpace { HALF_SPACE_MODES } else { modes_of_pack(&driven, row_s)? };
         let reduced = Reduced::new(&driven, path.sensors_part(), modes, row_s, LONGEST_S)?;
         let mut outputs = layer_gains.to_vec();
         outputs.resize(reduced.outputs, 0.0);

@@ -26,6 +26,10 @@ pub(crate) struct Bend {
 const REACH_ROWS: usize = 5;
 /// Strides in rows by which kinks are moved: each list one after another, all kinks anew with the next.
 const STRIDES_ROWS: [[f64; 2]; 2] = [[0.5, 0.15], [0.15, 0.05]];
+/// Numbers that were fitted with kinks at wrong times move them less than they should: fits and kinks take turns, at most so often,
+/// while any kink moves by this share of a row.
+const MOST_TURNS: usize = 4;
+const MOVED_ROWS: f64 = 0.02;
 /// A share of a step that counts as none.
 const NO_SHARE: f64 = 1e-3;
 
@@ -37,8 +41,18 @@ impl Chamber<'_> {
     pub(crate) fn settled_in_time(mut self, assumed: &Assumption) -> Result<(Self, Fit), ChamberError> {
         let fit = self.best_start(assumed, &[], &[0])?;
         let fit = self.looked_through(fit, &[0])?;
-        self.time_kinks(&fit, 0)?;
-        let fit = self.fit(assumed, &[], &[0], Some(&fit), Effort::FULL)?;
+        let mut kinks = self.time_kinks(&fit, 0)?;
+        let mut fit = self.fit(assumed, &[], &[0], Some(&fit), Effort::FULL)?;
+        for _ in 1..MOST_TURNS {
+            let before: Vec<f64> = kinks.iter().map(|kink| kink.time_s).collect();
+            kinks = self.move_kinks(&fit, 0, kinks, &STRIDES_ROWS[1..])?;
+            let enough_s = MOVED_ROWS * self.observed[0].series.shortest_s();
+            let stays = |(kink, before_s): (&Bend, &f64)| (kink.time_s - before_s).abs() < enough_s;
+            if kinks.len() == before.len() && kinks.iter().zip(&before).all(stays) {
+                break;
+            }
+            fit = self.fit(assumed, &[], &[0], Some(&fit), Effort::FULL)?;
+        }
         Ok((self, fit))
     }
 
@@ -46,15 +60,27 @@ impl Chamber<'_> {
     ///
     /// # Errors
     /// A model that cannot be solved.
-    pub(crate) fn time_kinks(&mut self, fit: &Fit, record: usize) -> Result<(), ChamberError> {
+    pub(crate) fn time_kinks(&mut self, fit: &Fit, record: usize) -> Result<Vec<Bend>, ChamberError> {
         let windows = self.observed[record].series.widen_kinks();
-        if windows.is_empty() {
-            return Ok(());
-        }
         let slopes = self.slopes(fit, record)?;
+        let times_s = &self.observed[record].series.times_s;
+        let kinks = windows.into_iter().map(|window| centre(times_s, &slopes, window)).collect();
+        self.move_kinks(fit, record, kinks, &STRIDES_ROWS)
+    }
+
+    /// Moves kinks, about where they are so far, to the likelihood's maximum; takes out those that are none.
+    fn move_kinks(
+        &mut self,
+        fit: &Fit,
+        record: usize,
+        mut kinks: Vec<Bend>,
+        strides_rows: &[[f64; 2]],
+    ) -> Result<Vec<Bend>, ChamberError> {
+        if kinks.is_empty() {
+            return Ok(kinks);
+        }
         let mut base = self.observed[record].series.clone();
         base.straighten();
-        let mut kinks: Vec<Bend> = windows.into_iter().map(|window| centre(&base.times_s, &slopes, window)).collect();
         let numbers = self.numbers_for(fit, record);
         let (side, values) = self.side_and_values(fit, record, &numbers)?;
         let likelihood = |kinks: &[Bend]| {
@@ -63,7 +89,7 @@ impl Chamber<'_> {
             filter::forward(&system, &series.rows, &values, false).log_likelihood
         };
         let row_s = base.shortest_s();
-        for strides in STRIDES_ROWS {
+        for strides in strides_rows {
             let (others, here) = (kinks.clone(), likelihood(&kinks));
             kinks.par_iter_mut().enumerate().for_each(|(place, kink)| {
                 let at = |time_s: f64| {
@@ -85,7 +111,7 @@ impl Chamber<'_> {
             }
         }
         self.observed[record].series = base.with_kinks(&kinks);
-        Ok(())
+        Ok(kinks)
     }
 
     /// The air's slope at each row by all measurements \[K/s\].

@@ -21,11 +21,14 @@
 //! A half space, or a pack whose heat capacity is unknown, is driven by its outermost layer, which follows the air with the
 //! time that a film over the pack's capacity would have.
 
+use nalgebra::SMatrix;
+
 use super::discretise::discretise;
 use super::filter::{RATE, Step, System};
 use super::prior::{OFFSET_RAD_PER_S, PRIORS, Quantity, START_APART_K, START_APART_MODES, START_APART_S, START_K};
 use super::series::{Series, Shape};
 use super::sparse::Sparse;
+use super::stationary::followed;
 use crate::numeric::statistics::median;
 use crate::thermal::reduced::Reduced;
 use crate::thermal::{Extent, HeatPath, Location, PackMaterial};
@@ -281,7 +284,7 @@ pub(super) fn system(parts: &Parts, numbers: &Numbers, series: &Series) -> Syste
         keeps[0].push((reading, 1));
         kept.extend(&places[0]);
     }
-    let (mean, covariance) = start(parts, &layout, numbers, series);
+    let (mean, covariance) = start(parts, &layout, &f, numbers, series);
     let square = |q: Quantity| numbers.get(q).powi(2);
     let grid = series.resolution_k.powi(2) / 12.0;
     System {
@@ -412,12 +415,12 @@ fn rotate(f: &mut [f64], n: usize, place: usize, period_s: f64) {
 }
 
 /// Mean and covariance before the first row.
-fn start(parts: &Parts, layout: &Layout, numbers: &Numbers, series: &Series) -> (Vec<f64>, Vec<f64>) {
+fn start(parts: &Parts, layout: &Layout, f: &[f64], numbers: &Numbers, series: &Series) -> (Vec<f64>, Vec<f64>) {
     let n = layout.size;
     let mut mean = vec![0.0; n];
     let rates: Vec<f64> = series.values[RATE].iter().copied().filter(|v| v.is_finite()).collect();
     mean[layout.offset] = median(&rates);
-    let mut covariance = vec![0.0; n * n];
+    let mut covariance = stationary(layout, f, numbers);
     let mut add = |direction: &[f64], size: f64| {
         for i in (0..n).filter(|&i| direction[i] != 0.0) {
             for j in 0..n {
@@ -465,6 +468,22 @@ fn start(parts: &Parts, layout: &Layout, numbers: &Numbers, series: &Series) -> 
         add(&direction, ripple);
     }
     (mean, covariance)
+}
+
+/// What turbulence and ripple have made of pack and sensor.
+fn stationary(layout: &Layout, f: &[f64], numbers: &Numbers) -> Vec<f64> {
+    let square = |q: Quantity| numbers.get(q).powi(2);
+    let (turbulence, ripple) = (square(Quantity::TurbulenceSize), square(Quantity::RippleSize));
+    let driving = [layout.turbulence, layout.ripple, layout.ripple + 1, layout.driver, layout.driver + 1];
+    // As in `start`.
+    let own = SMatrix::from_fn(|a, b| match (a, b) {
+        (0, 0) => turbulence,
+        (3, 3) | (4, 4) => 2.0 * ripple,
+        (1, 1) | (2, 2) | (1, 3) | (3, 1) | (2, 4) | (4, 2) => ripple,
+        _ => 0.0,
+    });
+    let followers: Vec<usize> = layout.skin.into_iter().chain(0..layout.modes).chain(layout.lag).collect();
+    followed(f, layout.size, driving, &own, &followers)
 }
 
 impl System {

@@ -1,8 +1,12 @@
-//! A heat path as a few states: its slowest modes behind the film, everything faster following without delay.
+//! A heat path as a few states: its slowest modes behind the film, and one for all faster ones together.
 //!
 //! ```text
 //! dx_i/dt = λ_i (u − x_i),   T_j = Σ_i a_ji x_i + ρ_j u + T_j^heat(t),   Σ_i a_ji + ρ_j = steady response (1 for a layer)
+//! the last:  a_jf/λ_f = Σ_fast a_ji/λ_i in every row,   λ_f = Σ_j |Σ_fast a_ji/λ_i| / Σ_j |Σ_fast a_ji/λ_i²|
 //! ```
+//!
+//! So each row lags behind a slow drive by exactly what all modes make, and behind a turbulent one by what the fast modes do on
+//! the whole: a coil whose winding cancels its slow modes is left with the fast ones.
 //!
 //! | symbol | meaning | unit | in code |
 //! |---|---|---|---|
@@ -15,8 +19,8 @@
 //! over the times that a record knows.
 //!
 //! # Source
-//! Modal truncation with static residue, as in any text on structural dynamics; the exponentials as in
-//! `thermal::half_space_memory`.
+//! Modal truncation with static residue, as in any text on structural dynamics; moments of what is truncated: Antoulas, Approximation of
+//! Large-Scale Dynamical Systems (2005), chapter 11; the exponentials as in `thermal::half_space_memory`.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -78,16 +82,27 @@ impl Reduced {
         let outputs = rows - usize::from(has_part);
         // What a mode takes away while the drive ramps; where a flange is heated the slowest modes need not matter most.
         let lag = |i: usize| joint.amplitude.column(i).iter().map(|a| a.abs()).sum::<f64>() / pack.decay_per_s[i];
-        let mut kept: Vec<usize> = (0..pack.modes()).collect();
-        kept.sort_by(|&a, &b| lag(b).total_cmp(&lag(a)));
-        kept.truncate(modes);
+        let mut all: Vec<usize> = (0..pack.modes()).collect();
+        all.sort_by(|&a, &b| lag(b).total_cmp(&lag(a)));
+        let (mut kept, fast) = match pack.modes() > modes {
+            true => (all[..modes - 1].to_vec(), all[modes - 1..].to_vec()),
+            false => (all, Vec::new()),
+        };
         kept.sort_unstable();
+        // Σ_fast a_ji/λ_i^power of each row.
+        let moment = |power: i32| {
+            let of = |j: usize| fast.iter().map(|&i| joint.amplitude[(j, i)] / pack.decay_per_s[i].powi(power)).sum();
+            (0..rows).map(of).collect::<Vec<f64>>()
+        };
+        let delays_s = moment(1);
+        let size = |moments: &[f64]| moments.iter().map(|m| m.abs()).sum::<f64>();
+        let together_per_s = size(&delays_s) / size(&moment(2));
         let mut reduced = Self {
             layers: pack.layers,
             outputs,
             part: has_part.then_some(outputs),
             decay_per_s: kept.iter().map(|&i| pack.decay_per_s[i]).collect(),
-            amplitude: Vec::with_capacity(rows * kept.len()),
+            amplitude: Vec::new(),
             residue: joint.steady.as_slice().to_vec(),
             own: (pack.heat.is_some() || pack.start.is_some()).then(|| OwnCourse {
                 decay_per_s: pack.decay_per_s.clone(),
@@ -95,9 +110,11 @@ impl Reduced {
                 start: pack.start.as_ref().map(|start| start.content.clone()),
             }),
         };
-        for j in 0..rows {
-            for &i in &kept {
-                let a = joint.amplitude[(j, i)];
+        reduced.decay_per_s.extend((!fast.is_empty()).then_some(together_per_s));
+        for (j, delay_s) in delays_s.iter().enumerate() {
+            let own = kept.iter().map(|&i| joint.amplitude[(j, i)]);
+            let own = own.chain((!fast.is_empty()).then_some(together_per_s * delay_s));
+            for a in own {
                 reduced.amplitude.push(a);
                 reduced.residue[j] -= a;
             }
@@ -223,6 +240,27 @@ mod tests {
                 let found = ramp * 15.0 / 900.0 + heat[j];
                 assert!((found - exact.temperatures_k(0)[j]).abs() < 1e-4, "{time_s} {j}");
             }
+        }
+    }
+
+    #[test]
+    fn each_row_lags_behind_a_slow_drive_as_with_all_modes() {
+        let mut path = path(Extent::Pack);
+        path.film_w_per_m2_k = Some(25.0);
+        let reduced = |modes: usize| Reduced::new(&path, None, modes, 10.0, 1e4).unwrap();
+        let delays_s = |reduced: &Reduced| -> Vec<f64> {
+            let of = |j: usize| reduced.row(j).iter().zip(&reduced.decay_per_s).map(|(a, l)| a / l).sum();
+            (0..reduced.outputs).map(of).collect()
+        };
+        let all = reduced(usize::MAX);
+        for modes in [3, 6] {
+            let few = reduced(modes);
+            assert_eq!(few.modes(), modes);
+            for (found, exact) in delays_s(&few).iter().zip(delays_s(&all)) {
+                assert!((found / exact - 1.0).abs() < 1e-9, "{found} s for {exact} s");
+            }
+            let steady = |reduced: &Reduced| reduced.row(5).iter().sum::<f64>() + reduced.residue[5];
+            assert!((steady(&few) - steady(&all)).abs() < 1e-12);
         }
     }
 
