@@ -89,14 +89,17 @@ pub(in crate::diagnose) fn discover<'a>(
     // Where a listed set is the answer, leaves nothing, a formula in its place has to do the same for more.
     let is_answer = |e: &Explanation| !e.is_outside() && e.total() > best_listed - NEAR;
     let beside = tools.without_shadows(found, best_listed);
+    let mut is_settled = false;
     if let Some(listed) = listed.filter(|e| is_answer(e)) {
         sets = tools.search(tools.plain(listed), MOST_TERMS, &|share| progress(0.4 * share));
+        let gains = |s: &Set| !s.terms.is_empty() && s.total() > listed.total();
         // A wander takes up a slow term before a term is tried.
         let may_replace = || {
-            tools.may_replace(umbrella(&tools, found, declared), best_listed)
-                || tools.may_replace(tools.plain(declared), best_listed)
+            tools.may_replace(&umbrella(&tools, found, declared), listed)
+                || tools.may_replace(&tools.plain(declared), listed)
         };
-        if sets.len() < 2 && beside.is_none() && !may_replace() {
+        is_settled = !sets.iter().any(gains) && !may_replace();
+        if is_settled && beside.is_none() {
             return Ok(Beyond::Nothing);
         }
     }
@@ -104,14 +107,8 @@ pub(in crate::diagnose) fn discover<'a>(
     if let Some(beside) = beside {
         sets.extend(tools.search(beside, MOST_TERMS, &|_| ()));
     }
-    let beneath = umbrella(&tools, found, declared);
-    let wanders = beneath.explanation.is_outside();
-    sets.extend(tools.search(beneath, MOST_TERMS, &|share| progress(0.4 + 0.4 * share)));
-    let most =
-        |sets: &[Set]| sets.iter().filter(|s| !s.terms.is_empty()).map(Set::total).fold(f64::NEG_INFINITY, f64::max);
-    if wanders && most(&sets) < best_listed + BEATS {
-        // A wander may have taken up a slow term, and the gyro's noise with it: begin without.
-        sets.extend(tools.search(tools.plain(declared), MOST_TERMS, &|_| ()));
+    if !is_settled {
+        sets.extend(tools.beneath(umbrella(&tools, found, declared), declared, best_listed, progress));
     }
     let best_yet = sets.iter().map(Set::total).fold(f64::NEG_INFINITY, f64::max);
     if let Some(listed) = listed.filter(|e| !from_listed && e.total() + BEATS > best_yet) {
@@ -119,7 +116,8 @@ pub(in crate::diagnose) fn discover<'a>(
     }
     sets.retain(|s| !s.terms.is_empty() && s.total().is_finite());
     sets.sort_by(|a, b| b.total().total_cmp(&a.total()));
-    let exchanged = sets.first().map(|best| tools.exchanged(best)).unwrap_or_default();
+    let near = sets.first().filter(|best| best.total() > best_listed - NEAR);
+    let exchanged = near.map(|best| tools.exchanged(best)).unwrap_or_default();
     sets.extend(exchanged.into_iter().filter(|s| s.total().is_finite()));
     sets.sort_by(|a, b| b.total().total_cmp(&a.total()));
     let sets = own_courses::with_own_courses(&tools, sets);

@@ -15,10 +15,10 @@ use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
-use super::NEAR;
 use super::courses::Courses;
 use super::grammar::{Family, Term};
 use super::grounds::{Grounds, Sought};
+use super::{BEATS, NEAR};
 use crate::chamber::{Assumption, Effort, Fit, Input, Scored, Scorer};
 use crate::diagnose::joint::{
     EFFECT, Explanation, Member, Proposal, Question, Readings, Winding, changes_readings, fitted, rates, with, without,
@@ -367,9 +367,36 @@ impl Tools<'_, '_> {
     }
 
     /// Whether one term in the place of all that is listed comes near what the listed effects are worth.
-    pub(crate) fn may_replace(&self, declared: Set, listed: f64) -> bool {
-        let one = self.search(declared, 1, &|_| ());
-        one.iter().any(|set| !set.terms.is_empty() && set.total() > listed - WITHIN_REACH)
+    pub(crate) fn may_replace(&self, declared: &Set, listed: &Explanation) -> bool {
+        let fit = &declared.explanation.fit;
+        let (Ok(scorer), Ok(regression)) = (self.question.chamber.scorer(fit), self.question.chamber.regression(fit))
+        else {
+            return false;
+        };
+        if !declared.explanation.is_outside() && self.most_worth(&scorer, declared) < 0.0 {
+            return false;
+        }
+        let mut sets = self.with_terms(declared, &regression, TRIED);
+        sets.retain(|s| s.merit > listed.merit - WITHIN_REACH);
+        self.foremost(sets).iter().any(|s| s.total() > listed.total() - WITHIN_REACH)
+    }
+
+    /// What is found from what lies beneath a wander; where that is no better than what is listed, from the declared model, too: a wander
+    /// may have taken up a slow term, and the gyro's noise with it.
+    pub(crate) fn beneath(
+        &self,
+        umbrella: Set,
+        declared: &Explanation,
+        best_listed: f64,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Vec<Set> {
+        let wanders = umbrella.explanation.is_outside();
+        let mut sets = self.search(umbrella, MOST_TERMS, &|share| progress(0.4 + 0.4 * share));
+        let is_better = |s: &Set| !s.terms.is_empty() && s.total() >= best_listed + BEATS;
+        if wanders && !sets.iter().any(is_better) {
+            sets.extend(self.search(self.plain(declared), MOST_TERMS, &|_| ()));
+        }
+        sets
     }
 
     /// Forward and back from a set, to so many terms; every set that was fitted and judged, best first.
