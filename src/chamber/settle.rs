@@ -56,21 +56,24 @@ impl<'a> Chamber<'a> {
     pub(super) fn looked_through(&mut self, mut fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
         fit = self.without_gross_errors(fit, records)?;
         for &r in records {
-            // Either the air bends wherever readings do, or it is straight but for its kinks, which must be worth being
-            // looked for: the record itself says which, by itself.
+            // Either the air bends wherever readings do, or it is straight but for its kinks, or it bends from kinks on as a stage that
+            // is switched does. Kinks must be worth being looked for: the record itself says which, by itself.
             let curved = self.fit(&fit.assumed, &[], &[r], Some(&fit), Effort::QUICK)?;
-            let before = self.observed[r].series.clone();
-            self.observed[r].series.rows.iter_mut().for_each(|row| row.bend = 0.0);
+            let bent = self.observed[r].series.clone();
+            let mut straight = bent.clone();
+            straight.rows.iter_mut().for_each(|row| row.bend = 0.0);
             let price = (self.times_s(r).len() as f64).ln();
-            match self.straightened(&curved, r) {
-                Ok(Some((straight, kinks))) if straight.posterior() > curved.posterior() + price * kinks as f64 => {
-                    fit.numbers[r] = straight.numbers[r];
-                }
-                _ => {
-                    self.observed[r].series = before;
-                    fit.numbers[r] = curved.numbers[r];
+            let mut best = (curved.posterior(), curved.numbers[r], bent.clone());
+            for air in [straight, bent] {
+                self.observed[r].series = air;
+                if let Ok(Some((kinked, kinks))) = self.kinked(&curved, r) {
+                    let worth = kinked.posterior() - price * kinks as f64;
+                    if worth > best.0 {
+                        best = (worth, kinked.numbers[r], self.observed[r].series.clone());
+                    }
                 }
             }
+            (fit.numbers[r], self.observed[r].series) = (best.1, best.2);
         }
         Ok(fit)
     }
@@ -122,9 +125,9 @@ impl<'a> Chamber<'a> {
         Ok(found)
     }
 
-    /// Finds the kinks of a record whose air is straight but for them, and the fit with them; None where there are so many
-    /// that it is all curves.
-    fn straightened(&mut self, fit: &Fit, record: usize) -> Result<Option<(Fit, usize)>, ChamberError> {
+    /// Finds the kinks that a record's air has beside what bends in it, and the fit with them; None where there are so many that it is
+    /// all curves.
+    fn kinked(&mut self, fit: &Fit, record: usize) -> Result<Option<(Fit, usize)>, ChamberError> {
         // Numbers that were fitted to a straight air without its kinks take kinks for noise; those of an air that bends take, where the
         // coil is not that of the model, what the coil does for kinks.
         let unbent = self.observed[record].series.clone();
@@ -134,7 +137,7 @@ impl<'a> Chamber<'a> {
         };
         for day in [fit.clone(), self.fit(&fit.assumed, &[], &[record], Some(fit), Effort::SHORT)?] {
             self.observed[record].series = unbent.clone();
-            let Some((straight, kinks)) = self.straightened_from(day, record)? else { continue };
+            let Some((straight, kinks)) = self.kinked_from(day, record)? else { continue };
             let found = (straight, kinks, self.observed[record].series.clone());
             if best.as_ref().is_none_or(|b| worth(&found) > worth(b)) {
                 best = Some(found);
@@ -147,7 +150,7 @@ impl<'a> Chamber<'a> {
     }
 
     /// The same by the numbers of one day.
-    fn straightened_from(&mut self, mut day: Fit, record: usize) -> Result<Option<(Fit, usize)>, ChamberError> {
+    fn kinked_from(&mut self, mut day: Fit, record: usize) -> Result<Option<(Fit, usize)>, ChamberError> {
         let rows = self.times_s(record).len();
         let mut count = 0;
         for _ in 0..KINK_ROUNDS {

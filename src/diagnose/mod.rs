@@ -382,8 +382,10 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
         depth: MOST_MEMBERS,
     };
     let found = joint::search(&question, null, &|share| progress(0.5 * share))?;
-    // Gross errors and kinks were those of the declared model: now those of the best.
-    let best = found.explanations.first().filter(|e| !e.members.is_empty()).map(|e| e.fit.clone());
+    // Gross errors and kinks were those of the declared model: now those of the best. Where that is the declared model after all, but
+    // found among the kinks of another, they are those that it has by what it was found to be there.
+    let best =
+        found.explanations.first().filter(|e| !e.members.is_empty() || found.is_elsewhere).map(|e| e.fit.clone());
     let again = match best {
         Some(fit) => Some(Chamber::new(request.model, &records)?.settled_from(fit, &question.fitted)?.0),
         None => None,
@@ -391,10 +393,6 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
     let (question, found) = match &again {
         Some(chamber) => {
             let question = Question { chamber, ..question };
-            let found = joint::again(&question, found)?;
-            (question, found)
-        }
-        None if found.is_elsewhere => {
             let found = joint::again(&question, found)?;
             (question, found)
         }
