@@ -377,7 +377,7 @@ mod tests {
         let chamber = Chamber::new(&bare, &[&record]).unwrap();
         let top = chamber.fit_anew(&Assumption::new(bare, pattern.clone()), &[], &[0]).unwrap();
         let with_effect = Assumption::new(model(vec![effect("strain_mismatch", &[0.001])]), pattern);
-        let free = [Free { effect: 0, parameter: 0, stated_within: None, deviation: None }];
+        let free = [Free { effect: 0, parameter: 0, stated: None, deviation: None }];
         let reached = |change: &dyn Fn(&mut crate::chamber::Fit)| {
             let mut start = top.clone();
             change(&mut start);

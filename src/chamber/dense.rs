@@ -352,7 +352,7 @@ pub(super) mod tests {
             follows: Vec::new(),
         };
         let assumed = Assumption { inputs: vec![input], ..Assumption::new(model, dip()) };
-        let free = [Free { effect: 0, parameter: 0, stated_within: None, deviation: None }];
+        let free = [Free { effect: 0, parameter: 0, stated: None, deviation: None }];
         let fit =
             chamber.fit(&assumed, &free, &[0], None, Effort { iterations: 0, tolerance: 0.0, rounds: 1 }).unwrap();
         let place = chamber.place(fit.assumed.clone(), fit.numbers.clone(), &[0], &fit.courses).unwrap();

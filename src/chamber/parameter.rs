@@ -29,12 +29,20 @@ pub(crate) enum Place {
 pub(crate) struct Free {
     pub(crate) effect: usize,
     pub(crate) parameter: usize,
-    /// Some: the model states the value, which is wrong by this share at the most (one standard deviation); None: the
-    /// prior is that of the effect's description.
-    pub(crate) stated_within: Option<f64>,
+    /// What the model states of it; None: the prior is that of the effect's description.
+    pub(crate) stated: Option<Stated>,
     /// Of a number whose unit is a logged column's, so that no description knows how large it may be: the prior's standard deviation
     /// about zero; SI.
     pub(crate) deviation: Option<f64>,
+}
+
+/// A number that a model states.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Stated {
+    /// SI; not what a fit has made of it since.
+    pub(crate) value: f64,
+    /// The share that it is wrong by: one standard deviation.
+    pub(crate) within: f64,
 }
 
 impl Free {
@@ -42,12 +50,7 @@ impl Free {
     pub(crate) fn again(effect: usize, parameter: usize, fitted: &DeclaredEffect) -> Self {
         let is_per_unit = fitted.spec().parameters.get(parameter).is_some_and(|p| p.unit == Unit::DegPerHourPerUnit);
         let deviation = STARTS * fitted.values()[parameter].abs();
-        Self {
-            effect,
-            parameter,
-            stated_within: None,
-            deviation: (is_per_unit && deviation > 0.0).then_some(deviation),
-        }
+        Self { effect, parameter, stated: None, deviation: (is_per_unit && deviation > 0.0).then_some(deviation) }
     }
 }
 
@@ -124,11 +127,11 @@ impl Parameter {
             let (lower, upper) = (declared.lower.ln(), declared.upper.ln());
             Self { place, scale: Scale::Logarithm, mean, deviation, lower, upper }
         };
-        if let Some(share) = free.stated_within {
+        if let Some(Stated { value, within }) = free.stated {
             return if declared.lower > 0.0 {
-                logarithm(value.ln(), share)
+                logarithm(value.ln(), within)
             } else {
-                linear(value, (share * value.abs()).max(1e-3 * STARTS * value.abs().max(f64::MIN_POSITIVE)))
+                linear(value, (within * value.abs()).max(1e-3 * STARTS * value.abs().max(f64::MIN_POSITIVE)))
             };
         }
         if let Some(deviation) = free.deviation {
@@ -247,4 +250,18 @@ pub(super) fn write(
         }
     }
     true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::find;
+
+    #[test]
+    fn what_a_model_states_is_the_prior_whatever_a_fit_has_made_of_it() {
+        let fitted = DeclaredEffect::new(find("surface_film").unwrap(), vec![17.4], vec![]).unwrap();
+        let stated = Some(Stated { value: 12.4, within: 0.25 });
+        let parameter = Parameter::of_effect(&fitted, &Free { effect: 0, parameter: 0, stated, deviation: None });
+        assert_eq!((parameter.mean, parameter.deviation), (12.4f64.ln(), 0.25));
+    }
 }

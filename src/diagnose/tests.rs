@@ -9,7 +9,7 @@ use super::*;
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::rate::RateModel;
 use crate::thermal::exposure::expose;
-use crate::thermal::{Instant, solve};
+use crate::thermal::{Instant, Location, solve};
 use crate::units::REFERENCE_TEMPERATURE_K;
 
 fn gaussian(seed: u64) -> impl FnMut(f64) -> f64 {
@@ -69,6 +69,26 @@ fn what_only_the_hold_out_shows_is_found() {
     assert!(first.holdout_rmse_rad_per_s.unwrap() > 1.2 * last.holdout_rmse_rad_per_s.unwrap());
     assert!(first.rmse_rad_per_s < 1.1 * last.rmse_rad_per_s);
     assert!(!says(&asked(&wild, &gentle)));
+}
+
+#[test]
+fn a_declared_film_that_is_wrong_is_said_with_what_it_is() {
+    let behind = |film: f64| {
+        let effects = vec![effect("surface_film", &[film])];
+        CoilModel { location: Location::Ambient, ..model(effects) }
+    };
+    let (records, holdout) = ([bare_day(&behind(25.0), 20.0, 1)], [bare_day(&behind(25.0), 15.0, 2)]);
+    let (declared, pattern) = (behind(16.0), pattern());
+    let terms = Terms::None;
+    let request = Request { model: &declared, pattern: &pattern, records: &records, holdout: &holdout, terms };
+    let found = diagnose(&request, &|_| ()).unwrap();
+    println!("{:?} {:?}", found.verdict, found.refitted);
+    assert_eq!((found.verdict, found.effects.len(), found.refitted.len()), (Verdict::Missing, 0, 1));
+    let film = &found.refitted[0];
+    assert_eq!((film.kind.as_str(), film.declared), ("surface_film", 16.0));
+    // Kinks between rows hold it back by some per cent.
+    assert!((film.value / 25.0 - 1.0).abs() < 0.1, "{}", film.value);
+    assert!(film.value - film.declared > 5.0 * film.standard_error.unwrap());
 }
 
 /// A day whose rate wanders by 6e-7 rad/s rms, forgotten after `time_constant_s`.

@@ -287,7 +287,7 @@ mod tests {
             held_out: Vec::new(),
             depth: 1,
         };
-        let free = [Free { effect: 0, parameter: 0, stated_within: None, deviation: None }];
+        let free = [Free { effect: 0, parameter: 0, stated: None, deviation: None }];
         let mut fit = chamber.fit_anew(&Assumption::new(with.clone(), pattern.clone()), &free, &[0]).unwrap();
         let lag_s = |lag: f64, fit: &mut Fit| fit.assumed.model.effects[0] = effect("sensor_lag", &[lag]);
         lag_s(60.0, &mut fit);

@@ -2,7 +2,7 @@
 
 use super::odds::{EFFECT, KNOWN_WITHIN, OUTSIDE, PHYSICAL, REFITTED, STATED_WITHIN, STEP};
 use super::{Question, Winding, rates};
-use crate::chamber::{Assumption, Effort, Fit, Free, Input, Parameter, Place, Scale, is_factor};
+use crate::chamber::{Assumption, Effort, Fit, Free, Input, Parameter, Place, Scale, Stated, is_factor};
 use crate::effect::DeclaredEffect;
 
 /// One thing that a set assumes beside the declared model.
@@ -165,16 +165,17 @@ pub(in crate::diagnose) fn with(
             free.extend(candidate.free.iter().map(|&parameter| Free {
                 effect: effect_place,
                 parameter,
-                stated_within: None,
+                stated: None,
                 deviation: candidate.deviation,
             }));
         }
         Member::Refitted(effect) => {
-            let parameters = assumed.model.effects[effect].values().iter().enumerate();
-            free.extend(parameters.filter(|(_, v)| **v != 0.0).map(|(parameter, _)| Free {
+            let stated = |value: f64| Some(Stated { value, within: STATED_WITHIN });
+            let parameters = question.model.effects[effect].values().iter().enumerate();
+            free.extend(parameters.filter(|(_, v)| **v != 0.0).map(|(parameter, &value)| Free {
                 effect,
                 parameter,
-                stated_within: Some(STATED_WITHIN),
+                stated: stated(value),
                 deviation: None,
             }));
         }
