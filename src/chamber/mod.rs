@@ -85,7 +85,7 @@ pub(crate) use known::Reference;
 pub(crate) use learned::{Estimate, Learned};
 pub(crate) use long::MOST_ROWS_FITTED;
 pub(crate) use noise::{Noise, Remedy};
-pub(crate) use parameter::{Free, Parameter, Place, Scale, Stated, is_factor};
+pub(crate) use parameter::{Free, Parameter, Place, Scale, StatedNumber, is_factor};
 pub(crate) use prior::{BREAK_K2_PER_S2, BREAKS_PER_S, PRIORS, Quantity};
 pub(crate) use readings::Told;
 pub(crate) use score::Column;

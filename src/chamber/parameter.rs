@@ -30,7 +30,7 @@ pub(crate) struct Free {
     pub(crate) effect: usize,
     pub(crate) parameter: usize,
     /// What the model states of it; None: the prior is that of the effect's description.
-    pub(crate) stated: Option<Stated>,
+    pub(crate) stated: Option<StatedNumber>,
     /// Of a number whose unit is a logged column's, so that no description knows how large it may be: the prior's standard deviation
     /// about zero; SI.
     pub(crate) deviation: Option<f64>,
@@ -38,7 +38,7 @@ pub(crate) struct Free {
 
 /// A number that a model states.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Stated {
+pub(crate) struct StatedNumber {
     /// SI; not what a fit has made of it since.
     pub(crate) value: f64,
     /// The share that it is wrong by: one standard deviation.
@@ -127,7 +127,7 @@ impl Parameter {
             let (lower, upper) = (declared.lower.ln(), declared.upper.ln());
             Self { place, scale: Scale::Logarithm, mean, deviation, lower, upper }
         };
-        if let Some(Stated { value, within }) = free.stated {
+        if let Some(StatedNumber { value, within }) = free.stated {
             return if declared.lower > 0.0 {
                 logarithm(value.ln(), within)
             } else {
@@ -260,7 +260,7 @@ mod tests {
     #[test]
     fn what_a_model_states_is_the_prior_whatever_a_fit_has_made_of_it() {
         let fitted = DeclaredEffect::new(find("surface_film").unwrap(), vec![17.4], vec![]).unwrap();
-        let stated = Some(Stated { value: 12.4, within: 0.25 });
+        let stated = Some(StatedNumber { value: 12.4, within: 0.25 });
         let parameter = Parameter::of_effect(&fitted, &Free { effect: 0, parameter: 0, stated, deviation: None });
         assert_eq!((parameter.mean, parameter.deviation), (12.4f64.ln(), 0.25));
     }

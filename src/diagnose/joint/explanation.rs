@@ -2,7 +2,7 @@
 
 use super::odds::{EFFECT, KNOWN_WITHIN, OUTSIDE, PHYSICAL, REFITTED, STATED_WITHIN, STEP};
 use super::{Question, Winding, rates};
-use crate::chamber::{Assumption, Effort, Fit, Free, Input, Parameter, Place, Scale, Stated, is_factor};
+use crate::chamber::{Assumption, Effort, Fit, Free, Input, Parameter, Place, Scale, StatedNumber, is_factor};
 use crate::effect::DeclaredEffect;
 
 /// One thing that a set assumes beside the declared model.
@@ -170,7 +170,7 @@ pub(in crate::diagnose) fn with(
             }));
         }
         Member::Refitted(effect) => {
-            let stated = |value: f64| Some(Stated { value, within: STATED_WITHIN });
+            let stated = |value: f64| Some(StatedNumber { value, within: STATED_WITHIN });
             let parameters = question.model.effects[effect].values().iter().enumerate();
             free.extend(parameters.filter(|(_, v)| **v != 0.0).map(|(parameter, &value)| Free {
                 effect,
