@@ -59,7 +59,8 @@ impl Chamber<'_> {
         }
         let has_kinks = stretch.observed[0].series.rows.iter().any(|row| row.kink > 0.0);
         if has_kinks {
-            self.place_kinks(&fit, 0)?;
+            let bends = stretch.observed[0].series.rows.iter().any(|row| row.bend > 0.0);
+            self.place_kinks(&fit, 0, bends)?;
         }
         settle(self, &mut fit)?;
         Ok(fit)

@@ -62,15 +62,13 @@ impl<'a> Chamber<'a> {
             let bent = self.observed[r].series.clone();
             let mut straight = bent.clone();
             straight.rows.iter_mut().for_each(|row| row.bend = 0.0);
-            let price = (self.times_s(r).len() as f64).ln();
             let mut best = (curved.posterior(), curved.numbers[r], bent.clone());
             for air in [straight, bent] {
                 self.observed[r].series = air;
-                if let Ok(Some((kinked, kinks))) = self.kinked(&curved, r) {
-                    let worth = kinked.posterior() - price * kinks as f64;
-                    if worth > best.0 {
-                        best = (worth, kinked.numbers[r], self.observed[r].series.clone());
-                    }
+                if let Ok(Some((kinked, worth))) = self.kinked(&curved, r)
+                    && worth > best.0
+                {
+                    best = (worth, kinked.numbers[r], self.observed[r].series.clone());
                 }
             }
             (fit.numbers[r], self.observed[r].series) = (best.1, best.2);
@@ -125,27 +123,25 @@ impl<'a> Chamber<'a> {
         Ok(found)
     }
 
-    /// Finds the kinks that a record's air has beside what bends in it, and the fit with them; None where there are so many that it is
-    /// all curves.
-    fn kinked(&mut self, fit: &Fit, record: usize) -> Result<Option<(Fit, usize)>, ChamberError> {
+    /// Finds the kinks that a record's air has beside what bends in it, the fit with them, and its log posterior less what they cost; None
+    /// where there are so many that it is all curves.
+    fn kinked(&mut self, fit: &Fit, record: usize) -> Result<Option<(Fit, f64)>, ChamberError> {
         // Numbers that were fitted to a straight air without its kinks take kinks for noise; those of an air that bends take, where the
         // coil is not that of the model, what the coil does for kinks.
-        let unbent = self.observed[record].series.clone();
-        let mut best: Option<(Fit, usize, Series)> = None;
-        let worth = |(fit, kinks, series): &(Fit, usize, Series)| {
-            fit.posterior() - (series.times_s.len() as f64).ln() * *kinks as f64
-        };
+        let before = self.observed[record].series.clone();
+        let price = (before.times_s.len() as f64).ln();
+        let mut best: Option<(Fit, f64, Series)> = None;
         for day in [fit.clone(), self.fit(&fit.assumed, &[], &[record], Some(fit), Effort::SHORT)?] {
-            self.observed[record].series = unbent.clone();
-            let Some((straight, kinks)) = self.kinked_from(day, record)? else { continue };
-            let found = (straight, kinks, self.observed[record].series.clone());
-            if best.as_ref().is_none_or(|b| worth(&found) > worth(b)) {
-                best = Some(found);
+            self.observed[record].series = before.clone();
+            let Some((kinked, kinks)) = self.kinked_from(day, record)? else { continue };
+            let worth = kinked.posterior() - price * kinks as f64;
+            if best.as_ref().is_none_or(|b| worth > b.1) {
+                best = Some((kinked, worth, self.observed[record].series.clone()));
             }
         }
-        Ok(best.map(|(fit, kinks, series)| {
+        Ok(best.map(|(fit, worth, series)| {
             self.observed[record].series = series;
-            (fit, kinks)
+            (fit, worth)
         }))
     }
 
@@ -169,11 +165,14 @@ impl<'a> Chamber<'a> {
         Ok(Some((day, count)))
     }
 
-    /// Places the kinks of a record's readings by numbers that are known, if it has any and is not all curves.
-    pub(super) fn place_kinks(&mut self, fit: &Fit, record: usize) -> Result<(), ChamberError> {
+    /// Places the kinks of a record's readings by numbers that are known, if it has any and is not all curves; `bends`: air may bend
+    /// behind them.
+    pub(super) fn place_kinks(&mut self, fit: &Fit, record: usize, bends: bool) -> Result<(), ChamberError> {
         let before = self.observed[record].series.clone();
         let rows = before.rows.len();
-        self.observed[record].series.rows.iter_mut().for_each(|row| row.bend = 0.0);
+        if !bends {
+            self.observed[record].series.rows.iter_mut().for_each(|row| row.bend = 0.0);
+        }
         let mut count = 0;
         for _ in 0..KINK_ROUNDS * KINK_PASSES {
             let new = self.kinks(fit, record)?;
@@ -190,7 +189,7 @@ impl<'a> Chamber<'a> {
     }
 
     /// The same chamber with the kinks of its straight air where the readings have them by this fit, the fit there, and what
-    /// the kinks that each record has more cost in log prior; None where no air is straight.
+    /// the kinks that each record has more cost in log prior; None where no air has any.
     ///
     /// # Errors
     /// As [`Chamber::fit`].

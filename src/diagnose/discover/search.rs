@@ -344,14 +344,18 @@ impl Tools<'_, '_> {
         sets
     }
 
+    /// Whether a set leaves anything, asked beneath the wander that was fitted; what it is, is asked without it. Where the gyro wanders more
+    /// than gyros do there is something, and a slow term looks like that wander until it is fitted.
+    fn leaves_anything(&self, scorer: &Scorer, set: &Set) -> bool {
+        set.explanation.is_outside() || self.most_worth(scorer, set) >= 0.0
+    }
+
     /// The next sets from one, best first; all of them were fitted. None beyond the set itself is worth more: empty.
     pub(crate) fn onwards(&self, set: &Set) -> Vec<Set> {
         let fit = &set.explanation.fit;
         let chamber = self.question.chamber;
         let (Ok(scorer), Ok(regression)) = (chamber.scorer(fit), chamber.regression(fit)) else { return Vec::new() };
-        // Whether there is anything is asked beneath the wander that was fitted, what it is without it. Where the gyro wanders more than gyros
-        // do there is something, and a slow term looks like that wander until it is fitted.
-        let is_anything = set.explanation.is_outside() || self.most_worth(&scorer, set) >= 0.0;
+        let is_anything = self.leaves_anything(&scorer, set);
         if !is_anything && set.terms.is_empty() {
             return Vec::new();
         }
@@ -373,7 +377,7 @@ impl Tools<'_, '_> {
         else {
             return false;
         };
-        if !declared.explanation.is_outside() && self.most_worth(&scorer, declared) < 0.0 {
+        if !self.leaves_anything(&scorer, declared) {
             return false;
         }
         let mut sets = self.with_terms(declared, &regression, TRIED);

@@ -170,12 +170,11 @@ pub(in crate::diagnose) fn with(
             }));
         }
         Member::Refitted(effect) => {
-            let stated = |value: f64| Some(StatedNumber { value, within: STATED_WITHIN });
             let parameters = question.model.effects[effect].values().iter().enumerate();
             free.extend(parameters.filter(|(_, v)| **v != 0.0).map(|(parameter, &value)| Free {
                 effect,
                 parameter,
-                stated: stated(value),
+                stated: Some(StatedNumber { value, within: STATED_WITHIN }),
                 deviation: None,
             }));
         }
