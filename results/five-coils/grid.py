@@ -1,6 +1,6 @@
 """Every objective and class on five coils with several seeds, each result as a line of JSON.
 
-    python grid.py COILWRIGHT c12,c16,c24,c32,c48 1,2 OUT.jsonl
+    python grid.py COILWRIGHT c12,c16,c24,c32,c48 1,2 OUT.jsonl [OBJECTIVE,…]
     python table.py OUT.jsonl
 """
 import json
@@ -33,7 +33,8 @@ def processor_s():
 
 
 def main():
-    program, names, seeds, out = sys.argv[1:]
+    program, names, seeds, out = sys.argv[1:5]
+    objectives = sys.argv[5].split(",") if len(sys.argv) > 5 else OBJECTIVES
     folder = tempfile.mkdtemp()
     for name in names.split(","):
         path = os.path.join(folder, f"{name}.toml")
@@ -42,7 +43,7 @@ def main():
         tolerance = TOLERANCE if "surface_film" in text else TOLERANCE.replace("film_percent_sd = 10.0\n", "")
         open(path, "w").write(text.replace("[search]", tolerance + "\n[search]"))
         for windability in CLASSES:
-            for objective in OBJECTIVES:
+            for objective in objectives:
                 for seed in seeds.split(","):
                     before_s = processor_s()
                     asked = ["--windability", windability, "--objective", objective, "--seed", seed, "--format", "json"]
@@ -53,6 +54,7 @@ def main():
                     row = {k: v for k, v in answer["best"].items() if isinstance(v, (int, float))}
                     row.update(coil=name, cls=windability, obj=objective, seed=int(seed))
                     row.update(segments=answer["best"]["segments"], gain=answer["improvement_over_qua"])
+                    row.update(resolution=answer.get("rate_resolution") or answer.get("pointing_resolution"))
                     row.update(by=answer["best_found"]["by"], rounds=answer["rounds"], stopped=answer["stopped_by"])
                     row.update(cpu=processor_s() - before_s)
                     with open(out, "a") as file:

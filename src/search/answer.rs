@@ -1,7 +1,7 @@
 //! What a search answers: the best pattern beside the classics, what is known about it, and what to wind.
 
 use super::anneal::rounds::{State, Stop};
-use super::aside::{GridCheck, PointingResolution};
+use super::aside::{GridCheck, Resolution};
 use super::end_turns::BestEndTurns;
 use super::evaluator::{Judged, name_of};
 use super::optimality::Proof;
@@ -101,8 +101,8 @@ pub struct Answer {
     pub statement: String,
     /// None where the temperature has no grid or the search was interrupted.
     pub(crate) grid_check: Option<GridCheck>,
-    /// None unless the search was for the pointing error.
-    pub(crate) resolution: Option<PointingResolution>,
+    /// None where the search was interrupted.
+    pub(crate) resolution: Option<Resolution>,
     /// None where no former pattern was given.
     pub(crate) compared_with: Option<Former>,
     pub(crate) proof: Proof,

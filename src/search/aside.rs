@@ -7,6 +7,8 @@ use crate::search::cost::objective::Objective;
 use crate::search::cost::pointing::{EndlessRamp, POINTING_S, largest_change_rad, worst_pointing};
 use crate::search::cost::tolerance::with_middle_moved;
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
+use crate::search::evaluator::Judged;
+use crate::search::weighing::TIE;
 use crate::units::{mm_from_m, percent_from_fraction};
 
 /// A worst rate that a finer grid changes by more than this is not to be relied upon.
@@ -78,32 +80,47 @@ pub(crate) struct PointingError {
     pub(crate) guaranteed_rad: Option<f64>,
 }
 
-/// By how much pointing errors must differ to be different in a coil that is wound.
+/// By how much the objective of two patterns must differ to be different in a coil that is wound.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PointingResolution {
+pub(crate) struct Resolution {
     /// Between the middle of the fibre and that of the coil: the fibre's diameter \[m\].
     pub(crate) offset_m: f64,
-    /// What that adds to the best pattern's ψ at most, over all profiles and times.
-    pub(crate) error_rad: f64,
+    /// What that changes at most over all profiles and times: the best pattern's rate error, or its pointing error as the rate
+    /// that makes it in one hour; of the rms error, the rms of that change.
+    pub(crate) change_rad_per_s: f64,
 }
 
-impl PointingResolution {
+impl Resolution {
     /// # Errors
     /// A pattern of another layer count.
-    pub(crate) fn of(model: &CoilModel, solved: &SolvedProfiles, pattern: &Pattern) -> Result<Self, SearchError> {
+    pub(crate) fn of(
+        objective: Objective,
+        model: &CoilModel,
+        solved: &SolvedProfiles,
+        pattern: &Pattern,
+    ) -> Result<Self, SearchError> {
         let offset_m = model.coil.fibre().outer_diameter_m;
         let moved = with_middle_moved(model, offset_m);
-        Ok(Self { offset_m, error_rad: largest_change_rad(model, &moved, solved, pattern)? })
+        let change_rad_per_s = if objective == Objective::Pointing {
+            largest_change_rad(model, &moved, solved, pattern)? / POINTING_S
+        } else {
+            objective.change_rad_per_s([model, &moved], solved, pattern)?
+        };
+        Ok(Self { offset_m, change_rad_per_s })
     }
 
-    /// In words.
-    pub(crate) fn words(self) -> String {
-        format!(
-            "A middle of the fibre that is off by no more than its diameter, {:.3} mm, adds up to {}: pointing errors that are \
+    /// In words; `None` where it is no more than what figures are equal to anyway.
+    pub(crate) fn words(self, objective: Objective, best: &Judged) -> Option<String> {
+        if self.change_rad_per_s <= TIE * best.objective_rad_per_s {
+            return None;
+        }
+        let figures = if objective == Objective::Pointing { "pointing errors" } else { "rate errors" };
+        Some(format!(
+            "A middle of the fibre that is off by no more than its diameter, {:.3} mm, changes up to {}: {figures} that are \
              closer together than that are the same in a coil that is wound.",
             mm_from_m(self.offset_m),
-            Objective::Pointing.shown(self.error_rad / POINTING_S)
-        )
+            objective.shown_finely(self.change_rad_per_s)
+        ))
     }
 }
 

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use super::anneal::rounds::{Rounds, State, Stop};
 use super::answer::{Answer, Ended, Former, FoundBy};
-use super::aside::{Aside, PointingResolution};
+use super::aside::{Aside, Resolution};
 use super::cost::guaranteed::UnitStep;
 use super::cost::objective::Objective;
 use super::cost::worst_case::SolvedProfiles;
@@ -97,15 +97,17 @@ pub fn run(request: &Request, observer: &mut dyn Observer) -> Result<Option<Answ
         }
         None => (None, None, None, None),
     };
-    let resolution = (request.objective == Objective::Pointing && !is_over)
-        .then(|| PointingResolution::of(request.model, &solved, &best.pattern))
-        .transpose()?;
+    let resolution =
+        (!is_over).then(|| Resolution::of(request.objective, request.model, &solved, &best.pattern)).transpose()?;
     let caution = grid_check.as_ref().and_then(|check| check.caution()).map(|words| format!(" {words}"));
     let on_unseen = validation.as_ref().map(|v| evaluator.words_on_unseen(v, &best, &baselines));
     let statement = evaluator.statement(&best, &baselines, class)
         + &on_unseen.unwrap_or_default()
         + &proof.words(request.objective)
-        + &resolution.map(|r| format!(" {}", r.words())).unwrap_or_default()
+        + &resolution
+            .and_then(|r| r.words(request.objective, &best))
+            .map(|words| format!(" {words}"))
+            .unwrap_or_default()
         + &caution.unwrap_or_default();
     let aside = Aside::new(request.model, &solved)?;
     let best = evaluator.completed(&aside, best)?;

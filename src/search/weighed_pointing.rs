@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::aside::PointingResolution;
+use super::aside::Resolution;
 use super::cost::objective::Objective;
 use super::cost::pointing::{EndlessRamp, POINTING_S, pointing_as_rate};
 use super::cost::tolerance::{Coils, SHARE, ToleranceError, ToleranceSpec};
@@ -85,14 +85,14 @@ impl Evaluator<'_> {
         };
         let of = |(i, pattern): (usize, &Pattern)| -> Result<PointingFigures, SearchError> {
             let guaranteed = ramp.as_ref().map(|ramp| ramp.guaranteed_rad(pattern, steepest)).transpose()?;
-            let resolution = PointingResolution::of(self.model, self.solved, pattern)?;
+            let resolution = Resolution::of(Objective::Pointing, self.model, self.solved, pattern)?;
             Ok(PointingFigures {
                 searched_rad_per_s: pointing_as_rate(self.model, self.solved, pattern)?.rate_rad_per_s.abs(),
                 unseen_rad_per_s: unseen[i],
                 guaranteed_rad_per_s: guaranteed.flatten().map(|rad| rad / POINTING_S),
                 built: built.as_ref().map(|(p95, coils)| (p95[i], *coils)),
                 likely_rad_per_s: likely.as_ref().map(|p95| p95[i]),
-                resolution_rad_per_s: resolution.error_rad / POINTING_S,
+                resolution_rad_per_s: resolution.change_rad_per_s,
             })
         };
         Ok(patterns.iter().enumerate().map(of).collect::<Result<_, _>>()?)

@@ -4,7 +4,6 @@ use serde::{Deserialize, Serialize};
 
 use super::{PatternJson, ProofJson};
 use crate::profile::Piece;
-use crate::search::Request;
 use crate::search::answer::{Answer, Cuts, Former, FoundBy};
 use crate::search::aside::{GridCheck, GridFigure};
 use crate::search::end_turns::BestEndTurns;
@@ -13,7 +12,8 @@ use crate::search::outlook::OtherBoundary;
 use crate::search::prospect::{Gain, Outlook, Prospect};
 use crate::search::recommendation::Recommendation;
 use crate::search::validation::Validation;
-use crate::units::{c_per_h_from_k_per_s, deg_from_rad, deg_per_h_from_rad_per_s, mm_from_m, percent_from_fraction};
+use crate::search::{Objective, Request};
+use crate::units::{c_per_h_from_k_per_s, deg_per_h_from_rad_per_s, mm_from_m, percent_from_fraction};
 
 impl PatternJson {
     /// Of a pattern that was judged by the reference.
@@ -59,6 +59,9 @@ pub struct OptimiseJson {
     pub(crate) predicted_gain: Option<GainJson>,
     /// Null where the temperature has no grid or the search was interrupted.
     pub(crate) grid_check: Option<GridCheckJson>,
+    /// Absent where the search was for the pointing error or was interrupted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) rate_resolution: Option<RateResolutionJson>,
     /// Absent unless the search was for the pointing error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) pointing_resolution: Option<PointingResolutionJson>,
@@ -309,6 +312,16 @@ impl GridCheckJson {
     }
 }
 
+/// Rate errors that are closer together than this are the same in a coil that is wound.
+#[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
+pub(crate) struct RateResolutionJson {
+    /// Between the middle of the fibre and that of the coil: the fibre's diameter.
+    pub(crate) midpoint_offset_mm: f64,
+    /// What that changes the best pattern's rate error at most; its rms where that is what was made small.
+    pub(crate) rate_error_deg_per_h: f64,
+}
+
 /// Pointing errors that are closer together than this are the same in a coil that is wound.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
@@ -407,6 +420,8 @@ impl OptimiseJson {
             FoundBy::Annealing => found_s,
             FoundBy::Shared | FoundBy::Bounds => seconds,
         };
+        let is_of_pointing = request.objective == Objective::Pointing;
+        let (of_pointing, of_rate) = if is_of_pointing { (answer.resolution, None) } else { (None, answer.resolution) };
         Self {
             model: model.to_owned(),
             objective: request.objective.key().to_owned(),
@@ -422,9 +437,13 @@ impl OptimiseJson {
             uncertainty: answer.outlook.as_ref().map(UncertaintyJson::of),
             predicted_gain: answer.outlook.as_ref().and_then(|o| o.gain.as_ref()).map(GainJson::of),
             grid_check: answer.grid_check.as_ref().map(GridCheckJson::of),
-            pointing_resolution: answer.resolution.map(|resolution| PointingResolutionJson {
+            rate_resolution: of_rate.map(|resolution| RateResolutionJson {
                 midpoint_offset_mm: mm_from_m(resolution.offset_m),
-                pointing_error_deg: deg_from_rad(resolution.error_rad),
+                rate_error_deg_per_h: deg_per_h_from_rad_per_s(resolution.change_rad_per_s),
+            }),
+            pointing_resolution: of_pointing.map(|resolution| PointingResolutionJson {
+                midpoint_offset_mm: mm_from_m(resolution.offset_m),
+                pointing_error_deg: deg_per_h_from_rad_per_s(resolution.change_rad_per_s),
             }),
             compared_with: answer.compared_with.as_ref().map(|former| FormerJson::of(former, &answer.best)),
             proof: ProofJson::of(&answer.proof),

@@ -6,3 +6,4 @@ pub mod restart;
 pub mod rounds;
 pub mod sample_cost;
 pub mod walk;
+mod windows;

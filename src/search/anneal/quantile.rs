@@ -17,7 +17,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::limits::{WindingLimits, draw, neighbour};
 use super::restart::generator;
-use super::rounds;
+use super::rounds::{self, FoundPattern};
+use crate::pattern::windability::WindabilityClass;
 use crate::search::cost::columns::Work;
 use crate::search::cost::objective::Objective;
 use crate::search::cost::sampled_coils::{QuantileWorst, SampledCoils};
@@ -44,8 +45,8 @@ impl Objective {
 /// The quantile of the worst case over sampled coils, within limits.
 #[derive(Debug, Clone)]
 pub(crate) struct QuantileCost {
-    coils: SampledCoils,
-    limits: WindingLimits,
+    pub(super) coils: SampledCoils,
+    pub(super) limits: WindingLimits,
 }
 
 impl QuantileCost {
@@ -147,6 +148,11 @@ impl Cost for QuantileCost {
             self.coils.by_worst(&typical).into_iter().skip(stride / 2).step_by(stride).collect();
         working.sort_unstable();
         working
+    }
+
+    fn in_other_orders(&self, starts: &[Vec<usize>]) -> Option<FoundPattern> {
+        // The walk's own moves are all that leads from one standard pattern to another.
+        (self.limits.class != WindabilityClass::Standard).then(|| self.followed(starts)).flatten()
     }
 
     fn order_working_set(&self, _best: &[&[usize]], _working: &mut [usize]) {}

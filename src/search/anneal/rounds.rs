@@ -233,6 +233,9 @@ pub trait Rounds {
     /// What short restarts find that begin, hardly warm, at given patterns: each judged on all samples.
     fn refined(&self, starts: &[Vec<usize>], moves: u64) -> Vec<FoundPattern>;
 
+    /// The best that descents from given patterns and from near them come to, where the walk is too slow for that.
+    fn in_other_orders(&self, starts: &[Vec<usize>]) -> Option<FoundPattern>;
+
     /// The best pattern so far, if a round has ended or a start was given.
     fn best(&self) -> Option<&FoundPattern> {
         self.state().found.first()
@@ -382,6 +385,10 @@ impl<C: Cost> Rounds for Optimisation<C> {
     fn judged(&self, segments: &[usize]) -> FoundPattern {
         let InFull { cost, segments, .. } = self.full.in_full(segments, &self.state.working);
         FoundPattern { cost, segments }
+    }
+
+    fn in_other_orders(&self, starts: &[Vec<usize>]) -> Option<FoundPattern> {
+        self.full.in_other_orders(starts)
     }
 
     fn refined(&self, starts: &[Vec<usize>], moves: u64) -> Vec<FoundPattern> {

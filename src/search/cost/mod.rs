@@ -19,6 +19,8 @@ use rand_chacha::ChaCha8Rng;
 
 use columns::Work;
 
+use crate::search::anneal::rounds::FoundPattern;
+
 /// How fast a search over a cost goes: what is drawn and done between two looks at the clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pace {
@@ -92,6 +94,12 @@ pub trait Cost: Clone + Send + Sync + std::fmt::Debug {
     /// Whether what the rounds run on is only near to the cost, so that what they find wants to be refined.
     fn is_approximated(&self) -> bool {
         false
+    }
+
+    /// The best that descents from given patterns and from near them come to through all orders of a few neighbours, where a
+    /// walk is too slow to come upon them.
+    fn in_other_orders(&self, _starts: &[Vec<usize>]) -> Option<FoundPattern> {
+        None
     }
 
     /// Puts those samples first that bind the best patterns.

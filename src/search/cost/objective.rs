@@ -1,11 +1,15 @@
 //! What a search makes small.
 
+use crate::pattern::Pattern;
 use crate::rate::{CoilModel, RateModel};
 use crate::search::cost::columns::Norm;
 use crate::search::cost::pointing::{POINTING_S, pointing_samples};
 use crate::search::cost::samples::SampleMatrix;
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
 use crate::units::deg_per_h_from_rad_per_s;
+
+/// Digits after the point of a figure that is not small.
+const USUAL_DECIMALS: usize = 4;
 
 /// What a search makes small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -74,16 +78,43 @@ impl Objective {
 
     /// A value in its unit, with enough digits to be told from its like: pointing errors are small numbers of degrees.
     pub(crate) fn shown(self, value_rad_per_s: f64) -> String {
-        const USUAL: usize = 4;
+        if self == Objective::Pointing {
+            return self.shown_finely(value_rad_per_s);
+        }
+        format!("{:.USUAL_DECIMALS$} {}", deg_per_h_from_rad_per_s(value_rad_per_s), self.unit())
+    }
+
+    /// A value in its unit with three significant digits at least.
+    pub(crate) fn shown_finely(self, value_rad_per_s: f64) -> String {
         const MOST: usize = 12;
         let value = deg_per_h_from_rad_per_s(value_rad_per_s);
-        let mut decimals = USUAL;
+        let mut decimals = USUAL_DECIMALS;
         let mut scaled = value.abs() * 1e4;
-        while self == Objective::Pointing && scaled > 0.0 && scaled < 100.0 && decimals < MOST {
+        while scaled > 0.0 && scaled < 100.0 && decimals < MOST {
             decimals += 1;
             scaled *= 10.0;
         }
         format!("{value:.decimals$} {}", self.unit())
+    }
+
+    /// By how much a pattern's rate error differs between two models over the profiles: at most, or its rms where that is
+    /// the objective. Their objectives differ by no more.
+    ///
+    /// # Errors
+    /// A pattern of another layer count.
+    pub(crate) fn change_rad_per_s(
+        self,
+        models: [&CoilModel; 2],
+        solved: &SolvedProfiles,
+        pattern: &Pattern,
+    ) -> Result<f64, SearchError> {
+        let of = |model: &CoilModel| Ok(series_rad_per_s(&RateModel::new(model, pattern, &[])?, solved));
+        let [one, other]: [Result<Vec<f64>, SearchError>; 2] = models.map(of);
+        let change: Vec<f64> = one?.iter().zip(other?).map(|(a, b)| a - b).collect();
+        Ok(match self {
+            Objective::RootMeanSquare => rms_of(&change, solved),
+            _ => change.iter().fold(0.0, |most: f64, v| v.abs().max(most)),
+        })
     }
 
     /// How the samples of a plain search make one cost; a search over built coils has its own.
@@ -118,8 +149,17 @@ impl Objective {
 
 /// √(mean Ω²) over all profiles' time, by the reference.
 pub(crate) fn rms_rad_per_s(rate_model: &RateModel, solved: &SolvedProfiles) -> f64 {
-    let series = solved.profiles().iter().flat_map(|p| rate_model.series_rad_per_s(&p.history));
-    series.zip(time_shares(solved)).map(|(rate, share)| share * rate * rate).sum::<f64>().sqrt()
+    rms_of(&series_rad_per_s(rate_model, solved), solved)
+}
+
+/// Over all profiles, one after the other.
+fn series_rad_per_s(rate_model: &RateModel, solved: &SolvedProfiles) -> Vec<f64> {
+    solved.profiles().iter().flat_map(|p| rate_model.series_rad_per_s(&p.history)).collect()
+}
+
+fn rms_of(series_rad_per_s: &[f64], solved: &SolvedProfiles) -> f64 {
+    let weighed = series_rad_per_s.iter().zip(time_shares(solved)).map(|(rate, share)| share * rate * rate);
+    weighed.sum::<f64>().sqrt()
 }
 
 /// The share of each sample in an integral over all profiles' time by the trapezium rule; they add up to one.

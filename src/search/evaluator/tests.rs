@@ -2,8 +2,9 @@
 
 use super::*;
 use crate::coil::LayerLength;
-use crate::search::aside::{GridChecked, PointingResolution};
+use crate::search::aside::{GridChecked, Resolution};
 use crate::search::cost::samples::tests::{model, profiles};
+use crate::search::cost::tolerance::with_middle_moved;
 
 #[test]
 fn a_search_is_checked_on_a_grid_twice_as_fine_and_cautioned_where_that_changes_much() {
@@ -77,7 +78,7 @@ fn what_tells_pointing_errors_apart_is_the_middle_of_the_fibre_off_by_its_diamet
     let model = model(8, LayerLength::Equal, &["surface_film"]);
     let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
     let pattern = Classic::Qua.pattern(8).unwrap();
-    let found = PointingResolution::of(&model, &solved, &pattern).unwrap();
+    let found = Resolution::of(Objective::Pointing, &model, &solved, &pattern).unwrap();
     let fibre = model.coil.fibre();
     // ψ = n κ 2δ/D · (change of the lead − mean change of the layers), all layers of one length.
     let lag_k = |history: &crate::thermal::ThermalHistory, row: usize| {
@@ -90,5 +91,33 @@ fn what_tells_pointing_errors_apart_is_the_middle_of_the_fibre_off_by_its_diamet
         / model.coil.mean_diameter_m()
         * largest_k;
     assert!(expected > 0.0 && found.offset_m == 165e-6);
-    assert!((found.error_rad / expected - 1.0).abs() < 1e-9, "{} {expected}", found.error_rad);
+    assert!(
+        (found.change_rad_per_s * POINTING_S / expected - 1.0).abs() < 1e-9,
+        "{} {expected}",
+        found.change_rad_per_s
+    );
+}
+
+#[test]
+fn no_objective_of_a_rate_changes_by_more_than_its_resolution_if_the_middle_is_off_by_the_fibre_s_diameter() {
+    let model = model(8, LayerLength::Actual, &["surface_film"]);
+    let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
+    for classic in [Classic::Qua, Classic::Zyl] {
+        let pattern = classic.pattern(8).unwrap();
+        for objective in [Objective::WorstRate, Objective::RootMeanSquare] {
+            let found = Resolution::of(objective, &model, &solved, &pattern).unwrap();
+            for by_m in [found.offset_m, -found.offset_m] {
+                let value = |model: &CoilModel| {
+                    let rate_model = RateModel::new(model, &pattern, &[]).unwrap();
+                    match objective {
+                        Objective::WorstRate => solved.worst_case(model, &pattern).unwrap().rate_rad_per_s.abs(),
+                        _ => crate::search::cost::objective::rms_rad_per_s(&rate_model, &solved),
+                    }
+                };
+                let change = (value(&with_middle_moved(&model, by_m)) - value(&model)).abs();
+                assert!(change <= found.change_rad_per_s * (1.0 + 1e-9), "{classic:?} {objective:?}");
+                assert!(change > 1e-3 * found.change_rad_per_s, "{classic:?} {objective:?}: {change}");
+            }
+        }
+    }
 }

@@ -6,7 +6,7 @@ use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;
 use crate::search::anneal::rounds::{Plan, Rules};
 use crate::search::cost::objective::Objective;
-use crate::search::cost::pointing::{POINTING_S, pointing_as_rate};
+use crate::search::cost::pointing::pointing_as_rate;
 use crate::search::cost::samples::tests::{model, profiles};
 use crate::search::cost::signs::segments_of_signs;
 use crate::search::cost::tolerance::{AsBuilt, ToleranceSpec};
@@ -202,7 +202,7 @@ fn a_recommendation_of_a_search_for_the_pointing_error_weighs_that_also_over_bui
         assert!(unseen.qua_rad_per_s.is_some_and(|qua| qua > 0.0) && unseen.best_rad_per_s > 0.0);
         // What no coil can be wound to does not count.
         let classic = answer.baselines.iter().map(|b| on_fresh(&b.pattern)).fold(f64::INFINITY, f64::min);
-        let resolution = answer.resolution.unwrap().error_rad / POINTING_S;
+        let resolution = answer.resolution.unwrap().change_rad_per_s;
         let mine = on_fresh(&recommended.pattern);
         assert!(mine <= 1.02 * classic + resolution, "{mine} {classic} {resolution}");
         if spread.is_none() {
