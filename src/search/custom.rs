@@ -21,6 +21,7 @@ use super::cost::samples::SampleMatrix;
 use super::cost::{Cost, InFull, MoveProposal, Pace, Position};
 use super::request::{Halt, Observer};
 use crate::pattern::classic::Classic;
+use crate::pattern::windability::WindabilityClass;
 
 /// Layers that a caller's array or function may have.
 pub(crate) const MOST_LAYERS: usize = 400;
@@ -194,6 +195,11 @@ impl<F: Fn(&[usize]) -> f64 + Send + Sync> Position<FunctionCost<F>> for Functio
         if proposed <= limit { MoveProposal::Within(proposed) } else { MoveProposal::Refused }
     }
 
+    fn cost_of(&mut self, cost: &FunctionCost<F>, segments: &[usize], limit: f64) -> Option<f64> {
+        self.work.samples += 1;
+        Some((cost.function)(segments)).filter(|found| *found <= limit)
+    }
+
     fn accept(&mut self, _cost: &FunctionCost<F>) {
         self.work.accepted += 1;
         self.cost = self.proposed.1;
@@ -223,6 +229,10 @@ impl<F: Fn(&[usize]) -> f64 + Send + Sync> Cost for FunctionCost<F> {
 
     fn admits(&self, segments: &[usize]) -> bool {
         self.limits.admits(segments)
+    }
+
+    fn is_of_permutations(&self) -> bool {
+        self.limits.class != WindabilityClass::Standard
     }
 
     fn draw(&self, random: &mut ChaCha8Rng) -> Vec<usize> {

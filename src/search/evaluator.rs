@@ -314,7 +314,7 @@ impl Evaluator<'_> {
         } else {
             Improvement { pattern: best.pattern.clone(), is_optimal: false }
         };
-        if self.objective == Objective::Pointing && !is_optimal {
+        if matches!(self.objective, Objective::Pointing | Objective::RootMeanSquare) && !is_optimal {
             let starts: Vec<Pattern> = std::iter::once(pattern).chain(starts.iter().cloned()).collect();
             pattern = compounded(&task, &starts, COMPOUND_SEED)?;
         }

@@ -17,7 +17,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::limits::{WindingLimits, draw, neighbour};
 use super::restart::generator;
-use super::rounds::{self, FoundPattern};
+use super::rounds;
 use crate::pattern::windability::WindabilityClass;
 use crate::search::cost::columns::Work;
 use crate::search::cost::objective::Objective;
@@ -45,8 +45,8 @@ impl Objective {
 /// The quantile of the worst case over sampled coils, within limits.
 #[derive(Debug, Clone)]
 pub(crate) struct QuantileCost {
-    pub(super) coils: SampledCoils,
-    pub(super) limits: WindingLimits,
+    coils: SampledCoils,
+    limits: WindingLimits,
 }
 
 impl QuantileCost {
@@ -82,6 +82,10 @@ impl Position<QuantileCost> for QuantilePosition {
         proposed.map_or(MoveProposal::Refused, MoveProposal::Within)
     }
 
+    fn cost_of(&mut self, cost: &QuantileCost, segments: &[usize], limit: f64) -> Option<f64> {
+        self.worst.propose(&cost.coils, segments, limit)
+    }
+
     fn accept(&mut self, _cost: &QuantileCost) {
         self.worst.accept();
         self.accepted += 1;
@@ -111,6 +115,10 @@ impl Cost for QuantileCost {
 
     fn admits(&self, segments: &[usize]) -> bool {
         self.limits.admits(segments)
+    }
+
+    fn is_of_permutations(&self) -> bool {
+        self.limits.class != WindabilityClass::Standard
     }
 
     fn draw(&self, random: &mut ChaCha8Rng) -> Vec<usize> {
@@ -148,11 +156,6 @@ impl Cost for QuantileCost {
             self.coils.by_worst(&typical).into_iter().skip(stride / 2).step_by(stride).collect();
         working.sort_unstable();
         working
-    }
-
-    fn in_other_orders(&self, starts: &[Vec<usize>]) -> Option<FoundPattern> {
-        // The walk's own moves are all that leads from one standard pattern to another.
-        (self.limits.class != WindabilityClass::Standard).then(|| self.followed(starts)).flatten()
     }
 
     fn order_working_set(&self, _best: &[&[usize]], _working: &mut [usize]) {}

@@ -7,6 +7,7 @@
 use rayon::prelude::*;
 
 use super::restart::{Cooling, Restart, cooling_for};
+use super::windows;
 use crate::pattern::Pattern;
 use crate::search::cost::columns::Work;
 use crate::search::cost::{Cost, InFull};
@@ -233,7 +234,8 @@ pub trait Rounds {
     /// What short restarts find that begin, hardly warm, at given patterns: each judged on all samples.
     fn refined(&self, starts: &[Vec<usize>], moves: u64) -> Vec<FoundPattern>;
 
-    /// The best that descents from given patterns and from near them come to, where the walk is too slow for that.
+    /// The best that descents from given patterns and from near them come to through all orders of a few neighbours; none
+    /// where patterns are no orders.
     fn in_other_orders(&self, starts: &[Vec<usize>]) -> Option<FoundPattern>;
 
     /// The best pattern so far, if a round has ended or a start was given.
@@ -388,7 +390,8 @@ impl<C: Cost> Rounds for Optimisation<C> {
     }
 
     fn in_other_orders(&self, starts: &[Vec<usize>]) -> Option<FoundPattern> {
-        self.full.in_other_orders(starts)
+        // The walk's own moves are all that leads from one standard pattern to another.
+        self.full.is_of_permutations().then(|| windows::followed(&self.full, starts)).flatten()
     }
 
     fn refined(&self, starts: &[Vec<usize>], moves: u64) -> Vec<FoundPattern> {

@@ -74,6 +74,13 @@ impl Position<SampleCost> for SamplePosition {
         }
     }
 
+    fn cost_of(&mut self, cost: &SampleCost, segments: &[usize], limit: f64) -> Option<f64> {
+        let changes = self.walk.propose_pattern(&cost.space, segments);
+        let found = self.values.propose(cost.space.columns(), changes, limit);
+        self.walk.refuse(&cost.space);
+        found
+    }
+
     fn accept(&mut self, cost: &SampleCost) {
         self.values.accept();
         self.walk.accept(&cost.space);
@@ -103,6 +110,10 @@ impl Cost for SampleCost {
 
     fn admits(&self, segments: &[usize]) -> bool {
         self.space.admits(segments)
+    }
+
+    fn is_of_permutations(&self) -> bool {
+        self.space.class() != WindabilityClass::Standard
     }
 
     fn draw(&self, random: &mut ChaCha8Rng) -> Vec<usize> {

@@ -188,6 +188,14 @@ impl Walk {
         Some(&self.changes)
     }
 
+    /// The changes of the coefficients that lead to another pattern of a class of permutations; refuse it afterwards.
+    pub(crate) fn propose_pattern(&mut self, space: &Space, segments: &[usize]) -> &[Change] {
+        self.changes.clear();
+        self.candidate.copy_from_slice(segments);
+        self.collect_changes(space);
+        &self.changes
+    }
+
     fn draw_flips(&mut self, layers: usize, random: &mut ChaCha8Rng) {
         self.flips.clear();
         let first = pick(random, layers - 1);

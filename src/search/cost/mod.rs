@@ -19,8 +19,6 @@ use rand_chacha::ChaCha8Rng;
 
 use columns::Work;
 
-use crate::search::anneal::rounds::FoundPattern;
-
 /// How fast a search over a cost goes: what is drawn and done between two looks at the clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pace {
@@ -57,7 +55,7 @@ pub struct InFull {
 /// A cost over the patterns of a class.
 pub trait Cost: Clone + Send + Sync + std::fmt::Debug {
     /// What moves from pattern to pattern.
-    type Position: Position<Self>;
+    type Position: Position<Self> + Clone + Send + Sync;
 
     /// How a search over it is paced.
     const PACE: Pace;
@@ -70,6 +68,9 @@ pub trait Cost: Clone + Send + Sync + std::fmt::Debug {
 
     /// Whether the winding shop puts up with P(j).
     fn admits(&self, segments: &[usize]) -> bool;
+
+    /// Whether its patterns are any order of the segments, but for what is not admitted.
+    fn is_of_permutations(&self) -> bool;
 
     /// A pattern drawn at random.
     fn draw(&self, random: &mut ChaCha8Rng) -> Vec<usize>;
@@ -96,12 +97,6 @@ pub trait Cost: Clone + Send + Sync + std::fmt::Debug {
         false
     }
 
-    /// The best that descents from given patterns and from near them come to through all orders of a few neighbours, where a
-    /// walk is too slow to come upon them.
-    fn in_other_orders(&self, _starts: &[Vec<usize>]) -> Option<FoundPattern> {
-        None
-    }
-
     /// Puts those samples first that bind the best patterns.
     fn order_working_set(&self, best: &[&[usize]], working: &mut [usize]);
 }
@@ -116,6 +111,9 @@ pub trait Position<C> {
 
     /// Draws a move and judges it against a limit that was drawn before.
     fn propose(&mut self, cost: &C, random: &mut ChaCha8Rng, limit: f64) -> MoveProposal;
+
+    /// The cost of another pattern than its own, `None` where that is above a limit; the position stays where it is.
+    fn cost_of(&mut self, cost: &C, segments: &[usize], limit: f64) -> Option<f64>;
 
     /// Goes where the last proposal leads, which must have been within its limit.
     fn accept(&mut self, cost: &C);
