@@ -7,8 +7,6 @@ use crate::search::cost::objective::Objective;
 use crate::search::cost::pointing::{EndlessRamp, POINTING_S, largest_change_rad, worst_pointing};
 use crate::search::cost::tolerance::with_middle_moved;
 use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
-use crate::search::evaluator::Judged;
-use crate::search::weighing::TIE;
 use crate::units::{mm_from_m, percent_from_fraction};
 
 /// A worst rate that a finer grid changes by more than this is not to be relied upon.
@@ -109,18 +107,15 @@ impl Resolution {
         Ok(Self { offset_m, change_rad_per_s })
     }
 
-    /// In words; `None` where it is no more than what figures are equal to anyway.
-    pub(crate) fn words(self, objective: Objective, best: &Judged) -> Option<String> {
-        if self.change_rad_per_s <= TIE * best.objective_rad_per_s {
-            return None;
-        }
+    /// In words.
+    pub(crate) fn words(self, objective: Objective) -> String {
         let figures = if objective == Objective::Pointing { "pointing errors" } else { "rate errors" };
-        Some(format!(
+        format!(
             "A middle of the fibre that is off by no more than its diameter, {:.3} mm, changes up to {}: {figures} that are \
              closer together than that are the same in a coil that is wound.",
             mm_from_m(self.offset_m),
             objective.shown_finely(self.change_rad_per_s)
-        ))
+        )
     }
 }
 

@@ -15,6 +15,7 @@ use super::optimality::Proof;
 use super::proof::{self, Status, prove};
 use super::recommendation::{Advised, Context};
 pub use super::request::{Halt, Observer, Request, RunError, Unobserved};
+use super::weighing::TIE;
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 
@@ -99,15 +100,14 @@ pub fn run(request: &Request, observer: &mut dyn Observer) -> Result<Option<Answ
     };
     let resolution =
         (!is_over).then(|| Resolution::of(request.objective, request.model, &solved, &best.pattern)).transpose()?;
+    // What is less counts as equal anyway.
+    let told = resolution.filter(|r| r.change_rad_per_s > TIE * best.objective_rad_per_s);
     let caution = grid_check.as_ref().and_then(|check| check.caution()).map(|words| format!(" {words}"));
     let on_unseen = validation.as_ref().map(|v| evaluator.words_on_unseen(v, &best, &baselines));
     let statement = evaluator.statement(&best, &baselines, class)
         + &on_unseen.unwrap_or_default()
         + &proof.words(request.objective)
-        + &resolution
-            .and_then(|r| r.words(request.objective, &best))
-            .map(|words| format!(" {words}"))
-            .unwrap_or_default()
+        + &told.map(|r| format!(" {}", r.words(request.objective))).unwrap_or_default()
         + &caution.unwrap_or_default();
     let aside = Aside::new(request.model, &solved)?;
     let best = evaluator.completed(&aside, best)?;

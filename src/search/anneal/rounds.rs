@@ -391,7 +391,8 @@ impl<C: Cost> Rounds for Optimisation<C> {
 
     fn in_other_orders(&self, starts: &[Vec<usize>]) -> Option<FoundPattern> {
         // The walk's own moves are all that leads from one standard pattern to another.
-        self.full.is_of_permutations().then(|| windows::followed(&self.full, starts)).flatten()
+        let reached = self.full.is_of_permutations().then(|| windows::followed(&self.full, starts)).flatten()?;
+        Some(FoundPattern { cost: reached.cost, segments: reached.segments })
     }
 
     fn refined(&self, starts: &[Vec<usize>], moves: u64) -> Vec<FoundPattern> {

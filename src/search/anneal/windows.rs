@@ -10,7 +10,6 @@ use rayon::prelude::*;
 
 use super::limits::pick;
 use super::restart::generator;
-use super::rounds::FoundPattern;
 use crate::search::cost::{Cost, Position};
 
 /// Neighbours of a window: few as long as that helps.
@@ -28,6 +27,15 @@ const STEPS_SEED: u64 = 1;
 /// A step that brings no more than this share is rounding.
 const ROUNDING: f64 = 1e-9;
 
+/// A pattern that a descent came to.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Reached {
+    /// In the cost's unit.
+    pub(super) cost: f64,
+    /// P(j), innermost layer first.
+    pub(super) segments: Vec<usize>,
+}
+
 /// What lies in a window.
 #[derive(Debug, Clone)]
 enum Window {
@@ -36,7 +44,7 @@ enum Window {
 }
 
 /// The best of descents from given patterns, and from a few steps off the best of them as long as that brings better ones.
-pub(super) fn followed<C: Cost>(cost: &C, starts: &[Vec<usize>]) -> Option<FoundPattern> {
+pub(super) fn followed<C: Cost>(cost: &C, starts: &[Vec<usize>]) -> Option<Reached> {
     let mut best = best_descended(cost, starts)?;
     let (mut round, mut idle) = (0, 0);
     while idle < PATIENCE {
@@ -66,16 +74,16 @@ fn steps_off<C: Cost>(cost: &C, segments: &[usize], stream: u64) -> Vec<usize> {
     at
 }
 
-fn best_descended<C: Cost>(cost: &C, starts: &[Vec<usize>]) -> Option<FoundPattern> {
+fn best_descended<C: Cost>(cost: &C, starts: &[Vec<usize>]) -> Option<Reached> {
     let found = starts.par_iter().map(|start| descended(cost, start));
     found.min_by(|a, b| a.cost.total_cmp(&b.cost).then_with(|| a.segments.cmp(&b.segments)))
 }
 
 /// Where a descent from a pattern ends.
-fn descended<C: Cost>(cost: &C, start: &[usize]) -> FoundPattern {
+fn descended<C: Cost>(cost: &C, start: &[usize]) -> Reached {
     let orders = WIDTHS.map(orders);
     let mut position = cost.at(start);
-    let mut found = FoundPattern { cost: position.cost(), segments: start.to_vec() };
+    let mut found = Reached { cost: position.cost(), segments: start.to_vec() };
     let mut at = 0;
     while let Some(&width) = WIDTHS.get(at).filter(|width| **width <= start.len()) {
         let segments = &found.segments;
@@ -99,7 +107,7 @@ fn best_order<C: Cost>(
     position: &C::Position,
     window: &Window,
     orders: &[Vec<usize>],
-) -> Option<FoundPattern> {
+) -> Option<Reached> {
     let mut position = position.clone();
     let mut limit = position.cost() * (1.0 - ROUNDING);
     let mut best = None;
@@ -116,7 +124,7 @@ fn best_order<C: Cost>(
         }
         if let Some(value) = position.cost_of(cost, &candidate, limit) {
             limit = value * (1.0 - ROUNDING);
-            best = Some(FoundPattern { cost: value, segments: candidate.clone() });
+            best = Some(Reached { cost: value, segments: candidate.clone() });
         }
     }
     best
