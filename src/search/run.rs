@@ -65,7 +65,7 @@ pub fn run(request: &Request, observer: &mut dyn Observer) -> Result<Option<Answ
         && concluded.is_none()
         && target.is_none()
         && (request.is_refined() || search.is_approximated());
-    let found = evaluator.gathered(search.as_ref(), class, &shared, is_refined);
+    let found = evaluator.gathered(search.as_ref(), class, &shared, is_refined, &|| observer.goes_on());
     let Some(best) = evaluator.best(class, &found, &baselines)? else { return Ok(None) };
     let is_good_enough = |judged: &Judged| target.is_some_and(|target| judged.objective_rad_per_s <= target);
     let annealed = best.pattern.clone();

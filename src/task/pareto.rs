@@ -205,7 +205,7 @@ fn candidates(
         }
     }
     let mut patterns = patterns(&search.state().found);
-    let found = evaluator.gathered(search.as_ref(), class, &shared, false);
+    let found = evaluator.gathered(search.as_ref(), class, &shared, false, &|| true);
     if let Some(best) = evaluator.best(class, &found, &[])? {
         patterns.push(evaluator.improved(class, best, &found, None)?.0.pattern);
     }

@@ -236,7 +236,7 @@ pub trait Rounds {
 
     /// The best that descents from given patterns and from near them come to through all orders of a few neighbours; none
     /// where patterns are no orders.
-    fn in_other_orders(&self, starts: &[Vec<usize>]) -> Option<FoundPattern>;
+    fn in_other_orders(&self, starts: &[Vec<usize>], goes_on: &dyn Fn() -> bool) -> Option<FoundPattern>;
 
     /// The best pattern so far, if a round has ended or a start was given.
     fn best(&self) -> Option<&FoundPattern> {
@@ -389,9 +389,10 @@ impl<C: Cost> Rounds for Optimisation<C> {
         FoundPattern { cost, segments }
     }
 
-    fn in_other_orders(&self, starts: &[Vec<usize>]) -> Option<FoundPattern> {
+    fn in_other_orders(&self, starts: &[Vec<usize>], goes_on: &dyn Fn() -> bool) -> Option<FoundPattern> {
         // The walk's own moves are all that leads from one standard pattern to another.
-        let reached = self.full.is_of_permutations().then(|| windows::followed(&self.full, starts)).flatten()?;
+        let reached =
+            self.full.is_of_permutations().then(|| windows::followed(&self.full, starts, goes_on)).flatten()?;
         Some(FoundPattern { cost: reached.cost, segments: reached.segments })
     }
 

@@ -12,11 +12,13 @@ use super::limits::pick;
 use super::restart::generator;
 use crate::search::cost::{Cost, Position};
 
-/// Neighbours of a window: few as long as that helps.
+/// Neighbours of a window: few as long as that helps. With one more, P95 of 14 layers ends 0.2 % lower for two and a half times
+/// the processor time.
 const WIDTHS: [usize; 3] = [4, 5, 6];
 
 /// Descents of a round, how many steps off the best pattern they begin, and rounds without a better one after which no more
-/// follow. Two seeds of 24 layers with one captive run ended on one pattern so; with three steps, or two rounds, they did not.
+/// follow. By P95 with one captive run on 24 layers (windows one wider) two seeds ended on one pattern so, and up to 0.4 % above
+/// it with three or twelve steps.
 const STARTS: u64 = 12;
 const STEPS_OFF: usize = 6;
 const PATIENCE: usize = 3;
@@ -44,15 +46,16 @@ enum Window {
 }
 
 /// The best of descents from given patterns, and from a few steps off the best of them as long as that brings better ones.
-pub(super) fn followed<C: Cost>(cost: &C, starts: &[Vec<usize>]) -> Option<Reached> {
-    let mut best = best_descended(cost, starts)?;
+/// `goes_on` is asked between descents; none before the first.
+pub(super) fn followed<C: Cost>(cost: &C, starts: &[Vec<usize>], goes_on: &dyn Fn() -> bool) -> Option<Reached> {
+    let mut best = best_descended(cost, starts, goes_on)?;
     let (mut round, mut idle) = (0, 0);
-    while idle < PATIENCE {
+    while idle < PATIENCE && goes_on() {
         let near: Vec<Vec<usize>> =
             (0..STARTS).map(|start| steps_off(cost, &best.segments, round * STARTS + start)).collect();
         round += 1;
         idle += 1;
-        let found = best_descended(cost, &near);
+        let found = best_descended(cost, &near, goes_on);
         if let Some(better) = found.filter(|found| found.cost < best.cost * (1.0 - ROUNDING)) {
             (best, idle) = (better, 0);
         }
@@ -74,8 +77,9 @@ fn steps_off<C: Cost>(cost: &C, segments: &[usize], stream: u64) -> Vec<usize> {
     at
 }
 
-fn best_descended<C: Cost>(cost: &C, starts: &[Vec<usize>]) -> Option<Reached> {
-    let found = starts.par_iter().map(|start| descended(cost, start));
+/// One descent after the other: the windows of each are shared out.
+fn best_descended<C: Cost>(cost: &C, starts: &[Vec<usize>], goes_on: &dyn Fn() -> bool) -> Option<Reached> {
+    let found = starts.iter().take_while(|_| goes_on()).map(|start| descended(cost, start));
     found.min_by(|a, b| a.cost.total_cmp(&b.cost).then_with(|| a.segments.cmp(&b.segments)))
 }
 
@@ -171,9 +175,10 @@ mod tests {
                 assert!(!cost.admits(&other) || value(&other) >= found.cost * (1.0 - 3.0 * ROUNDING));
             }
         }
-        let all = followed(cost, &[start]).unwrap();
+        let all = followed(cost, std::slice::from_ref(&start), &|| true).unwrap();
         assert!(all.cost <= found.cost && cost.admits(&all.segments));
-        let again = followed(cost, &[found.segments]).unwrap();
+        assert_eq!(followed(cost, &[start], &|| false), None);
+        let again = followed(cost, &[found.segments], &|| true).unwrap();
         assert!((again.cost / all.cost - 1.0).abs() < 1e-9, "{again:?} {all:?}");
     }
 

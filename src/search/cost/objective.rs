@@ -76,9 +76,10 @@ impl Objective {
         if self == Objective::Pointing { "°" } else { "°/h" }
     }
 
-    /// A value in its unit, with enough digits to be told from its like: pointing errors are small numbers of degrees.
+    /// A value in its unit, with enough digits to be told from its like: pointing errors are small numbers of degrees, and a
+    /// search makes the rms smaller than any largest value.
     pub(crate) fn shown(self, value_rad_per_s: f64) -> String {
-        if self == Objective::Pointing {
+        if matches!(self, Objective::Pointing | Objective::RootMeanSquare) {
             return self.shown_finely(value_rad_per_s);
         }
         format!("{:.USUAL_DECIMALS$} {}", deg_per_h_from_rad_per_s(value_rad_per_s), self.unit())
