@@ -147,7 +147,8 @@ impl Causal {
         [Quantity::RateNoise, Quantity::WanderShare, Quantity::WanderTime]
             .into_iter()
             .for_each(|q| numbers.set(q, 1.0));
-        let (f, noise, _) = dynamics(&parts, &layout, &numbers);
+        // Which set point a stream's air approaches nobody knows.
+        let (f, noise, _) = dynamics(&parts, &layout, &numbers, f64::INFINITY);
         let (all, n) = (layout.size, layout.own());
         let level = |row: &[f64]| row[..n].to_vec();
         Ok(Self {

@@ -57,7 +57,7 @@ pub(super) mod tests {
     }
 
     /// Rows every 10 s with a gap of 47 s, one of them off the grid, and a gross error in a reading.
-    fn record(rows: usize) -> Record {
+    pub(in crate::chamber) fn record(rows: usize) -> Record {
         let mut times_s: Vec<f64> = (0..rows).map(|i| 10.0 * i as f64 + if i > 25 { 37.0 } else { 0.0 }).collect();
         times_s[13] += 3.0;
         let wave = |t: f64, k: f64| (0.013 * k * t).sin() + 0.3 * (0.17 * k * t).cos();
@@ -251,7 +251,7 @@ pub(super) mod tests {
         Record::new("fast", times_s, temperature_k, rate).unwrap()
     }
 
-    fn dip() -> crate::pattern::Pattern {
+    pub(in crate::chamber) fn dip() -> crate::pattern::Pattern {
         Classic::Dip.pattern(8).unwrap()
     }
 

@@ -56,6 +56,23 @@ impl Chamber<'_> {
         Ok((self, fit))
     }
 
+    /// The chamber with every record's kinks at the times that a fit has them at: what is said of predictions, and sets that differ in
+    /// little, need them sharper than a search does.
+    ///
+    /// # Errors
+    /// A model that cannot be solved.
+    pub(crate) fn with_timed_kinks(mut self, fit: &Fit) -> Result<Self, ChamberError> {
+        for record in 0..self.records() {
+            if fit.records.contains(&record) {
+                self.time_kinks(fit, record)?;
+            } else {
+                let day = self.held_out(fit, record)?;
+                self.time_kinks(&day, record)?;
+            }
+        }
+        Ok(self)
+    }
+
     /// Moves a record's kinks, each somewhere within a few rows so far, to the times that readings and rates have them at.
     ///
     /// # Errors
@@ -341,9 +358,13 @@ pub(super) mod tests {
 
     /// A record in that air.
     pub(in crate::chamber) fn kinked(model: &CoilModel, pattern: &Pattern) -> Record {
-        let air = PiecewiseLinear::new(knots_s(), AIR_K.to_vec()).unwrap();
+        in_air(model, pattern, &PiecewiseLinear::new(knots_s(), AIR_K.to_vec()).unwrap())
+    }
+
+    /// A record of 6000 s behind a film of 25 W/(m²K).
+    pub(in crate::chamber) fn in_air(model: &CoilModel, pattern: &Pattern, air: &PiecewiseLinear) -> Record {
         let times_s: Vec<f64> = (1..=600).map(|i| 10.0 * f64::from(i)).collect();
-        let exposed = expose(&model.heat_path().unwrap(), Some(25.0), 0.0, &air, &times_s).unwrap();
+        let exposed = expose(&model.heat_path().unwrap(), Some(25.0), 0.0, air, &times_s).unwrap();
         let history = solve(&exposed.path, &exposed.drive).unwrap().means(&times_s, 10.0);
         let rates = RateModel::new(model, pattern, &[]).unwrap().series_rad_per_s(&history);
         let mut random = ChaCha8Rng::seed_from_u64(3);

@@ -45,6 +45,7 @@ impl Chamber<'_> {
     /// A model that cannot be solved.
     pub(crate) fn adopt(&mut self, stretch: &Chamber, found: &Fit) -> Result<Fit, ChamberError> {
         let mut fit = found.of_record(found.records[0]);
+        self.observed[0].series.approaches = stretch.observed[0].series.approaches;
         let settle = |chamber: &Self, fit: &mut Fit| {
             let (assumed, numbers) = (fit.assumed.clone(), fit.numbers.clone());
             chamber.settle_courses(&assumed, &numbers, &[0], &mut fit.courses, Wanted::Everywhere)

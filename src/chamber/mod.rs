@@ -57,6 +57,7 @@ mod score;
 mod scorer;
 mod series;
 mod settle;
+mod shows;
 mod sparse;
 mod states;
 mod stationary;

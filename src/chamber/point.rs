@@ -316,6 +316,9 @@ pub(super) fn quantities(assumed: &Assumption, observed: &Observed) -> Result<Ve
         Quantity::RippleCoherence,
         Quantity::StartSlope,
     ]);
+    if observed.series.approaches {
+        all.push(Quantity::ApproachTime);
+    }
     if assumed.drift {
         all.extend([Quantity::DriftSize, Quantity::DriftTime]);
     }

@@ -35,6 +35,8 @@ pub(crate) enum Quantity {
     CyclePeriod,
     /// Deviation of the air's slope where a record begins \[K/s\]; what pack and sensor lag behind it follows.
     StartSlope,
+    /// Time in which the air of a stage approaches its set point, its slope dying away \[s\]; only where the air does.
+    ApproachTime,
 }
 
 /// One line of the table.
@@ -52,7 +54,7 @@ pub(crate) struct Prior {
 }
 
 /// Every prior of the chamber.
-pub(crate) const PRIORS: [Prior; 19] = [
+pub(crate) const PRIORS: [Prior; 20] = [
     line(Quantity::Film, 25.0, 0.8, "free to moderately forced convection in a chamber: 8 … 80 W/(m²K)"),
     line(Quantity::ReadingNoise, 0.005, 1.0, "platinum sensors and their bridges read to a few millikelvin"),
     line(Quantity::InnerNoise, 0.005, 1.0, "as the sensor"),
@@ -85,6 +87,7 @@ pub(crate) const PRIORS: [Prior; 19] = [
     relative(Quantity::CycleSize, 2.0, 1.2, "as the drift"),
     line(Quantity::CyclePeriod, 5000.0, 0.8, "below a record's length, above what an air conditioning makes"),
     line(Quantity::StartSlope, 2e-4, 2.0, "a record begins at rest, or in a ramp of up to a kelvin or two a minute"),
+    line(Quantity::ApproachTime, 90.0, 0.8, "thermoelectric stages settle within half a minute to several minutes"),
 ];
 
 const fn line(quantity: Quantity, median: f64, deviation: f64, reason: &'static str) -> Prior {
@@ -118,11 +121,12 @@ impl Quantity {
             Self::CycleSize => "cycle_deg_per_h",
             Self::CyclePeriod => "cycle_period_s",
             Self::StartSlope => "start_slope_k_per_s",
+            Self::ApproachTime => "approach_s",
         }
     }
 
     /// What the air of one day is.
-    pub(super) const AIR: [Self; 8] = [
+    pub(super) const AIR: [Self; 9] = [
         Self::RestNoise,
         Self::BendNoise,
         Self::TurbulenceSize,
@@ -131,6 +135,7 @@ impl Quantity {
         Self::RipplePeriod,
         Self::RippleCoherence,
         Self::StartSlope,
+        Self::ApproachTime,
     ];
 
     /// Whether it is an angular rate, in SI rad/s.

@@ -147,7 +147,7 @@ impl Chamber<'_> {
     pub(crate) fn score_models(
         &self,
         fit: &Fit,
-        changed: &[Assumption],
+        changed: &[&Assumption],
     ) -> Result<Vec<Option<Direction>>, ChamberError> {
         let place = self.place(fit.assumed.clone(), fit.numbers.clone(), &fit.records, &fit.courses)?;
         let base: Result<Vec<_>, _> = fit.records.iter().map(|&r| self.innovations(&place, r)).collect();
@@ -169,7 +169,7 @@ impl Chamber<'_> {
                 let mut score = 0.0;
                 let mut information = 0.0;
                 let mut cross = DVector::zeros(fitted);
-                let there = self.place(assumed.clone(), fit.numbers.clone(), &fit.records, &fit.courses).ok()?;
+                let there = self.place((*assumed).clone(), fit.numbers.clone(), &fit.records, &fit.courses).ok()?;
                 for (i, &record) in fit.records.iter().enumerate() {
                     let moved = self.innovations(&there, record).ok()?;
                     let column = DerivativeColumn::new(&base[i], &moved, 1.0);

@@ -20,11 +20,13 @@ use super::fit::Fit;
 use super::parameter::{Parameter, Place};
 use super::point::run_kept;
 use super::prior::Quantity;
-use super::{Chamber, ChamberError, Column};
+use super::{Assumption, Chamber, ChamberError, Column};
 
 /// A fit with its filter's gains and derivatives, of each record that it was fitted to.
 pub(crate) struct Scorer<'c, 'a> {
     chamber: &'c Chamber<'a>,
+    /// With whatever its gyro was made for it.
+    fit: Fit,
     records: Vec<Prepared>,
     factor: Cholesky<f64, Dyn>,
     /// s of the fitted posterior.
@@ -70,6 +72,19 @@ impl Scored {
     /// By how much a fitted coordinate falls with each unit of the column's amplitude.
     pub(crate) fn weight(&self, coordinate: usize) -> f64 {
         self.weights[coordinate]
+    }
+
+    /// By how much the log likelihood would rise with two columns at once, and their amplitudes; None where one does what the other does.
+    pub(crate) fn gain_with(&self, other: &Self) -> Option<(f64, [f64; 2])> {
+        let both = self.information_with(other);
+        let determinant = self.information * other.information - both * both;
+        if !(determinant > OWN_SHARE * self.information * other.information) {
+            return None;
+        }
+        let own = (self.score * other.information - other.score * both) / determinant;
+        let others = (other.score * self.information - self.score * both) / determinant;
+        let gain = 0.5 * (own * self.score + others * other.score);
+        gain.is_finite().then_some((gain, [own, others]))
     }
 
     /// J̃ between two columns.
@@ -144,7 +159,7 @@ impl<'a> Chamber<'a> {
             information[(i, i)] += precision;
         }
         let factor = information.cholesky().ok_or(ChamberError::Unsolvable)?;
-        Ok(Scorer { chamber: self, records, factor, slope })
+        Ok(Scorer { chamber: self, fit: fit.clone(), records, factor, slope })
     }
 }
 
@@ -162,14 +177,36 @@ fn scaled(own: &Derivatives, deviations: &[f64], fitted: usize) -> DMatrix<f64> 
 impl Scorer<'_, '_> {
     /// One column; the amplitude's unit is that of the column.
     pub(crate) fn score(&self, column: &Column) -> Scored {
-        let mut response = Vec::new();
-        let mut cross = DVector::zeros(self.slope.len());
-        let mut score = 0.0;
-        for prepared in &self.records {
+        let of = |prepared: &Prepared| {
             let mut inputs = Values { of: std::array::from_fn(|_| Vec::new()) };
             inputs.of[RATE] = column.rate_rad_per_s.get(prepared.record).cloned().unwrap_or_default();
             let rows = &self.chamber.observed[prepared.record].series.rows;
-            let mut own = respond(&prepared.system, rows, &prepared.trace, &inputs);
+            respond(&prepared.system, rows, &prepared.trace, &inputs)
+        };
+        self.scored(self.records.iter().map(of).collect())
+    }
+
+    /// A changed model as a direction from the fit, the whole change one unit: what it does to the innovations themselves.
+    ///
+    /// # Errors
+    /// A changed model that cannot be solved.
+    pub(crate) fn score_model(&self, changed: &Assumption) -> Result<Scored, ChamberError> {
+        let fit = &self.fit;
+        let there = self.chamber.place(changed.clone(), fit.numbers.clone(), &fit.records, &fit.courses)?;
+        let of = |prepared: &Prepared| {
+            let moved = self.chamber.innovations(&there, prepared.record)?;
+            Ok(prepared.trace.innovations.iter().zip(&moved).map(|(here, there)| here.value - there.value).collect())
+        };
+        let responses: Result<Vec<Vec<f64>>, ChamberError> = self.records.iter().map(of).collect();
+        Ok(self.scored(responses?))
+    }
+
+    /// By how much innovations fall, record after record, cleared of what was fitted.
+    fn scored(&self, responses: Vec<Vec<f64>>) -> Scored {
+        let mut response = Vec::new();
+        let mut cross = DVector::zeros(self.slope.len());
+        let mut score = 0.0;
+        for (prepared, mut own) in self.records.iter().zip(responses) {
             own.iter_mut().zip(&prepared.trace.innovations).for_each(|(o, i)| *o /= i.variance.sqrt());
             let own = DVector::from_vec(own);
             score += own.dot(&prepared.innovations);
@@ -181,5 +218,43 @@ impl Scorer<'_, '_> {
         let score = score + weights.dot(&self.slope);
         let information = response.iter().map(|r| r * r).sum::<f64>() - cross.dot(&weights);
         Scored { response, cross, weights, score, information }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::dense::tests::{dip, effect, model, record};
+    use super::*;
+    use crate::chamber::Effort;
+
+    #[test]
+    fn two_columns_gain_together_what_their_matrix_says_and_a_model_what_its_direction_does() {
+        let record = record(400);
+        let declared = model(Vec::new());
+        let chamber = Chamber::new(&declared, &[&record]).unwrap();
+        let assumed = Assumption::new(declared, dip());
+        let fit = chamber.fit(&assumed, &[], &[0], None, Effort::QUICK).unwrap();
+        let course = |of: &dyn Fn(f64) -> f64| Column {
+            rate_rad_per_s: vec![(0..400).map(|k| 1e-7 * of(f64::from(k))).collect()],
+        };
+        let columns = [course(&|k| (k / 40.0).sin()), course(&|k| (k / 43.0).sin())];
+        let scores = chamber.score(&fit, &columns).unwrap();
+        let best = scores.information.clone().cholesky().unwrap().solve(&scores.score);
+        let scorer = chamber.scorer(&fit).unwrap();
+        let [first, second] = columns.each_ref().map(|c| scorer.score(c));
+        let (gain, amplitudes) = first.gain_with(&second).unwrap();
+        let expected = 0.5 * best.dot(&scores.score);
+        println!("{gain} for {expected}, each alone {} and {}", first.gain().0, second.gain().0);
+        assert!((gain / expected - 1.0).abs() < 1e-6 && gain > first.gain().0 + second.gain().0);
+        assert!((amplitudes[0] / best[0] - 1.0).abs() < 1e-6 && (amplitudes[1] / best[1] - 1.0).abs() < 1e-6);
+        assert!(first.gain_with(&first).is_none());
+
+        let changed = Assumption::new(model(vec![effect("strain_mismatch", &[1e-5])]), dip());
+        let direction = chamber.score_models(&fit, &[&changed]).unwrap()[0].unwrap();
+        let scored = scorer.score_model(&changed).unwrap();
+        println!("{} for {}, {} for {}", scored.score, direction.score, scored.information, direction.information);
+        // The direction counts what becomes of variances, too.
+        assert!((scored.score / direction.score - 1.0).abs() < 0.05);
+        assert!((scored.information / direction.information - 1.0).abs() < 0.02);
     }
 }

@@ -32,6 +32,8 @@ pub(super) struct Series {
     pub(crate) spikes: usize,
     /// Kinks that were placed in its air.
     pub(super) kinks: usize,
+    /// Whether its air approaches a set point, as that of a stage does behind a step: its slope dies away.
+    pub(super) approaches: bool,
     /// Values in one row.
     pub(crate) averaged: usize,
     /// Resolution of the sensor [K]; 0 where readings are not on a grid.
@@ -134,6 +136,7 @@ impl Series {
             spans: blocks.iter().map(|b| b.span).collect(),
             spikes,
             kinks: 0,
+            approaches: false,
             averaged,
             resolution_k,
             noise_floor_rad_per_s: white_noise(times_s, record.rate_rad_per_s()).deviation,
@@ -151,6 +154,18 @@ impl Series {
         self.values[measurement][row] = f64::NAN;
         self.rows[row].measured[measurement] = None;
         self.spikes += 1;
+    }
+
+    /// The time in which its air approaches set points \[s\]; infinite where it does not.
+    pub(super) fn approach_s(&self, where_it_does_s: f64) -> f64 {
+        if self.approaches { where_it_does_s } else { f64::INFINITY }
+    }
+
+    /// Takes in again what was left out since.
+    pub(super) fn take_in_again(&mut self, before: &Self) {
+        self.values.clone_from(&before.values);
+        self.rows.iter_mut().zip(&before.rows).for_each(|(row, whole)| row.measured = whole.measured);
+        self.spikes = before.spikes;
     }
 
     pub(crate) fn shape_of(&self, row: usize) -> usize {

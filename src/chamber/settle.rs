@@ -12,7 +12,7 @@ use super::kinks::Bend;
 use super::point::{BLIND_RAD2_PER_S2, CoilSide, run_kept};
 use super::prior::{GROSS_FACTOR, GROSS_SHARE, KINKS_PER_ROW, Quantity};
 use super::series::Series;
-use super::system::system;
+use super::system::{Numbers, system};
 use super::{Assumption, Chamber, ChamberError};
 
 /// Times that a record is looked through for gross errors, and for kinks.
@@ -34,18 +34,35 @@ impl<'a> Chamber<'a> {
     /// As [`Chamber::fit`].
     pub(crate) fn settled(self, assumed: &Assumption, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
         let fit = self.best_start(assumed, &[], records)?;
-        self.settled_from(fit, records)
+        self.settled_about(fit, records)
     }
 
-    /// The same by a fit that is there already, what is free of its effects included: where a model shows the air at other
-    /// times than the declared one did, its kinks are elsewhere.
+    /// The same chamber by a fit that is there already, what is free of its effects included: where a model shows the air at other
+    /// times than the declared one did, its kinks are elsewhere. By a model that may be the coil's own they are timed, too.
     ///
     /// # Errors
     /// As [`Chamber::fit`].
-    pub(crate) fn settled_from(mut self, fit: Fit, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
-        let fit = self.looked_through(fit, records)?;
+    pub(crate) fn settled_from(self, fit: Fit, records: &[usize]) -> Result<Self, ChamberError> {
+        let curved = self.curved(fit, records)?;
+        let (chamber, fit) = self.settled_about(curved, records)?;
+        chamber.with_timed_kinks(&fit)
+    }
+
+    /// A fit in an air that bends wherever readings do, whatever the air was.
+    fn curved(&self, mut fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
+        for &r in records {
+            let medians = Numbers::medians(&self.observed[r].series);
+            Quantity::AIR.iter().for_each(|&quantity| fit.numbers[r].set(quantity, medians.get(quantity)));
+        }
+        self.fit(&fit.assumed.clone(), &fit.free.clone(), records, Some(&fit), Effort::QUICK)
+    }
+
+    /// By a fit whose air bends wherever readings do: to one that is straight but for its kinks, what does not know them yet is full of
+    /// gross errors.
+    fn settled_about(mut self, curved: Fit, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
+        let (curved, fit) = self.looked_at(curved, records)?;
         for other in (0..self.records()).filter(|r| !records.contains(r)) {
-            let day = self.fit(&fit.assumed, &[], &[other], Some(&fit), Effort::SHORT)?;
+            let day = self.fit(&fit.assumed, &[], &[other], Some(&curved), Effort::SHORT)?;
             let day = self.looked_through(day, &[other])?;
             self.observed[other].day = Some(day.numbers[other]);
         }
@@ -53,27 +70,77 @@ impl<'a> Chamber<'a> {
         Ok((self, fit))
     }
 
-    pub(super) fn looked_through(&mut self, mut fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
-        fit = self.without_gross_errors(fit, records)?;
+    pub(super) fn looked_through(&mut self, fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
+        self.looked_at(fit, records).map(|(_, fit)| fit)
+    }
+
+    /// The same, and the fit by which the air was a curve.
+    fn looked_at(&mut self, fit: Fit, records: &[usize]) -> Result<(Fit, Fit), ChamberError> {
+        let whole: Vec<Series> = records.iter().map(|&r| self.observed[r].series.clone()).collect();
+        let curved = self.without_gross_errors(fit, records)?;
+        let mut fit = self.with_airs(curved.clone(), records)?;
+        // To a curve the rows behind a kink are gross errors.
+        let mut again = Vec::new();
+        for (&r, whole) in records.iter().zip(&whole) {
+            let series = &mut self.observed[r].series;
+            if series.kinks > 0 && series.spikes > whole.spikes {
+                series.take_in_again(whole);
+                again.push(r);
+            }
+        }
+        if !again.is_empty() {
+            let there = self.without_gross_errors(fit.clone(), &again)?;
+            again.iter().for_each(|&r| fit.numbers[r] = there.numbers[r]);
+        }
+        Ok((curved, fit))
+    }
+
+    /// Each record's air as it is likeliest: a curve, straight but for kinks, or both; and whether it approaches set points.
+    fn with_airs(&mut self, mut fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
         for &r in records {
             // Either the air bends wherever readings do, or it is straight but for its kinks, or it bends from kinks on as a stage that
             // is switched does. Kinks must be worth being looked for: the record itself says which, by itself.
             let curved = self.fit(&fit.assumed, &[], &[r], Some(&fit), Effort::QUICK)?;
             let bent = self.observed[r].series.clone();
-            let mut straight = bent.clone();
-            straight.rows.iter_mut().for_each(|row| row.bend = 0.0);
             let mut best = (curved.posterior(), curved.numbers[r], bent.clone());
-            for air in [straight, bent] {
-                self.observed[r].series = air;
-                if let Ok(Some((kinked, worth))) = self.kinked(&curved, r)
-                    && worth > best.0
-                {
-                    best = (worth, kinked.numbers[r], self.observed[r].series.clone());
+            self.observed[r].series.approaches = true;
+            let approaching = self.fit(&fit.assumed, &[], &[r], Some(&curved), Effort::QUICK)?;
+            let approaching = (approaching.posterior() > curved.posterior()).then_some(approaching);
+            for (from, approaches) in std::iter::once((curved, false)).chain(approaching.map(|fit| (fit, true))) {
+                for bends in [false, true] {
+                    let series = &mut self.observed[r].series;
+                    series.clone_from(&bent);
+                    series.approaches = approaches;
+                    if !bends {
+                        series.rows.iter_mut().for_each(|row| row.bend = 0.0);
+                    }
+                    let Ok(Some((kinked, worth))) = self.kinked(&from, r) else { continue };
+                    let other = if approaches { self.in_other_order(&kinked, r)? } else { None };
+                    let gain = other.as_ref().map_or(0.0, |other| other.posterior() - kinked.posterior());
+                    let (kinked, worth) = (other.unwrap_or(kinked), worth + gain);
+                    if worth > best.0 {
+                        best = (worth, kinked.numbers[r], self.observed[r].series.clone());
+                    }
                 }
             }
             (fit.numbers[r], self.observed[r].series) = (best.1, best.2);
         }
         Ok(fit)
+    }
+
+    /// Air that approaches a set point, and a pack that follows the air behind its film, are two lags in a row: a sensor on the pack shows
+    /// nearly the same whichever is the longer. The fit with their times exchanged, if it is better.
+    fn in_other_order(&self, kinked: &Fit, record: usize) -> Result<Option<Fit>, ChamberError> {
+        let numbers = &kinked.numbers[record];
+        let film = numbers.get(Quantity::Film);
+        let side = CoilSide::new(&kinked.assumed, film, self.modes, &self.observed[record])?;
+        let pack_s = side.reduced.decay_per_s.iter().fold(f64::INFINITY, |least, decay| least.min(*decay)).recip();
+        let mut other = kinked.clone();
+        other.numbers[record].set(Quantity::ApproachTime, pack_s);
+        let film = film * pack_s / numbers.get(Quantity::ApproachTime);
+        other.numbers.iter_mut().for_each(|n| n.set(Quantity::Film, film));
+        let other = self.fit(&kinked.assumed, &[], &[record], Some(&other), Effort::QUICK)?;
+        Ok((other.posterior() > kinked.posterior()).then_some(other))
     }
 
     /// A fit to records without what it says are gross errors.
@@ -345,9 +412,52 @@ fn peaks(values: &[f64], reach: usize) -> impl Iterator<Item = usize> {
 #[cfg(test)]
 mod tests {
     use super::super::dense::tests::{effect, model};
-    use super::super::kinks::tests::{KINKS_S, kinked};
+    use super::super::kinks::tests::{KINKS_S, in_air, kinked};
     use super::*;
+    use crate::numeric::piecewise::PiecewiseLinear;
     use crate::pattern::classic::Classic;
+
+    /// Air that approaches each of its set points with a time, from instants that are no rows'; in straight lines of two seconds.
+    fn staged(approach_s: f64) -> PiecewiseLinear {
+        let steps = [(904.3, 311.0), (1707.7, 302.0), (2612.9, 318.0), (3571.4, 289.0), (4703.6, 296.0)];
+        let times_s: Vec<f64> = (0..=3000).map(|i| 2.0 * f64::from(i)).collect();
+        let air = |t: f64| {
+            let mut before = 293.0;
+            let mut air = 293.0;
+            for (at_s, aim) in steps.into_iter().filter(|(at_s, _)| *at_s < t) {
+                air += (aim - before) * (1.0 - (-(t - at_s) / approach_s).exp());
+                before = aim;
+            }
+            air
+        };
+        let values = times_s.iter().map(|t| air(*t)).collect();
+        PiecewiseLinear::new(times_s, values).unwrap()
+    }
+
+    #[test]
+    fn a_stages_air_is_told_by_the_time_of_its_approach_and_nothing_in_it_is_a_gross_error() {
+        let (bare, pattern) = (model(Vec::new()), Classic::Zyl.pattern(8).unwrap());
+        let declared = Assumption::new(bare.clone(), pattern.clone());
+        for approach_s in [40.0, 220.0] {
+            let record = in_air(&bare, &pattern, &staged(approach_s));
+            let (_, fit) = Chamber::new(&bare, &[&record]).unwrap().settled(&declared, &[0]).unwrap();
+            // Looked through again by numbers of air whose kinks are known, a chamber that does not know them leaves nothing out.
+            let chamber = Chamber::new(&bare, &[&record]).unwrap().settled_from(fit, &[0]).unwrap();
+            let fit = chamber.fit_anew(&declared, &[], &[0]).unwrap();
+            let series = &chamber.observed[0].series;
+            let (found_s, film) = (fit.number(Quantity::ApproachTime, 0), fit.number(Quantity::Film, 0));
+            println!(
+                "{approach_s} s: {found_s:.1} s, film {film:.2}, {} kinks, {} left out",
+                series.kinks, series.spikes
+            );
+            assert!(series.approaches && (found_s / approach_s - 1.0).abs() < 0.03, "{found_s}");
+            assert!((film / 25.0 - 1.0).abs() < 0.03, "{film}");
+            assert_eq!(series.spikes, 0);
+        }
+        let ramps = kinked(&bare, &pattern);
+        let (chamber, _) = Chamber::new(&bare, &[&ramps]).unwrap().settled(&declared, &[0]).unwrap();
+        assert!(!chamber.observed[0].series.approaches);
+    }
 
     #[test]
     fn a_coil_on_a_spool_needs_fewer_kinks_by_its_own_model_than_by_another() {

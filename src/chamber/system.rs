@@ -3,6 +3,7 @@
 //! ```text
 //! dx_i = λ_i (a − x_i) dt                     modes of the pack behind the film; a = u + f + o, the air
 //! du = s dt,   ds = √q dW                     trend; q between the noise at rest and that where readings bend
+//! ds = −s/τ_a dt + √q dW                      … of a stage, which approaches its set point
 //! df = −f/τ_f dt + σ_f √(2/τ_f) dW            turbulence
 //! d(o, p) = R (o, p) dt + γ (d, e) dt,   d(d, e) = R (d, e) dt + 2 σ_o √γ dW,   R = (−γ, ω; −ω, −γ)        ripple
 //! dl = (sensor's place − l)/τ dt              lag
@@ -14,6 +15,7 @@
 //! |---|---|---|
 //! | x_i, λ_i, c | modes, their decays and the rate per kelvin a second of each | K, 1/s, rad |
 //! | τ, W, b | sensor's lag, the rate's window, offset | s, s, rad/s |
+//! | τ_a | time in which the air of a stage approaches its set point | s |
 //!
 //! The ripple's size and phase are what a compressor makes of its load, and as smooth: driven by noise itself the oscillator
 //! would have a tail that falls as 1/f², which the coil sees as white noise of its own.
@@ -27,6 +29,7 @@ use super::discretise::discretise;
 use super::filter::{RATE, Step, System};
 use super::prior::{OFFSET_RAD_PER_S, PRIORS, Quantity, START_APART_K, START_APART_MODES, START_APART_S, START_K};
 use super::series::{Series, Shape};
+pub(super) use super::shows::Shows;
 use super::sparse::Sparse;
 use super::stationary::followed;
 use crate::numeric::statistics::median;
@@ -75,25 +78,6 @@ pub(super) struct Parts<'a> {
     pub(crate) lag_s: f64,
     pub(crate) drift: bool,
     pub(crate) cycle: bool,
-}
-
-/// What the sensor shows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Shows {
-    Air,
-    /// A housing, the spool or a flange.
-    Part,
-    OuterLayer,
-}
-
-impl Shows {
-    pub(crate) fn of(location: Location) -> Self {
-        match location {
-            Location::Ambient => Shows::Air,
-            Location::OuterLayer => Shows::OuterLayer,
-            Location::Housing(_) | Location::Spool | Location::Flange(_) => Shows::Part,
-        }
-    }
 }
 
 /// Heat capacity that a pack is taken to have where only its diffusivity is known [J/(m³K)].
@@ -245,7 +229,8 @@ impl Layout {
 pub(super) fn system(parts: &Parts, numbers: &Numbers, series: &Series) -> System {
     let layout = Layout::new(parts, series);
     let n = layout.size;
-    let (f, noise, trend_noise) = dynamics(parts, &layout, numbers);
+    let approach_s = series.approach_s(numbers.get(Quantity::ApproachTime));
+    let (f, noise, trend_noise) = dynamics(parts, &layout, numbers, approach_s);
     let steps = series
         .steps_s
         .iter()
@@ -261,8 +246,7 @@ pub(super) fn system(parts: &Parts, numbers: &Numbers, series: &Series) -> Syste
             }
         })
         .collect();
-    let response = response(parts, &layout);
-    let places = places(parts, &layout);
+    let (response, places) = (response(parts, &layout), places(parts, &layout));
     let mut rows = Vec::new();
     for shape in &series.shapes {
         for place in &places {
@@ -356,7 +340,12 @@ fn rate_row(layout: &Layout, f: &[f64], response: &[f64], shape: &Shape) -> Vec<
 }
 
 /// F, the diagonal of G without the trend's noise, and that of the trend's per unit of its density.
-pub(super) fn dynamics(parts: &Parts, layout: &Layout, numbers: &Numbers) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+pub(super) fn dynamics(
+    parts: &Parts,
+    layout: &Layout,
+    numbers: &Numbers,
+    approach_s: f64,
+) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let n = layout.size;
     let (mut f, mut g) = (vec![0.0; n * n], vec![0.0; n]);
     let get = |q: Quantity| numbers.get(q);
@@ -373,6 +362,7 @@ pub(super) fn dynamics(parts: &Parts, layout: &Layout, numbers: &Numbers) -> (Ve
         layout.air().into_iter().for_each(|j| f[skin * n + j] = 1.0 / skin_s);
     }
     f[layout.trend * n + layout.trend + 1] = 1.0;
+    f[(layout.trend + 1) * n + layout.trend + 1] = -1.0 / approach_s;
     let mut relax = |i: usize, size: f64, time_s: f64| {
         f[i * n + i] = -1.0 / time_s;
         g[i] = 2.0 * size * size / time_s;

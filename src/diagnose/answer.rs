@@ -5,35 +5,26 @@
 //! hold half, or the coil is wound or connected otherwise.
 
 use super::describe::{ScoredExplanation, contenders, findings, ladder, names, unexplained};
-use super::joint::{Explanation, Found, Member, Question};
+use super::joint::{Explanation, Found, Member, Question, on_the_way};
 use super::standing::CERTAIN;
 use super::{Caution, DiagnoseError, Diagnosis, Hypothesis, OffsetStep, RecordNoise, Refitted, Share, Verdict};
-use crate::chamber::{Chamber, Fit, Place};
+use crate::chamber::{Chamber, Place};
 use crate::record::Record;
 
 /// What sets with something unknown in them must hold for that to be the answer.
 const HALF: f64 = 0.5;
 
-/// The chamber with every record's kinks at the times that a fit, if there is one, has them at: what is said of predictions
-/// needs them sharper than the search does.
-pub(super) fn with_timed_kinks<'a>(question: &Question<'a>, best: Option<&Fit>) -> Result<Chamber<'a>, DiagnoseError> {
-    let mut timed = question.chamber.clone();
-    let Some(best) = best else { return Ok(timed) };
-    for &record in &question.fitted {
-        timed.time_kinks(best, record)?;
-    }
-    for &record in &question.held_out {
-        let day = question.chamber.held_out(best, record)?;
-        timed.time_kinks(&day, record)?;
-    }
-    Ok(timed)
-}
-
-/// The whole answer.
+/// The whole answer; what is left of records is said by the chamber with `timed` kinks.
 ///
 /// # Errors
 /// A model that cannot be solved any more.
-pub(super) fn answer(question: &Question, found: &Found, records: &[&Record]) -> Result<Diagnosis, DiagnoseError> {
+pub(super) fn answer(
+    asked: &Question,
+    timed: &Chamber,
+    found: &Found,
+    records: &[&Record],
+) -> Result<Diagnosis, DiagnoseError> {
+    let question = &Question { chamber: timed, ..asked.clone() };
     let declared = found.declared().ok_or(DiagnoseError::Unsolvable)?;
     let outside: f64 = found.explanations.iter().filter(|e| e.is_outside()).map(|e| e.probability).sum();
     let rewound = |e: &Explanation| e.members.iter().any(|m| matches!(m, Member::Winding(_)));
@@ -55,14 +46,15 @@ pub(super) fn answer(question: &Question, found: &Found, records: &[&Record]) ->
     };
     let likeliest =
         if outside >= HALF { found.explanations.iter().find(|e| e.is_outside()).unwrap_or(top) } else { top };
-    let (scored, first) = (ScoredExplanation::new(question, named)?, ScoredExplanation::new(question, declared)?);
+    let between = on_the_way(asked, named)?;
+    let to = (!std::ptr::eq(named, declared)).then_some(named);
+    let steps = ScoredExplanation::all(question, std::iter::once(declared).chain(&between).chain(to))?;
+    let (first, scored) = (&steps[0], &steps[steps.len() - 1]);
     let noise = noises(question, likeliest)?;
-    let noise_floor = {
-        let squares: f64 = noise.iter().take(question.fitted.len()).map(|n| n.noise.white_rad_per_s.powi(2)).sum();
-        (squares / question.fitted.len().max(1) as f64).sqrt()
-    };
+    let squares: f64 = noise.iter().take(question.fitted.len()).map(|n| n.noise.white_rad_per_s.powi(2)).sum();
+    let noise_floor = (squares / question.fitted.len().max(1) as f64).sqrt();
     let equals: &[&Explanation] = if verdict == Verdict::Indistinguishable { &family } else { &[] };
-    let effects = findings(question, found, &scored, &first, equals)?;
+    let effects = findings(question, found, scored, first, equals)?;
     let mut cautions = cautions(question.chamber, records);
     let hypothesis = hypothesis(question, found, named);
     if let Some(winding) = hypothesis.as_ref().and_then(|h| h.winding) {
@@ -74,11 +66,11 @@ pub(super) fn answer(question: &Question, found: &Found, records: &[&Record]) ->
     let suggested_experiment = experiment(verdict, &effects);
     Ok(Diagnosis {
         verdict,
-        ladder: ladder(question, found, &scored, &first, &noise)?,
+        ladder: ladder(question, &steps, &noise)?,
         candidates: contenders(question, found, declared),
         noise_floor_rad_per_s: noise_floor,
         unexplained: match verdict {
-            Verdict::Unexplained => Some(unexplained(question, &first, likeliest)?),
+            Verdict::Unexplained => Some(unexplained(question, first, likeliest)?),
             _ => None,
         },
         suggested_experiment,

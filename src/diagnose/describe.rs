@@ -22,6 +22,13 @@ impl<'e> ScoredExplanation<'e> {
             question.held_out.par_iter().map(|&r| question.chamber.held_out(&explanation.fit, r)).collect();
         Ok(Self { explanation, held_out: fits? })
     }
+
+    pub(crate) fn all(
+        question: &Question,
+        explanations: impl Iterator<Item = &'e Explanation>,
+    ) -> Result<Vec<Self>, DiagnoseError> {
+        explanations.map(|explanation| Self::new(question, explanation)).collect()
+    }
 }
 
 /// The kinds of a set; of what is no effect, a word.
@@ -158,67 +165,46 @@ fn left(question: &Question, fit: &Fit, record: usize) -> Result<(f64, usize), D
     Ok(((rms(&residuals).powi(2) + white * white * (1.0 - 1.0 / averaged)).sqrt(), residuals.len()))
 }
 
-/// A fit with fewer of its added effects, everything else as it is.
-fn shortened(question: &Question, fit: &Fit, kept: usize) -> Fit {
-    let mut fit = fit.clone();
-    fit.assumed.model.effects.truncate(question.model.effects.len() + kept);
-    fit
-}
-
-/// The errors after each effect, in the order in which the search took them in.
+/// The errors after each effect, in the order in which the search took them in; `steps`: the declared model, the sets on the way, the
+/// set itself.
 pub(super) fn ladder(
     question: &Question,
-    found: &Found,
-    scored: &ScoredExplanation,
-    declared: &ScoredExplanation,
+    steps: &[ScoredExplanation],
     noise: &[RecordNoise],
 ) -> Result<Vec<Rung>, DiagnoseError> {
-    let named = scored.explanation;
-    let effects = named.effects(question);
     let expected = |place: usize| {
         let n = &noise[place].noise;
         n.white_rad_per_s.powi(2) + n.wander_rad_per_s.powi(2) + n.unresolved_air_rad_per_s.powi(2)
     };
-    let rung = |kept: usize| -> Result<Rung, DiagnoseError> {
-        let from = if kept == 0 { declared } else { scored };
-        let kinds: Vec<String> = effects[..kept].iter().map(|(c, _)| question.candidates[*c].kind()).collect();
-        let over = |fits: &[(Fit, usize, usize)]| -> Result<(f64, f64), DiagnoseError> {
-            let (mut squares, mut chi_square, mut rows) = (0.0, 0.0, 0);
-            for (fit, record, place) in fits {
-                let (error, count) = left(question, fit, *record)?;
-                squares += error * error * count as f64;
-                chi_square += error * error / expected(*place) * count as f64;
-                rows += count;
-            }
-            Ok(((squares / rows.max(1) as f64).sqrt(), chi_square / rows.max(1) as f64))
-        };
-        let fitted: Vec<(Fit, usize, usize)> = question
-            .fitted
-            .iter()
-            .enumerate()
-            .map(|(place, &r)| (shortened(question, &from.explanation.fit, kept), r, place))
-            .collect();
-        let unseen: Vec<(Fit, usize, usize)> = question
-            .held_out
-            .iter()
-            .zip(&from.held_out)
-            .enumerate()
-            .map(|(place, (&r, fit))| (shortened(question, fit, kept), r, question.fitted.len() + place))
-            .collect();
+    let over = |fits: &[(&Fit, usize, usize)]| -> Result<(f64, f64), DiagnoseError> {
+        let (mut squares, mut chi_square, mut rows) = (0.0, 0.0, 0);
+        for (fit, record, place) in fits {
+            let (error, count) = left(question, fit, *record)?;
+            squares += error * error * count as f64;
+            chi_square += error * error / expected(*place) * count as f64;
+            rows += count;
+        }
+        Ok(((squares / rows.max(1) as f64).sqrt(), chi_square / rows.max(1) as f64))
+    };
+    let rung = |step: &ScoredExplanation| -> Result<Rung, DiagnoseError> {
+        let fit = &step.explanation.fit;
+        let fitted: Vec<(&Fit, usize, usize)> =
+            question.fitted.iter().enumerate().map(|(place, &r)| (fit, r, place)).collect();
+        let days = question.held_out.iter().zip(&step.held_out).enumerate();
+        let unseen: Vec<(&Fit, usize, usize)> =
+            days.map(|(place, (&r, day))| (day, r, question.fitted.len() + place)).collect();
         let (rmse, reduced) = over(&fitted)?;
         let held_out = if unseen.is_empty() { None } else { Some(over(&unseen)?) };
-        let known = found.explanations.iter().find(|e| names(question, e) == kinds).unwrap_or(from.explanation);
-        let parameters = known.fit.parameters.len() as f64;
         Ok(Rung {
-            effects: kinds,
+            effects: fit.assumed.model.effects[question.model.effects.len()..].iter().map(|e| e.kind()).collect(),
             rmse_rad_per_s: rmse,
             holdout_rmse_rad_per_s: held_out.map(|h| h.0),
             reduced_chi_square: reduced,
             holdout_reduced_chi_square: held_out.map(|h| h.1),
-            bic: -2.0 * known.fit.log_likelihood + parameters * (rows(question) as f64).ln(),
+            bic: -2.0 * fit.log_likelihood + fit.parameters.len() as f64 * (rows(question) as f64).ln(),
         })
     };
-    (0..=effects.len()).map(rung).collect()
+    steps.iter().map(rung).collect()
 }
 
 impl Rung {

@@ -387,7 +387,7 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
     let best =
         found.explanations.first().filter(|e| !e.members.is_empty() || found.is_elsewhere).map(|e| e.fit.clone());
     let again = match best {
-        Some(fit) => Some(Chamber::new(request.model, &records)?.settled_from(fit, &question.fitted)?.0),
+        Some(fit) => Some(Chamber::new(request.model, &records)?.settled_from(fit, &question.fitted)?),
         None => None,
     };
     let (question, found) = match &again {
@@ -400,8 +400,11 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
     };
     let chamber = question.chamber;
     progress(0.6);
-    let timed = answer::with_timed_kinks(&question, found.likeliest())?;
-    let mut diagnosis = answer::answer(&Question { chamber: &timed, ..question.clone() }, &found, &records)?;
+    let timed = match &again {
+        Some(chamber) => chamber.clone(),
+        None => in_time(chamber, &found)?,
+    };
+    let mut diagnosis = answer::answer(&question, &timed, &found, &records)?;
     beyond(request, &question, &timed, &found, &mut diagnosis, &|share| progress(0.6 + 0.2 * share))?;
     // Where what is to be fitted shows nothing, the other records may; the former then confirm it.
     if let (Verdict::Adequate, Some(declared), false) =
@@ -411,8 +414,8 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
         let day = chamber.fit(&declared.fit.assumed, &[], &other.fitted, Some(&declared.fit), Effort::FULL)?;
         if joint::promise(&other, &day)? > PROMISING {
             let found = joint::search(&other, day, &|share| progress(0.8 + 0.2 * share))?;
-            let timed = answer::with_timed_kinks(&other, found.likeliest())?;
-            let mut elsewhere = answer::answer(&Question { chamber: &timed, ..other.clone() }, &found, &records)?;
+            let timed = in_time(chamber, &found)?;
+            let mut elsewhere = answer::answer(&other, &timed, &found, &records)?;
             beyond(request, &other, &timed, &found, &mut elsewhere, &|_| ())?;
             if elsewhere.verdict != Verdict::Adequate {
                 // Columns stay those of the records as they were given.
@@ -424,6 +427,15 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
     }
     progress(1.0);
     Ok(diagnosis)
+}
+
+/// The chamber with its kinks at the times that the likeliest set has them at.
+fn in_time<'a>(chamber: &Chamber<'a>, found: &joint::Found) -> Result<Chamber<'a>, DiagnoseError> {
+    let chamber = chamber.clone();
+    Ok(match found.likeliest() {
+        Some(fit) => chamber.with_timed_kinks(fit)?,
+        None => chamber,
+    })
 }
 
 /// Formulas for what no listed effect explains; what they leave of records is said by the `timed` chamber.
@@ -448,13 +460,7 @@ fn beyond(
         }
         Beyond::Found(discovered, elsewhere) => (discovered, elsewhere),
     };
-    let own = match &elsewhere {
-        Some(chamber) => {
-            Some(answer::with_timed_kinks(&Question { chamber, ..question.clone() }, Some(discovered.fit()))?)
-        }
-        None => None,
-    };
-    let timed = own.as_ref().unwrap_or(timed);
+    let timed = elsewhere.as_ref().unwrap_or(timed);
     discover::amend(&Question { chamber: timed, ..question.clone() }, found, &discovered, diagnosis)
 }
 

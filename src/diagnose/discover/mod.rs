@@ -15,6 +15,7 @@ mod grammar;
 mod grounds;
 mod inner;
 mod own_courses;
+mod pairs;
 mod proposal;
 mod search;
 mod shadows;
@@ -42,14 +43,15 @@ pub(in crate::diagnose) struct Discovered {
     /// Of the best set, and of the sets that do nearly as well.
     pub(crate) probability: f64,
     pub(crate) alternatives: Vec<(Set, f64)>,
-    /// What all records that are not fitted have in common with the best set, frozen.
-    pub(crate) days: Vec<Fit>,
+    /// The set with fewer of its terms, from none on, each fitted by itself, and the best; with what the records that are not fitted have in
+    /// common with each, frozen.
+    pub(crate) steps: Vec<(Set, Vec<Fit>)>,
 }
 
 impl Discovered {
-    /// The best set's, as it was fitted.
-    pub(crate) fn fit(&self) -> &Fit {
-        &self.best.explanation.fit
+    /// Of the best set.
+    pub(crate) fn days(&self) -> &[Fit] {
+        self.steps.last().map_or(&[], |(_, days)| days)
     }
 }
 
@@ -99,7 +101,8 @@ pub(in crate::diagnose) fn discover<'a>(
                 || tools.may_replace(&tools.plain(declared), listed)
         };
         is_settled = !sets.iter().any(gains) && !may_replace();
-        if is_settled && beside.is_none() {
+        let may_be_pair = listed.members.len() > 1;
+        if is_settled && beside.is_none() && !may_be_pair {
             return Ok(Beyond::Nothing);
         }
     }
@@ -114,6 +117,7 @@ pub(in crate::diagnose) fn discover<'a>(
     if let Some(listed) = listed.filter(|e| !from_listed && e.total() + BEATS > best_yet) {
         sets.extend(tools.search(tools.plain(listed), MOST_TERMS, &|_| ()));
     }
+    sets.extend(tools.in_the_place_of_two(declared, listed, &sets));
     sets.retain(|s| !s.terms.is_empty() && s.total().is_finite());
     sets.sort_by(|a, b| b.total().total_cmp(&a.total()));
     let near = sets.first().filter(|best| best.total() > best_listed - NEAR);
@@ -182,11 +186,23 @@ fn concluded(tools: &Tools, sets: Vec<Set>, listed: &[f64], least: f64) -> Resul
     let alternatives =
         near.into_iter().skip(1).map(|s| ((s.total() - best.total()).exp() / sum, s)).map(|(p, s)| (s, p)).collect();
     let (refined, errors) = refined(tools, &best);
-    let mut frozen = best.explanation.fit.clone();
-    frozen.assumed.inputs.iter_mut().for_each(|i| i.deviation = 0.0);
-    let days: Result<Vec<Fit>, ChamberError> =
-        question.held_out.iter().map(|&r| question.chamber.held_out(&frozen, r)).collect();
-    Ok(Some(Discovered { best, refined, errors, probability, alternatives, days: days? }))
+    let steps = steps(tools, &best)?;
+    Ok(Some(Discovered { best, refined, errors, probability, alternatives, steps }))
+}
+
+/// A set with fewer of its terms, from none on, and the set itself, each with the held-out records' days by it, frozen.
+fn steps(tools: &Tools, best: &Set) -> Result<Vec<(Set, Vec<Fit>)>, ChamberError> {
+    let mut sets = vec![best.clone()];
+    while let Some(fewer) = sets.last().filter(|s| !s.terms.is_empty()).and_then(|s| tools.without(s, s.len() - 1)) {
+        sets.push(fewer);
+    }
+    let with_days = |set: Set| {
+        let mut frozen = set.explanation.fit.clone();
+        frozen.assumed.inputs.iter_mut().for_each(|i| i.deviation = 0.0);
+        let days = tools.question.held_out.iter().map(|&r| tools.question.chamber.held_out(&frozen, r));
+        Ok((set, days.collect::<Result<Vec<Fit>, ChamberError>>()?))
+    };
+    sets.into_iter().rev().map(with_days).collect()
 }
 
 /// The variables are those of a fit; None where no term can be made of these records.

@@ -126,7 +126,7 @@ pub(in crate::diagnose) fn amend(
     // Amplitudes as they were fitted wherever a record is only judged by.
     let mut frozen = best.explanation.clone();
     frozen.fit.assumed.inputs.iter_mut().for_each(|input| input.deviation = 0.0);
-    let refined = ScoredExplanation { explanation: &frozen, held_out: discovered.days.clone() };
+    let refined = ScoredExplanation { explanation: &frozen, held_out: discovered.days().to_vec() };
     let first = ScoredExplanation::new(question, declared)?;
     // Sets that do as well with another listed effect in the place of one.
     let equals: Vec<&Explanation> = discovered.alternatives.iter().map(|(set, _)| &set.explanation).collect();
@@ -196,20 +196,21 @@ fn proposal(
     diagnosis: &mut Diagnosis,
 ) -> Result<FormulaProposal, DiagnoseError> {
     let (best, refined) = (&discovered.best, &discovered.refined);
-    let over = |fits: &[(&Fit, usize)], terms: usize| -> Result<f64, DiagnoseError> {
+    let over = |fits: &[(&Fit, usize)]| -> Result<f64, DiagnoseError> {
         let (mut squares, mut rows) = (0.0, 0.0);
         for (fit, record) in fits {
-            let mut fit = (*fit).clone();
-            fit.assumed.inputs.truncate(best.first_input() + terms);
-            let residuals = left(question, &fit, *record)?;
+            let residuals = left(question, fit, *record)?;
             let count = residuals.iter().filter(|v| v.is_finite()).count() as f64;
             squares += size(&residuals).powi(2) * count;
             rows += count;
         }
         Ok((squares / f64::max(rows, 1.0)).sqrt())
     };
-    let fitted: Vec<(&Fit, usize)> = question.fitted.iter().map(|&r| (&best.explanation.fit, r)).collect();
-    let unseen: Vec<(&Fit, usize)> = discovered.days.iter().zip(&question.held_out).map(|(f, &r)| (f, r)).collect();
+    let errors = |set: &Set, days: &[Fit]| -> Result<(f64, Option<f64>), DiagnoseError> {
+        let fitted: Vec<(&Fit, usize)> = question.fitted.iter().map(|&r| (&set.explanation.fit, r)).collect();
+        let unseen: Vec<(&Fit, usize)> = days.iter().zip(&question.held_out).map(|(f, &r)| (f, r)).collect();
+        Ok((over(&fitted)?, if unseen.is_empty() { None } else { Some(over(&unseen)?) }))
+    };
     let kinds: Vec<String> = diagnosis.effects.iter().map(|f| f.effect.kind()).collect();
     let expected = |place: usize| {
         diagnosis.noise.get(place).map_or(f64::NAN, |n| {
@@ -219,21 +220,19 @@ fn proposal(
     let (noise, unseen_noise) = (expected(0), expected(question.fitted.len()));
     let mut ladder: Vec<Rung> = diagnosis.ladder.first().cloned().into_iter().collect();
     let from = usize::from(kinds.is_empty());
-    for terms in from..=best.terms.len() {
-        let rmse = over(&fitted, terms)?;
-        let holdout = if unseen.is_empty() { None } else { Some(over(&unseen, terms)?) };
-        let named = best.terms[..terms].iter().map(|t| t.family.text.clone());
+    for (set, days) in discovered.steps.iter().filter(|(set, _)| set.terms.len() >= from) {
+        let (rmse, holdout) = errors(set, days)?;
+        let named = set.terms.iter().map(|t| t.family.text.clone());
         ladder.push(Rung {
             effects: kinds.iter().cloned().chain(named).collect(),
             rmse_rad_per_s: rmse,
             holdout_rmse_rad_per_s: holdout,
             reduced_chi_square: (rmse / noise).powi(2),
             holdout_reduced_chi_square: holdout.map(|h| (h / unseen_noise).powi(2)),
-            bic: bic(best),
+            bic: bic(set),
         });
     }
-    let rmse_rad_per_s = over(&fitted, best.terms.len())?;
-    let holdout_rmse_rad_per_s = if unseen.is_empty() { None } else { Some(over(&unseen, best.terms.len())?) };
+    let (rmse_rad_per_s, holdout_rmse_rad_per_s) = errors(best, discovered.days())?;
     diagnosis.ladder = ladder;
     let mut terms = Vec::new();
     let mut proposed = refined.explanation.fit.assumed.model.clone();

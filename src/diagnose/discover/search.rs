@@ -116,12 +116,12 @@ pub(crate) struct PromisingTerm {
 }
 
 impl Tools<'_, '_> {
-    fn rows(&self, fit: &Fit) -> f64 {
+    pub(super) fn rows(&self, fit: &Fit) -> f64 {
         rates(self.question.chamber, fit) as f64
     }
 
     /// What a term costs beside its amplitude, which the merit of its fit pays for.
-    fn price(&self, term: &Term, rows: f64) -> f64 {
+    pub(super) fn price(&self, term: &Term, rows: f64) -> f64 {
         -EFFECT.log + (self.candidates.max(1) as f64).ln() + 0.5 * rows.ln() * term.inner.len() as f64
     }
 

@@ -21,7 +21,7 @@ mod winding;
 
 use std::sync::Arc;
 
-use crate::chamber::{Chamber, ChamberError, Fit};
+use crate::chamber::{Chamber, ChamberError, Effort, Fit, Free};
 use crate::diagnose::candidate::Candidate;
 use crate::pattern::Pattern;
 
@@ -30,7 +30,7 @@ pub(crate) use explanation::{Explanation, Member};
 pub(in crate::diagnose) use explanation::{fitted, with, without};
 pub(in crate::diagnose) use odds::EFFECT;
 pub(in crate::diagnose) use readings::{Readings, changes_readings, is_seen};
-pub(in crate::diagnose) use screen::{Proposal, proposals_along};
+pub(in crate::diagnose) use screen::{Proposal, TestedStart, proposals_along, tested_starts};
 pub(crate) use search::{again, promise, refit_without, search, settle_one};
 pub(crate) use winding::Winding;
 
@@ -70,6 +70,23 @@ pub(crate) struct Found {
     pub(crate) windings: Vec<Winding>,
     /// Whether its fits are of another chamber than that which was asked about.
     pub(crate) is_elsewhere: bool,
+}
+
+/// The sets on the way to one: its first effect, its first two, and so on, each fitted by itself.
+///
+/// # Errors
+/// A set that cannot be solved.
+pub(in crate::diagnose) fn on_the_way(question: &Question, to: &Explanation) -> Outcome<Vec<Explanation>> {
+    let declared = question.model.effects.len();
+    let added = to.fit.assumed.model.effects.len() - declared;
+    let shorter = |kept: usize| {
+        let mut assumed = to.fit.assumed.clone();
+        assumed.model.effects.truncate(declared + kept);
+        let free: Vec<Free> = to.fit.free.iter().filter(|f| f.effect < declared + kept).copied().collect();
+        let fit = question.chamber.fit(&assumed, &free, &question.fitted, Some(&to.fit), Effort::QUICK)?;
+        Ok(Explanation { fit, held_out: None, probability: 0.0, ..to.clone() })
+    };
+    (1..added).map(shorter).collect()
 }
 
 impl Found {

@@ -73,11 +73,42 @@ pub(super) fn looked_at(question: &Question, best: &Explanation) -> Outcome<Vec<
     Ok(best_layers(question, all, LAYERS_TRIED))
 }
 
-fn scored(
+/// A candidate from one of its starts, so near to a fit that what it adds is a direction.
+pub(in crate::diagnose) struct TestedStart {
+    place: usize,
+    start: Vec<f64>,
+    /// Of the start, where it is looked at.
+    share: f64,
+    /// The least and the largest multiple of the start that may be.
+    range: (f64, f64),
+    pub(crate) assumed: Assumption,
+}
+
+impl TestedStart {
+    /// Multiples of what was looked at that may be.
+    pub(in crate::diagnose) fn range(&self) -> (f64, f64) {
+        (self.range.0 / self.share, self.range.1 / self.share)
+    }
+
+    /// How many parameters a fit with it has more.
+    pub(in crate::diagnose) fn free(&self, question: &Question) -> usize {
+        question.candidates[self.place].free.len()
+    }
+
+    /// Where a fit with so many times what was looked at begins.
+    pub(in crate::diagnose) fn proposal(&self, question: &Question, gain: f64, amplitude: f64) -> Proposal {
+        let candidate = &question.candidates[self.place];
+        let values = scaled(&candidate.effect, &candidate.free, &self.start, amplitude * self.share);
+        Proposal { member: Member::Effect(self.place), values: Some(values), gain }
+    }
+}
+
+/// Every candidate that a set lacks, from each of its starts; `along` changes the rest of an assumption, and says whether it is looked at.
+pub(in crate::diagnose) fn tested_starts(
     question: &Question,
     best: &Explanation,
     along: &(dyn Fn(&Candidate, &mut Assumption) -> bool + Sync),
-) -> Outcome<Vec<Proposal>> {
+) -> Vec<TestedStart> {
     let mut asked: Vec<(usize, Vec<f64>)> = Vec::new();
     for (place, candidate) in question.candidates.iter().enumerate() {
         let there = best.members.iter().any(|m| match m {
@@ -90,34 +121,34 @@ fn scored(
             asked.extend(candidate.starts.iter().map(|start| (place, start.clone())));
         }
     }
-    let changed: Vec<Option<Assumption>> = asked
-        .par_iter()
-        .map(|(place, start)| {
-            let candidate = &question.candidates[*place];
-            let values = match is_sized(&candidate.effect, &candidate.free) {
-                true => scaled(&candidate.effect, &candidate.free, start, TESTED_SHARE),
-                false => start.clone(),
-            };
-            let (mut assumed, _) = with(question, &[], &best.fit, Member::Effect(*place), Some(values))?;
-            along(candidate, &mut assumed).then_some(assumed)
-        })
-        .collect();
-    let places: Vec<usize> = (0..asked.len()).filter(|&i| changed[i].is_some()).collect();
-    let changed: Vec<Assumption> = changed.into_iter().flatten().collect();
-    let directions = question.chamber.score_models(&best.fit, &changed)?;
-    let mut all = Vec::new();
-    for (&i, direction) in places.iter().zip(directions) {
-        let Some(direction) = direction else { continue };
-        let (place, start) = &asked[i];
-        let effect = &question.candidates[*place].effect;
-        let free = &question.candidates[*place].free;
-        let share = if is_sized(effect, free) { TESTED_SHARE } else { 1.0 };
-        let (least, most) = range(effect, free);
-        let (gain, amplitude) = direction.gain(least / share, most / share);
-        let values = scaled(effect, free, start, amplitude * share);
-        all.push(Proposal { member: Member::Effect(*place), values: Some(values), gain });
-    }
-    Ok(all)
+    let direction = |(place, start): (usize, Vec<f64>)| {
+        let candidate = &question.candidates[place];
+        let (effect, free) = (&candidate.effect, &candidate.free);
+        let (share, values) = match is_sized(effect, free) {
+            true => (TESTED_SHARE, scaled(effect, free, &start, TESTED_SHARE)),
+            false => (1.0, start.clone()),
+        };
+        let (mut assumed, _) = with(question, &[], &best.fit, Member::Effect(place), Some(values))?;
+        let range = range(effect, free);
+        along(candidate, &mut assumed).then_some(TestedStart { place, start, share, range, assumed })
+    };
+    asked.into_par_iter().filter_map(direction).collect()
+}
+
+fn scored(
+    question: &Question,
+    best: &Explanation,
+    along: &(dyn Fn(&Candidate, &mut Assumption) -> bool + Sync),
+) -> Outcome<Vec<Proposal>> {
+    let directions = tested_starts(question, best, along);
+    let changed: Vec<&Assumption> = directions.iter().map(|d| &d.assumed).collect();
+    let scores = question.chamber.score_models(&best.fit, &changed)?;
+    let scored = directions.iter().zip(scores).filter_map(|(direction, score)| {
+        let (least, most) = direction.range();
+        let (gain, amplitude) = score?.gain(least, most);
+        Some(direction.proposal(question, gain, amplitude))
+    });
+    Ok(scored.collect())
 }
 
 /// Of what every layer has a candidate for, only the layers that promise most: their neighbours look alike.

@@ -12,7 +12,7 @@ use parquet::file::serialized_reader::SerializedFileReader;
 use parquet::schema::types::ColumnDescriptor;
 
 use super::Source;
-use super::rows::{BLOCK_ROWS, Columns, Values};
+use super::rows::{BLOCK_ROWS, ColumnValues, TableColumns};
 
 pub(super) fn open(path: &Path) -> Result<Source<'static>, String> {
     let file = File::open(path).map_err(|e| format!("cannot be read: {e}"))?;
@@ -98,16 +98,16 @@ impl Meaning {
         }
     }
 
-    fn values(self, cells: Vec<Option<i64>>, unsigned: fn(i64) -> u64) -> Values {
+    fn values(self, cells: Vec<Option<i64>>, unsigned: fn(i64) -> u64) -> ColumnValues {
         if let Meaning::Stamp(unit_ns) = self {
             let stamp = |cell: Option<i64>| {
                 let nanoseconds = i128::from(cell?) * i128::from(unit_ns);
                 jiff::Timestamp::from_nanosecond(nanoseconds).ok().map(|stamp| stamp.to_string())
             };
-            return Values::Texts(cells.into_iter().map(|cell| stamp(cell).unwrap_or_default()).collect());
+            return ColumnValues::Texts(cells.into_iter().map(|cell| stamp(cell).unwrap_or_default()).collect());
         }
         let number = |cell: Option<i64>| cell.map_or(f64::NAN, |v| self.number(v, unsigned(v)));
-        Values::Numbers(cells.into_iter().map(number).collect())
+        ColumnValues::Numbers(cells.into_iter().map(number).collect())
     }
 }
 
@@ -127,12 +127,12 @@ struct Table {
     left: usize,
 }
 
-impl Columns for Table {
+impl TableColumns for Table {
     fn names(&self) -> Vec<String> {
         self.columns.iter().map(|c| c.name.clone()).collect()
     }
 
-    fn block(&mut self) -> Result<Option<Vec<Values>>, String> {
+    fn block(&mut self) -> Result<Option<Vec<ColumnValues>>, String> {
         while self.left == 0 {
             if self.group == self.reader.num_row_groups() {
                 return Ok(None);
@@ -146,12 +146,12 @@ impl Columns for Table {
         let rows = self.left.min(BLOCK_ROWS);
         self.left -= rows;
         let read = |(column, reader): (&Read, &mut ColumnReader)| cells(column.meaning, reader, rows);
-        let block: Vec<Values> = self.columns.iter().zip(&mut self.open).map(read).collect::<Result<_, _>>()?;
+        let block: Vec<ColumnValues> = self.columns.iter().zip(&mut self.open).map(read).collect::<Result<_, _>>()?;
         Ok(Some(block))
     }
 }
 
-fn cells(meaning: Meaning, reader: &mut ColumnReader, rows: usize) -> Result<Values, String> {
+fn cells(meaning: Meaning, reader: &mut ColumnReader, rows: usize) -> Result<ColumnValues, String> {
     // What a 32-bit column holds has 32 bits without its sign, too.
     let short = |v: i64| u64::from(v as u32);
     let long = |v: i64| v as u64;
@@ -160,14 +160,14 @@ fn cells(meaning: Meaning, reader: &mut ColumnReader, rows: usize) -> Result<Val
         ColumnReader::Int32ColumnReader(r) => meaning.values(taken(r, rows, |v| i64::from(*v))?, short),
         ColumnReader::Int64ColumnReader(r) => meaning.values(taken(r, rows, |v| *v)?, long),
         ColumnReader::Int96ColumnReader(r) => meaning.values(taken(r, rows, |v| v.to_nanos())?, long),
-        ColumnReader::FloatColumnReader(r) => Values::Numbers(filled(taken(r, rows, |v| f64::from(*v))?)),
-        ColumnReader::DoubleColumnReader(r) => Values::Numbers(filled(taken(r, rows, |v| *v)?)),
+        ColumnReader::FloatColumnReader(r) => ColumnValues::Numbers(filled(taken(r, rows, |v| f64::from(*v))?)),
+        ColumnReader::DoubleColumnReader(r) => ColumnValues::Numbers(filled(taken(r, rows, |v| *v)?)),
         ColumnReader::ByteArrayColumnReader(r) => {
             let texts = taken(r, rows, |v: &ByteArray| String::from_utf8_lossy(v.data()).into_owned())?;
-            Values::Texts(texts.into_iter().map(Option::unwrap_or_default).collect())
+            ColumnValues::Texts(texts.into_iter().map(Option::unwrap_or_default).collect())
         }
         ColumnReader::FixedLenByteArrayColumnReader(r) => {
-            Values::Texts(taken(r, rows, |_: &FixedLenByteArray| String::new())?.into_iter().flatten().collect())
+            ColumnValues::Texts(taken(r, rows, |_: &FixedLenByteArray| String::new())?.into_iter().flatten().collect())
         }
     })
 }
