@@ -42,9 +42,7 @@ impl Chamber<'_> {
             .filter(|(value, error)| determined(Quantity::Film, error / value))
             .map(|(value, standard_error)| Estimate { value, standard_error });
         let mut numbers = Vec::new();
-        // What a stage does behind a step is of one record's day, as its kinks are.
-        let is_lasting = |q: &Quantity| !q.is_shared() && *q != Quantity::ApproachTime;
-        for quantity in PRIORS.iter().map(|p| p.quantity).filter(is_lasting) {
+        for quantity in PRIORS.iter().map(|p| p.quantity).filter(|q| q.is_learned()) {
             let found: Vec<(f64, f64)> = fit
                 .records
                 .iter()

@@ -148,6 +148,12 @@ impl Quantity {
         found.unwrap_or(&PRIORS[0])
     }
 
+    /// Whether it may be learned from one record for the next. What a stage does behind a step is of one record's day, as its kinks are;
+    /// what all records share is learned by itself.
+    pub(crate) fn is_learned(self) -> bool {
+        !self.is_shared() && self != Self::ApproachTime
+    }
+
     /// Whether it is one number for all records.
     pub(crate) fn is_shared(self) -> bool {
         self == Quantity::Film

@@ -72,6 +72,18 @@ pub(crate) struct Found {
     pub(crate) is_elsewhere: bool,
 }
 
+impl Found {
+    /// The declared model, with whatever belongs to the day.
+    pub(crate) fn declared(&self) -> Option<&Explanation> {
+        self.explanations.iter().find(|e| e.members.is_empty())
+    }
+
+    /// The fit of the likeliest set.
+    pub(crate) fn likeliest(&self) -> Option<&Fit> {
+        self.explanations.first().map(|e| &e.fit)
+    }
+}
+
 /// The sets on the way to one: its first effect, its first two, and so on, each fitted by itself.
 ///
 /// # Errors
@@ -87,18 +99,6 @@ pub(in crate::diagnose) fn on_the_way(question: &Question, to: &Explanation) -> 
         Ok(Explanation { fit, held_out: None, probability: 0.0, ..to.clone() })
     };
     (1..added).map(shorter).collect()
-}
-
-impl Found {
-    /// The declared model, with whatever belongs to the day.
-    pub(crate) fn declared(&self) -> Option<&Explanation> {
-        self.explanations.iter().find(|e| e.members.is_empty())
-    }
-
-    /// The fit of the likeliest set.
-    pub(crate) fn likeliest(&self) -> Option<&Fit> {
-        self.explanations.first().map(|e| &e.fit)
-    }
 }
 
 pub(in crate::diagnose) type Outcome<T> = Result<T, ChamberError>;

@@ -79,7 +79,7 @@ pub(super) fn schema() -> Value {
         (quantity.key().to_owned(), own)
     };
     let chamber: Map<String, Value> =
-        PRIORS.iter().map(|p| p.quantity).filter(|q| !q.is_shared()).map(number).collect();
+        PRIORS.iter().map(|p| p.quantity).filter(|q| q.is_learned()).map(number).collect();
     table(
         "boundary",
         &[],

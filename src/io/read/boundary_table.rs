@@ -32,7 +32,7 @@ pub(super) fn read_boundary(r: &mut TomlReader, table: &mut TableReader) -> Opti
     let records = table.integer(r, "records", 1, i64::MAX).unwrap_or(1) as usize;
     let mut chamber = table.table(r, "chamber");
     let mut numbers = Vec::new();
-    for quantity in PRIORS.iter().map(|p| p.quantity).filter(|q| !q.is_shared()) {
+    for quantity in PRIORS.iter().map(|p| p.quantity).filter(|q| q.is_learned()) {
         let mut own = chamber.table(r, quantity.key());
         let value = if own.is_present() { own.needed_number(r, "value", POSITIVE) } else { None };
         let error = own.number(r, error_key(quantity), Limits::between(0.0, 1e9));
