@@ -9,8 +9,8 @@
 
 use pulp::{Arch, NullaryFnOnce};
 
-use super::filter::{Innovation, MEASURED, MOST_STATES, Move, Row, SETTLED, SETTLED_ROWS, System, Values};
-use super::sparse::Sparse;
+use super::filter::{Innovation, MEASURED, Move, Row, SETTLED, SETTLED_ROWS, System, Values};
+use super::sparse::{MOST_STATES, Sparse};
 
 /// Passes that go abreast.
 pub(super) const LANES: usize = 4;

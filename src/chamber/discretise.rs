@@ -5,71 +5,183 @@
 //! Φ(2h) = Φ(h)²,   Q(2h) = Q(h) + Φ(h) Q(h) Φ(h)ᵀ,   both by their Taylor series at h = Δ/2^k
 //! ```
 //!
-//! Van Loan's one exponential of a doubled matrix overflows where a mode is stiff; doubling does not.
+//! Van Loan's one exponential of a doubled matrix overflows where a mode is stiff; doubling does not. A record whose rows differ,
+//! or whose air has kinks within them, has steps of a hundred lengths, which need not be doubled from nothing: a step is the next shorter
+//! one and a little more.
+//!
+//! ```text
+//! Φ(a + δ) = Φ(δ) Φ(a),   Q(a + δ) = Q(δ) + Φ(δ) Q(a) Φ(δ)ᵀ
+//! ```
 //!
 //! # Source
 //! Moler and Van Loan, SIAM Rev. 45 (2003) 3, method 3.
 
-use super::sparse::Sparse;
+// Loops over an index that the compiler knows the end of: iterators stay calls in functions as large as these.
+#![allow(clippy::needless_range_loop)]
+
+use pulp::{Arch, NullaryFnOnce};
+
+use super::sparse::{MOST_STATES, Sparse, Square, dispatch, turned, wide_square};
 
 /// Terms of the series; what they leave out is below ½^13/13! = 2e-14.
 const TERMS: usize = 12;
 const LARGEST_NORM: f64 = 0.5;
+/// Noises that are told apart.
+const NOISES: usize = 2;
 
 /// Φ and, for each of the noises, Q; all row-major n × n.
 #[derive(Debug, Clone)]
 pub(super) struct Discrete {
     pub(crate) transition: Vec<f64>,
-    pub(crate) noises: Vec<Vec<f64>>,
+    pub(crate) noises: [Vec<f64>; NOISES],
 }
 
+/// The system over each of the steps, in their order.
+///
 /// # Shapes
 /// `system` row-major n × n; each of `noises` the diagonal of a G.
-pub(super) fn discretise(system: &[f64], noises: &[Vec<f64>], n: usize, step_s: f64) -> Discrete {
-    let norm = system.chunks_exact(n).map(|row| row.iter().map(|v| v.abs()).sum::<f64>()).fold(0.0, f64::max) * step_s;
-    let doublings = if norm.is_finite() { (norm / LARGEST_NORM).log2().ceil().clamp(0.0, 60.0) as i32 } else { 0 };
-    let h = step_s / 2.0_f64.powi(doublings);
-    let scaled: Vec<f64> = system.iter().map(|v| v * h).collect();
-    let f = Sparse::new(&scaled, n);
-    let mut transition = vec![0.0; n * n];
-    (0..n).for_each(|i| transition[i * n + i] = 1.0);
-    let mut term = transition.clone();
-    for order in 1..=TERMS {
-        term = f.times_matrix(&term, n);
-        term.iter_mut().for_each(|v| *v /= order as f64);
-        transition.iter_mut().zip(&term).for_each(|(t, v)| *t += v);
-    }
-    let mut noises: Vec<Vec<f64>> = noises.iter().map(|diagonal| noise_of(&f, diagonal, n, h)).collect();
-    for _ in 0..doublings {
-        let phi = Sparse::new(&transition, n);
-        for noise in &mut noises {
-            let half = turned(&phi.times_matrix(noise, n), n);
-            let carried = phi.times_matrix(&half, n);
-            noise.iter_mut().zip(carried).for_each(|(q, c)| *q += c);
-        }
-        transition = phi.times_matrix(&transition, n);
-    }
-    Discrete { transition, noises }
+pub(super) fn discretise(system: &[f64], noises: [&[f64]; NOISES], n: usize, steps_s: &[f64]) -> Vec<Discrete> {
+    Arch::new().dispatch(Discretise { system, noises, n, steps_s })
 }
 
-fn noise_of(f: &Sparse, diagonal: &[f64], n: usize, h: f64) -> Vec<f64> {
-    let mut term = vec![0.0; n * n];
-    diagonal.iter().enumerate().for_each(|(i, g)| term[i * n + i] = g * h);
-    let mut sum = term.clone();
-    for order in 2..=TERMS {
-        // The terms are symmetric: F t + (F t)ᵀ.
-        let product = f.times_matrix(&term, n);
-        let other = turned(&product, n);
-        for ((t, a), b) in term.iter_mut().zip(&product).zip(&other) {
-            *t = (a + b) / order as f64;
+struct Discretise<'a> {
+    system: &'a [f64],
+    noises: [&'a [f64]; NOISES],
+    n: usize,
+    steps_s: &'a [f64],
+}
+
+impl NullaryFnOnce for Discretise<'_> {
+    type Output = Vec<Discrete>;
+
+    #[inline(always)]
+    fn call(self) -> Self::Output {
+        dispatch!(self.n, discretise_of(&self))
+    }
+}
+
+/// Φ and the two Q over one length of time.
+#[derive(Clone)]
+struct Over<const N: usize> {
+    transition: Square<N>,
+    noises: [Square<N>; NOISES],
+}
+
+impl<const N: usize> Over<N> {
+    fn nothing(n: usize) -> Self {
+        let mut transition = [[0.0; N]; N];
+        (0..n).for_each(|i| transition[i][i] = 1.0);
+        Self { transition, noises: [[[0.0; N]; N]; NOISES] }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, other: &Self, factor: f64) {
+        for i in 0..N {
+            for j in 0..N {
+                self.transition[i][j] += factor * other.transition[i][j];
+                for k in 0..NOISES {
+                    self.noises[k][i][j] += factor * other.noises[k][i][j];
+                }
+            }
         }
-        sum.iter_mut().zip(&term).for_each(|(s, t)| *s += t);
+    }
+
+    /// This time, and then another.
+    #[inline(always)]
+    fn then(&self, other: &Self, n: usize) -> Self {
+        let phi = Sparse::of_square(&other.transition, n);
+        let mut both = Self {
+            transition: phi.times_square(&self.transition),
+            noises: [phi.surround(&self.noises[0]), phi.surround(&self.noises[1])],
+        };
+        for k in 0..NOISES {
+            for i in 0..N {
+                for j in 0..N {
+                    both.noises[k][i][j] += other.noises[k][i][j];
+                }
+            }
+        }
+        both
+    }
+
+    fn discrete(&self, n: usize) -> Discrete {
+        let flat = |square: &Square<N>| square[..n].iter().flat_map(|row| row[..n].iter().copied()).collect();
+        Discrete { transition: flat(&self.transition), noises: [flat(&self.noises[0]), flat(&self.noises[1])] }
+    }
+}
+
+#[inline(always)]
+fn discretise_of<const N: usize>(of: &Discretise) -> Vec<Discrete> {
+    let n = of.n;
+    let norm = of.system.chunks_exact(n).map(|row| row.iter().map(|v| v.abs()).sum::<f64>()).fold(0.0, f64::max);
+    let longest_s = of.steps_s.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    // The longest time for which the series serves.
+    let unit_s = if norm.is_finite() { longest_s.min(LARGEST_NORM / norm) } else { longest_s };
+    let series = series_of::<N>(of, unit_s);
+    let mut order: Vec<usize> = (0..of.steps_s.len()).collect();
+    order.sort_by(|a, b| of.steps_s[*a].total_cmp(&of.steps_s[*b]));
+    let mut found: Vec<(usize, Discrete)> = Vec::with_capacity(order.len());
+    let mut known: Option<(f64, Over<N>)> = None;
+    for place in order {
+        let step_s = of.steps_s[place];
+        let more_s = step_s - known.as_ref().map_or(0.0, |k| k.0);
+        let more = over(&series, more_s / unit_s, n);
+        let whole = match &known {
+            Some((_, before)) => before.then(&more, n),
+            None => more,
+        };
+        found.push((place, whole.discrete(n)));
+        known = Some((step_s, whole));
+    }
+    found.sort_by_key(|f| f.0);
+    found.into_iter().map(|f| f.1).collect()
+}
+
+/// So many units of time, of whose powers the series' terms are.
+#[inline(always)]
+fn over<const N: usize>(series: &[Over<N>], units: f64, n: usize) -> Over<N> {
+    let doublings = units.log2().ceil().clamp(0.0, 60.0) as i32;
+    let share = units / 2.0_f64.powi(doublings);
+    let mut sum = Over::nothing(n);
+    let mut power = 1.0;
+    for term in series {
+        power *= share;
+        sum.add(term, power);
+    }
+    for _ in 0..doublings {
+        sum = sum.then(&sum, n);
     }
     sum
 }
 
-fn turned(matrix: &[f64], n: usize) -> Vec<f64> {
-    (0..n * n).map(|i| matrix[i % n * n + i / n]).collect()
+/// The terms of Φ's and Q's series at one unit of time.
+#[inline(always)]
+fn series_of<const N: usize>(of: &Discretise, unit_s: f64) -> Vec<Over<N>> {
+    let n = of.n;
+    let scaled: Vec<f64> = of.system.iter().map(|v| v * unit_s).collect();
+    let f = Sparse::new(&scaled, n);
+    let mut first = Over { transition: wide_square(&scaled, n), noises: [[[0.0; N]; N]; NOISES] };
+    for (noise, diagonal) in first.noises.iter_mut().zip(of.noises) {
+        diagonal.iter().enumerate().for_each(|(i, g)| noise[i][i] = g * unit_s);
+    }
+    let mut terms = vec![first];
+    for order in 2..=TERMS {
+        let (before, share) = (&terms[order - 2], 1.0 / order as f64);
+        let mut next = Over { transition: f.times_square(&before.transition), noises: before.noises };
+        next.transition.iter_mut().flatten().for_each(|v| *v *= share);
+        for noise in &mut next.noises {
+            // The terms are symmetric: F t + (F t)ᵀ.
+            let product = f.times_square(noise);
+            let other = turned(&product);
+            for i in 0..N {
+                for j in 0..N {
+                    noise[i][j] = (product[i][j] + other[i][j]) * share;
+                }
+            }
+        }
+        terms.push(next);
+    }
+    terms
 }
 
 #[cfg(test)]
@@ -80,13 +192,30 @@ mod tests {
     fn a_stiff_mode_behind_a_random_walk_is_the_closed_form() {
         // x' = −λ (x − w), w' = noise of density q.
         let (l, q, step) = (3.0_f64, 0.2, 20.0);
-        let found = discretise(&[-l, l, 0.0, 0.0], &[vec![0.0, q]], 2, step);
+        let found = &discretise(&[-l, l, 0.0, 0.0], [&[0.0, q], &[0.0, 0.0]], 2, &[step])[0];
         let left = (-l * step).exp();
         assert!((found.transition[0] - left).abs() < 1e-14 && (found.transition[1] - 1.0 + left).abs() < 1e-13);
         let cross = q * (step - (1.0 - left) / l);
         let own = q * (step - 2.0 * (1.0 - left) / l + (1.0 - left * left) / (2.0 * l));
         for (found, exact) in found.noises[0].iter().zip([own, cross, cross, q * step]) {
             assert!((found / exact - 1.0).abs() < 1e-12, "{found} for {exact}");
+        }
+    }
+
+    #[test]
+    fn a_step_is_the_same_beside_any_others() {
+        // A stiff mode, an oscillator that noise drives, and a random walk that both follow.
+        let f = [[-2.5, 0.0, 0.0, 2.5], [0.0, -0.01, 0.05, 0.3], [0.0, -0.05, -0.01, 0.0], [0.0, 0.0, 0.0, -0.002]];
+        let (f, rest, bend) = (f.concat(), [0.0, 0.0, 0.4, 0.0], [0.0, 0.0, 0.0, 1.0]);
+        let steps_s = [10.0, 3.7, 9.8, 3.701, 60.0, 10.0, 0.02];
+        let all = discretise(&f, [&rest, &bend], 4, &steps_s);
+        for (step_s, found) in steps_s.iter().zip(&all) {
+            let alone = &discretise(&f, [&rest, &bend], 4, &[*step_s])[0];
+            let of = |d: &Discrete| [&d.transition[..], &d.noises[0], &d.noises[1]].map(<[f64]>::to_vec);
+            for (one, other) in of(alone).iter().zip(of(found)) {
+                let size = one.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+                assert!(one.iter().zip(&other).all(|(a, b)| (a - b).abs() < 1e-13 * size), "{step_s}");
+            }
         }
     }
 }

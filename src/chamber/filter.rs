@@ -24,7 +24,7 @@
 use pulp::{Arch, NullaryFnOnce};
 
 pub(super) use super::row::{AMBIENT, MEASURED, Move, RATE, Row};
-use super::sparse::{Sparse, Square};
+use super::sparse::{MOST_STATES, Sparse, Square, dispatch, wide, wide_square};
 
 /// Relative change of every S from row to row below which a row counts as settled, and how many of them freeze the gains:
 /// together they cost less than 0.2 of log likelihood on 1 500 rows (a test).
@@ -99,26 +99,6 @@ pub(super) struct Trace {
     /// Rows for which the covariance was computed.
     pub(crate) thawed: usize,
 }
-
-/// Calls a function with the least number of states that has room.
-macro_rules! dispatch {
-    ($size:expr, $function:ident($($argument:expr),*)) => {
-        match $size {
-            0..=8 => $function::<8>($($argument),*),
-            9..=12 => $function::<12>($($argument),*),
-            13..=16 => $function::<16>($($argument),*),
-            17..=20 => $function::<20>($($argument),*),
-            21..=24 => $function::<24>($($argument),*),
-            size => {
-                assert!(size <= MOST_STATES, "a model has at most {MOST_STATES} states");
-                $function::<MOST_STATES>($($argument),*)
-            }
-        }
-    };
-}
-
-/// States for which there is room.
-pub(super) const MOST_STATES: usize = 32;
 
 /// The forward pass; gains and means are kept for the other passes if `keep`.
 pub(super) fn forward(system: &System, rows: &[Row], values: &Values, keep: bool) -> Trace {
@@ -195,14 +175,6 @@ impl NullaryFnOnce for Respond<'_> {
     fn call(self) -> Vec<f64> {
         dispatch!(self.system.size, respond_of(self.system, self.rows, self.trace, self.inputs))
     }
-}
-
-fn wide<const N: usize>(vector: &[f64]) -> [f64; N] {
-    std::array::from_fn(|i| vector.get(i).copied().unwrap_or(0.0))
-}
-
-fn wide_square<const N: usize>(matrix: &[f64], n: usize) -> Square<N> {
-    std::array::from_fn(|i| if i < n { wide(&matrix[i * n..(i + 1) * n]) } else { [0.0; N] })
 }
 
 #[inline(always)]

@@ -3,6 +3,27 @@
 // Loops over an index that the compiler knows the end of: iterators stay calls in functions as large as these.
 #![allow(clippy::needless_range_loop)]
 
+/// Calls a function with the least number of states that has room.
+macro_rules! dispatch {
+    ($size:expr, $function:ident($($argument:expr),*)) => {
+        match $size {
+            0..=8 => $function::<8>($($argument),*),
+            9..=12 => $function::<12>($($argument),*),
+            13..=16 => $function::<16>($($argument),*),
+            17..=20 => $function::<20>($($argument),*),
+            21..=24 => $function::<24>($($argument),*),
+            size => {
+                assert!(size <= MOST_STATES, "a model has at most {MOST_STATES} states");
+                $function::<MOST_STATES>($($argument),*)
+            }
+        }
+    };
+}
+pub(super) use dispatch;
+
+/// States for which there is room.
+pub(super) const MOST_STATES: usize = 32;
+
 /// A square block of states; lanes beyond the model's states stay zero.
 pub(super) type Square<const N: usize> = [[f64; N]; N];
 
@@ -26,9 +47,26 @@ impl Sparse {
         sparse
     }
 
+    /// # Shapes
+    /// `matrix` row-major n × n.
     pub(crate) fn transposed(matrix: &[f64], n: usize) -> Self {
-        let turned: Vec<f64> = (0..n * n).map(|i| matrix[i % n * n + i / n]).collect();
-        Self::new(&turned, n)
+        let mut sparse = Self { starts: vec![0], entries: Vec::new() };
+        for column in 0..n {
+            let entries = matrix.chunks_exact(n).map(|row| row[column]).enumerate();
+            sparse.entries.extend(entries.filter(|(_, v)| *v != 0.0));
+            sparse.starts.push(sparse.entries.len());
+        }
+        sparse
+    }
+
+    /// Of what is zero beyond n × n.
+    pub(crate) fn of_square<const N: usize>(square: &Square<N>, n: usize) -> Self {
+        let mut sparse = Self { starts: vec![0], entries: Vec::new() };
+        for row in &square[..n] {
+            sparse.entries.extend(row[..n].iter().copied().enumerate().filter(|(_, v)| *v != 0.0));
+            sparse.starts.push(sparse.entries.len());
+        }
+        sparse
     }
 
     #[inline(always)]
@@ -83,25 +121,6 @@ impl Sparse {
         sum
     }
 
-    /// M S Mᵀ for a symmetric S.
-    #[inline(always)]
-    pub(crate) fn surround<const N: usize>(&self, square: &Square<N>) -> Square<N> {
-        let mut product = [[0.0; N]; N];
-        for row in 0..self.rows() {
-            product[row] = self.combine(row, square);
-        }
-        let mut turned = [[0.0; N]; N];
-        for i in 0..N {
-            for j in 0..N {
-                turned[i][j] = product[j][i];
-            }
-        }
-        for row in 0..self.rows() {
-            product[row] = self.combine(row, &turned);
-        }
-        product
-    }
-
     /// M X for a row-major X of `columns` columns, without a width known to the compiler.
     pub(crate) fn times_matrix(&self, x: &[f64], columns: usize) -> Vec<f64> {
         let mut out = vec![0.0; self.rows() * columns];
@@ -112,4 +131,41 @@ impl Sparse {
         }
         out
     }
+
+    /// M X.
+    #[inline(always)]
+    pub(crate) fn times_square<const N: usize>(&self, x: &Square<N>) -> Square<N> {
+        let mut product = [[0.0; N]; N];
+        for row in 0..self.rows() {
+            product[row] = self.combine(row, x);
+        }
+        product
+    }
+
+    /// M S Mᵀ for a symmetric S.
+    #[inline(always)]
+    pub(crate) fn surround<const N: usize>(&self, square: &Square<N>) -> Square<N> {
+        self.times_square(&turned(&self.times_square(square)))
+    }
+}
+
+#[inline(always)]
+pub(super) fn turned<const N: usize>(square: &Square<N>) -> Square<N> {
+    let mut turned = [[0.0; N]; N];
+    for i in 0..N {
+        for j in 0..N {
+            turned[i][j] = square[j][i];
+        }
+    }
+    turned
+}
+
+#[inline(always)]
+pub(super) fn wide<const N: usize>(vector: &[f64]) -> [f64; N] {
+    std::array::from_fn(|i| vector.get(i).copied().unwrap_or(0.0))
+}
+
+#[inline(always)]
+pub(super) fn wide_square<const N: usize>(matrix: &[f64], n: usize) -> Square<N> {
+    std::array::from_fn(|i| if i < n { wide(&matrix[i * n..(i + 1) * n]) } else { [0.0; N] })
 }

@@ -99,7 +99,7 @@ mod tests {
         let mut noise = vec![0.0; n];
         noise[0] = 2.0 * turbulence * turbulence / turbulence_s;
         (noise[3], noise[4]) = (2.0 * driver / coherence_s, 2.0 * driver / coherence_s);
-        let long = discretise(&f, &[noise], n, 2e4);
+        let long = &discretise(&f, [&noise, &vec![0.0; n]], n, &[2e4])[0];
         let found = followed(&f, n, [0, 1, 2, 3, 4], &own, &[5, 6, 7, 8]);
         for i in 0..n {
             for j in 0..n {

@@ -231,21 +231,12 @@ pub(super) fn system(parts: &Parts, numbers: &Numbers, series: &Series) -> Syste
     let n = layout.size;
     let approach_s = series.approach_s(numbers.get(Quantity::ApproachTime));
     let (f, noise, trend_noise) = dynamics(parts, &layout, numbers, approach_s);
-    let steps = series
-        .steps_s
-        .iter()
-        .map(|&step_s| {
-            let mut found = discretise(&f, &[noise.clone(), trend_noise.clone()], n, step_s);
-            let trend_noise = found.noises.pop().unwrap_or_default();
-            let noise = found.noises.pop().unwrap_or_default();
-            Step {
-                phi: Sparse::new(&found.transition, n),
-                phi_turned: Sparse::transposed(&found.transition, n),
-                noise,
-                trend_noise,
-            }
-        })
-        .collect();
+    let steps = discretise(&f, [&noise, &trend_noise], n, &series.steps_s).into_iter().map(|found| {
+        let [noise, trend_noise] = found.noises;
+        let (phi, phi_turned) = (Sparse::new(&found.transition, n), Sparse::transposed(&found.transition, n));
+        Step { phi, phi_turned, noise, trend_noise }
+    });
+    let steps = steps.collect();
     let (response, places) = (response(parts, &layout), places(parts, &layout));
     let mut rows = Vec::new();
     for shape in &series.shapes {

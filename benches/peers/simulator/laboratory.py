@@ -82,7 +82,7 @@ def ideal(rng, part, **p):
 
 
 def stage(rng, part, **p):
-    """A thermoelectric stage: steps, each approached exponentially; hardly any ripple."""
+    """A thermoelectric stage: steps, each approached exponentially, some through a second, faster lag; hardly any ripple."""
     span = 15500 if part == "calibration" else 13000
     target = np.full(REST_S + span, 20.0)
     at = REST_S + int(rng.uniform(500, 1100))
@@ -91,7 +91,8 @@ def stage(rng, part, **p):
         target[at:] = np.clip(target[at] + rng.choice([-1, 1]) * rng.uniform(2, 24), -18, 58)
         at += hold
     air = follow(1.0 / p["stage_s"], target / p["stage_s"])
-    air = follow(1.0 / 8.0, air / 8.0)
+    if p["second_s"]:
+        air = follow(1.0 / p["second_s"], air / p["second_s"])
     return air + ou(rng, len(air), p["turbulence"], p["turbulence_s"]), REST_S
 
 
@@ -130,7 +131,7 @@ def drawn_chamber(rng, kind):
         p |= dict(wn=float(1.0 / rng.uniform(80, 160)), zeta=float(rng.uniform(0.4, 0.95)), ripple=float(rng.uniform(0.04, 0.22)),
                   period=float(rng.uniform(100, 320)), mid_ramp=kind == "mid_ramp")
     if kind == "stage":
-        p |= dict(stage_s=float(rng.uniform(25, 180)), turbulence=float(rng.uniform(0.001, 0.01)))
+        p |= dict(stage_s=float(rng.uniform(25, 180)), turbulence=float(rng.uniform(0.001, 0.01)), second_s=float(rng.choice([0, 0, 8])))
     if kind == "outdoors":
         p |= dict(days=1.1, turbulence=float(rng.uniform(0.05, 0.25)), turbulence_s=float(rng.uniform(30, 120)))
     if kind == "thermostat":
