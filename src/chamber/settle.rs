@@ -60,31 +60,46 @@ impl<'a> Chamber<'a> {
     /// By a fit whose air bends wherever readings do: to one that is straight but for its kinks, what does not know them yet is full of
     /// gross errors.
     fn settled_about(mut self, curved: Fit, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
-        let (curved, fit) = self.looked_at(curved, records)?;
-        for other in (0..self.records()).filter(|r| !records.contains(r)) {
-            let day = self.fit(&fit.assumed, &[], &[other], Some(&curved), Effort::SHORT)?;
-            let day = self.looked_through(day, &[other])?;
-            self.observed[other].day = Some(day.numbers[other]);
+        let whole = self.observed.iter().map(|o| o.series.clone()).collect::<Vec<_>>();
+        let curved = self.without_gross_errors(curved, records)?;
+        let others: Vec<usize> = (0..self.records()).filter(|r| !records.contains(r)).collect();
+        let own = || self.clone().with_airs(curved.clone(), records, &whole);
+        let of_other = |&other: &usize| -> Result<(Series, Numbers), ChamberError> {
+            let mut chamber = self.clone();
+            let day = chamber.fit(&curved.assumed, &[], &[other], Some(&curved), Effort::SHORT)?;
+            let day = chamber.looked_through(day, &[other])?;
+            Ok((chamber.observed.swap_remove(other).series, day.numbers[other]))
+        };
+        let (own, days) = rayon::join(own, || others.par_iter().map(of_other).collect::<Result<Vec<_>, _>>());
+        let (mut chamber, fit) = own?;
+        for (&other, (series, day)) in others.iter().zip(days?) {
+            chamber.observed[other].series = series;
+            chamber.observed[other].day = Some(day);
         }
-        let fit = self.fit(&fit.assumed.clone(), &fit.free.clone(), records, Some(&fit), Effort::FULL)?;
-        Ok((self, fit))
+        let fit = chamber.fit(&fit.assumed.clone(), &fit.free.clone(), records, Some(&fit), Effort::FULL)?;
+        Ok((chamber, fit))
     }
 
+    /// Records without gross errors, each with its air as it is likeliest.
     pub(super) fn looked_through(&mut self, fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
-        self.looked_at(fit, records).map(|(_, fit)| fit)
+        let whole = self.observed.iter().map(|o| o.series.clone()).collect::<Vec<_>>();
+        let curved = self.without_gross_errors(fit, records)?;
+        let fit;
+        (*self, fit) = self.clone().with_airs(curved, records, &whole)?;
+        Ok(fit)
     }
 
-    /// The same, and the fit by which the air was a curve.
-    fn looked_at(&mut self, fit: Fit, records: &[usize]) -> Result<(Fit, Fit), ChamberError> {
-        let whole: Vec<Series> = records.iter().map(|&r| self.observed[r].series.clone()).collect();
-        let curved = self.without_gross_errors(fit, records)?;
-        let mut fit = self.with_airs(curved.clone(), records)?;
+    /// Each record's air as it is likeliest; `whole`: the records before gross errors were left out.
+    fn with_airs(mut self, mut fit: Fit, records: &[usize], whole: &[Series]) -> Result<(Self, Fit), ChamberError> {
+        let found: Result<Vec<_>, ChamberError> = records.par_iter().map(|&r| self.likeliest_air(&fit, r)).collect();
         // To a curve the rows behind a kink are gross errors.
         let mut again = Vec::new();
-        for (&r, whole) in records.iter().zip(&whole) {
+        for (&r, (series, numbers)) in records.iter().zip(found?) {
+            fit.numbers[r] = numbers;
+            self.observed[r].series = series;
             let series = &mut self.observed[r].series;
-            if series.kinks > 0 && series.spikes > whole.spikes {
-                series.take_in_again(whole);
+            if series.kinks > 0 && series.spikes > whole[r].spikes {
+                series.take_in_again(&whole[r]);
                 again.push(r);
             }
         }
@@ -92,40 +107,42 @@ impl<'a> Chamber<'a> {
             let there = self.without_gross_errors(fit.clone(), &again)?;
             again.iter().for_each(|&r| fit.numbers[r] = there.numbers[r]);
         }
-        Ok((curved, fit))
+        Ok((self, fit))
     }
 
-    /// Each record's air as it is likeliest: a curve, straight but for kinks, or both; and whether it approaches set points.
-    fn with_airs(&mut self, mut fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
-        for &r in records {
-            // Either the air bends wherever readings do, or it is straight but for its kinks, or it bends from kinks on as a stage that
-            // is switched does. Kinks must be worth being looked for: the record itself says which, by itself.
-            let curved = self.fit(&fit.assumed, &[], &[r], Some(&fit), Effort::QUICK)?;
-            let bent = self.observed[r].series.clone();
-            let mut best = (curved.posterior(), curved.numbers[r], bent.clone());
-            self.observed[r].series.approaches = true;
-            let approaching = self.fit(&fit.assumed, &[], &[r], Some(&curved), Effort::QUICK)?;
-            let approaching = (approaching.posterior() > curved.posterior()).then_some(approaching);
-            for (from, approaches) in std::iter::once((curved, false)).chain(approaching.map(|fit| (fit, true))) {
-                for bends in [false, true] {
-                    let series = &mut self.observed[r].series;
-                    series.clone_from(&bent);
-                    series.approaches = approaches;
-                    if !bends {
-                        series.rows.iter_mut().for_each(|row| row.bend = 0.0);
-                    }
-                    let Ok(Some((kinked, worth))) = self.kinked(&from, r) else { continue };
-                    let other = if approaches { self.in_other_order(&kinked, r)? } else { None };
-                    let gain = other.as_ref().map_or(0.0, |other| other.posterior() - kinked.posterior());
-                    let (kinked, worth) = (other.unwrap_or(kinked), worth + gain);
-                    if worth > best.0 {
-                        best = (worth, kinked.numbers[r], self.observed[r].series.clone());
-                    }
-                }
-            }
-            (fit.numbers[r], self.observed[r].series) = (best.1, best.2);
+    /// One record's air as it is likeliest: a curve, straight but for kinks, or both; and whether it approaches set points.
+    fn likeliest_air(&self, fit: &Fit, r: usize) -> Result<(Series, Numbers), ChamberError> {
+        // Either the air bends wherever readings do, or it is straight but for its kinks, or it bends from kinks on as a stage that is
+        // switched does. Kinks must be worth being looked for: the record itself says which, by itself.
+        let curved = self.fit(&fit.assumed, &[], &[r], Some(fit), Effort::QUICK)?;
+        let mut approaching = self.clone();
+        approaching.observed[r].series.approaches = true;
+        let approached = approaching.fit(&fit.assumed, &[], &[r], Some(&curved), Effort::QUICK)?;
+        let mut asked = vec![(self, &curved, false), (self, &curved, true)];
+        if approached.posterior() > curved.posterior() {
+            asked.extend([(&approaching, &approached, false), (&approaching, &approached, true)]);
         }
-        Ok(fit)
+        let kinked = |(chamber, from, bends): (&Self, &Fit, bool)| {
+            let mut chamber = chamber.clone();
+            let series = &mut chamber.observed[r].series;
+            let approaches = series.approaches;
+            if !bends {
+                series.rows.iter_mut().for_each(|row| row.bend = 0.0);
+            }
+            let Ok(Some((kinked, worth))) = chamber.kinked(from, r) else { return Ok(None) };
+            let other = if approaches { chamber.in_other_order(&kinked, r)? } else { None };
+            let gain = other.as_ref().map_or(0.0, |other| other.posterior() - kinked.posterior());
+            let kinked = other.unwrap_or(kinked);
+            Ok(Some((worth + gain, chamber.observed.swap_remove(r).series, kinked.numbers[r])))
+        };
+        let found: Result<Vec<_>, ChamberError> = asked.into_par_iter().map(kinked).collect();
+        let mut best = (curved.posterior(), self.observed[r].series.clone(), curved.numbers[r]);
+        for there in found?.into_iter().flatten() {
+            if there.0 > best.0 {
+                best = there;
+            }
+        }
+        Ok((best.1, best.2))
     }
 
     /// Air that approaches a set point, and a pack that follows the air behind its film, are two lags in a row: a sensor on the pack shows

@@ -381,7 +381,7 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
         held_out: (given..records.len()).collect(),
         depth: MOST_MEMBERS,
     };
-    let found = joint::search(&question, null, &|share| progress(0.5 * share))?;
+    let found = joint::ranked(&question, null, &|share| progress(0.5 * share))?;
     // Gross errors and kinks were those of the declared model: now those of the best. Where that is the declared model after all, but
     // found among the kinks of another, they are those that it has by what it was found to be there.
     let best =
@@ -396,7 +396,10 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
             let found = joint::again(&question, found)?;
             (question, found)
         }
-        None => (question, found),
+        None => {
+            let found = joint::judged(&question, found)?;
+            (question, found)
+        }
     };
     let chamber = question.chamber;
     progress(0.6);

@@ -14,6 +14,15 @@ const JUDGED: usize = 8;
 /// … and sets whose smaller ones begin again from what was found with them.
 const LOOKED_INTO: usize = 3;
 
+/// How far sets are looked into before they are judged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Care {
+    /// As they were ranked: enough to say in which chamber they are to be judged.
+    AsRanked,
+    /// Each fitted in full, and smaller ones begun again from the largest.
+    InFull,
+}
+
 /// Held-out records, posterior masses, and what is as good without some of its members.
 ///
 /// # Errors
@@ -22,7 +31,12 @@ const LOOKED_INTO: usize = 3;
     clippy::too_many_lines,
     reason = "the steps of one judgement: each orders or weighs what the step before left"
 )]
-pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mut Vec<Explanation>) -> Outcome<()> {
+pub(super) fn judge(
+    question: &Question,
+    windings: &[Winding],
+    explanations: &mut Vec<Explanation>,
+    care: Care,
+) -> Outcome<()> {
     let order = |list: &mut Vec<Explanation>| {
         list.sort_by(|a, b| b.total().total_cmp(&a.total()).then_with(|| a.key().cmp(&b.key())))
     };
@@ -30,7 +44,7 @@ pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mu
     // What a larger set has found of the chamber may be better for a smaller one, too.
     let again: Vec<Explanation> = explanations
         .iter()
-        .take(LOOKED_INTO)
+        .take(if care == Care::InFull { LOOKED_INTO } else { 0 })
         .flat_map(|e| (0..e.members.len()).map(move |place| (e, place)))
         .collect::<Vec<_>>()
         .into_par_iter()
@@ -57,7 +71,8 @@ pub(super) fn judge(question: &Question, windings: &[Winding], explanations: &mu
     let judged = |e: &mut Explanation| {
         // What was only ranked is fitted in full before it is judged.
         let begin = (e.fit.assumed.clone(), e.fit.free.clone());
-        if !e.fit.is_full()
+        if care == Care::InFull
+            && !e.fit.is_full()
             && let Some(again) = fitted(question, windings, e.members.clone(), &begin, &e.fit, Effort::FULL)
             && again.merit > e.merit
         {

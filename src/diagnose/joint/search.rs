@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::explanation::{fitted, with, without};
-use super::judge::judge;
+use super::judge::{Care, judge};
 use super::odds::{CERTAIN, WINDING};
 use super::own_kinks::best_by_own_kinks;
 use super::screen::{Proposal, foremost, looked_at, proposals};
@@ -36,11 +36,29 @@ type Begin = (Assumption, Vec<Free>);
 /// Sets that were fitted, by their members.
 type Cache = BTreeMap<Vec<Member>, Explanation>;
 
-/// Searches sets of explanations from a fit of the declared model; `progress` is told the share that is done.
+/// Searches sets of explanations from a fit of the declared model, and judges them; `progress` is told the share that is done.
 ///
 /// # Errors
 /// A declared model that cannot be solved for these records.
 pub(crate) fn search(question: &Question, null: Fit, progress: &(dyn Fn(f64) + Sync)) -> Outcome<Found> {
+    let found = ranked(question, null, progress)?;
+    if found.is_elsewhere { again(question, found) } else { judged(question, found) }
+}
+
+/// Sets that were only ranked, judged in the chamber that they were found in.
+///
+/// # Errors
+/// As [`search`].
+pub(crate) fn judged(question: &Question, mut found: Found) -> Outcome<Found> {
+    judge(question, &found.windings, &mut found.explanations, Care::InFull)?;
+    Ok(found)
+}
+
+/// Searches sets of explanations, and ranks them.
+///
+/// # Errors
+/// As [`search`].
+pub(crate) fn ranked(question: &Question, null: Fit, progress: &(dyn Fn(f64) + Sync)) -> Outcome<Found> {
     progress(0.2);
     let mut windings: Vec<Winding> = Vec::new();
     let mut cache = Cache::new();
@@ -101,7 +119,7 @@ pub(crate) fn search(question: &Question, null: Fit, progress: &(dyn Fn(f64) + S
     let here = Question { chamber: &chamber, ..question.clone() };
     complete(&here, &windings, &best, &mut cache);
     let mut explanations: Vec<Explanation> = cache.into_values().collect();
-    judge(&here, &windings, &mut explanations)?;
+    judge(&here, &windings, &mut explanations, Care::AsRanked)?;
     progress(1.0);
     Ok(Found { explanations, promised, windings, is_elsewhere })
 }
@@ -119,7 +137,7 @@ pub(crate) fn again(question: &Question, found: Found) -> Outcome<Found> {
             fitted(question, &windings, e.members, &begin, &e.fit, Effort::FULL)
         })
         .collect();
-    judge(question, &windings, &mut explanations)?;
+    judge(question, &windings, &mut explanations, Care::InFull)?;
     let has_declared = explanations.iter().any(|e| e.members.is_empty());
     has_declared
         .then_some(Found { explanations, promised, windings, is_elsewhere: false })
@@ -255,16 +273,11 @@ fn fit_all(question: &Question, windings: &[Winding], best: &Explanation, tried:
             let begin = with(question, windings, &best.fit, proposal.member, proposal.values)?;
             if proposal.member == Member::Cycle {
                 let longest = question.fitted.iter().map(|&r| duration_s(question, r)).fold(0.0, f64::max);
-                let from = CYCLES.iter().map(|share| moved(&best.fit, Quantity::CyclePeriod, share * longest));
-                let fits =
-                    from.filter_map(|start| fitted(question, windings, members.clone(), &begin, &start, Effort::QUICK));
-                return fits.max_by(|a, b| a.merit.total_cmp(&b.merit));
+                let starts = CYCLES.map(|share| moved(&best.fit, Quantity::CyclePeriod, share * longest));
+                return from_the_best(question, windings, &members, &begin, &starts.each_ref());
             }
             // Wander that stood for what was missing may stay where it is: each begins without it, too.
-            let known = [&best.fit, &calm]
-                .into_par_iter()
-                .filter_map(|from| fitted(question, windings, members.clone(), &begin, from, Effort::QUICK))
-                .max_by(|a, b| a.merit.total_cmp(&b.merit));
+            let known = from_the_best(question, windings, &members, &begin, &[&best.fit, &calm]);
             let is_better = known.as_ref().is_some_and(|k| k.merit > best.merit);
             if !matches!(proposal.member, Member::Winding(_)) || !is_better || proposal.gain < MAY_WIN * most {
                 return known;
@@ -275,6 +288,23 @@ fn fit_all(question: &Question, windings: &[Winding], best: &Explanation, tried:
             known.into_iter().chain(again).max_by(|a, b| a.merit.total_cmp(&b.merit))
         })
         .collect()
+}
+
+/// A set fitted from whichever start a short fit leads furthest from.
+fn from_the_best(
+    question: &Question,
+    windings: &[Winding],
+    members: &[Member],
+    begin: &Begin,
+    starts: &[&Fit],
+) -> Option<Explanation> {
+    let short = starts.par_iter().filter_map(|from| {
+        let members = members.to_vec();
+        fitted(question, windings, members, begin, from, Effort::SHORT)
+    });
+    let best = short.max_by(|a, b| a.merit.total_cmp(&b.merit))?;
+    let begin = (best.fit.assumed.clone(), best.fit.free.clone());
+    fitted(question, windings, members.to_vec(), &begin, &best.fit, Effort::QUICK)
 }
 
 /// A set once more from a gyro that does not wander: with less missing there may be a better maximum there.
