@@ -25,14 +25,20 @@ pub(crate) struct Winding {
 }
 
 impl Winding {
-    /// What is held likely of it before any record is read: an exchange might be of any two layers.
+    /// What is held likely of it before any record is read.
     pub(super) fn log_prior(&self) -> f64 {
-        let layers = self.pattern.layers() as f64;
         match self.exchanged {
-            Some(_) => EXCHANGE.log - (0.5 * layers * (layers - 1.0)).ln(),
+            Some(pair) => EXCHANGE.log + share_of_exchanges(pair, self.pattern.layers()).ln(),
             None => WINDING.log,
         }
     }
+}
+
+/// The share of all exchanges that is of this pair of layers: who loses count is off by one more often than by ten, so a pair is taken to
+/// be the likelier the nearer its layers are, in inverse proportion.
+fn share_of_exchanges((one, other): (usize, usize), layers: usize) -> f64 {
+    let all: f64 = (1..layers).map(|apart| (layers - apart) as f64 / apart as f64).sum();
+    1.0 / (one.abs_diff(other) as f64 * all)
 }
 
 /// Exchanges of two layers that are looked at more closely, if the score test promises so much of them.
@@ -117,4 +123,19 @@ pub(super) fn promise_beside(question: &Question, fit: &Fit, windings: &mut [Win
         there.map_or(f64::NEG_INFINITY, |there| there.posterior() - fit.posterior())
     };
     windings.par_iter_mut().for_each(|winding| winding.promised = promise(winding));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_of_all_pairs_add_up_to_one_and_neighbours_have_most() {
+        let layers = 36;
+        let pairs = (0..layers).flat_map(|i| (i + 1..layers).map(move |j| (i, j)));
+        let sum: f64 = pairs.map(|pair| share_of_exchanges(pair, layers)).sum();
+        assert!((sum - 1.0).abs() < 1e-12, "{sum}");
+        let ratio = share_of_exchanges((31, 32), layers) / share_of_exchanges((3, 13), layers);
+        assert!((ratio - 10.0).abs() < 1e-12);
+    }
 }
