@@ -28,7 +28,7 @@ use super::derivative::{DerivativeColumn, Derivatives};
 use super::filter::Innovation;
 use super::known::Reference;
 use super::parameter::{Parameter, write};
-use super::place::{Place0, log_likelihood};
+use super::place::{ModelPoint, log_likelihood};
 use super::system::Numbers;
 use super::{Assumption, Chamber, ChamberError};
 
@@ -104,14 +104,41 @@ impl KnownDerivatives {
 
 /// A place on the way.
 pub(super) struct Ascent<'c> {
-    pub(super) place: Place0<'c>,
+    pub(super) place: ModelPoint<'c>,
     pub(super) coordinates: Vec<f64>,
     innovations: Vec<Vec<Innovation>>,
     pub(super) log_likelihood: f64,
     posterior: f64,
     /// Of data and prior.
     pub(super) information: DMatrix<f64>,
-    pub(super) sensitivities: Option<KnownDerivatives>,
+    pub(super) known_derivatives: Option<KnownDerivatives>,
+}
+
+/// Where an ascent ended, without what it was computed from.
+pub(super) struct AscentEnd {
+    pub(super) assumed: Assumption,
+    pub(super) numbers: Vec<Numbers>,
+    pub(super) coordinates: Vec<f64>,
+    pub(super) log_likelihood: f64,
+    pub(super) information: DMatrix<f64>,
+    pub(super) known_derivatives: Option<KnownDerivatives>,
+}
+
+impl From<Ascent<'_>> for AscentEnd {
+    fn from(ascent: Ascent) -> Self {
+        let Ascent { place, coordinates, log_likelihood, information, known_derivatives, .. } = ascent;
+        let ModelPoint { assumed, numbers, .. } = place;
+        Self { assumed, numbers, coordinates, log_likelihood, information, known_derivatives }
+    }
+}
+
+/// Where an ascent begins, and along what it goes.
+pub(super) struct Beginning<'a, 'c> {
+    pub(super) assumed: &'a Assumption,
+    pub(super) numbers: &'a [Numbers],
+    pub(super) parameters: &'a [Parameter],
+    pub(super) records: &'a [usize],
+    pub(super) courses: &'c [Option<Reference>],
 }
 
 impl Chamber<'_> {
@@ -119,25 +146,21 @@ impl Chamber<'_> {
     ///
     /// # Errors
     /// A model that cannot be solved where the ascent begins, or beside a place on it.
-    #[allow(clippy::too_many_arguments)]
     pub(super) fn ascended<'c>(
         &self,
-        assumed: &Assumption,
-        parameters: &[Parameter],
-        numbers: &[Numbers],
-        records: &[usize],
-        courses: &'c [Option<Reference>],
+        begin: &Beginning<'_, 'c>,
         effort: Effort,
         known: Option<&KnownDerivatives>,
     ) -> Result<Ascent<'c>, ChamberError> {
-        let begin: Vec<f64> = parameters
+        let &Beginning { assumed, numbers, parameters, records, courses } = begin;
+        let coordinates: Vec<f64> = parameters
             .iter()
             .map(|p| {
                 let read = p.read(assumed, numbers);
                 if read.is_finite() { read.clamp(p.lower, p.upper) } else { p.mean }
             })
             .collect();
-        let mut state = self.state(assumed, numbers, parameters, begin, records, courses)?;
+        let mut state = self.state(assumed, numbers, parameters, coordinates, records, courses)?;
         let (mut derivatives, mut is_fresh) = self.derivatives_beside(&state, parameters, records, known)?;
         let (mut taken, mut served, mut failures, mut share) = (usize::from(is_fresh), 0, 0, 1.0);
         let mut information = information_of(&derivatives, &state, parameters);
@@ -172,8 +195,8 @@ impl Chamber<'_> {
             }
         }
         let information = information_of(&derivatives, &state, parameters);
-        let sensitivities = Some(KnownDerivatives::new(parameters, records, derivatives, &state.innovations));
-        Ok(Ascent { information, sensitivities, ..state })
+        let known_derivatives = Some(KnownDerivatives::new(parameters, records, derivatives, &state.innovations));
+        Ok(Ascent { information, known_derivatives, ..state })
     }
 
     /// Derivatives at a place: those that are known of one nearby, and the rest taken here; whether all are of the very place.
@@ -228,7 +251,7 @@ impl Chamber<'_> {
         }
         let posterior = log_likelihood + log_prior;
         let information = DMatrix::zeros(0, 0);
-        Ok(Ascent { place, coordinates, innovations, log_likelihood, posterior, information, sensitivities: None })
+        Ok(Ascent { place, coordinates, innovations, log_likelihood, posterior, information, known_derivatives: None })
     }
 }
 
@@ -385,7 +408,7 @@ mod tests {
         };
         let known = reached(&|_| ());
         for far in [
-            reached(&|start| start.sensitivities = None),
+            reached(&|start| start.known_derivatives = None),
             // A film and a white noise ten times too large: one coordinate that has far to go shortens no other's way.
             reached(&|start| {
                 let noise = start.numbers[0].get(Quantity::RateNoise);

@@ -40,7 +40,7 @@ impl Chamber<'_> {
             start.records = vec![record];
             start.numbers.clone_from(&day.numbers);
             start.courses[record].clone_from(&day.courses[record]);
-            start.sensitivities.clone_from(&day.sensitivities);
+            start.known_derivatives.clone_from(&day.known_derivatives);
         }
         start.days = Arc::default();
         self.fit(&fit.assumed, &[], &[record], Some(&start), Effort::FULL)

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::ascent::{Effort, KnownDerivatives};
+use super::ascent::{AscentEnd, Beginning, Effort, KnownDerivatives};
 use super::known::Reference;
 use super::parameter::{Free, Parameter};
 use super::point::{CoilSide, Rates, quantities, smoothed};
@@ -42,7 +42,7 @@ pub(crate) struct Fit {
     /// Whether its ascent was that of [`Effort::FULL`], from whatever start.
     pub(super) is_full: bool,
     /// At its end, for fits that begin there.
-    pub(super) sensitivities: Option<Arc<KnownDerivatives>>,
+    pub(super) known_derivatives: Option<Arc<KnownDerivatives>>,
     /// Records that were not fitted, as this fit or one that it began with found them: where [`Chamber::held_out`] begins.
     pub(crate) days: Arc<Vec<Fit>>,
     /// Of every record of the chamber.
@@ -73,25 +73,24 @@ impl Chamber<'_> {
         courses.resize(self.records(), None);
         let parameters = self.parameters(assumed, free, records)?;
         self.settle_courses(assumed, &numbers, records, &mut courses, Wanted::WhereNeeded)?;
-        let known = from.and_then(|f| f.sensitivities.as_deref());
-        let mut state = self.ascended(assumed, &parameters, &numbers, records, &courses, effort, known)?;
+        let known = from.and_then(|f| f.known_derivatives.as_deref());
+        let begin = Beginning { assumed, numbers: &numbers, parameters: &parameters, records, courses: &courses };
+        let mut state = self.ascended(&begin, effort, known)?;
         let curved = records.iter().any(|&r| state.place.sides[r].as_ref().is_some_and(CoilSide::needs_reference));
         for _ in 1..if curved { effort.rounds.max(1) } else { 1 } {
             let (assumed, numbers) = (state.place.assumed.clone(), state.place.numbers.clone());
-            let known = state.sensitivities.take();
+            let known = state.known_derivatives.take();
             self.settle_courses(&assumed, &numbers, records, &mut courses, Wanted::WhereNeeded)?;
-            state = self.ascended(&assumed, &parameters, &numbers, records, &courses, effort, known.as_ref())?;
+            let (assumed, numbers, parameters, courses) = (&assumed, &numbers, &parameters, &courses);
+            let begin = Beginning { assumed, numbers, parameters, records, courses };
+            state = self.ascended(&begin, effort, known.as_ref())?;
         }
-        let (assumed, numbers) = (state.place.assumed.clone(), state.place.numbers.clone());
-        let (coordinates, log_likelihood, information) = (state.coordinates, state.log_likelihood, state.information);
-        let sensitivities = state.sensitivities.map(Arc::new);
+        let end = AscentEnd::from(state);
         let wanted = if effort.is_for_ranking() { Wanted::WhereNeeded } else { Wanted::Everywhere };
-        self.settle_courses(&assumed, &numbers, records, &mut courses, wanted)?;
+        self.settle_courses(&end.assumed, &end.numbers, records, &mut courses, wanted)?;
         let is_full = effort == Effort::FULL;
-        let fit =
-            finished(assumed, free, records, parameters, coordinates, log_likelihood, information, numbers, courses);
         let days = from.map_or_else(Arc::default, |f| f.days.clone());
-        Ok(Fit { is_full, sensitivities, days, ..fit })
+        Ok(Fit { is_full, days, ..finished(end, free, records, parameters, courses) })
     }
 
     /// Numbers for all records: those that were not fitted take the first fitted one's, their air as it was found to be where
@@ -167,18 +166,15 @@ impl Chamber<'_> {
     }
 }
 
-#[allow(clippy::too_many_arguments)]
+/// A fit by where its ascent ended.
 fn finished(
-    assumed: Assumption,
+    end: AscentEnd,
     free: &[Free],
     records: &[usize],
     parameters: Vec<Parameter>,
-    coordinates: Vec<f64>,
-    log_likelihood: f64,
-    information: DMatrix<f64>,
-    numbers: Vec<Numbers>,
     courses: Vec<Option<Reference>>,
 ) -> Fit {
+    let AscentEnd { assumed, numbers, coordinates, log_likelihood, information, known_derivatives } = end;
     let log_prior: f64 = parameters.iter().zip(&coordinates).map(|(p, &c)| p.log_prior(c)).sum();
     let (standard_errors, log_determinant) = match information.clone().cholesky() {
         Some(factor) => {
@@ -202,7 +198,7 @@ fn finished(
         evidence,
         information,
         is_full: false,
-        sensitivities: None,
+        known_derivatives: known_derivatives.map(Arc::new),
         days: Arc::default(),
         numbers,
         courses,

@@ -92,7 +92,7 @@ impl Fit {
     /// Begins where another fit of these records ended, with what was known there; what is assumed of the coil stays.
     pub(crate) fn begin_beside(&mut self, other: &Fit) {
         self.is_full = false;
-        self.sensitivities.clone_from(&other.sensitivities);
+        self.known_derivatives.clone_from(&other.known_derivatives);
         self.days.clone_from(&other.days);
     }
 

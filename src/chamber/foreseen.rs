@@ -56,7 +56,7 @@ impl Fit {
             evidence: 0.0,
             information: DMatrix::zeros(0, 0),
             is_full: false,
-            sensitivities: None,
+            known_derivatives: None,
             days: std::sync::Arc::default(),
             numbers: vec![numbers],
             courses: vec![None],

@@ -30,6 +30,7 @@
 
 mod abreast;
 mod adjustment;
+mod airs;
 mod ascent;
 mod causal;
 mod course;

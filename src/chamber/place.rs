@@ -13,7 +13,7 @@ use super::system::{Numbers, system};
 use super::{Assumption, Chamber, ChamberError};
 
 /// All that a likelihood is computed from.
-pub(super) struct Place0<'a> {
+pub(super) struct ModelPoint<'a> {
     pub(crate) assumed: Assumption,
     pub(crate) numbers: Vec<Numbers>,
     pub(crate) sides: Vec<Option<CoilSide>>,
@@ -29,7 +29,7 @@ impl Chamber<'_> {
         numbers: Vec<Numbers>,
         records: &[usize],
         courses: &'c [Option<Reference>],
-    ) -> Result<Place0<'c>, ChamberError> {
+    ) -> Result<ModelPoint<'c>, ChamberError> {
         let mut sides: Vec<Option<CoilSide>> = (0..self.records()).map(|_| None).collect();
         let mut values: Vec<Option<Values>> = (0..self.records()).map(|_| None).collect();
         for &r in records {
@@ -43,11 +43,11 @@ impl Chamber<'_> {
             values[r] = Some(side.values(&assumed, observed, r, reference)?);
             sides[r] = Some(side);
         }
-        Ok(Place0 { assumed, numbers, sides, values, courses })
+        Ok(ModelPoint { assumed, numbers, sides, values, courses })
     }
 
     /// Of one record that was computed for the place.
-    pub(super) fn innovations(&self, place: &Place0, record: usize) -> Result<Vec<Innovation>, ChamberError> {
+    pub(super) fn innovations(&self, place: &ModelPoint, record: usize) -> Result<Vec<Innovation>, ChamberError> {
         let (Some(side), Some(values)) = (&place.sides[record], &place.values[record]) else {
             return Err(ChamberError::Unsolvable);
         };
@@ -57,7 +57,7 @@ impl Chamber<'_> {
     /// One record with one coordinate moved.
     fn moved(
         &self,
-        place: &Place0,
+        place: &ModelPoint,
         parameter: &Parameter,
         coordinate: f64,
         record: usize,
@@ -84,7 +84,7 @@ impl Chamber<'_> {
     /// Derivatives of each record's innovations by its coordinates, at a place whose innovations (`base`) are known.
     pub(super) fn derivatives(
         &self,
-        place: &Place0,
+        place: &ModelPoint,
         parameters: &[Parameter],
         coordinates: &[f64],
         records: &[usize],
@@ -120,7 +120,7 @@ impl Chamber<'_> {
     /// One record with one coordinate moved by a step, up or, where that is out of bounds, down; and the step.
     fn moved_a_step(
         &self,
-        place: &Place0,
+        place: &ModelPoint,
         parameter: &Parameter,
         coordinate: f64,
         record: usize,
@@ -133,7 +133,7 @@ impl Chamber<'_> {
     /// The innovations of one record by several systems, those of one structure at once.
     pub(super) fn innovations_abreast(
         &self,
-        place: &Place0,
+        place: &ModelPoint,
         moved: Vec<MovedRecord>,
         record: usize,
     ) -> Result<Vec<Vec<Innovation>>, ChamberError> {

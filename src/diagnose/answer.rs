@@ -54,7 +54,7 @@ pub(super) fn answer(
     let squares: f64 = noise.iter().take(question.fitted.len()).map(|n| n.noise.white_rad_per_s.powi(2)).sum();
     let noise_floor = (squares / question.fitted.len().max(1) as f64).sqrt();
     let equals: &[&Explanation] = if verdict == Verdict::Indistinguishable { &family } else { &[] };
-    let effects = findings(question, found, scored, first, equals)?;
+    let effects = findings(question, scored, first, equals)?;
     let mut cautions = cautions(question.chamber, records);
     let hypothesis = hypothesis(question, found, named);
     if let Some(winding) = hypothesis.as_ref().and_then(|h| h.winding) {

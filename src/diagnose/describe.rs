@@ -47,7 +47,6 @@ pub(super) fn names(question: &Question, explanation: &Explanation) -> Vec<Strin
 /// Every effect that a set adds.
 pub(super) fn findings(
     question: &Question,
-    found: &Found,
     scored: &ScoredExplanation,
     declared: &ScoredExplanation,
     equals: &[&Explanation],
@@ -73,7 +72,7 @@ pub(super) fn findings(
         Ok(Finding {
             effect: effect.clone(),
             parameters: parameters(&named.fit, question.model.effects.len() + place, effect),
-            equivalents: equivalents(question, found, named, candidate, equals),
+            equivalents: equivalents(question, named, candidate, equals),
             chi_square_less: 2.0 * less,
             confirmed_by: 2.0 * confirmed,
         })
@@ -113,14 +112,7 @@ pub(super) fn parameters(fit: &Fit, place: usize, effect: &DeclaredEffect) -> Ve
 }
 
 /// What stands in the place of one effect in the other sets of a family.
-fn equivalents(
-    question: &Question,
-    found: &Found,
-    named: &Explanation,
-    candidate: usize,
-    equals: &[&Explanation],
-) -> Vec<Equivalent> {
-    let _ = found;
+fn equivalents(question: &Question, named: &Explanation, candidate: usize, equals: &[&Explanation]) -> Vec<Equivalent> {
     let own = names(question, named);
     let kind = question.candidates[candidate].kind();
     let mut all: Vec<Equivalent> = Vec::new();

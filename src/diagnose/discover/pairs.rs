@@ -121,7 +121,7 @@ impl Tools<'_, '_> {
                 if !(least..=most).contains(&of_effect) {
                     continue;
                 }
-                let free = direction.free(self.question) as f64;
+                let free = direction.free_parameters(self.question) as f64;
                 let price = self.price(&term, rows) - EFFECT.log + 0.5 * (free + 1.0) * rows.ln();
                 if best.as_ref().is_none_or(|b| gain - price > b.worth) {
                     let listed = direction.proposal(self.question, gain, of_effect);

@@ -130,7 +130,7 @@ pub(in crate::diagnose) fn amend(
     let first = ScoredExplanation::new(question, declared)?;
     // Sets that do as well with another listed effect in the place of one.
     let equals: Vec<&Explanation> = discovered.alternatives.iter().map(|(set, _)| &set.explanation).collect();
-    diagnosis.effects = findings(question, found, &refined, &first, &equals)?;
+    diagnosis.effects = findings(question, &refined, &first, &equals)?;
     diagnosis.verdict = Verdict::Unexplained;
     diagnosis.suggested_experiment = None;
     let noise = noises(question, &best.explanation)?;

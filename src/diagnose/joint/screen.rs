@@ -91,7 +91,7 @@ impl TestedStart {
     }
 
     /// How many parameters a fit with it has more.
-    pub(in crate::diagnose) fn free(&self, question: &Question) -> usize {
+    pub(in crate::diagnose) fn free_parameters(&self, question: &Question) -> usize {
         question.candidates[self.place].free.len()
     }
 
