@@ -390,17 +390,11 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
         Some(fit) => Some(Chamber::new(request.model, &records)?.settled_from(fit, &question.fitted)?),
         None => None,
     };
-    let (question, found) = match &again {
-        Some(chamber) => {
-            let question = Question { chamber, ..question };
-            let found = joint::again(&question, found)?;
-            (question, found)
-        }
-        None => {
-            let found = joint::judged(&question, found)?;
-            (question, found)
-        }
+    let question = match &again {
+        Some(chamber) => Question { chamber, ..question },
+        None => question,
     };
+    let found = if again.is_some() { joint::again(&question, found)? } else { joint::judged(&question, found)? };
     let chamber = question.chamber;
     progress(0.6);
     let timed = match &again {
