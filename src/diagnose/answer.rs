@@ -121,6 +121,7 @@ pub(super) fn posterior(question: &Question, found: &Found) -> Vec<Share> {
             None => shares.push(Share {
                 effects,
                 probability: explanation.probability,
+                hypothesis: hypothesis(question, found, explanation),
                 members: explanation.fit.assumed.model.effects.clone(),
                 estimates: explanation.fit.effect_estimates(),
             }),
@@ -155,7 +156,7 @@ fn refitted(question: &Question, named: &Explanation) -> Vec<Refitted> {
 }
 
 /// What is no effect and yet explains the records.
-fn hypothesis(question: &Question, found: &Found, named: &Explanation) -> Option<Hypothesis> {
+pub(super) fn hypothesis(question: &Question, found: &Found, named: &Explanation) -> Option<Hypothesis> {
     let mut said = Hypothesis::default();
     let mut steps = 0;
     for member in &named.members {

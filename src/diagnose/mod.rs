@@ -213,6 +213,8 @@ pub struct Diagnosis {
 pub(crate) struct Share {
     pub(crate) effects: Vec<String>,
     pub(crate) probability: f64,
+    /// What of it is no effect: of sets with the same effects, the likeliest's.
+    pub(crate) hypothesis: Option<Hypothesis>,
     /// All effects of the model that the set makes of the declared one, the declared ones first.
     pub(crate) members: Vec<DeclaredEffect>,
     /// Of the members' parameters.
@@ -452,7 +454,7 @@ fn beyond(
     let (discovered, elsewhere) = match discover::discover(question, found, &allowed, progress)? {
         Beyond::Nothing => return Ok(()),
         Beyond::Alike(alike) => {
-            discover::share_with(question, &alike, diagnosis);
+            discover::share_with(question, found, &alike, diagnosis);
             return Ok(());
         }
         Beyond::Found(discovered, elsewhere) => (discovered, elsewhere),

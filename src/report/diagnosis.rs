@@ -6,7 +6,9 @@ use super::ladder::ladder_chart;
 use super::noise::{noise_chart, noise_in_words};
 use super::page::figure;
 use super::plot::{Axis, Chart, ChartSeries, Mark};
-use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow, FindingJson, FittedParameterJson, RefittedJson};
+use crate::io::json::diagnosis::{
+    DiagnosisJson, DiagnosisRow, FindingJson, FittedParameterJson, HypothesisJson, RefittedJson,
+};
 use crate::io::json::experiment::ExperimentJson;
 use crate::units::{h_from_s, min_from_s, percent_from_fraction};
 
@@ -23,7 +25,9 @@ pub(crate) fn verdict_in_words(body: &DiagnosisJson) -> String {
             format!("missing — what the model file states of {} is wrong", wrong.join(" and "))
         }
         "missing" => format!("missing — the model lacks {}", kinds()),
-        "indistinguishable" => format!("indistinguishable — {} or an equivalent is missing", kinds()),
+        "indistinguishable" => {
+            format!("indistinguishable — {} or an equivalent is missing{}", kinds(), or_wound_otherwise(body))
+        }
         _ if body.hypothesis.is_some() => format!("unexplained — {}", hypothesis_in_words(body).join("; ")),
         _ if !body.proposals.is_empty() => {
             let beside = if body.effects.is_empty() { String::new() } else { format!("{} and ", kinds()) };
@@ -35,6 +39,16 @@ pub(crate) fn verdict_in_words(body: &DiagnosisJson) -> String {
         }
         _ => format!("unexplained — {} explains a part only", kinds()),
     }
+}
+
+/// A share of the posterior below which no other winding is mentioned beside effects.
+const MENTIONED: f64 = 0.05;
+
+/// The other winding that explains the records as well, if one does.
+fn or_wound_otherwise(body: &DiagnosisJson) -> String {
+    let wound = body.posterior.iter().filter(|s| s.probability > MENTIONED);
+    let winding = wound.filter_map(|s| winding_in_words(s.hypothesis.as_ref()?)).next();
+    winding.map(|winding| format!(", or the coil is wound otherwise ({winding})")).unwrap_or_default()
 }
 
 /// Another winding, a reversed coil, steps of the offset: a line each.
@@ -82,9 +96,20 @@ pub(crate) fn posterior_in_words(body: &DiagnosisJson) -> Vec<String> {
     shown
         .map(|s| {
             let name = if s.effects.is_empty() { "the declared model".to_owned() } else { s.effects.join(" + ") };
-            format!("{:.1} % {name}", percent_from_fraction(s.probability))
+            let winding =
+                s.hypothesis.as_ref().and_then(winding_in_words).map(|w| format!(" ({w})")).unwrap_or_default();
+            format!("{:.1} % {name}{winding}", percent_from_fraction(s.probability))
         })
         .collect()
+}
+
+/// How a coil was wound instead, in few words.
+fn winding_in_words(said: &HypothesisJson) -> Option<String> {
+    let exchanged = said.exchanged_layers.map(|[a, b]| format!("layers {a} and {b} exchanged"));
+    let winding = said.winding.clone();
+    let reversed = said.reversed.then(|| "connected the other way round".to_owned());
+    let words: Vec<String> = winding.into_iter().chain(exchanged).chain(reversed).collect();
+    (!words.is_empty()).then(|| words.join(", "))
 }
 
 /// With its error, and whether a bound holds it.

@@ -88,6 +88,16 @@ def hypothesis_right(expects, answer):
     return None
 
 
+def said_among_others(expects, answer):
+    """Whether the winding that was to be said is among the sets that hold 95 %."""
+    mass = 0.0
+    for share in sorted(answer.get("posterior") or [], key=lambda p: -p["probability"]):
+        if mass < 0.95 and hypothesis_right(expects, share):
+            return True
+        mass += share["probability"]
+    return False
+
+
 def faint(truth):
     """Whether what is hidden is too little to be found: below 0.15 noises, and nothing that acts through the readings."""
     through_readings = {"sensor_lag", "surface_film", "finite_pack"} & set(truth["answers"] or [])
@@ -115,6 +125,8 @@ def judge(truth, answer):
         return "missed"
     if hypothesis is False and not answer.get("effects"):
         return "honest" if verdict in ("unexplained", "indistinguishable") else "missed"
+    if hypothesis is False and verdict == "indistinguishable" and said_among_others(expects, answer):
+        return "right set"
     if hypothesis is False:
         return "CONFIDENT WRONG" if verdict == "missing" else "WRONG SET"
     if expects.get("no_name") or truth_set is None:

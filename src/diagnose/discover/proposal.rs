@@ -4,7 +4,7 @@ use super::grammar::{Class, Family, Term};
 use super::search::Set;
 use super::{Discovered, Question};
 use crate::chamber::Fit;
-use crate::diagnose::answer::noises;
+use crate::diagnose::answer::{hypothesis, noises};
 use crate::diagnose::describe::{ScoredExplanation, findings, names, unexplained};
 use crate::diagnose::joint::{Explanation, Found};
 use crate::diagnose::standing::CERTAIN;
@@ -139,9 +139,10 @@ pub(in crate::diagnose) fn amend(
     diagnosis.noise = noise;
     diagnosis.unexplained = Some(unexplained(question, &first, &best.explanation)?);
     let proposal = proposal(question, discovered, diagnosis)?;
-    let mut posterior = vec![share(question, best, proposal.formula.clone(), discovered.probability)];
+    let mut posterior = vec![share(question, found, best, proposal.formula.clone(), discovered.probability)];
     let others = discovered.alternatives.iter();
-    posterior.extend(others.map(|(set, probability)| share(question, set, formula_in_numbers(set), *probability)));
+    posterior
+        .extend(others.map(|(set, probability)| share(question, found, set, formula_in_numbers(set), *probability)));
     let left: f64 = (1.0 - posterior.iter().map(|s| s.probability).sum::<f64>()).max(0.0);
     posterior.extend(
         diagnosis
@@ -156,21 +157,28 @@ pub(in crate::diagnose) fn amend(
     Ok(())
 }
 
-fn share(question: &Question, set: &Set, formula: String, probability: f64) -> Share {
+fn share(question: &Question, found: &Found, set: &Set, formula: String, probability: f64) -> Share {
     Share {
         effects: names(question, &set.explanation).into_iter().chain([formula]).collect(),
         probability,
+        hypothesis: hypothesis(question, found, &set.explanation),
         members: set.explanation.fit.assumed.model.effects.clone(),
         estimates: set.explanation.fit.effect_estimates(),
     }
 }
 
 /// Puts formulas beside the listed effects that do no better than they.
-pub(in crate::diagnose) fn share_with(question: &Question, alike: &[(Set, f64)], diagnosis: &mut Diagnosis) {
+pub(in crate::diagnose) fn share_with(
+    question: &Question,
+    found: &Found,
+    alike: &[(Set, f64)],
+    diagnosis: &mut Diagnosis,
+) {
     let left = 1.0 - alike.iter().map(|(_, probability)| probability).sum::<f64>();
     let named = diagnosis.posterior.first().map_or(0.0, |s| s.probability) * left;
     diagnosis.posterior.iter_mut().for_each(|s| s.probability *= left);
-    let shares = alike.iter().map(|(set, probability)| share(question, set, formula_in_numbers(set), *probability));
+    let shares =
+        alike.iter().map(|(set, probability)| share(question, found, set, formula_in_numbers(set), *probability));
     diagnosis.posterior.extend(shares);
     diagnosis.posterior.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     if diagnosis.verdict == Verdict::Missing && named < CERTAIN {

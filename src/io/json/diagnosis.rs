@@ -65,6 +65,9 @@ pub struct DiagnosisJson {
 pub struct PosteriorShareJson {
     pub(crate) effects: Vec<String>,
     pub(crate) probability: f64,
+    /// Which winding, which way round, which steps of the offset: of a set that has one of these.
+    #[serde(default)]
+    pub(crate) hypothesis: Option<HypothesisJson>,
     /// All effects of the model that the set makes of the declared one, the declared ones first.
     #[serde(default)]
     pub(crate) members: Vec<MemberJson>,
@@ -348,6 +351,7 @@ impl PosteriorShareJson {
         Self {
             effects: share.effects.clone(),
             probability: share.probability,
+            hypothesis: share.hypothesis.as_ref().map(HypothesisJson::new),
             members: share.members.iter().map(member).collect(),
             estimates: of.iter().enumerate().map(estimate).collect(),
             correlation: (0..count).map(correlation).collect(),

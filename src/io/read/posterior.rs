@@ -185,6 +185,7 @@ mod tests {
         PosteriorShareJson {
             effects: members.iter().map(|m| m.kind.clone()).collect(),
             probability,
+            hypothesis: None,
             members,
             estimates: error.into_iter().map(estimate).collect(),
             correlation: if error.is_some() { vec![vec![1.0]] } else { Vec::new() },
