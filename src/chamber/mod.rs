@@ -148,8 +148,10 @@ impl Input {
         let mut added: Vec<f64> = course.iter().map(|c| self.amplitude * c).collect();
         for follow in &self.follows {
             let Some(slope) = follow.slope_rad_per_s.get(place).filter(|s| !s.is_empty()) else { continue };
+            // A model without that effect has the course as it was made.
             let value = model.effects.get(follow.effect).and_then(|e| e.values().get(follow.parameter));
-            let moved = self.amplitude * (value? - follow.about);
+            let Some(value) = value else { continue };
+            let moved = self.amplitude * (value - follow.about);
             added.iter_mut().zip(slope).for_each(|(a, s)| *a += moved * s);
         }
         Some(added)
@@ -296,5 +298,25 @@ impl<'a> Chamber<'a> {
     /// The record's noise by windows too short for anything else.
     pub(crate) fn noise_floor_rad_per_s(&self, place: usize) -> f64 {
         self.observed[place].series.noise_floor_rad_per_s
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::dense::tests::model;
+    use super::*;
+
+    #[test]
+    fn an_input_adds_its_course_to_a_model_without_the_effect_that_it_follows() {
+        let follow = Follow { effect: 0, parameter: 0, about: 3.0, slope_rad_per_s: vec![vec![1.0, 1.0]] };
+        let input = Input {
+            name: "t".to_owned(),
+            rate_rad_per_s: vec![vec![1.0, 2.0]],
+            amplitude: 0.5,
+            deviation: 1.0,
+            follows: vec![follow],
+        };
+        assert_eq!(input.added_rad_per_s(&model(Vec::new()), 0), Some(vec![0.5, 1.0]));
+        assert_eq!(input.added_rad_per_s(&model(Vec::new()), 1), None);
     }
 }
