@@ -11,22 +11,20 @@ use super::system::Numbers;
 use super::{Chamber, ChamberError};
 
 impl Chamber<'_> {
-    /// Each record's air as it is likeliest; `whole`: the records before gross errors were left out.
-    pub(super) fn with_airs(
-        mut self,
-        mut fit: Fit,
-        records: &[usize],
-        whole: &[Series],
-    ) -> Result<(Self, Fit), ChamberError> {
+    /// Gives each record the air that it is likeliest to have; the fit there. `whole`: all records before gross errors were left out.
+    ///
+    /// # Errors
+    /// As [`Chamber::fit`].
+    pub(super) fn take_airs(&mut self, mut fit: Fit, records: &[usize], whole: &[Series]) -> Result<Fit, ChamberError> {
         let found: Result<Vec<_>, ChamberError> = records.par_iter().map(|&r| self.likeliest_air(&fit, r)).collect();
         // To a curve the rows behind a kink are gross errors.
         let mut again = Vec::new();
         for (&r, (series, numbers)) in records.iter().zip(found?) {
             fit.numbers[r] = numbers;
-            self.observed[r].series = series;
-            let series = &mut self.observed[r].series;
-            if series.kinks > 0 && series.spikes > whole[r].spikes {
-                series.take_in_again(&whole[r]);
+            let own = &mut self.observed[r].series;
+            *own = series;
+            if own.kinks > 0 && own.spikes > whole[r].spikes {
+                own.take_in_again(&whole[r]);
                 again.push(r);
             }
         }
@@ -34,10 +32,10 @@ impl Chamber<'_> {
             let there = self.without_gross_errors(fit.clone(), &again)?;
             again.iter().for_each(|&r| fit.numbers[r] = there.numbers[r]);
         }
-        Ok((self, fit))
+        Ok(fit)
     }
 
-    /// One record's air as it is likeliest: a curve, straight but for kinks, or both; and whether it approaches set points.
+    /// One record with its likeliest air, and its numbers there.
     fn likeliest_air(&self, fit: &Fit, r: usize) -> Result<(Series, Numbers), ChamberError> {
         // Either the air bends wherever readings do, or it is straight but for its kinks, or it bends from kinks on as a stage that is
         // switched does. Kinks must be worth being looked for: the record itself says which, by itself.

@@ -39,7 +39,7 @@ pub(super) struct Discrete {
 /// The system over each of the steps, in their order.
 ///
 /// # Shapes
-/// `system` row-major n × n; each of `noises` the diagonal of a G.
+/// `system` row-major n × n \[1/s\]; each of `noises` the diagonal of a G; one entry of the answer a step.
 pub(super) fn discretise(system: &[f64], noises: [&[f64]; NOISES], n: usize, steps_s: &[f64]) -> Vec<Discrete> {
     Arch::new().dispatch(Discretise { system, noises, n, steps_s })
 }
@@ -61,7 +61,6 @@ impl NullaryFnOnce for Discretise<'_> {
 }
 
 /// Φ and the two Q over one length of time.
-#[derive(Clone)]
 struct Over<const N: usize> {
     transition: Square<N>,
     noises: [Square<N>; NOISES],

@@ -63,7 +63,11 @@ impl<'a> Chamber<'a> {
         let whole = self.observed.iter().map(|o| o.series.clone()).collect::<Vec<_>>();
         let curved = self.without_gross_errors(curved, records)?;
         let others: Vec<usize> = (0..self.records()).filter(|r| !records.contains(r)).collect();
-        let own = || self.clone().with_airs(curved.clone(), records, &whole);
+        let own = || -> Result<(Self, Fit), ChamberError> {
+            let mut chamber = self.clone();
+            let fit = chamber.take_airs(curved.clone(), records, &whole)?;
+            Ok((chamber, fit))
+        };
         let of_other = |&other: &usize| -> Result<(Series, Numbers), ChamberError> {
             let mut chamber = self.clone();
             let day = chamber.fit(&curved.assumed, &[], &[other], Some(&curved), Effort::SHORT)?;
@@ -84,9 +88,7 @@ impl<'a> Chamber<'a> {
     pub(super) fn looked_through(&mut self, fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
         let whole = self.observed.iter().map(|o| o.series.clone()).collect::<Vec<_>>();
         let curved = self.without_gross_errors(fit, records)?;
-        let fit;
-        (*self, fit) = self.clone().with_airs(curved, records, &whole)?;
-        Ok(fit)
+        self.take_airs(curved, records, &whole)
     }
 
     /// A fit to records without what it says are gross errors.

@@ -39,9 +39,13 @@ impl Sparse {
     /// # Shapes
     /// `matrix` row-major with `columns` columns.
     pub(crate) fn new(matrix: &[f64], columns: usize) -> Self {
+        Self::of_rows(matrix.chunks_exact(columns).map(|row| row.iter().copied()))
+    }
+
+    fn of_rows(rows: impl Iterator<Item = impl Iterator<Item = f64>>) -> Self {
         let mut sparse = Self { starts: vec![0], entries: Vec::new() };
-        for row in matrix.chunks_exact(columns) {
-            sparse.entries.extend(row.iter().copied().enumerate().filter(|(_, v)| *v != 0.0));
+        for row in rows {
+            sparse.entries.extend(row.enumerate().filter(|(_, v)| *v != 0.0));
             sparse.starts.push(sparse.entries.len());
         }
         sparse
@@ -50,23 +54,12 @@ impl Sparse {
     /// # Shapes
     /// `matrix` row-major n × n.
     pub(crate) fn transposed(matrix: &[f64], n: usize) -> Self {
-        let mut sparse = Self { starts: vec![0], entries: Vec::new() };
-        for column in 0..n {
-            let entries = matrix.chunks_exact(n).map(|row| row[column]).enumerate();
-            sparse.entries.extend(entries.filter(|(_, v)| *v != 0.0));
-            sparse.starts.push(sparse.entries.len());
-        }
-        sparse
+        Self::of_rows((0..n).map(|column| matrix.chunks_exact(n).map(move |row| row[column])))
     }
 
     /// Of what is zero beyond n × n.
     pub(crate) fn of_square<const N: usize>(square: &Square<N>, n: usize) -> Self {
-        let mut sparse = Self { starts: vec![0], entries: Vec::new() };
-        for row in &square[..n] {
-            sparse.entries.extend(row[..n].iter().copied().enumerate().filter(|(_, v)| *v != 0.0));
-            sparse.starts.push(sparse.entries.len());
-        }
-        sparse
+        Self::of_rows(square[..n].iter().map(|row| row[..n].iter().copied()))
     }
 
     #[inline(always)]

@@ -374,6 +374,18 @@ mod tests {
     }
 
     #[test]
+    fn another_winding_is_said_in_few_words() {
+        let said = |winding: Option<&str>, reversed, exchanged_layers| {
+            let winding = winding.map(str::to_owned);
+            winding_in_words(&HypothesisJson { winding, reversed, exchanged_layers, offset_steps: Vec::new() })
+        };
+        assert_eq!(said(None, false, Some([32, 33])).as_deref(), Some("layers 32 and 33 exchanged"));
+        assert_eq!(said(Some("dip"), true, None).as_deref(), Some("dip, connected the other way round"));
+        // A step of the offset alone is no winding.
+        assert_eq!(said(None, false, None), None);
+    }
+
+    #[test]
     fn every_effect_of_a_set_is_explained_once_in_two_sentences() {
         let mut first = finding("strain_mismatch");
         let other = finding("bias_temperature_rate");

@@ -20,10 +20,13 @@ use super::search::{Set, Tools, WORTH_LISTED};
 use crate::chamber::{Assumption, ChamberError, Column, Effort, Fit, Follow, Free, Input, Quantity};
 use crate::diagnose::candidate::Candidate;
 use crate::diagnose::joint::{Member, Proposal, Question, fitted, is_seen, proposals_along};
+use crate::rate::CoilModel;
 
 /// Variables along the records, and the same with each number of the coil moved a little.
 #[derive(Debug, Clone)]
 pub(crate) struct Grounds {
+    /// By which its courses are.
+    model: CoilModel,
     pub(crate) courses: Courses,
     moved: Vec<Moved>,
 }
@@ -73,7 +76,12 @@ impl Grounds {
             .collect();
         let courses = courses(question, fit, &days)?;
         let moved: Vec<Moved> = fit.free.par_iter().filter_map(|free| Moved::new(question, fit, free)).collect();
-        Ok(Self { courses, moved })
+        Ok(Self { model: fit.assumed.model.clone(), courses, moved })
+    }
+
+    /// Whether they are also those of another model.
+    pub(super) fn are_of(&self, model: &CoilModel) -> bool {
+        !is_seen(model, &self.model)
     }
 
     /// Whether they go anywhere with the coil.
@@ -293,7 +301,10 @@ mod tests {
         lag_s(60.0, &mut fit);
         let here = Grounds::new(&question, &fit, &[]).unwrap();
         assert!(here.moves());
+        // A formula beside the declared model reads other layers, and so does one beside another lag.
+        assert!(here.are_of(&fit.assumed.model) && !here.are_of(&model(Vec::new())));
         lag_s(66.0, &mut fit);
+        assert!(!here.are_of(&fit.assumed.model));
         let there = Grounds::new(&question, &fit, &[]).unwrap();
         let of =
             |text: &str| families(&variables(&here.courses), &Allowed::default()).into_iter().find(|f| f.text == text);

@@ -242,9 +242,9 @@ impl Tools<'_, '_> {
 
     /// A set without any term.
     pub(crate) fn plain(&self, explanation: &Explanation) -> Set {
-        // Courses that follow what the fit of the grounds has are not those of a set without it.
-        let is_of_others = changes_readings(self.question, explanation) || self.grounds.moves();
-        let grounds = if is_of_others { self.grounds_of(&explanation.fit) } else { Arc::clone(&self.grounds) };
+        let fit = &explanation.fit;
+        let grounds =
+            if self.grounds.are_of(&fit.assumed.model) { Arc::clone(&self.grounds) } else { self.grounds_of(fit) };
         let set = self.set(explanation.clone(), Vec::new(), &grounds);
         let is_judged = explanation.held_out.is_some();
         Set { merit: explanation.merit, held_out: explanation.held_out, is_judged, ..set }
