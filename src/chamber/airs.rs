@@ -4,10 +4,10 @@ use rayon::prelude::*;
 
 use super::ascent::Effort;
 use super::fit::Fit;
+use super::layout::Numbers;
 use super::point::CoilSide;
 use super::prior::Quantity;
 use super::series::Series;
-use super::system::Numbers;
 use super::{Chamber, ChamberError};
 
 impl Chamber<'_> {

@@ -27,9 +27,9 @@ use rayon::prelude::*;
 use super::derivative::{DerivativeColumn, Derivatives};
 use super::filter::Innovation;
 use super::known::Reference;
+use super::layout::Numbers;
 use super::parameter::{Parameter, write};
 use super::place::{ModelPoint, log_likelihood};
-use super::system::Numbers;
 use super::{Assumption, Chamber, ChamberError};
 
 /// Steps that derivatives of one place serve for.

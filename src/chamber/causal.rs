@@ -1,10 +1,15 @@
 //! The chamber as a filter meets it that sees one thermometer row by row: the same system, the gyro's own states left out.
 
+use super::film::drive;
 use super::fit::Fit;
+use super::layout::{Layout, Numbers, OutputGains, Parts};
 use super::learned::Learned;
 use super::parameter::Place;
 use super::prior::{PRIORS, Quantity};
-use super::system::{Layout, Numbers, OutputGains, Parts, Shows, driven_by_air, dynamics, places, response};
+
+use super::shows::Shows;
+
+use super::system::{driven_by_air, dynamics, places, response};
 use super::{Chamber, HALF_SPACE_MODES, modes_of_pack};
 use crate::thermal::reduced::Reduced;
 use crate::thermal::{Extent, HeatPath, ThermalError};
@@ -148,16 +153,17 @@ impl Causal {
             .into_iter()
             .for_each(|q| numbers.set(q, 1.0));
         // Which set point a stream's air approaches nobody knows.
-        let (f, noise, _) = dynamics(&parts, &layout, &numbers, f64::INFINITY);
+        let (f, noise, _) = dynamics(&parts, &layout, &numbers, f64::INFINITY, 1.0);
+        let drive = drive(&layout, &reduced, 1.0);
         let (all, n) = (layout.size, layout.own());
         let level = |row: &[f64]| row[..n].to_vec();
         Ok(Self {
             states: n,
             dynamics: f.chunks_exact(all).take(n).flat_map(|row| row[..n].to_vec()).collect(),
             noise: noise[..n].to_vec(),
-            functional: level(&response(&parts, &layout)),
-            reading: level(&places(&parts, &layout)[0]),
-            layers: (0..reduced.layers).flat_map(|layer| level(&layout.output(&reduced, layer))).collect(),
+            functional: level(&response(&parts, &layout, &drive)),
+            reading: level(&places(&parts, &layout, &drive)[0]),
+            layers: (0..reduced.layers).flat_map(|layer| level(&layout.output(&reduced, layer, &drive))).collect(),
             level_states: layout.levels().collect(),
             slope: layout.trend + 1,
         })

@@ -6,10 +6,10 @@ use super::ascent::Effort;
 use super::filter::{Innovation, RATE};
 use super::fit::Fit;
 use super::known::Reference;
+use super::layout::Numbers;
 use super::noise::Remedy;
 use super::point::{BLIND_RAD2_PER_S2, CoilSide, Rates, smoothed};
 use super::prior::Quantity;
-use super::system::Numbers;
 use super::{Chamber, ChamberError};
 
 /// What a model says a record's rate was, from its readings alone.

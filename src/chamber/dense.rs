@@ -8,10 +8,11 @@ pub(super) mod tests {
     use crate::chamber::abreast;
     use crate::chamber::filter::{self, Move, System};
     use crate::chamber::kinks::Bend;
+    use crate::chamber::layout::{Numbers, Parts};
     use crate::chamber::point::{CoilSide, Observed};
     use crate::chamber::prior::Quantity;
     use crate::chamber::series::{Origin, Series};
-    use crate::chamber::system::{Numbers, Parts, system};
+    use crate::chamber::system::system;
     use crate::chamber::{Assumption, Chamber, Effort, Free, Input};
     use crate::coil::{Coil, CoilSpec, Fibre, LayerLength};
     use crate::effect::{DeclaredEffect, find};

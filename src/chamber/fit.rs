@@ -7,10 +7,10 @@ use rayon::prelude::*;
 
 use super::ascent::{AscentEnd, Beginning, Effort, KnownDerivatives};
 use super::known::Reference;
+use super::layout::Numbers;
 use super::parameter::{Free, Parameter};
 use super::point::{CoilSide, Rates, quantities, smoothed};
 use super::prior::Quantity;
-use super::system::Numbers;
 use super::{Assumption, Chamber, ChamberError};
 
 /// Which courses are smoothed.

@@ -11,7 +11,8 @@ use rayon::prelude::*;
 use super::ascent::Effort;
 use super::filter::{self, Move};
 use super::fit::Fit;
-use super::series::{SHORT_ROW_S, Series};
+use super::prior::KINKS_PER_ROW;
+use super::series::{SHORT_ROW_S, Series, TimeStep};
 use super::system::system;
 use super::{Assumption, Chamber, ChamberError};
 
@@ -34,11 +35,30 @@ const MOVED_ROWS: f64 = 0.02;
 const NO_SHARE: f64 = 1e-3;
 
 impl Chamber<'_> {
-    /// As [`Chamber::settled`] for the first record, with its kinks at the times that readings and rates have them at.
+    /// As [`Chamber::settled`] for the first record, with its kinks, and its film's switches, at the times that readings and rates have
+    /// them at.
     ///
     /// # Errors
     /// As [`Chamber::fit`].
-    pub(crate) fn settled_in_time(mut self, assumed: &Assumption) -> Result<(Self, Fit), ChamberError> {
+    pub(crate) fn settled_in_time(self, assumed: &Assumption) -> Result<(Self, Fit), ChamberError> {
+        let whole = self.clone();
+        let (chamber, fit) = self.settled_as_it_is(assumed)?;
+        // What rates say nothing of is one film's.
+        if whole.observed[0].blind {
+            return Ok((chamber, fit));
+        }
+        let Some((switched, _)) = whole.with_switched_film(&fit)? else { return Ok((chamber, fit)) };
+        let (switched, other) = switched.settled_as_it_is(assumed)?;
+        let worth = |chamber: &Self, fit: &Fit| {
+            let kinks = chamber.observed[0].series.kinks as f64;
+            fit.posterior() + kinks * KINKS_PER_ROW.ln() - chamber.film_price(&[0])
+        };
+        let is_better = worth(&switched, &other) > worth(&chamber, &fit);
+        Ok(if is_better { (switched, other) } else { (chamber, fit) })
+    }
+
+    /// With the film switched, or not, as it is.
+    fn settled_as_it_is(mut self, assumed: &Assumption) -> Result<(Self, Fit), ChamberError> {
         let fit = self.best_start(assumed, &[], &[0])?;
         let fit = self.looked_through(fit, &[0])?;
         let mut kinks = self.time_kinks(&fit, 0)?;
@@ -192,7 +212,7 @@ fn worthless(kinks: &[Bend], likelihood: &(impl Fn(&[Bend]) -> f64 + Sync), pric
 }
 
 /// The time of the highest likelihood near a time: by parabolas through three, ever closer.
-fn highest(at: impl Fn(f64) -> f64, start_s: f64, value: f64, strides_s: &[f64]) -> f64 {
+pub(super) fn highest(at: impl Fn(f64) -> f64, start_s: f64, value: f64, strides_s: &[f64]) -> f64 {
     let (mut best_s, mut best) = (start_s, value);
     for &stride_s in strides_s {
         let (before, after) = (at(best_s - stride_s), at(best_s + stride_s));
@@ -249,7 +269,7 @@ impl Series {
         let (mut sum_s, mut count) = (0.0, 0.0);
         for movement in &self.rows[row].moves {
             match movement {
-                Move::Step(step) => at_s += self.steps_s[*step as usize],
+                Move::Step(step) => at_s += self.steps[*step as usize].length_s,
                 Move::Keep(_) => {}
                 Move::Kink => {
                     sum_s += at_s;
@@ -283,9 +303,10 @@ impl Series {
                     moves.push(movement);
                     continue;
                 };
-                let step_s = self.steps_s[step as usize];
-                let parts = (step_s / SHORT_ROW_S).ceil().max(1.0);
-                let part = if parts > 1.0 { self.step_of(step_s / parts) } else { step };
+                let whole = self.steps[step as usize];
+                let parts = (whole.length_s / SHORT_ROW_S).ceil().max(1.0);
+                let length_s = whole.length_s / parts;
+                let part = if parts > 1.0 { self.step_of(TimeStep { length_s, ..whole }) } else { step };
                 (0..parts as usize).for_each(|_| moves.extend([Move::Kink, Move::Step(part)]));
             }
             // One place alone is where the steps begin.
@@ -310,7 +331,8 @@ impl Series {
                     moves.push(movement);
                     continue;
                 };
-                let step_s = with.steps_s[step as usize];
+                let whole = with.steps[step as usize];
+                let step_s = whole.length_s;
                 let share = left_s / step_s;
                 if placed || share >= 1.0 - NO_SHARE {
                     moves.push(movement);
@@ -318,8 +340,8 @@ impl Series {
                     moves.extend([Move::Kink, movement]);
                     placed = true;
                 } else {
-                    let first = with.steps_s.len() as u16;
-                    with.steps_s.extend([left_s, step_s - left_s]);
+                    let first = with.steps.len() as u16;
+                    with.steps.extend([left_s, step_s - left_s].map(|length_s| TimeStep { length_s, ..whole }));
                     moves.extend([Move::Step(first), Move::Kink, Move::Step(first + 1)]);
                     placed = true;
                 }

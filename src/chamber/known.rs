@@ -14,8 +14,12 @@
 //! | δT, W | known change of the layers; the rate's window | K, s |
 
 use super::filter::{MEASURED, RATE, Values};
+use super::layout::OutputGains;
 use super::series::Series;
-use super::system::{OutputGains, Shows, driven_by_air};
+
+use super::shows::Shows;
+
+use super::system::driven_by_air;
 use crate::effect::PackState;
 use crate::rate::{Past, RateModel};
 use crate::thermal::reduced::Reduced;
@@ -32,6 +36,8 @@ pub(crate) struct Reference {
     pub(crate) outputs: usize,
     /// Above the record's `reference_k`.
     pub(crate) air_k: Vec<f64>,
+    /// What the pack's modes follow: the air, but for a skin and behind a film that is switched.
+    pub(super) drive_k: Vec<f64>,
     pub(crate) outputs_k: Vec<f64>,
 }
 
@@ -108,12 +114,7 @@ pub(super) fn known(asked: &Asked, series: &Series, reference: &Reference) -> Re
     if asked.path.has_own_course() || asked.path.conductivity_slope_per_k != 0.0 {
         let changes = changes(asked, series, reference)?;
         let columns = changes.len() / rows;
-        let shown = match asked.shows {
-            Shows::Air => None,
-            Shows::Part => asked.reduced.part,
-            Shows::OuterLayer => Some(asked.reduced.layers - 1),
-        };
-        if let Some(shown) = shown {
+        if let Some(shown) = asked.shows.row_of(asked.reduced) {
             let of_shown: Vec<f64> = changes.chunks_exact(columns).map(|row| row[shown]).collect();
             values.of[0] = lagged(&of_shown, &series.times_s, asked.lag_s);
         }
@@ -131,7 +132,7 @@ pub(super) fn known(asked: &Asked, series: &Series, reference: &Reference) -> Re
     Ok(values)
 }
 
-fn lagged(values: &[f64], times_s: &[f64], lag_s: f64) -> Vec<f64> {
+pub(super) fn lagged(values: &[f64], times_s: &[f64], lag_s: f64) -> Vec<f64> {
     if lag_s <= 0.0 {
         return values.to_vec();
     }
@@ -181,9 +182,9 @@ pub(super) fn changes(asked: &Asked, series: &Series, reference: &Reference) -> 
             let (path, _) = driven_by_air(&path, asked.film_w_per_m2_k);
             let part = asked.path.sensors_part();
             let there = Reduced::new(&path, part, asked.modes, series.shortest_s(), series.duration_s)?;
-            fields.push(there.driven(&series.times_s, &reference.air_k));
+            fields.push(there.driven(&series.times_s, &reference.drive_k));
         }
-        let here = asked.reduced.driven(&series.times_s, &reference.air_k);
+        let here = asked.reduced.driven(&series.times_s, &reference.drive_k);
         for (k, temperature_k) in temperatures.iter().enumerate() {
             let x = (temperature_k - nodes[1]) / (nodes[2] - nodes[1]);
             let weights = [0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0)];

@@ -1,10 +1,10 @@
 //! What a fit says of film, offset and chamber, where the records determine it.
 
 use super::fit::Fit;
+use super::layout::Layout;
 use super::parameter::Place;
 use super::prior::{PRIORS, Quantity};
 use super::readings::backward;
-use super::system::Layout;
 use super::{Chamber, ChamberError};
 
 /// A number with its standard error, both in SI.

@@ -38,12 +38,15 @@ mod course;
 mod dense;
 mod derivative;
 mod discretise;
+mod film;
+mod film_step;
 mod filter;
 mod fit;
 mod fitted;
 mod foreseen;
 mod kinks;
 mod known;
+mod layout;
 mod learned;
 mod long;
 mod noise;
@@ -52,6 +55,7 @@ mod place;
 mod point;
 pub(crate) mod prior;
 mod readings;
+mod responses;
 mod ripple;
 mod row;
 mod score;
@@ -60,8 +64,10 @@ mod series;
 mod settle;
 mod shows;
 mod sparse;
+mod start;
 mod states;
 mod stationary;
+mod switches;
 mod system;
 
 use thiserror::Error;
@@ -93,6 +99,7 @@ pub(crate) use readings::Told;
 pub(crate) use score::Column;
 pub(crate) use scorer::{Scored, Scorer};
 pub(crate) use states::RowStates;
+pub(crate) use switches::Films;
 
 /// What is assumed of coil, sensor and gyro; the numbers of chamber and noise are fitted with it.
 #[derive(Debug, Clone)]

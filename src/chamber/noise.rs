@@ -7,8 +7,10 @@
 
 use super::filter::RATE;
 use super::fit::Fit;
+use super::layout::{Numbers, Parts};
 use super::prior::Quantity;
-use super::system::{Numbers, Parts, Shows};
+
+use super::shows::Shows;
 use super::{Chamber, ChamberError, Place};
 
 /// What the rate of a record consists of beside the coil [rad/s].

@@ -1,8 +1,8 @@
 //! What a fit moves: numbers of the chamber, parameters of effects, amplitudes of inputs; and where they are likely to be.
 
 use super::Assumption;
+use super::layout::Numbers;
 use super::prior::Quantity;
-use super::system::Numbers;
 use crate::effect::{DeclaredEffect, ParameterSpec};
 use crate::units::Unit;
 

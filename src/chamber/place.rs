@@ -6,10 +6,12 @@ use super::abreast;
 use super::derivative::{DerivativeColumn, Derivatives};
 use super::filter::{Innovation, System, Values};
 use super::known::Reference;
+use super::layout::Numbers;
 use super::parameter::{Parameter, write};
 use super::point::{CoilSide, run};
 use super::prior::Quantity;
-use super::system::{Numbers, system};
+
+use super::system::system;
 use super::{Assumption, Chamber, ChamberError};
 
 /// All that a likelihood is computed from.

@@ -1,10 +1,16 @@
 //! A model with all its numbers, and what the filter makes of a record with it.
 
+use super::film::drive;
 use super::filter::{self, Innovation, Trace, Values};
 use super::known::{Asked, Reference, known, taken_off};
+use super::layout::{Layout, Numbers, OutputGains, Parts};
 use super::prior::Quantity;
+use super::row::Film;
 use super::series::Series;
-use super::system::{Layout, Numbers, OutputGains, Parts, Shows, driven_by_air, system};
+
+use super::shows::Shows;
+
+use super::system::{driven_by_air, system};
 use super::{Assumption, ChamberError};
 use crate::effect::PackState;
 use crate::rate::{Past, RateModel};
@@ -77,6 +83,15 @@ impl CoilSide {
             drift: assumed.drift,
             cycle: assumed.cycle,
         }
+    }
+
+    /// The row of the heat path that the sensor shows; None: the air.
+    pub(super) fn shown(&self) -> Option<usize> {
+        self.shows.row_of(&self.reduced)
+    }
+
+    pub(super) fn lag_s(&self) -> f64 {
+        self.lag_s
     }
 
     fn asked(&self) -> Asked<'_> {
@@ -155,33 +170,48 @@ impl CoilSide {
         course.outputs == self.reduced.outputs
     }
 
-    /// The course that states and known changes make.
+    /// The course that states and known changes make, with the numbers of its record.
     ///
     /// # Errors
     /// A conductivity that is not positive.
     pub(crate) fn reference(
         &self,
         assumed: &Assumption,
+        numbers: &Numbers,
         observed: &Observed,
         states: &[f64],
         before: Option<&Reference>,
     ) -> Result<Reference, ChamberError> {
-        let layout = Layout::new(&self.parts(assumed), &observed.series);
-        let rows = observed.series.times_s.len();
+        let series = &observed.series;
+        let layout = Layout::new(&self.parts(assumed), series);
+        let rows = series.times_s.len();
         let outputs = self.reduced.outputs;
-        let air: Vec<f64> =
-            states.chunks_exact(layout.size).map(|x| layout.air().into_iter().map(|i| x[i]).sum()).collect();
-        let rows_of: Vec<Vec<f64>> = (0..outputs).map(|j| layout.output(&self.reduced, j)).collect();
-        let mut outputs_k = Vec::with_capacity(rows * outputs);
-        for x in states.chunks_exact(layout.size) {
-            outputs_k.extend(rows_of.iter().map(|row| row.iter().zip(x).map(|(a, b)| a * b).sum::<f64>()));
+        // Of each film what the modes follow, and the outputs.
+        let behind = |film: &Film| {
+            let drive = drive(&layout, &self.reduced, numbers.film_ratio(*film));
+            let of: Vec<Vec<f64>> = (0..outputs).map(|j| layout.output(&self.reduced, j, &drive)).collect();
+            (drive, of)
+        };
+        let behind: Vec<(Vec<f64>, Vec<Vec<f64>>)> = series.films().iter().map(behind).collect();
+        let dot = |row: &[f64], x: &[f64]| row.iter().zip(x).map(|(a, b)| a * b).sum::<f64>();
+        let mut found = Reference {
+            layers: self.reduced.layers,
+            outputs,
+            air_k: Vec::with_capacity(rows),
+            drive_k: Vec::with_capacity(rows),
+            outputs_k: Vec::with_capacity(rows * outputs),
+        };
+        for (k, x) in states.chunks_exact(layout.size).enumerate() {
+            let (drive, of) = &behind[series.film_at(k) as usize];
+            found.air_k.push(layout.air().into_iter().map(|i| x[i]).sum());
+            found.drive_k.push(dot(drive, x));
+            found.outputs_k.extend(of.iter().map(|row| dot(row, x)));
         }
-        let mut found = Reference { layers: self.reduced.layers, outputs, air_k: air, outputs_k };
         // Known changes of the layers belong to the course; they were taken off the readings.
         let asked = self.asked();
         if asked.path.has_own_course() || asked.path.conductivity_slope_per_k != 0.0 {
             let about = before.unwrap_or(&found);
-            let changes = super::known::changes(&asked, &observed.series, about)?;
+            let changes = super::known::changes(&asked, series, about)?;
             let of_outputs = changes.chunks_exact(changes.len() / rows).flat_map(|row| &row[..outputs]);
             found.outputs_k.iter_mut().zip(of_outputs).for_each(|(o, c)| *o += c);
         }
@@ -282,7 +312,7 @@ pub(super) fn smoothed(
     }
     let trace = filter::forward(&system, &observed.series.rows, &values, true);
     let states = filter::smooth(&system, &observed.series.rows, &trace);
-    side.reference(assumed, observed, &states, before)
+    side.reference(assumed, numbers, observed, &states, before)
 }
 
 /// The film as a number of the chamber, where the model does not state one.
@@ -318,6 +348,9 @@ pub(super) fn quantities(assumed: &Assumption, observed: &Observed) -> Result<Ve
     ]);
     if observed.series.approaches {
         all.push(Quantity::ApproachTime);
+    }
+    if !observed.series.film_switches_s.is_empty() {
+        all.push(Quantity::FilmRatio);
     }
     if assumed.drift {
         all.extend([Quantity::DriftSize, Quantity::DriftTime]);

@@ -37,6 +37,8 @@ pub(crate) enum Quantity {
     StartSlope,
     /// Time in which the air of a stage approaches its set point, its slope dying away \[s\]; only where the air does.
     ApproachTime,
+    /// The film while it is switched over the usual one; only where it is.
+    FilmRatio,
 }
 
 /// One line of the table.
@@ -54,7 +56,7 @@ pub(crate) struct Prior {
 }
 
 /// Every prior of the chamber.
-pub(crate) const PRIORS: [Prior; 20] = [
+pub(crate) const PRIORS: [Prior; 21] = [
     line(Quantity::Film, 25.0, 0.8, "free to moderately forced convection in a chamber: 8 … 80 W/(m²K)"),
     line(Quantity::ReadingNoise, 0.005, 1.0, "platinum sensors and their bridges read to a few millikelvin"),
     line(Quantity::InnerNoise, 0.005, 1.0, "as the sensor"),
@@ -88,6 +90,7 @@ pub(crate) const PRIORS: [Prior; 20] = [
     line(Quantity::CyclePeriod, 5000.0, 0.8, "below a record's length, above what an air conditioning makes"),
     line(Quantity::StartSlope, 2e-4, 2.0, "a record begins at rest, or in a ramp of up to a kelvin or two a minute"),
     line(Quantity::ApproachTime, 90.0, 0.8, "thermoelectric stages settle within half a minute to several minutes"),
+    line(Quantity::FilmRatio, 1.0, 0.7, "a fan makes twice or thrice of still air's film, or stops doing so"),
 ];
 
 const fn line(quantity: Quantity, median: f64, deviation: f64, reason: &'static str) -> Prior {
@@ -122,11 +125,12 @@ impl Quantity {
             Self::CyclePeriod => "cycle_period_s",
             Self::StartSlope => "start_slope_k_per_s",
             Self::ApproachTime => "approach_s",
+            Self::FilmRatio => "switched_film_over_usual",
         }
     }
 
     /// What the air of one day is.
-    pub(super) const AIR: [Self; 9] = [
+    pub(super) const AIR: [Self; 10] = [
         Self::RestNoise,
         Self::BendNoise,
         Self::TurbulenceSize,
@@ -136,6 +140,7 @@ impl Quantity {
         Self::RippleCoherence,
         Self::StartSlope,
         Self::ApproachTime,
+        Self::FilmRatio,
     ];
 
     /// Whether it is an angular rate, in SI rad/s.
@@ -148,10 +153,10 @@ impl Quantity {
         found.unwrap_or(&PRIORS[0])
     }
 
-    /// Whether it may be learned from one record for the next. What a stage does behind a step is of one record's day, as its kinks are;
+    /// Whether it may be learned from one record for the next. What a stage does behind a step, or a fan, is of one record's day, as its kinks are;
     /// what all records share is learned by itself.
     pub(crate) fn is_learned(self) -> bool {
-        !self.is_shared() && self != Self::ApproachTime
+        !self.is_shared() && !matches!(self, Self::ApproachTime | Self::FilmRatio)
     }
 
     /// Whether it is one number for all records.
@@ -175,6 +180,9 @@ pub(super) const START_APART_MODES: f64 = 0.1;
 /// … of the rate's offset about the record's median [rad/s]: the earth's rate is 7.3e-5.
 pub(super) const OFFSET_RAD_PER_S: f64 = 2.5e-5;
 
+/// One chamber in fifty has a fan that is switched while a record runs: natural logarithm.
+pub(super) const SWITCHED_LOG: f64 = -3.912;
+
 /// One measurement in a thousand is a gross error, of tens of deviations.
 pub(super) const GROSS_SHARE: f64 = 1e-3;
 pub(super) const GROSS_FACTOR: f64 = 30.0;
@@ -192,5 +200,6 @@ mod tests {
             assert_eq!(PRIORS.iter().filter(|p| p.quantity == prior.quantity).count(), 1);
             assert!(prior.median > 0.0 && prior.deviation > 0.0 && prior.reason.len() > 10);
         }
+        assert!((SWITCHED_LOG - 0.02_f64.ln()).abs() < 1e-3);
     }
 }

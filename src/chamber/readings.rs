@@ -12,10 +12,12 @@ use super::filter::{self, Innovation, MEASURED, Move, RATE, Row, System, Trace, 
 use super::fit::Fit;
 use super::kinks::Bend;
 use super::known::Reference;
+use super::layout::{Layout, Numbers};
 use super::point::{CoilSide, run_kept};
 use super::prior::Quantity;
 use super::series::{Origin, Series};
-use super::system::{Layout, Numbers, system};
+
+use super::system::system;
 use super::{Chamber, ChamberError};
 use crate::rate::CoilModel;
 use crate::record::Record;
@@ -121,7 +123,7 @@ impl<'a> Chamber<'a> {
         let states = filter::smooth(&system, &rows, &trace);
         let bends = self.bends(record, |k| states[k * n + layout.trend + 1]);
         let before = fit.courses[record].as_ref().filter(|c| side.fits(c));
-        let course = side.reference(&fit.assumed, &self.observed[record], &states, before)?;
+        let course = side.reference(&fit.assumed, &numbers, &self.observed[record], &states, before)?;
         let slopes_k_per_s = slopes(&side, &layout, series, &states, &course);
         Ok(Told { course, slopes_k_per_s, rate_variance_rad2_per_s2: variance, bends })
     }
@@ -137,11 +139,10 @@ fn slopes(side: &CoilSide, layout: &Layout, series: &Series, states: &[f64], cou
     for j in 0..course.outputs {
         let shares = &reduced.row(j)[..layout.modes];
         for (k, x) in states.chunks_exact(layout.size).enumerate() {
-            let drive = layout.drive(x);
             rest[k] = course.row(k)[j];
             for ((share, x), decay) in shares.iter().zip(x).zip(&reduced.decay_per_s) {
                 rest[k] -= share * x;
-                slopes[k * columns + j] += share * decay * (drive - x);
+                slopes[k * columns + j] += share * decay * (course.drive_k[k] - x);
             }
         }
         add_parabolas(times_s, &rest, columns, j, &mut slopes);

@@ -41,3 +41,22 @@ impl Row {
         self.kink > 0.0 && self.moves.contains(&Move::Kink)
     }
 }
+
+/// Which of its two films a pack is behind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Film {
+    /// The one that the model is of.
+    Usual,
+    Switched,
+}
+
+impl Film {
+    pub(super) const BOTH: [Self; 2] = [Self::Usual, Self::Switched];
+
+    pub(super) fn other(self) -> Self {
+        match self {
+            Self::Usual => Self::Switched,
+            Self::Switched => Self::Usual,
+        }
+    }
+}

@@ -6,6 +6,7 @@
 //! ```
 
 use super::filter::{AMBIENT, MEASURED, Move, RATE, Row};
+use super::row::Film;
 use crate::numeric::noise::white_noise;
 use crate::numeric::statistics::median;
 use crate::record::Record;
@@ -22,8 +23,8 @@ pub(super) struct Series {
     pub(crate) columns: Vec<Vec<f64>>,
     /// One entry a row; `Row::measured` holds places of [`Self::shapes`] times measured.
     pub(crate) rows: Vec<Row>,
-    /// Distinct lengths of steps [s].
-    pub(crate) steps_s: Vec<f64>,
+    /// Distinct steps of time.
+    pub(super) steps: Vec<TimeStep>,
     /// Distinct ways in which a row is measured.
     pub(crate) shapes: Vec<Shape>,
     /// Of each row, the first and last of the record's rows in it.
@@ -34,6 +35,8 @@ pub(super) struct Series {
     pub(super) kinks: usize,
     /// Whether its air approaches a set point, as that of a stage does behind a step: its slope dies away.
     pub(super) approaches: bool,
+    /// When the film between air and pack changes to another one and back, ascending [s].
+    pub(super) film_switches_s: Vec<f64>,
     /// Values in one row.
     pub(crate) averaged: usize,
     /// Resolution of the sensor [K]; 0 where readings are not on a grid.
@@ -44,7 +47,14 @@ pub(super) struct Series {
     pub(crate) start_s: f64,
     /// Whether a rate's window may begin before the row before it.
     pub(crate) overlaps: bool,
-    shape_of: Vec<u16>,
+    pub(super) shape_of: Vec<u16>,
+}
+
+/// A step of time behind one film.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct TimeStep {
+    pub(super) length_s: f64,
+    pub(super) film: Film,
 }
 
 /// Where a record comes from.
@@ -64,6 +74,8 @@ pub(super) struct Shape {
     pub(crate) end_share: f64,
     /// Of the two slots that remember a window's beginning.
     pub(crate) slot: u8,
+    /// The film at the row.
+    pub(super) film: Film,
 }
 
 /// Rows are averaged while they are shorter than this share of the pack's own time …
@@ -131,12 +143,13 @@ impl Series {
                 .map(|c| blocks.iter().map(|b| b.mean(c)).collect())
                 .collect(),
             rows: Vec::new(),
-            steps_s: Vec::new(),
+            steps: Vec::new(),
             shapes: Vec::new(),
             spans: blocks.iter().map(|b| b.span).collect(),
             spikes,
             kinks: 0,
             approaches: false,
+            film_switches_s: Vec::new(),
             averaged,
             resolution_k,
             noise_floor_rad_per_s: white_noise(times_s, record.rate_rad_per_s()).deviation,
@@ -172,12 +185,12 @@ impl Series {
         self.shape_of[row] as usize
     }
 
-    /// The step of this length, which may be a new one.
-    pub(super) fn step_of(&mut self, length_s: f64) -> u16 {
-        let known = self.steps_s.iter().position(|l| (l - length_s).abs() < SAME_S);
-        known.unwrap_or_else(|| {
-            self.steps_s.push(length_s);
-            self.steps_s.len() - 1
+    /// The step like this one, which may be a new one.
+    pub(super) fn step_of(&mut self, step: TimeStep) -> u16 {
+        let is_same = |s: &TimeStep| (s.length_s - step.length_s).abs() < SAME_S && s.film == step.film;
+        self.steps.iter().position(is_same).unwrap_or_else(|| {
+            self.steps.push(step);
+            self.steps.len() - 1
         }) as u16
     }
 
@@ -247,11 +260,9 @@ impl Series {
         for k in 0..times_s.len() {
             let window_s = windows_s[k];
             let keeps = k > 0 && window_s > 0.0;
-            let shape = Shape { window_s, end_share: if keeps { end_share } else { 1.0 }, slot: slot_of(k) };
-            let place = self.shapes.iter().position(|s| same(s, &shape)).unwrap_or_else(|| {
-                self.shapes.push(shape);
-                self.shapes.len() - 1
-            });
+            let end_share = if keeps { end_share } else { 1.0 };
+            let shape = Shape { window_s, end_share, slot: slot_of(k), film: Film::Usual };
+            let place = place_of(&mut self.shapes, shape);
             self.shape_of.push(place as u16);
             let measured = std::array::from_fn(|m| {
                 let there = self.values[m][k].is_finite() && (m != RATE || k > 0);
@@ -265,12 +276,23 @@ impl Series {
             moves.extend(steps.of(rest_s(k)).into_iter().map(Move::Step));
             self.rows.push(Row { moves, bend: bends[k], kink: 0.0, measured, averaged: self.averaged as f64 });
         }
-        self.steps_s = steps.lengths_s;
+        let step = |length_s: f64| TimeStep { length_s, film: Film::Usual };
+        self.steps = steps.lengths_s.into_iter().map(step).collect();
     }
 }
 
+/// The place of a shape, which may be a new one.
+pub(super) fn place_of(shapes: &mut Vec<Shape>, shape: Shape) -> usize {
+    shapes.iter().position(|s| same(s, &shape)).unwrap_or_else(|| {
+        shapes.push(shape);
+        shapes.len() - 1
+    })
+}
+
 fn same(a: &Shape, b: &Shape) -> bool {
-    (a.window_s - b.window_s).abs() < SAME_S && (a.end_share - b.end_share).abs() < SAME_S && a.slot == b.slot
+    (a.window_s - b.window_s).abs() < SAME_S
+        && (a.end_share - b.end_share).abs() < SAME_S
+        && (a.slot, a.film) == (b.slot, b.film)
 }
 
 /// Rows that become one.

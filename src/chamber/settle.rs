@@ -9,10 +9,12 @@ use super::ascent::Effort;
 use super::filter::{self, RATE};
 use super::fit::Fit;
 use super::kinks::Bend;
+use super::layout::Numbers;
 use super::point::{BLIND_RAD2_PER_S2, CoilSide, run_kept};
 use super::prior::{GROSS_FACTOR, GROSS_SHARE, KINKS_PER_ROW, Quantity};
 use super::series::Series;
-use super::system::{Numbers, system};
+
+use super::system::system;
 use super::{Assumption, Chamber, ChamberError};
 
 /// Times that a record is looked through for gross errors, and for kinks.
@@ -43,13 +45,21 @@ impl<'a> Chamber<'a> {
     /// # Errors
     /// As [`Chamber::fit`].
     pub(crate) fn settled_from(self, fit: Fit, records: &[usize]) -> Result<Self, ChamberError> {
-        let curved = self.curved(fit, records)?;
-        let (chamber, fit) = self.settled_about(curved, records)?;
+        let (chamber, fit) = self.settled_with(fit, records)?;
         chamber.with_timed_kinks(&fit)
     }
 
+    /// As [`Chamber::settled_from`], with the fit there and kinks near which rows they are.
+    ///
+    /// # Errors
+    /// As [`Chamber::fit`].
+    pub(crate) fn settled_with(self, fit: Fit, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
+        let curved = self.curved(fit, records)?;
+        self.settled_about(curved, records)
+    }
+
     /// A fit in an air that bends wherever readings do, whatever the air was.
-    fn curved(&self, mut fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
+    pub(super) fn curved(&self, mut fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
         for &r in records {
             let medians = Numbers::medians(&self.observed[r].series);
             Quantity::AIR.iter().for_each(|&quantity| fit.numbers[r].set(quantity, medians.get(quantity)));

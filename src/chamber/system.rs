@@ -8,6 +8,7 @@
 //! d(o, p) = R (o, p) dt + γ (d, e) dt,   d(d, e) = R (d, e) dt + 2 σ_o √γ dW,   R = (−γ, ω; −ω, −γ)        ripple
 //! dl = (sensor's place − l)/τ dt              lag
 //! dw = −w/τ_w dt + σ_w √(2/τ_w) dW            wander; drift and cycle likewise where they are asked for
+//! dx_i = λ_i (a' − x_i) dt                    … behind another film ([`super::film`])
 //! reading = l or the sensor's place + noise,   rate = (c·x(t) − c·x(t − W))/W + b + w + noise
 //! ```
 //!
@@ -23,62 +24,15 @@
 //! A half space, or a pack whose heat capacity is unknown, is driven by its outermost layer, which follows the air with the
 //! time that a film over the pack's capacity would have.
 
-use nalgebra::SMatrix;
-
 use super::discretise::discretise;
+use super::film::drive;
 use super::filter::{RATE, Step, System};
-use super::prior::{OFFSET_RAD_PER_S, PRIORS, Quantity, START_APART_K, START_APART_MODES, START_APART_S, START_K};
+use super::layout::{Layout, Numbers, Parts};
+use super::prior::Quantity;
 use super::series::{Series, Shape};
-pub(super) use super::shows::Shows;
 use super::sparse::Sparse;
-use super::stationary::followed;
-use crate::numeric::statistics::median;
-use crate::thermal::reduced::Reduced;
+use super::start::start;
 use crate::thermal::{Extent, HeatPath, Location, PackMaterial};
-
-/// Values of the chamber's quantities, by [`Quantity`]; NaN where a model has none.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Numbers(pub(crate) [f64; PRIORS.len()]);
-
-impl Numbers {
-    pub(crate) fn get(&self, quantity: Quantity) -> f64 {
-        self.0[quantity as usize]
-    }
-
-    pub(crate) fn set(&mut self, quantity: Quantity, value: f64) {
-        self.0[quantity as usize] = value;
-    }
-
-    /// The medians of the priors, for one record.
-    pub(crate) fn medians(series: &Series) -> Self {
-        let mut numbers = Self([f64::NAN; PRIORS.len()]);
-        for prior in &PRIORS {
-            let unit = if prior.relative { series.noise_floor_rad_per_s } else { 1.0 };
-            numbers.set(prior.quantity, prior.median * unit);
-        }
-        numbers
-    }
-}
-
-/// What the coil makes of the outputs' rates, and of the air's [rad/s per K/s].
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct OutputGains {
-    pub(crate) outputs: Vec<f64>,
-    pub(crate) air: f64,
-}
-
-/// What of a model's structure the system depends on.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Parts<'a> {
-    pub(crate) reduced: &'a Reduced,
-    pub(crate) gains: &'a OutputGains,
-    /// The drive follows the air with this time [s]; None: the film is in the modes.
-    pub(crate) skin_s: Option<f64>,
-    pub(crate) shows: Shows,
-    pub(crate) lag_s: f64,
-    pub(crate) drift: bool,
-    pub(crate) cycle: bool,
-}
 
 /// Heat capacity that a pack is taken to have where only its diffusivity is known [J/(m³K)].
 const USUAL_CAPACITY_J_PER_M3_K: f64 = 1.7e6;
@@ -109,119 +63,22 @@ pub(super) fn driven_by_air(path: &HeatPath, film_w_per_m2_k: f64) -> (HeatPath,
     (driven, None)
 }
 
-/// Where each state stands.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Layout {
-    pub(crate) modes: usize,
-    skin: Option<usize>,
-    /// Level of the air's trend; its slope is the next.
-    pub(crate) trend: usize,
-    pub(crate) turbulence: usize,
-    pub(crate) ripple: usize,
-    /// What drives the ripple.
-    driver: usize,
-    lag: Option<usize>,
-    wander: usize,
-    drift: Option<usize>,
-    cycle: Option<usize>,
-    offset: usize,
-    /// What the rate's window began with; two where windows overlap.
-    windows: [usize; 2],
-    /// What readings were where a window begins; only where readings are averaged.
-    reading: Option<usize>,
-    pub(crate) size: usize,
+/// What of the system is another one behind another film.
+struct Behind {
+    /// F, row-major.
+    dynamics: Vec<f64>,
+    response: Vec<f64>,
+    places: [Vec<f64>; RATE],
 }
 
-impl Layout {
-    pub(crate) fn new(parts: &Parts, series: &Series) -> Self {
-        Self::with(parts, series.overlaps, series.averaged > 1)
-    }
-
-    /// `overlaps`: rates' windows do; `averaged`: readings are means.
-    pub(crate) fn with(parts: &Parts, overlaps: bool, averaged: bool) -> Self {
-        let mut size = 0;
-        let mut take = |count: usize| {
-            size += count;
-            size - count
-        };
-        let modes = take(parts.reduced.modes());
-        let _ = modes;
-        let skin = parts.skin_s.map(|_| take(1));
-        let (trend, turbulence, ripple, driver) = (take(2), take(1), take(2), take(2));
-        let lag = (parts.lag_s > 0.0).then(|| take(1));
-        let wander = take(1);
-        let drift = parts.drift.then(|| take(1));
-        let cycle = parts.cycle.then(|| take(2));
-        let (offset, window) = (take(1), take(1));
-        let windows = [window, if overlaps { take(1) } else { window }];
-        let reading = averaged.then(|| take(1));
-        let modes = parts.reduced.modes();
+impl Behind {
+    fn new(parts: &Parts, layout: &Layout, numbers: &Numbers, approach_s: f64, film_ratio: f64) -> Self {
+        let drive = drive(layout, parts.reduced, film_ratio);
         Self {
-            modes,
-            skin,
-            trend,
-            turbulence,
-            ripple,
-            driver,
-            lag,
-            wander,
-            drift,
-            cycle,
-            offset,
-            windows,
-            reading,
-            size,
+            dynamics: dynamics(parts, layout, numbers, approach_s, film_ratio).0,
+            response: response(parts, layout, &drive),
+            places: places(parts, layout, &drive),
         }
-    }
-
-    /// How many states come before the gyro's own.
-    pub(crate) fn own(&self) -> usize {
-        self.wander
-    }
-
-    /// The states that show the air's temperature in equilibrium.
-    pub(crate) fn levels(&self) -> impl Iterator<Item = usize> {
-        (0..self.modes).chain(self.skin).chain([self.trend]).chain(self.lag)
-    }
-
-    pub(crate) fn offset(&self) -> usize {
-        self.offset
-    }
-
-    /// The states that are the gyro's own.
-    pub(crate) fn gyro(&self) -> impl Iterator<Item = usize> {
-        let cycle = self.cycle.into_iter().flat_map(|c| [c, c + 1]);
-        [self.wander, self.offset].into_iter().chain(self.drift).chain(cycle)
-    }
-
-    /// The states whose sum is the air.
-    pub(crate) fn air(&self) -> [usize; 3] {
-        [self.trend, self.turbulence, self.ripple]
-    }
-
-    /// What the modes follow.
-    pub(crate) fn drive(&self, states: &[f64]) -> f64 {
-        match self.skin {
-            Some(skin) => states[skin],
-            None => self.air().into_iter().map(|i| states[i]).sum(),
-        }
-    }
-
-    /// An output's row over the states.
-    pub(crate) fn output(&self, reduced: &Reduced, output: usize) -> Vec<f64> {
-        let mut row = vec![0.0; self.size];
-        row[..self.modes].copy_from_slice(reduced.row(output));
-        match self.skin {
-            Some(skin) => row[skin] = reduced.residue[output],
-            None => self.air().into_iter().for_each(|i| row[i] = reduced.residue[output]),
-        }
-        row
-    }
-
-    pub(crate) fn air_row(&self) -> Vec<f64> {
-        let mut row = vec![0.0; self.size];
-        self.air().into_iter().for_each(|i| row[i] = 1.0);
-        row
     }
 }
 
@@ -230,34 +87,36 @@ pub(super) fn system(parts: &Parts, numbers: &Numbers, series: &Series) -> Syste
     let layout = Layout::new(parts, series);
     let n = layout.size;
     let approach_s = series.approach_s(numbers.get(Quantity::ApproachTime));
-    let (f, noise, trend_noise) = dynamics(parts, &layout, numbers, approach_s);
-    let steps = discretise(&f, [&noise, &trend_noise], n, &series.steps_s).into_iter().map(|found| {
-        let [noise, trend_noise] = found.noises;
-        let (phi, phi_turned) = (Sparse::new(&found.transition, n), Sparse::transposed(&found.transition, n));
-        Step { phi, phi_turned, noise, trend_noise }
-    });
-    let steps = steps.collect();
-    let (response, places) = (response(parts, &layout), places(parts, &layout));
+    let (f, noise, trend_noise) = dynamics(parts, &layout, numbers, approach_s, 1.0);
+    let behind = series.films().iter().map(|film| numbers.film_ratio(*film));
+    let behind: Vec<Behind> = behind.map(|ratio| Behind::new(parts, &layout, numbers, approach_s, ratio)).collect();
+    let steps = steps(&behind, [&noise, &trend_noise], series);
     let mut rows = Vec::new();
     for shape in &series.shapes {
-        for place in &places {
+        let Behind { dynamics, response, places } = &behind[shape.film as usize];
+        for place in places {
             let share = |row: &[f64]| row.iter().map(|v| v * shape.end_share).collect::<Vec<f64>>();
             let mut row = share(place);
             // Only the sensor's readings are interpolated; those of other thermometers are taken at the window's end.
-            if let (Some(reading), true) = (layout.reading, std::ptr::eq(place, &places[0])) {
+            if let (Some(reading), true) = (layout.reading, std::ptr::eq(place, &raw const places[0])) {
                 row[reading] = 1.0 - shape.end_share;
             } else {
                 row.clone_from(place);
             }
             rows.extend(row);
         }
-        rows.extend(rate_row(&layout, &f, &response, shape));
+        rows.extend(rate_row(&layout, dynamics, response, shape));
     }
-    let mut keeps: Vec<Vec<(usize, usize)>> = layout.windows.iter().map(|&window| vec![(window, 0)]).collect();
-    let mut kept = response;
-    if let Some(reading) = layout.reading {
-        keeps[0].push((reading, 1));
-        kept.extend(&places[0]);
+    // Of each film the slots of windows, and what they keep.
+    let (mut keeps, mut kept): (Vec<Vec<(usize, usize)>>, Vec<f64>) = (Vec::new(), Vec::new());
+    for Behind { response, places, .. } in &behind {
+        let first = keeps.len();
+        keeps.extend(layout.windows.iter().map(|&window| vec![(window, kept.len() / n)]));
+        kept.extend(response);
+        if let Some(reading) = layout.reading {
+            keeps[first].push((reading, kept.len() / n));
+            kept.extend(&places[0]);
+        }
     }
     let (mean, covariance) = start(parts, &layout, &f, numbers, series);
     let square = |q: Quantity| numbers.get(q).powi(2);
@@ -281,32 +140,46 @@ pub(super) fn system(parts: &Parts, numbers: &Numbers, series: &Series) -> Syste
     }
 }
 
+/// All steps of a record, each behind its film.
+fn steps(behind: &[Behind], noises: [&[f64]; 2], series: &Series) -> Vec<Step> {
+    let n = noises[0].len();
+    let mut steps: Vec<Option<Step>> = vec![None; series.steps.len()];
+    for (film, behind) in series.films().iter().zip(behind) {
+        let own: Vec<usize> = (0..steps.len()).filter(|&i| series.steps[i].film == *film).collect();
+        let lengths_s: Vec<f64> = own.iter().map(|&i| series.steps[i].length_s).collect();
+        for (i, found) in own.into_iter().zip(discretise(&behind.dynamics, noises, n, &lengths_s)) {
+            let [noise, trend_noise] = found.noises;
+            let (phi, phi_turned) = (Sparse::new(&found.transition, n), Sparse::transposed(&found.transition, n));
+            steps[i] = Some(Step { phi, phi_turned, noise, trend_noise });
+        }
+    }
+    steps.into_iter().flatten().collect()
+}
+
 /// c: the rate per kelvin a second of each state.
-pub(super) fn response(parts: &Parts, layout: &Layout) -> Vec<f64> {
+pub(super) fn response(parts: &Parts, layout: &Layout, drive: &[f64]) -> Vec<f64> {
     let mut row = vec![0.0; layout.size];
     for (output, gain) in parts.gains.outputs.iter().enumerate().filter(|(_, g)| **g != 0.0) {
-        row.iter_mut().zip(layout.output(parts.reduced, output)).for_each(|(r, a)| *r += gain * a);
+        row.iter_mut().zip(layout.output(parts.reduced, output, drive)).for_each(|(r, a)| *r += gain * a);
     }
     layout.air().into_iter().for_each(|i| row[i] += parts.gains.air);
     row
 }
 
 /// What each thermometer shows.
-pub(super) fn places(parts: &Parts, layout: &Layout) -> [Vec<f64>; RATE] {
-    let place = sensor_place(parts, layout);
+pub(super) fn places(parts: &Parts, layout: &Layout, drive: &[f64]) -> [Vec<f64>; RATE] {
+    let place = sensor_place(parts, layout, drive);
     let sensor = match layout.lag {
         Some(lag) => (0..layout.size).map(|i| f64::from(i == lag)).collect(),
         None => place,
     };
-    [sensor, layout.output(parts.reduced, 0), layout.air_row()]
+    [sensor, layout.output(parts.reduced, 0, drive), layout.air_row()]
 }
 
-fn sensor_place(parts: &Parts, layout: &Layout) -> Vec<f64> {
-    match parts.shows {
-        Shows::Air => layout.air_row(),
-        // What carries the sensor is the last row.
-        Shows::Part => layout.output(parts.reduced, parts.reduced.part.unwrap_or(parts.reduced.layers - 1)),
-        Shows::OuterLayer => layout.output(parts.reduced, parts.reduced.layers - 1),
+fn sensor_place(parts: &Parts, layout: &Layout, drive: &[f64]) -> Vec<f64> {
+    match parts.shows.row_of(parts.reduced) {
+        Some(row) => layout.output(parts.reduced, row, drive),
+        None => layout.air_row(),
     }
 }
 
@@ -330,27 +203,26 @@ fn rate_row(layout: &Layout, f: &[f64], response: &[f64], shape: &Shape) -> Vec<
     row
 }
 
-/// F, the diagonal of G without the trend's noise, and that of the trend's per unit of its density.
+/// F behind a film of this ratio to that of the modes, the diagonal of G without the trend's noise, and that of the trend's per unit of its density.
 pub(super) fn dynamics(
     parts: &Parts,
     layout: &Layout,
     numbers: &Numbers,
     approach_s: f64,
+    film_ratio: f64,
 ) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let n = layout.size;
     let (mut f, mut g) = (vec![0.0; n * n], vec![0.0; n]);
     let get = |q: Quantity| numbers.get(q);
-    let driving: Vec<usize> = match layout.skin {
-        Some(skin) => vec![skin],
-        None => layout.air().to_vec(),
-    };
+    let drive = drive(layout, parts.reduced, film_ratio);
     for (i, &l) in parts.reduced.decay_per_s.iter().enumerate() {
-        f[i * n + i] = -l;
-        driving.iter().for_each(|&j| f[i * n + j] = l);
+        drive.iter().enumerate().for_each(|(j, d)| f[i * n + j] = l * d);
+        f[i * n + i] -= l;
     }
     if let (Some(skin), Some(skin_s)) = (layout.skin, parts.skin_s) {
-        f[skin * n + skin] = -1.0 / skin_s;
-        layout.air().into_iter().for_each(|j| f[skin * n + j] = 1.0 / skin_s);
+        let decay_per_s = film_ratio / skin_s;
+        f[skin * n + skin] = -decay_per_s;
+        layout.air().into_iter().for_each(|j| f[skin * n + j] = decay_per_s);
     }
     f[layout.trend * n + layout.trend + 1] = 1.0;
     f[(layout.trend + 1) * n + layout.trend + 1] = -1.0 / approach_s;
@@ -379,7 +251,7 @@ pub(super) fn dynamics(
         rotate(&mut f, n, cycle, get(Quantity::CyclePeriod));
     }
     if let Some(lag) = layout.lag {
-        for (j, v) in sensor_place(parts, layout).iter().enumerate() {
+        for (j, v) in sensor_place(parts, layout, &drive).iter().enumerate() {
             f[lag * n + j] += v / parts.lag_s;
         }
         f[lag * n + lag] -= 1.0 / parts.lag_s;
@@ -393,78 +265,6 @@ fn rotate(f: &mut [f64], n: usize, place: usize, period_s: f64) {
     let omega = std::f64::consts::TAU / period_s;
     f[place * n + place + 1] = omega;
     f[(place + 1) * n + place] = -omega;
-}
-
-/// Mean and covariance before the first row.
-fn start(parts: &Parts, layout: &Layout, f: &[f64], numbers: &Numbers, series: &Series) -> (Vec<f64>, Vec<f64>) {
-    let n = layout.size;
-    let mut mean = vec![0.0; n];
-    let rates: Vec<f64> = series.values[RATE].iter().copied().filter(|v| v.is_finite()).collect();
-    mean[layout.offset] = median(&rates);
-    let mut covariance = stationary(layout, f, numbers);
-    let mut add = |direction: &[f64], size: f64| {
-        for i in (0..n).filter(|&i| direction[i] != 0.0) {
-            for j in 0..n {
-                covariance[i * n + j] += size * size * direction[i] * direction[j];
-            }
-        }
-    };
-    let slow: Vec<usize> = (0..layout.modes).chain(layout.skin).chain(layout.lag).collect();
-    let mut together = vec![0.0; n];
-    slow.iter().for_each(|&i| together[i] = 1.0);
-    let mut ramp = vec![0.0; n];
-    ramp[layout.trend + 1] = 1.0;
-    let skin_s = parts.skin_s.unwrap_or(0.0);
-    parts.reduced.decay_per_s.iter().enumerate().for_each(|(i, l)| ramp[i] = -1.0 / l - skin_s);
-    layout.skin.into_iter().for_each(|i| ramp[i] = -skin_s);
-    layout.lag.into_iter().for_each(|i| ramp[i] = -parts.lag_s + ramp[0]);
-    let slope = numbers.get(Quantity::StartSlope);
-    let apart = START_APART_K.hypot(START_APART_S * slope);
-    add(&ramp, slope);
-    add(&together, apart);
-    together[layout.trend] = 1.0;
-    add(&together, START_K);
-    let mut one = |i: usize, size: f64| {
-        let mut direction = vec![0.0; n];
-        direction[i] = 1.0;
-        add(&direction, size);
-    };
-    one(layout.trend + 1, slope);
-    (0..layout.modes).for_each(|i| one(i, START_APART_MODES * apart));
-    one(layout.turbulence, numbers.get(Quantity::TurbulenceSize));
-    one(layout.wander, numbers.get(Quantity::WanderShare) * numbers.get(Quantity::RateNoise));
-    layout.drift.into_iter().for_each(|i| one(i, numbers.get(Quantity::DriftSize)));
-    layout
-        .cycle
-        .into_iter()
-        .for_each(|i| [i, i + 1].into_iter().for_each(|i| one(i, numbers.get(Quantity::CycleSize))));
-    one(layout.offset, OFFSET_RAD_PER_S);
-    // ⟨o²⟩ = ⟨o d⟩ = σ², ⟨d²⟩ = 2 σ².
-    let ripple = numbers.get(Quantity::RippleSize);
-    for (i, driver) in [(layout.ripple, layout.driver), (layout.ripple + 1, layout.driver + 1)] {
-        let mut direction = vec![0.0; n];
-        (direction[i], direction[driver]) = (1.0, 1.0);
-        add(&direction, ripple);
-        direction[i] = 0.0;
-        add(&direction, ripple);
-    }
-    (mean, covariance)
-}
-
-/// What turbulence and ripple have made of pack and sensor.
-fn stationary(layout: &Layout, f: &[f64], numbers: &Numbers) -> Vec<f64> {
-    let square = |q: Quantity| numbers.get(q).powi(2);
-    let (turbulence, ripple) = (square(Quantity::TurbulenceSize), square(Quantity::RippleSize));
-    let driving = [layout.turbulence, layout.ripple, layout.ripple + 1, layout.driver, layout.driver + 1];
-    // As in `start`.
-    let own = SMatrix::from_fn(|a, b| match (a, b) {
-        (0, 0) => turbulence,
-        (3, 3) | (4, 4) => 2.0 * ripple,
-        (1, 1) | (2, 2) | (1, 3) | (3, 1) | (2, 4) | (4, 2) => ripple,
-        _ => 0.0,
-    });
-    let followers: Vec<usize> = layout.skin.into_iter().chain(0..layout.modes).chain(layout.lag).collect();
-    followed(f, layout.size, driving, &own, &followers)
 }
 
 impl System {

@@ -7,6 +7,7 @@
 use super::describe::{ScoredExplanation, contenders, findings, ladder, names, unexplained};
 use super::joint::{Explanation, Found, Member, Question, on_the_way};
 use super::standing::CERTAIN;
+use super::switched_film::film_switches;
 use super::{Caution, DiagnoseError, Diagnosis, Hypothesis, OffsetStep, RecordNoise, Refitted, Share, Verdict};
 use crate::chamber::{Chamber, Place};
 use crate::record::Record;
@@ -55,14 +56,13 @@ pub(super) fn answer(
     let noise_floor = (squares / question.fitted.len().max(1) as f64).sqrt();
     let equals: &[&Explanation] = if verdict == Verdict::Indistinguishable { &family } else { &[] };
     let effects = findings(question, scored, first, equals)?;
-    let mut cautions = cautions(question.chamber, records);
     let hypothesis = hypothesis(question, found, named);
-    if let Some(winding) = hypothesis.as_ref().and_then(|h| h.winding) {
-        cautions.push(Caution::OtherWinding { winding });
-    }
-    if question.held_out.is_empty() {
-        cautions.push(Caution::NoHoldout);
-    }
+    let film_switches = film_switches(question, named);
+    let mut cautions = cautions(question.chamber, records);
+    cautions.extend(film_switches.iter().cloned().map(Caution::FilmSwitched));
+    let winding = hypothesis.as_ref().and_then(|h| h.winding);
+    cautions.extend(winding.map(|winding| Caution::OtherWinding { winding }));
+    cautions.extend(question.held_out.is_empty().then_some(Caution::NoHoldout));
     let suggested_experiment = experiment(verdict, &effects);
     Ok(Diagnosis {
         verdict,
@@ -80,6 +80,7 @@ pub(super) fn answer(
         posterior: posterior(question, found),
         refitted: refitted(question, named),
         hypothesis,
+        film_switches,
         noise,
         effects,
         proposals: Vec::new(),

@@ -22,6 +22,7 @@ pub(crate) mod experiment;
 mod joint;
 pub(crate) mod plain;
 mod standing;
+mod switched_film;
 mod terms;
 #[cfg(test)]
 mod tests;
@@ -30,7 +31,7 @@ pub(crate) mod trim;
 
 use thiserror::Error;
 
-use crate::chamber::{Assumption, Chamber, ChamberError, EffectEstimates, Effort, Learned, Noise};
+use crate::chamber::{Assumption, Chamber, ChamberError, EffectEstimates, Effort, Films, Learned, Noise};
 use crate::coil::CoilError;
 use crate::effect::DeclaredEffect;
 use crate::numeric::noise::white_noise;
@@ -46,6 +47,7 @@ use experiment::ModelComparison;
 use joint::Question;
 pub(crate) use plain::{Plain, ResidualShape};
 pub(crate) use standing::{Standing, standing};
+pub use switched_film::FilmSwitches;
 pub use terms::Terms;
 pub(crate) use together::{declared_with, extend_together};
 
@@ -200,6 +202,8 @@ pub struct Diagnosis {
     pub(crate) refitted: Vec<Refitted>,
     /// What is no effect and yet explains the records.
     pub(crate) hypothesis: Option<Hypothesis>,
+    /// Of records whose film is switched.
+    pub(crate) film_switches: Vec<FilmSwitches>,
     /// Fitted records first, then those held out.
     pub(crate) noise: Vec<RecordNoise>,
     /// Formulas that explain what no listed effect does, best first.
@@ -383,15 +387,14 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
         held_out: (given..records.len()).collect(),
         depth: MOST_MEMBERS,
     };
-    let found = joint::ranked(&question, null, &|share| progress(0.5 * share))?;
-    // Gross errors and kinks were those of the declared model: now those of the best. Where that is the declared model after all, but
-    // found among the kinks of another, they are those that it has by what it was found to be there.
-    let best =
-        found.explanations.first().filter(|e| !e.members.is_empty() || found.is_elsewhere).map(|e| e.fit.clone());
-    let again = match best {
-        Some(fit) => Some(Chamber::new(request.model, &records)?.settled_from(fit, &question.fitted)?),
-        None => None,
+    let found = joint::ranked(&question, null, &|share| progress(0.4 * share))?;
+    let (switched, found) = match switched_film::in_turns(&question, &records, found)? {
+        (Some(chamber), found) => (chamber, found),
+        (None, found) => (chamber.clone(), found),
     };
+    progress(0.5);
+    let question = Question { chamber: &switched, ..question };
+    let again = looked_through_again(request, &records, &question, &found)?;
     let question = match &again {
         Some(chamber) => Question { chamber, ..question },
         None => question,
@@ -426,6 +429,20 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
     }
     progress(1.0);
     Ok(diagnosis)
+}
+
+/// The chamber looked through by the best set: gross errors and kinks were those of the declared model. None where that is the best; if
+/// it was found among the kinks of another, they are those that it has by what it was found to be there.
+fn looked_through_again<'a>(
+    request: &Request,
+    records: &[&'a Record],
+    question: &Question,
+    found: &joint::Found,
+) -> Result<Option<Chamber<'a>>, DiagnoseError> {
+    let best = found.explanations.first().filter(|e| !e.members.is_empty() || found.is_elsewhere);
+    let Some(best) = best else { return Ok(None) };
+    let whole = Chamber::new(request.model, records)?.switched_like(question.chamber, Films::Same);
+    Ok(Some(whole.settled_from(best.fit.clone(), &question.fitted)?))
 }
 
 /// The chamber with its kinks at the times that the likeliest set has them at.

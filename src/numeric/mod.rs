@@ -7,6 +7,7 @@ pub(crate) mod lobatto;
 pub(crate) mod maximise;
 pub(crate) mod noise;
 pub mod piecewise;
+pub(crate) mod pursuit;
 pub mod pyramid;
 pub(crate) mod quantiles;
 pub(crate) mod spectrum;

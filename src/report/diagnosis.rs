@@ -6,10 +6,9 @@ use super::ladder::ladder_chart;
 use super::noise::{noise_chart, noise_in_words};
 use super::page::figure;
 use super::plot::{Axis, Chart, ChartSeries, Mark};
-use crate::io::json::diagnosis::{
-    DiagnosisJson, DiagnosisRow, FindingJson, FittedParameterJson, HypothesisJson, RefittedJson,
-};
+use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow, FindingJson, FittedParameterJson, RefittedJson};
 use crate::io::json::experiment::ExperimentJson;
+use crate::io::json::hypothesis::HypothesisJson;
 use crate::units::{h_from_s, min_from_s, percent_from_fraction};
 
 /// Candidates that the page lists.

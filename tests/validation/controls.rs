@@ -6,7 +6,7 @@ use std::path::Path;
 
 use coilwright::compare::adequacy::Adequacy as Compared;
 use coilwright::compare::compare;
-use coilwright::diagnose::{Diagnosis, Request, Terms, Verdict, diagnose};
+use coilwright::diagnose::{Caution, Diagnosis, FilmSwitches, Request, Terms, Verdict, diagnose};
 use coilwright::io::read::model_file::read_model;
 use coilwright::io::read::record_file::read_record;
 
@@ -78,4 +78,45 @@ fn a_sensor_on_the_spool_beside_one_in_the_air_names_nothing() {
         let found = compare(&file.model, &pattern, &read_record(&folder.join(part)).unwrap()).unwrap();
         assert_eq!(found.verdict, Compared::Adequate, "{part}");
     }
+}
+
+/// The switches that a diagnosis names, of each record.
+fn switches(found: &Diagnosis) -> Vec<FilmSwitches> {
+    let of = |caution: &Caution| match caution {
+        Caution::FilmSwitched(switches) => Some(switches.clone()),
+        _ => None,
+    };
+    found.cautions.iter().filter_map(of).collect()
+}
+
+/// Behind one film the sensor's readings, which are the air's, contradict the rates by 5 noises in the next record.
+#[test]
+fn a_film_that_a_fan_switches_behind_a_sensor_in_the_air_is_found_with_its_times() {
+    let found = diagnosed("records-controls/fan-air");
+    assert_eq!((found.verdict, found.effects.len(), found.proposals.len()), (Verdict::Adequate, 0, 0));
+    let switches = switches(&found);
+    println!("{switches:?}");
+    let ratio = switches[0].film_ratio.unwrap();
+    assert!((ratio / 1.97 - 1.0).abs() < 0.1, "{ratio}");
+    let times = switches[0].times_s.iter().zip([2430.0, 6144.0, 7086.0]);
+    assert_eq!(switches[0].times_s.len(), 3);
+    times.for_each(|(found_s, true_s)| assert!((found_s - true_s).abs() < 20.0, "{found_s}"));
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/records-controls/fan-air");
+    let file = read_model(&folder.join("coil.toml")).unwrap();
+    let record = read_record(&folder.join("calibration.csv")).unwrap();
+    let compared = compare(&file.model, &file.pattern.unwrap().pattern, &record).unwrap();
+    assert_eq!(compared.verdict, Compared::Adequate);
+}
+
+/// A sensor on the pack shows a switch as a jump of the air.
+#[test]
+fn a_film_that_a_fan_switches_is_told_from_an_air_that_jumps() {
+    let found = diagnosed("records-controls/fan-pack");
+    assert_eq!((found.verdict, found.effects.len(), found.proposals.len()), (Verdict::Adequate, 0, 0));
+    let switches = switches(&found);
+    println!("{switches:?}");
+    let ratio = switches[0].film_ratio.unwrap();
+    assert!((ratio / 0.404 - 1.0).abs() < 0.05, "{ratio}");
+    let near = |true_s: f64| switches[0].times_s.iter().any(|t| (t - true_s).abs() < 5.0);
+    assert!(near(8294.0) && near(11593.0), "{switches:?}");
 }

@@ -1,9 +1,9 @@
-"""Draws trial cases under laboratory conditions: `python laboratory_cases.py DIR KIND SEED [COUNT]`, KIND one of lab, other, beyond.
+"""Draws trial cases under laboratory conditions: `python laboratory_cases.py DIR KIND SEED [COUNT]`, KIND one of lab, other, beyond, fan.
 
 One folder a case: coil.toml, calibration.csv, validation.csv, test.csv (a third record of another kind); truth.json and README.md
 beside them. `lab`: listed effects, alone and together, and controls, in chambers of several kinds with coarse sensors, gaps, spikes
 and flicker. `other`: outdoor days, thermoelectric stages, starts in a ramp, wrong declared numbers, other windings, reversed coils,
-offset steps, random walk, slow and irregular rows, a fan that is switched. `beyond`: effects that no catalogue lists.
+offset steps, random walk, slow and irregular rows, a fan that is switched. `beyond`: effects that no catalogue lists. `fan`: more of the fan.
 """
 import json, os, sys, tomllib
 import numpy as np
@@ -196,6 +196,21 @@ def other(rng):
     return out
 
 
+def fan(rng):
+    """A fan is switched, and the film with it: sensors on the pack, sensors in the air behind a film that the model declares."""
+    out = []
+    for i in range(12):
+        kinds = [str(rng.choice(["strain_mismatch", "bias_temperature", "spool_mass", "stress_gradient"]))] if i % 3 == 2 else []
+        in_air = i % 2 == 1
+        case = with_effects(rng, f"fan-{'air' if in_air else 'pack'}-{i}", "fan", kinds, conditions=["fan switched"] + ["sensor in the air"] * in_air)
+        case.test_chamber = str(rng.choice(["fan", "controlled"]))
+        if in_air:
+            case.declared["ambient_film"] = case.chamber["film"]
+            case.hidden["film"] = case.chamber["film"]
+        out.append(case)
+    return out
+
+
 def term(rng, form):
     """A term with its constants drawn; its gain is set later, from its size."""
     tau = number(np.exp(rng.uniform(np.log(250), np.log(3000))))
@@ -284,6 +299,7 @@ def write(root, kind, seed, cases):
             if part == "test":
                 other_kind = case.test_chamber or ("controlled" if chamber["kind"] == "stage" else "stage")
                 chamber = drawn_chamber(case.rng, other_kind)
+                chamber |= {k: case.chamber[k] for k in ("film", "fan_factor") if other_kind == "fan"}
             header, rows, plain, beyond = record(declared, hidden, chamber, case.logger, case.gyro, part if part == "calibration" else "validation", base + n)
             write_record(f"{folder}/{part}.csv", header, rows)
             signal[part], size[part], rows_of[part] = number(float(plain.std()), 4), number(float(beyond.std()), 4), len(rows)
@@ -305,7 +321,7 @@ def write(root, kind, seed, cases):
 def main():
     root, kind, seed = sys.argv[1], sys.argv[2], int(sys.argv[3])
     rng = np.random.default_rng(seed)
-    cases = dict(lab=lab, other=other, beyond=beyond)[kind](rng)
+    cases = dict(lab=lab, other=other, beyond=beyond, fan=fan)[kind](rng)
     write(root, kind, seed, cases[:int(sys.argv[4])] if len(sys.argv) > 4 else cases)
 
 

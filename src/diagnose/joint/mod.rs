@@ -49,6 +49,12 @@ pub(crate) struct Question<'a> {
 }
 
 impl Question<'_> {
+    /// The merit of the best set found, less what the switches of the film cost in its chamber.
+    pub(crate) fn most(&self, found: &Found) -> f64 {
+        let merit = found.explanations.first().map_or(f64::NEG_INFINITY, |best| best.merit);
+        merit - self.chamber.film_price(&self.fitted)
+    }
+
     /// Log evidence of the held-out records with the coil's numbers as a fit has them; −∞ where one cannot be solved. The fit keeps
     /// what their days were.
     pub(crate) fn held_out_evidence(&self, fit: &mut Fit) -> f64 {

@@ -7,14 +7,15 @@ use serde::{Deserialize, Serialize};
 use crate::chamber::EffectEstimate;
 use crate::diagnose::experiment::Experiment;
 use crate::diagnose::{
-    Contender, Diagnosis, Equivalent, Finding, FittedParameter, Hypothesis, OffsetStep, Plain, Refitted, ResidualShape,
-    Rung, Share, Unexplained, Verdict,
+    Contender, Diagnosis, Equivalent, Finding, FittedParameter, Plain, Refitted, ResidualShape, Rung, Share,
+    Unexplained, Verdict,
 };
 use crate::effect::DeclaredEffect;
 use crate::units::deg_per_h_from_rad_per_s;
 
 use super::boundary::BoundaryJson;
 use super::experiment::ExperimentJson;
+use super::hypothesis::{FilmSwitchesJson, HypothesisJson};
 use super::inputs::InputsJson;
 pub(crate) use super::noise::RecordNoiseJson;
 use super::proposals::ProposalJson;
@@ -48,6 +49,9 @@ pub struct DiagnosisJson {
     /// Another winding, a coil connected the other way round, steps of the offset; null where none of these won.
     #[serde(default)]
     pub(crate) hypothesis: Option<HypothesisJson>,
+    /// Records in which the film between air and pack changes to another one and back.
+    #[serde(default)]
+    pub(crate) film_switches: Vec<FilmSwitchesJson>,
     /// White noise, wander and unresolved air of each record, fitted ones first.
     #[serde(default)]
     pub(crate) noise: Vec<RecordNoiseJson>,
@@ -110,25 +114,6 @@ pub struct RefittedJson {
     pub(crate) value: f64,
     pub(crate) standard_error: Option<f64>,
     pub(crate) unit: String,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-pub(crate) struct HypothesisJson {
-    /// The classic that the coil seems to be wound as.
-    pub(crate) winding: Option<String>,
-    pub(crate) reversed: bool,
-    /// Two layers that changed places, counted from 1 innermost.
-    pub(crate) exchanged_layers: Option<[usize; 2]>,
-    pub(crate) offset_steps: Vec<OffsetStepJson>,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-pub(crate) struct OffsetStepJson {
-    pub(crate) record: String,
-    pub(crate) time_s: f64,
-    pub(crate) size_deg_per_h: f64,
 }
 
 /// One row of a record: what the declared model and the one with the accepted effects leave.
@@ -269,6 +254,7 @@ impl DiagnosisJson {
             posterior: diagnosis.posterior.iter().map(PosteriorShareJson::new).collect(),
             refitted: diagnosis.refitted.iter().map(RefittedJson::new).collect(),
             hypothesis: diagnosis.hypothesis.as_ref().map(HypothesisJson::new),
+            film_switches: diagnosis.film_switches.iter().map(FilmSwitchesJson::new).collect(),
             noise: diagnosis.noise.iter().map(RecordNoiseJson::new).collect(),
             proposals: diagnosis.proposals.iter().map(ProposalJson::new).collect(),
             boundary: BoundaryJson::new(&diagnosis.boundary),
@@ -369,22 +355,6 @@ impl RefittedJson {
             value: unit.from_si(refitted.value),
             standard_error: refitted.standard_error.map(|e| unit.difference_from_si(e)),
             unit: unit.symbol().to_owned(),
-        }
-    }
-}
-
-impl HypothesisJson {
-    fn new(hypothesis: &Hypothesis) -> Self {
-        let step = |s: &OffsetStep| OffsetStepJson {
-            record: s.record.clone(),
-            time_s: s.time_s,
-            size_deg_per_h: deg_per_h_from_rad_per_s(s.size_rad_per_s),
-        };
-        Self {
-            winding: hypothesis.winding.map(str::to_owned),
-            reversed: hypothesis.reversed,
-            exchanged_layers: hypothesis.exchanged.map(|(a, b)| [a, b]),
-            offset_steps: hypothesis.offset_steps.iter().map(step).collect(),
         }
     }
 }

@@ -13,6 +13,7 @@ pub(crate) mod fibres;
 pub(crate) mod field;
 pub(crate) mod fleet;
 pub mod further_schemas;
+pub(crate) mod hypothesis;
 pub(crate) mod improve;
 pub mod inputs;
 pub(crate) mod metrics;

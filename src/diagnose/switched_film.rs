@@ -1,0 +1,118 @@
+//! Records whose film between air and pack changes while they run, as where a fan is switched.
+//!
+//! To a model with one film such a record lacks something, or its air jumps. When the film is switched and what is missing in the coil
+//! are found in turns: each by what the other is so far, for as long as the records are explained better.
+//!
+//! ```text
+//! M(set, switches) = M(set) − Σ ln(rows) a switch − ln 50 a record that has any
+//! ```
+
+use super::DiagnoseError;
+use super::joint::{self, Explanation, Found, Question};
+use crate::chamber::{Assumption, Chamber, ChamberError, Effort, Films, Fit, Quantity};
+use crate::record::Record;
+
+/// Turns, and what a further one must gain.
+const MOST_TURNS: usize = 3;
+const LEAST_GAIN: f64 = 3.0;
+/// What a switch gains in one record, its air not looked through, is known to so much: sets that are further behind are no use.
+const NEARLY: f64 = 20.0;
+
+/// What was found behind one film, or, where a film that is switched explains the records better, the chamber with it and what is found
+/// there.
+///
+/// # Errors
+/// A model that cannot be solved for these records.
+pub(super) fn in_turns<'a>(
+    question: &Question,
+    records: &[&'a Record],
+    mut found: Found,
+) -> Result<(Option<Chamber<'a>>, Found), DiagnoseError> {
+    let whole = Chamber::new(question.model, records)?;
+    let mut switched: Option<Chamber> = None;
+    for _ in 0..MOST_TURNS {
+        let here = Question { chamber: switched.as_ref().unwrap_or(question.chamber), ..question.clone() };
+        let mut best: Option<(f64, Chamber, Found)> = None;
+        for (chamber, null) in better(&whole, &here, &found)? {
+            let there = Question { chamber: &chamber, ..question.clone() };
+            let found = joint::ranked(&there, null, &|_| ())?;
+            let merit = there.most(&found);
+            if best.as_ref().is_none_or(|best| merit > best.0) {
+                best = Some((merit, chamber, found));
+            }
+        }
+        let Some((_, chamber, there)) = best else { break };
+        (switched, found) = (Some(chamber), there);
+    }
+    Ok((switched, found))
+}
+
+/// The chamber in which the film of some record is switched otherwise than in that of the question, and the fit of the declared model
+/// there, if that, or the best set, explains the records better than any set has so far; where the model states one of the two films,
+/// also the chamber in which that is the other. None where nothing is better.
+fn better<'a>(
+    whole: &Chamber<'a>,
+    question: &Question,
+    found: &Found,
+) -> Result<Vec<(Chamber<'a>, Fit)>, ChamberError> {
+    let mut asked: Vec<&Explanation> = found.explanations.first().into_iter().chain(found.declared()).collect();
+    asked.dedup_by(|a, b| a.members == b.members);
+    let (price, most) = (question.chamber.film_price(&question.fitted), question.most(found));
+    let mut better: Option<(f64, Chamber, Fit)> = None;
+    for explanation in asked {
+        let Some((switched, gain)) = whole.with_switched_film(&explanation.fit)? else { continue };
+        if explanation.merit - price + gain < most - NEARLY {
+            continue;
+        }
+        let (chamber, fit) = switched.settled_with(explanation.fit.clone(), &question.fitted)?;
+        let there = Question { chamber: &chamber, ..question.clone() };
+        let there = Explanation::new(&there, &found.windings, explanation.members.clone(), fit);
+        let merit = there.merit - chamber.film_price(&question.fitted);
+        if merit > better.as_ref().map_or(most + LEAST_GAIN, |best| best.0) {
+            better = Some((merit, chamber, there.fit));
+        }
+    }
+    let Some((_, chamber, fit)) = better else { return Ok(Vec::new()) };
+    let declared = Assumption::new(question.model.clone(), question.pattern.clone());
+    let of_declared = |chamber: Chamber<'a>, fit: &Fit| -> Result<(Chamber<'a>, Fit), ChamberError> {
+        let null = chamber.fit(&declared, &[], &question.fitted, Some(fit), Effort::FULL)?;
+        Ok((chamber, null))
+    };
+    let states_a_film = !question.model.heat_path()?.film_is_unknown();
+    let exchanged = states_a_film.then(|| {
+        let exchanged = whole.switched_like(&chamber, Films::Exchanged);
+        let (exchanged, there) = exchanged.settled_with(fit.clone(), &question.fitted)?;
+        of_declared(exchanged, &there)
+    });
+    std::iter::once(of_declared(chamber, &fit)).chain(exchanged).collect()
+}
+
+/// The film between air and pack of a record, which changes to another one and back.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FilmSwitches {
+    /// The record's name.
+    pub record: String,
+    /// Whether it begins behind the other film.
+    pub begins_switched: bool,
+    /// When the film changes \[s\].
+    pub times_s: Vec<f64>,
+    /// The other film over the usual one; None where the record's numbers are not known.
+    pub film_ratio: Option<f64>,
+}
+
+/// Records of the question's chamber whose film is switched, with what a set found it to be.
+pub(super) fn film_switches(question: &Question, named: &Explanation) -> Vec<FilmSwitches> {
+    let of = |&r: &usize| {
+        let all = question.chamber.film_switches_s(r);
+        let begin_s = question.chamber.record(r).times_s()[0];
+        let day = std::iter::once(&named.fit).chain(&*named.fit.days).find(|fit| fit.records.contains(&r));
+        let (before, times_s): (Vec<f64>, Vec<f64>) = all.iter().partition(|t| **t <= begin_s);
+        (!times_s.is_empty()).then(|| FilmSwitches {
+            record: question.chamber.record(r).name().to_owned(),
+            begins_switched: before.len() % 2 == 1,
+            times_s,
+            film_ratio: day.map(|day| day.number(Quantity::FilmRatio, r)),
+        })
+    };
+    question.fitted.iter().chain(&question.held_out).filter_map(of).collect()
+}
