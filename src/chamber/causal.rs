@@ -8,7 +8,6 @@ use super::parameter::Place;
 use super::prior::{PRIORS, Quantity};
 
 use super::shows::Shows;
-
 use super::system::{driven_by_air, dynamics, places, response};
 use super::{Chamber, HALF_SPACE_MODES, modes_of_pack};
 use crate::thermal::reduced::Reduced;

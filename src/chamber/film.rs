@@ -115,9 +115,7 @@ mod tests {
     use super::super::dense::tests::model;
     use super::super::kinks::tests::kinked;
     use super::super::layout::{OutputGains, Parts};
-
     use super::super::shows::Shows;
-
     use super::super::system::driven_by_air;
     use super::*;
     use crate::pattern::classic::Classic;

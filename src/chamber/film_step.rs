@@ -32,7 +32,7 @@ impl Shares {
 }
 
 impl<'a> FilmStep<'a> {
-    /// `apart_k`: what drives the pack beyond its outermost layer, at each row.
+    /// `apart_k`: what drives the pack beyond its outermost layer, one entry a row.
     pub(super) fn new(side: &CoilSide, series: &'a Series, apart_k: &[f64]) -> Self {
         let reduced = &side.reduced;
         let of_output = |j: usize| Shares { of_modes: reduced.row(j).to_vec(), of_drive: reduced.residue[j] };
@@ -55,7 +55,10 @@ impl<'a> FilmStep<'a> {
         }
     }
 
-    /// Readings and rates of a step before a row.
+    /// What a step before a row adds to readings [K] and rates [rad/s], per unit of the film's logarithm.
+    ///
+    /// # Shapes
+    /// One entry a row in each column; zero before the step.
     pub(super) fn before(&self, row: usize) -> Values {
         let rows = self.apart_k.len();
         let modes = self.bore.of_modes.len();

@@ -18,7 +18,6 @@ use super::layout::OutputGains;
 use super::series::Series;
 
 use super::shows::Shows;
-
 use super::system::driven_by_air;
 use crate::effect::PackState;
 use crate::rate::{Past, RateModel};

@@ -9,7 +9,6 @@ use super::row::Film;
 use super::series::Series;
 
 use super::shows::Shows;
-
 use super::system::{driven_by_air, system};
 use super::{Assumption, ChamberError};
 use crate::effect::PackState;

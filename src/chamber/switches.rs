@@ -142,7 +142,6 @@ impl Chamber<'_> {
             return Ok(None);
         }
         let whole = &self.observed[record].series;
-        let price = (whole.times_s.len() as f64).ln();
         let mut best: Option<(Series, f64)> = None;
         let (mut chamber, mut day) = (self.clone(), usual.clone());
         for _ in 0..ROUNDS {
@@ -156,7 +155,7 @@ impl Chamber<'_> {
                 let mut there = self.clone();
                 there.observed[record].series = whole.with_film_switches(&times_s);
                 let with = there.fit(&timed.assumed, &[], &[record], Some(&timed), Effort::QUICK)?;
-                let worth = with.posterior() - price * times_s.len() as f64 + SWITCHED_LOG;
+                let worth = with.posterior() - there.film_price(&[record]);
                 Ok(Some((there.observed.swap_remove(record).series, with, worth)))
             };
             let found: Result<Vec<_>, ChamberError> = proposed.into_par_iter().map(judged).collect();

@@ -65,8 +65,9 @@ pub(super) fn driven_by_air(path: &HeatPath, film_w_per_m2_k: f64) -> (HeatPath,
 
 /// What of the system is another one behind another film.
 struct Behind {
-    /// F, row-major.
+    /// F, row-major, and what drives it, which is the same behind either: the diagonal of G, and that of the trend's noise.
     dynamics: Vec<f64>,
+    noises: [Vec<f64>; 2],
     response: Vec<f64>,
     places: [Vec<f64>; RATE],
 }
@@ -74,11 +75,9 @@ struct Behind {
 impl Behind {
     fn new(parts: &Parts, layout: &Layout, numbers: &Numbers, approach_s: f64, film_ratio: f64) -> Self {
         let drive = drive(layout, parts.reduced, film_ratio);
-        Self {
-            dynamics: dynamics(parts, layout, numbers, approach_s, film_ratio).0,
-            response: response(parts, layout, &drive),
-            places: places(parts, layout, &drive),
-        }
+        let (dynamics, noise, trend_noise) = dynamics(parts, layout, numbers, approach_s, film_ratio);
+        let (response, places) = (response(parts, layout, &drive), places(parts, layout, &drive));
+        Self { dynamics, noises: [noise, trend_noise], response, places }
     }
 }
 
@@ -87,13 +86,12 @@ pub(super) fn system(parts: &Parts, numbers: &Numbers, series: &Series) -> Syste
     let layout = Layout::new(parts, series);
     let n = layout.size;
     let approach_s = series.approach_s(numbers.get(Quantity::ApproachTime));
-    let (f, noise, trend_noise) = dynamics(parts, &layout, numbers, approach_s, 1.0);
     let behind = series.films().iter().map(|film| numbers.film_ratio(*film));
     let behind: Vec<Behind> = behind.map(|ratio| Behind::new(parts, &layout, numbers, approach_s, ratio)).collect();
-    let steps = steps(&behind, [&noise, &trend_noise], series);
+    let steps = steps(&behind, series);
     let mut rows = Vec::new();
     for shape in &series.shapes {
-        let Behind { dynamics, response, places } = &behind[shape.film as usize];
+        let Behind { dynamics, response, places, .. } = &behind[shape.film as usize];
         for place in places {
             let share = |row: &[f64]| row.iter().map(|v| v * shape.end_share).collect::<Vec<f64>>();
             let mut row = share(place);
@@ -118,7 +116,7 @@ pub(super) fn system(parts: &Parts, numbers: &Numbers, series: &Series) -> Syste
             kept.extend(&places[0]);
         }
     }
-    let (mean, covariance) = start(parts, &layout, &f, numbers, series);
+    let (mean, covariance) = start(parts, &layout, &behind[0].dynamics, numbers, series);
     let square = |q: Quantity| numbers.get(q).powi(2);
     let grid = series.resolution_k.powi(2) / 12.0;
     System {
@@ -141,13 +139,14 @@ pub(super) fn system(parts: &Parts, numbers: &Numbers, series: &Series) -> Syste
 }
 
 /// All steps of a record, each behind its film.
-fn steps(behind: &[Behind], noises: [&[f64]; 2], series: &Series) -> Vec<Step> {
-    let n = noises[0].len();
+fn steps(behind: &[Behind], series: &Series) -> Vec<Step> {
     let mut steps: Vec<Option<Step>> = vec![None; series.steps.len()];
     for (film, behind) in series.films().iter().zip(behind) {
         let own: Vec<usize> = (0..steps.len()).filter(|&i| series.steps[i].film == *film).collect();
         let lengths_s: Vec<f64> = own.iter().map(|&i| series.steps[i].length_s).collect();
-        for (i, found) in own.into_iter().zip(discretise(&behind.dynamics, noises, n, &lengths_s)) {
+        let [noise, trend_noise] = &behind.noises;
+        let n = noise.len();
+        for (i, found) in own.into_iter().zip(discretise(&behind.dynamics, [noise, trend_noise], n, &lengths_s)) {
             let [noise, trend_noise] = found.noises;
             let (phi, phi_turned) = (Sparse::new(&found.transition, n), Sparse::transposed(&found.transition, n));
             steps[i] = Some(Step { phi, phi_turned, noise, trend_noise });

@@ -80,22 +80,23 @@ fn a_sensor_on_the_spool_beside_one_in_the_air_names_nothing() {
     }
 }
 
-/// The switches that a diagnosis names, of each record.
-fn switches(found: &Diagnosis) -> Vec<FilmSwitches> {
+/// The switches that the diagnosis of records names, of each; nothing else is named.
+fn switches(name: &str) -> Vec<FilmSwitches> {
+    let found = diagnosed(name);
+    assert_eq!((found.verdict, found.effects.len(), found.proposals.len()), (Verdict::Adequate, 0, 0), "{name}");
     let of = |caution: &Caution| match caution {
         Caution::FilmSwitched(switches) => Some(switches.clone()),
         _ => None,
     };
-    found.cautions.iter().filter_map(of).collect()
+    let switches: Vec<FilmSwitches> = found.cautions.iter().filter_map(of).collect();
+    println!("{switches:?}");
+    switches
 }
 
 /// Behind one film the sensor's readings, which are the air's, contradict the rates by 5 noises in the next record.
 #[test]
 fn a_film_that_a_fan_switches_behind_a_sensor_in_the_air_is_found_with_its_times() {
-    let found = diagnosed("records-controls/fan-air");
-    assert_eq!((found.verdict, found.effects.len(), found.proposals.len()), (Verdict::Adequate, 0, 0));
-    let switches = switches(&found);
-    println!("{switches:?}");
+    let switches = switches("records-controls/fan-air");
     let ratio = switches[0].film_ratio.unwrap();
     assert!((ratio / 1.97 - 1.0).abs() < 0.1, "{ratio}");
     let times = switches[0].times_s.iter().zip([2430.0, 6144.0, 7086.0]);
@@ -111,10 +112,7 @@ fn a_film_that_a_fan_switches_behind_a_sensor_in_the_air_is_found_with_its_times
 /// A sensor on the pack shows a switch as a jump of the air.
 #[test]
 fn a_film_that_a_fan_switches_is_told_from_an_air_that_jumps() {
-    let found = diagnosed("records-controls/fan-pack");
-    assert_eq!((found.verdict, found.effects.len(), found.proposals.len()), (Verdict::Adequate, 0, 0));
-    let switches = switches(&found);
-    println!("{switches:?}");
+    let switches = switches("records-controls/fan-pack");
     let ratio = switches[0].film_ratio.unwrap();
     assert!((ratio / 0.404 - 1.0).abs() < 0.05, "{ratio}");
     let near = |true_s: f64| switches[0].times_s.iter().any(|t| (t - true_s).abs() < 5.0);
