@@ -14,8 +14,11 @@
 //!
 //! | class | a move | where the sum is exact |
 //! |---|---|---|
-//! | `standard` | a layer goes to the other end of what lies inside it | where the halves respond alike |
+//! | `standard`, `captive:K` | a layer goes to the other end of the inner layers that it joins | where the halves respond alike |
 //! | `captive:K`, `any` | two neighbouring runs of segments change places whole | for layers of any lengths, but for a run across the middle where the halves differ |
+//!
+//! A layer that goes to the other end takes along no run that it was not at before, so that every set of such moves leaves as many
+//! captive runs as there were.
 //!
 //! That runs of different lengths shift nothing that another move touches is because they are drawn as a tree: the fibre is cut in two at
 //! random, each part again, down to single segments, and every cut can have its two parts exchanged or not. Where the halves respond alike
@@ -31,6 +34,8 @@
 //! Sets of sums: Horowitz and Sahni, J. ACM 21, 277 (1974). Large neighbourhoods: Ahuja, Ergun, Orlin, Punnen, Discrete Appl.
 //! Math. 123, 75 (2002).
 
+use std::ops::Range;
+
 use rand_chacha::ChaCha8Rng;
 
 use super::box_join::{Matching, Tree};
@@ -40,7 +45,6 @@ use super::{PassOutcome, Task};
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::search::anneal::limits::{WindingLimits, pick};
-use crate::search::cost::signs::{segments_of_signs, signs_of_segments};
 use crate::search::cost::worst_case::SearchError;
 
 /// Moves of a neighbourhood at most: both sets of their sums are made in milliseconds.
@@ -65,7 +69,7 @@ pub(crate) fn compounded(task: &Task, starts: &[Pattern], seed: u64) -> Result<P
 /// A move that can be made or left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Move {
-    /// The layer outside the numbered one goes to the other end of what lies inside it.
+    /// The layer goes to the other end of the run of inner layers at one end of which it lies.
     End(usize),
     /// The segments after the first `from` up to the first `middle` change places with those up to the first `to`.
     Exchange { from: usize, middle: usize, to: usize },
@@ -85,8 +89,13 @@ impl Neighbourhood for Moves {
     /// By itself each move stays within the class; most sets of such moves then do.
     fn draw(class: WindabilityClass, segments: &[usize], random: &mut ChaCha8Rng) -> Self {
         let layers = segments.len();
-        let mut all: Vec<Move> = if class == WindabilityClass::Standard {
-            (0..layers - 1).map(Move::End).collect()
+        let is_of_ends = match class {
+            WindabilityClass::Standard => true,
+            WindabilityClass::Captive(_) | WindabilityClass::Any => pick(random, 2) == 1,
+        };
+        let mut all: Vec<Move> = if is_of_ends {
+            let order = order_of(segments);
+            (0..layers).filter(|&layer| run_of(&order, segments[layer] - 1).is_some()).map(Move::End).collect()
         } else {
             cuts(layers, random)
         };
@@ -106,7 +115,7 @@ impl Neighbourhood for Moves {
             }
         }
         drawn.moves.sort_by_key(|made| match *made {
-            Move::End(_) => 0,
+            Move::End(layer) => layer,
             Move::Exchange { from, to, .. } => to - from,
         });
         drawn
@@ -161,30 +170,46 @@ impl Neighbourhood for Moves {
 
 impl Moves {
     fn with(&self, moves: &[Move]) -> Vec<usize> {
-        let mut high = None;
-        let mut order = vec![0; self.segments.len()];
-        for (layer, &segment) in self.segments.iter().enumerate() {
-            order[segment - 1] = layer;
-        }
+        let mut order = order_of(&self.segments);
         for made in moves {
             match *made {
                 Move::Exchange { from, middle, to } => order[from..to].rotate_left(middle - from),
                 Move::End(layer) => {
-                    let high = high.get_or_insert_with(|| signs_of_segments(&self.segments).unwrap_or_default());
-                    if let Some(end) = high.get_mut(layer) {
-                        *end = !*end;
+                    let at = order.iter().position(|other| *other == layer).unwrap_or_default();
+                    match run_of(&order, at) {
+                        Some(run) if run.start < at => order[run.start..=at].rotate_right(1),
+                        Some(run) => order[at..run.end].rotate_left(1),
+                        None => {}
                     }
                 }
             }
-        }
-        if let Some(high) = high {
-            return segments_of_signs(&high);
         }
         let mut segments = vec![0; order.len()];
         for (at, &layer) in order.iter().enumerate() {
             segments[layer] = at + 1;
         }
         segments
+    }
+}
+
+/// Layers from the fibre's beginning to its end.
+fn order_of(segments: &[usize]) -> Vec<usize> {
+    let mut order = vec![0; segments.len()];
+    for (layer, &segment) in segments.iter().enumerate() {
+        order[segment - 1] = layer;
+    }
+    order
+}
+
+/// The inner layers next to the layer at a place of the fibre; none where they lie at both sides of it or at neither.
+fn run_of(order: &[usize], at: usize) -> Option<Range<usize>> {
+    let layer = order[at];
+    let below = order[..at].iter().rev().take_while(|other| **other < layer).count();
+    let above = order[at + 1..].iter().take_while(|other| **other < layer).count();
+    match (below, above) {
+        (0, 1..) => Some(at + 1..at + 1 + above),
+        (1.., 0) => Some(at - below..at),
+        _ => None,
     }
 }
 
@@ -207,23 +232,29 @@ fn cuts(segments: usize, random: &mut ChaCha8Rng) -> Vec<Move> {
 mod tests {
     use super::*;
     use crate::coil::LayerLength;
+    use crate::pattern::windability::WindingGraph;
+    use crate::search::anneal::limits::neighbour;
     use crate::search::anneal::restart::generator;
     use crate::search::cost::samples::tests::{model, profiles};
     use crate::search::cost::worst_case::SolvedProfiles;
     use crate::search::proof::{Goal, checked_judge};
 
-    #[test]
-    fn exchanges_of_runs_add_up_exactly_for_layers_of_different_lengths() {
+    /// Values of all subsets of moves are sums of those of the moves alone; says how many moves of each kind there were.
+    fn assert_sums_are_exact(class: WindabilityClass) -> (usize, usize) {
         let model = model(12, LayerLength::Actual, &["surface_film"]);
         let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
-        let class = WindabilityClass::Any;
         let judge = checked_judge(&Task { model: &model, solved: &solved, class, goal: Goal::Pointing }).unwrap();
         let samples: Vec<usize> = (0..judge.matrix().samples()).collect();
-        for stream in 0..20 {
+        let captive =
+            |segments: &[usize]| WindingGraph::new(&Pattern::new(segments.to_vec()).unwrap()).windability().captive;
+        let (mut ends, mut exchanges) = (0, 0);
+        for stream in 0..40 {
             let mut random = generator(1, stream);
-            let start = crate::search::anneal::limits::draw(class, 12, &mut random);
+            let mut start = crate::search::anneal::limits::draw(class, 12, &mut random);
+            for _ in 0..200 {
+                start = neighbour(class.into(), &start, &mut random).unwrap_or(start);
+            }
             let drawn = Moves::draw(class, &start, &mut random);
-            assert_eq!(drawn.moves.len(), 11, "a fibre of twelve segments has eleven cuts");
             let here = judge.values_at(&samples, &start);
             let made: Vec<Move> = drawn.moves.iter().copied().filter(|_| pick(&mut random, 2) == 1).collect();
             let mut expected = here.clone();
@@ -231,11 +262,27 @@ mod tests {
                 let there = judge.values_at(&samples, &drawn.with(&[*a_move]));
                 expected.iter_mut().zip(there.iter().zip(&here)).for_each(|(e, (t, h))| *e += t - h);
             }
-            let found = judge.values_at(&samples, &drawn.with(&made));
+            let with_all = drawn.with(&made);
+            let found = judge.values_at(&samples, &with_all);
             let scale = expected.iter().chain(&here).fold(0.0_f64, |most, v| most.max(v.abs()));
             for (e, f) in expected.iter().zip(&found) {
-                assert!((e - f).abs() < 1e-10 * scale, "{e} {f} of {scale}");
+                assert!((e - f).abs() < 1e-10 * scale, "{class}: {e} {f} of {scale}");
+            }
+            if drawn.moves.iter().all(|m| matches!(m, Move::End(_))) {
+                assert_eq!(captive(&with_all), captive(&start), "{start:?} {made:?}");
+                ends += drawn.moves.len();
+            } else {
+                exchanges += drawn.moves.len();
             }
         }
+        (ends, exchanges)
+    }
+
+    #[test]
+    fn moves_that_do_not_touch_each_other_add_up_exactly_for_layers_of_different_lengths() {
+        assert_eq!(assert_sums_are_exact(WindabilityClass::Standard), (40 * 11, 0));
+        let (ends, exchanges) = assert_sums_are_exact(WindabilityClass::Captive(1));
+        assert!(ends > 100 && exchanges > 0, "{ends} {exchanges}");
+        assert_sums_are_exact(WindabilityClass::Any);
     }
 }
