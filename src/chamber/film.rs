@@ -49,11 +49,13 @@ impl Series {
         self.shapes[self.shape_of(row)].film
     }
 
-    /// The same record with its film switched at these times, ascending; one before the first row is that the record begins behind the
+    /// The same record with its film switched at these times and no others, ascending; one before the first row is that the record begins behind the
     /// other film.
     pub(super) fn with_film_switches(&self, times_s: &[f64]) -> Self {
         let mut with = self.clone();
         with.film_switches_s = times_s.to_vec();
+        // Only those of the films that it has.
+        (with.steps, with.shapes) = (Vec::new(), Vec::new());
         let mut film = Film::Usual;
         let mut left = times_s.iter().copied().peekable();
         for k in 0..with.rows.len() {
@@ -83,14 +85,11 @@ impl Series {
                 film = film.other();
             }
             with.rows[k].moves = moves;
-            if film == Film::Switched {
-                let usual = with.shape_of(k);
-                let like = Shape { film, ..with.shapes[usual] };
-                let shape = place_of(&mut with.shapes, like);
-                with.shape_of[k] = shape as u16;
-                for (m, h) in with.rows[k].measured.iter_mut().enumerate() {
-                    *h = h.map(|_| (shape * MEASURED + m) as u16);
-                }
+            let like = Shape { film, ..self.shapes[self.shape_of(k)] };
+            let shape = place_of(&mut with.shapes, like);
+            with.shape_of[k] = shape as u16;
+            for (m, h) in with.rows[k].measured.iter_mut().enumerate() {
+                *h = h.map(|_| (shape * MEASURED + m) as u16);
             }
         }
         with
@@ -100,7 +99,8 @@ impl Series {
 /// A window that begins keeps what there is behind its film.
 fn behind(movement: Move, film: Film) -> Move {
     match (movement, film) {
-        (Move::Keep(slot), Film::Switched) => Move::Keep(slot + SLOTS),
+        (Move::Keep(slot), Film::Usual) => Move::Keep(slot % SLOTS),
+        (Move::Keep(slot), Film::Switched) => Move::Keep(slot % SLOTS + SLOTS),
         _ => movement,
     }
 }

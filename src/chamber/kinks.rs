@@ -11,7 +11,6 @@ use rayon::prelude::*;
 use super::ascent::Effort;
 use super::filter::{self, Move};
 use super::fit::Fit;
-use super::prior::KINKS_PER_ROW;
 use super::series::{SHORT_ROW_S, Series, TimeStep};
 use super::system::system;
 use super::{Assumption, Chamber, ChamberError};
@@ -49,11 +48,7 @@ impl Chamber<'_> {
         }
         let Some((switched, _)) = whole.with_switched_film(&fit)? else { return Ok((chamber, fit)) };
         let (switched, other) = switched.settled_as_it_is(assumed)?;
-        let worth = |chamber: &Self, fit: &Fit| {
-            let kinks = chamber.observed[0].series.kinks as f64;
-            fit.posterior() + kinks * KINKS_PER_ROW.ln() - chamber.film_price(&[0])
-        };
-        let is_better = worth(&switched, &other) > worth(&chamber, &fit);
+        let is_better = switched.gain_over(&other, (&chamber, &fit), 0)? > 0.0;
         Ok(if is_better { (switched, other) } else { (chamber, fit) })
     }
 

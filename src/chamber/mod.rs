@@ -44,6 +44,7 @@ mod filter;
 mod fit;
 mod fitted;
 mod foreseen;
+mod gain;
 mod kinks;
 mod known;
 mod layout;

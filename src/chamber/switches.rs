@@ -101,6 +101,13 @@ impl Chamber<'_> {
         switched
     }
 
+    /// These records with the film of some switched as it is in another chamber of them, both as [`Chamber::new`] made them.
+    pub(crate) fn with_films_of(&self, other: &Self, records: &[usize]) -> Self {
+        let mut with = self.clone();
+        records.iter().for_each(|&r| with.observed[r].series = other.observed[r].series.clone());
+        with
+    }
+
     /// When the film of a record is switched \[s\].
     pub(crate) fn film_switches_s(&self, record: usize) -> &[f64] {
         &self.observed[record].series.film_switches_s

@@ -64,7 +64,10 @@ fn better<'a>(
         if explanation.merit - price + gain < most - NEARLY {
             continue;
         }
-        let (chamber, fit) = switched.settled_with(explanation.fit.clone(), &question.fitted)?;
+        let usual = whole.switched_like(question.chamber, Films::Same);
+        let Some((chamber, fit)) = settled_where_needed(&switched, &usual, &explanation.fit, &question.fitted)? else {
+            continue;
+        };
         let there = Question { chamber: &chamber, ..question.clone() };
         let there = Explanation::new(&there, &found.windings, explanation.members.clone(), fit);
         let merit = there.merit - chamber.film_price(&question.fitted);
@@ -85,6 +88,34 @@ fn better<'a>(
         of_declared(exchanged, &there)
     });
     std::iter::once(of_declared(chamber, &fit)).chain(exchanged).collect()
+}
+
+/// The records with those switches that explain one better than it is explained without them, and a fit there; None where none does.
+/// Either chamber is settled by the same fit, because being looked through once more explains a record better by itself.
+fn settled_where_needed<'a>(
+    switched: &Chamber<'a>,
+    usual: &Chamber<'a>,
+    fit: &Fit,
+    fitted: &[usize],
+) -> Result<Option<(Chamber<'a>, Fit)>, ChamberError> {
+    let settled = |chamber: &Chamber<'a>| chamber.clone().settled_with(fit.clone(), fitted);
+    let (with, without) = rayon::join(|| settled(switched), || settled(usual));
+    let ((with, with_fit), (without, without_fit)) = (with?, without?);
+    let changed: Vec<usize> =
+        (0..with.records()).filter(|&r| with.film_switches_s(r) != without.film_switches_s(r)).collect();
+    let mut needless = Vec::new();
+    for &r in &changed {
+        if with.gain_over(&with_fit, (&without, &without_fit), r)? < 0.0 {
+            needless.push(r);
+        }
+    }
+    if needless.is_empty() {
+        return Ok(Some((with, with_fit)));
+    }
+    if needless.len() == changed.len() {
+        return Ok(None);
+    }
+    settled(&switched.with_films_of(usual, &needless)).map(Some)
 }
 
 /// The film between air and pack of a record, which changes to another one and back.
