@@ -14,7 +14,7 @@
 //!
 //! | class | a move | where the sum is exact |
 //! |---|---|---|
-//! | `standard`, `captive:K` | a layer goes to the other end of the inner layers that it joins | where the halves respond alike |
+//! | `standard`, `captive:K`, `any` | a layer goes to the other end of the inner layers that it joins | where the halves respond alike |
 //! | `captive:K`, `any` | two neighbouring runs of segments change places whole | for layers of any lengths, but for a run across the middle where the halves differ |
 //!
 //! A layer that goes to the other end takes along no run that it was not at before, so that every set of such moves leaves as many
