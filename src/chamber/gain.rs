@@ -4,8 +4,8 @@
 //! ln p(what both keep | one) − ln p(what both keep | other) − Δ(what kinks of the air and switches of the film cost)
 //! ```
 //!
-//! A chamber may leave out as a gross error what the other explains, or is explained by. A density of fewer values is another one's, so
-//! that what either leaves out says nothing here.
+//! A chamber may leave out as a gross error what the other explains. A density of fewer values is no density of all of them, so that what
+//! either leaves out is left out of both here.
 
 use super::ascent::Effort;
 use super::fit::Fit;
@@ -13,8 +13,8 @@ use super::prior::KINKS_PER_ROW;
 use super::{Chamber, ChamberError};
 
 impl Chamber<'_> {
-    /// The rise of the log posterior of a record over that by another chamber, its air, noises and film's ratio fitted in either; the coil
-    /// is that of the fits.
+    /// The rise of the log posterior of a record \[nat\] over that by another chamber, and over that by this one with the film of the
+    /// other: air, noises and the film's ratio are fitted in each, the coil is that of the chamber's fit.
     ///
     /// # Errors
     /// As [`Chamber::fit`].

@@ -134,11 +134,7 @@ impl Pattern {
 
     /// P⁻¹ as layer indices: entry s−1 is the layer of segment s.
     pub(crate) fn layers_by_segment(&self) -> Vec<usize> {
-        let mut layers = vec![0; self.layers()];
-        for (layer, &segment) in self.segments.iter().enumerate() {
-            layers[segment - 1] = layer;
-        }
-        layers
+        layers_by_segment(&self.segments)
     }
 
     pub(crate) fn half(&self, layer: usize) -> Half {
@@ -159,6 +155,15 @@ impl Pattern {
     pub(crate) fn axial_direction(&self, layer: usize) -> f64 {
         axial_direction(&self.segments, layer)
     }
+}
+
+/// P⁻¹ as layer indices, of P(j), innermost layer first: entry s−1 is the layer of segment s.
+pub(crate) fn layers_by_segment(segments: &[usize]) -> Vec<usize> {
+    let mut layers = vec![0; segments.len()];
+    for (layer, &segment) in segments.iter().enumerate() {
+        layers[segment - 1] = layer;
+    }
+    layers
 }
 
 /// As [`Pattern::axial_direction`], of segments that are known to be a permutation.

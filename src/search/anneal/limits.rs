@@ -3,6 +3,7 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::Rng;
 
+use crate::pattern::layers_by_segment;
 use crate::pattern::windability::WindabilityClass;
 use crate::search::cost::signs::{segments_of_signs, signs_of_segments};
 
@@ -38,11 +39,7 @@ impl WindingLimits {
 
 /// Layers between the two ends of the longest crossover.
 fn largest_climb(segments: &[usize]) -> usize {
-    let mut layers = vec![0; segments.len()];
-    for (layer, &segment) in segments.iter().enumerate() {
-        layers[segment - 1] = layer;
-    }
-    layers.windows(2).map(|pair| pair[0].abs_diff(pair[1])).max().unwrap_or(0)
+    layers_by_segment(segments).windows(2).map(|pair| pair[0].abs_diff(pair[1])).max().unwrap_or(0)
 }
 
 /// Most captive runs at any step: one less than the intervals that the wound segments form.

@@ -12,8 +12,8 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::Rng;
 
-use crate::pattern::axial_direction;
 use crate::pattern::windability::WindabilityClass;
+use crate::pattern::{axial_direction, layers_by_segment};
 use crate::rate::segment_weights_m2;
 use crate::search::anneal::limits::{WindingLimits, draw, most_captive, pick};
 use crate::search::cost::columns::{Change, Columns};
@@ -93,7 +93,7 @@ impl Space {
                 WindabilityClass::Standard => signs_of_segments(&segments).unwrap_or_default(),
                 _ => Vec::new(),
             },
-            layers_by_segment: invert(&segments),
+            layers_by_segment: layers_by_segment(&segments),
             candidate: segments.clone(),
             segments,
             coefficients: Vec::new(),
@@ -103,14 +103,6 @@ impl Space {
         walk.coefficients = walk.recomputed_coefficients(self);
         walk
     }
-}
-
-fn invert(segments: &[usize]) -> Vec<usize> {
-    let mut layers = vec![0; segments.len()];
-    for (layer, &segment) in segments.iter().enumerate() {
-        layers[segment - 1] = layer;
-    }
-    layers
 }
 
 /// A pattern, its coefficients, and the proposal made last.

@@ -24,7 +24,7 @@
 use rayon::prelude::*;
 
 use crate::numeric::statistics::quantile;
-use crate::pattern::{Pattern, axial_direction};
+use crate::pattern::{Pattern, axial_direction, layers_by_segment};
 use crate::profile::ProfileSpec;
 use crate::rate::{CoilModel, WeightResponse, segment_weights_m2};
 use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
@@ -212,11 +212,7 @@ struct Arrangement<'a> {
 
 impl<'a> Arrangement<'a> {
     fn new(segments: &'a [usize]) -> Self {
-        let mut layers_by_segment = vec![0; segments.len()];
-        for (layer, &segment) in segments.iter().enumerate() {
-            layers_by_segment[segment - 1] = layer;
-        }
-        Self { segments, layers_by_segment }
+        Self { segments, layers_by_segment: layers_by_segment(segments) }
     }
 
     fn weigh(&self, lengths_m: &[f64], scratch: &mut Scratch) {

@@ -31,8 +31,8 @@ use super::box_join::{Matching, Tree};
 use super::candidates::Judge;
 use super::neighbourhood::{Following, Matches, Neighbourhood, followed};
 use super::{PassOutcome, Task};
-use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
+use crate::pattern::{Pattern, layers_by_segment};
 use crate::search::anneal::limits::{WindingLimits, pick};
 use crate::search::cost::samples::SampleMatrix;
 use crate::search::cost::worst_case::SearchError;
@@ -117,11 +117,7 @@ impl Neighbourhood for Stretches {
                 segments = exchanged;
             }
         }
-        let mut layers = vec![0; segments.len()];
-        for (layer, &segment) in segments.iter().enumerate() {
-            layers[segment - 1] = layer;
-        }
-        Self { layers, sets: sets(segments.len(), random) }
+        Self { layers: layers_by_segment(&segments), sets: sets(segments.len(), random) }
     }
 
     fn search(&self, judge: &Judge, samples: &[usize], class: WindabilityClass, limit_rad_per_s: f64) -> PassOutcome {
