@@ -16,7 +16,9 @@ use std::ops::Range;
 
 use thiserror::Error;
 
-use crate::chamber::{Assumption, Bend, Chamber, ChamberError, Effort, Fit, MOST_ROWS_FITTED, Place, Quantity, Told};
+use crate::chamber::{
+    Assumption, Bend, Chamber, ChamberError, Effort, FilmSwitches, Fit, MOST_ROWS_FITTED, Place, Quantity, Told,
+};
 use crate::coil::CoilError;
 use crate::numeric::noise::{WhiteNoise, white_noise};
 use crate::pattern::Pattern;
@@ -63,6 +65,8 @@ pub struct Boundary {
     pub(crate) film_w_per_m2_k: Option<(f64, f64)>,
     /// Where the air's slope changed.
     pub(crate) bends: Vec<Bend>,
+    /// None where the film is one.
+    pub(crate) film_switches: Option<FilmSwitches>,
     course: Course,
     /// One entry a row of the chamber.
     rate_variance_rad2_per_s2: Vec<f64>,
@@ -156,7 +160,8 @@ pub(crate) fn read<'a>(model: &CoilModel, pattern: &Pattern, record: &'a Record)
     }
     let times_s = chamber.times_s(0).to_vec();
     let course = Course { layers: course.layers, columns, times_s, values, slopes_per_s: slopes_k_per_s };
-    let boundary = Boundary { film_w_per_m2_k, bends, course, rate_variance_rad2_per_s2 };
+    let film_switches = chamber.film_switches(0, Some(&fit));
+    let boundary = Boundary { film_w_per_m2_k, bends, film_switches, course, rate_variance_rad2_per_s2 };
     Ok(Read { chamber, fit, boundary })
 }
 
@@ -329,7 +334,7 @@ impl Boundary {
         let times_s = history.times_s.clone();
         let rate_variance_rad2_per_s2 = vec![0.0; times_s.len()];
         let course = Course { layers, columns, times_s, values, slopes_per_s };
-        Ok(Self { film_w_per_m2_k: None, bends: Vec::new(), course, rate_variance_rad2_per_s2 })
+        Ok(Self { film_w_per_m2_k: None, bends: Vec::new(), film_switches: None, course, rate_variance_rad2_per_s2 })
     }
 
     /// The pack over the averaging intervals of some of a record's rows.

@@ -100,6 +100,7 @@ pub(crate) use readings::Told;
 pub(crate) use score::Column;
 pub(crate) use scorer::{Scored, Scorer};
 pub(crate) use states::RowStates;
+pub use switches::FilmSwitches;
 pub(crate) use switches::Films;
 
 /// What is assumed of coil, sensor and gyro; the numbers of chamber and noise are fitted with it.

@@ -49,6 +49,31 @@ pub(crate) enum Films {
     Exchanged,
 }
 
+/// The film between air and pack of a record, which changes to another one and back.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FilmSwitches {
+    /// The record's name.
+    pub record: String,
+    /// Whether it begins behind the other film.
+    pub begins_switched: bool,
+    /// When the film changes \[s\].
+    pub times_s: Vec<f64>,
+    /// The other film over the usual one; None where the record's numbers are not known.
+    pub film_ratio: Option<f64>,
+}
+
+impl std::fmt::Display for FilmSwitches {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("the film between air and pack changes")?;
+        if let Some(ratio) = self.film_ratio {
+            write!(f, " to {ratio:.2} times what it is else")?;
+        }
+        let times: Vec<String> = self.times_s.iter().map(|t| format!("{t:.0}")).collect();
+        write!(f, " and back, at {} s", times.join(", "))?;
+        f.write_str(if self.begins_switched { ", the record beginning behind the other one" } else { "" })
+    }
+}
+
 /// A film that is switched at some times: one before the first row is that the record begins behind the other film.
 #[derive(Debug, Clone, PartialEq)]
 struct Switches {
@@ -111,6 +136,18 @@ impl Chamber<'_> {
     /// When the film of a record is switched \[s\].
     pub(crate) fn film_switches_s(&self, record: usize) -> &[f64] {
         &self.observed[record].series.film_switches_s
+    }
+
+    /// The switched film of a record, and what a fit of the record found it to be; None where it has one film.
+    pub(crate) fn film_switches(&self, record: usize, fit: Option<&Fit>) -> Option<FilmSwitches> {
+        let begin_s = self.times_s(record)[0];
+        let (before, times_s): (Vec<f64>, Vec<f64>) = self.film_switches_s(record).iter().partition(|t| **t <= begin_s);
+        (!times_s.is_empty()).then(|| FilmSwitches {
+            record: self.record(record).name().to_owned(),
+            begins_switched: before.len() % 2 == 1,
+            times_s,
+            film_ratio: fit.map(|fit| fit.number(Quantity::FilmRatio, record)),
+        })
     }
 
     /// What the switches of these records cost in log prior.

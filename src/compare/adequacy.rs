@@ -5,6 +5,7 @@
 
 use super::regimes::{RecordPart, Regime};
 use super::{Comparison, Covariate};
+use crate::chamber::FilmSwitches;
 use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
 
 /// Whether a model is adequate for a record.
@@ -87,6 +88,8 @@ pub enum ResidualFinding {
         /// The part of it that the boundary makes.
         boundary_chi_square: f64,
     },
+    /// The film between air and pack is switched.
+    FilmSwitched(FilmSwitches),
     /// The largest single error.
     Largest {
         /// With its sign.
@@ -155,6 +158,9 @@ impl std::fmt::Display for ResidualFinding {
                 f,
                 "of the reduced chi-square of {reduced_chi_square:.3}, {boundary_chi_square:.3} is expected from the uncertainty of the estimated boundary"
             ),
+            ResidualFinding::FilmSwitched(switches) => {
+                write!(f, "{switches}: was a fan switched? The prediction takes this into account")
+            }
             ResidualFinding::Largest { residual_rad_per_s, time_s } => write!(
                 f,
                 "the largest error is {:.4} °/h at {time_s:.1} s",
@@ -245,6 +251,7 @@ pub(super) fn judge(found: &Comparison, transient_s: f64) -> (Adequacy, Vec<Resi
         reduced_chi_square: found.reduced_chi_square,
         boundary_chi_square: found.boundary_chi_square,
     });
+    findings.extend(found.film_switches.clone().map(ResidualFinding::FilmSwitched));
     let largest = found.largest;
     findings.push(ResidualFinding::Largest { residual_rad_per_s: largest.residual_rad_per_s, time_s: largest.time_s });
     (verdict, findings)

@@ -29,6 +29,7 @@ pub mod regimes;
 pub(crate) mod sensors;
 pub(crate) mod suspicion;
 
+use crate::chamber::FilmSwitches;
 use crate::diagnose::{Standing, standing};
 use crate::numeric::statistics::{LjungBox, autocorrelation, autocorrelation_band_99, correlation, rms};
 use crate::pattern::Pattern;
@@ -83,6 +84,8 @@ pub struct Comparison {
     pub(crate) film_w_per_m2_k: Option<(f64, f64)>,
     /// Where the air's slope changed.
     pub(crate) bends_s: Vec<f64>,
+    /// None where the film between air and pack is one.
+    pub(crate) film_switches: Option<FilmSwitches>,
     /// What readings and rates together say of model and noise; None where the rates have none.
     pub(crate) standing: Option<Standing>,
     /// Thermometers at layers.
@@ -196,7 +199,7 @@ fn judged(
     let (largest_row, _) =
         residual.iter().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).unwrap_or((0, &0.0));
     let cut = Regimes::new(model, record, boundary, &prediction)?;
-    let Boundary { film_w_per_m2_k, bends, .. } = boundary.clone();
+    let Boundary { film_w_per_m2_k, bends, film_switches, .. } = boundary.clone();
     let reduced_chi_square = square / (noise * noise) / freedom;
     let mut found = Comparison {
         rows,
@@ -223,6 +226,7 @@ fn judged(
         residual_rad_per_s: residual,
         film_w_per_m2_k,
         bends_s: bends.iter().map(|b| b.time_s).collect(),
+        film_switches,
         standing,
         sensors: sensors::misfits(model, record, boundary)?,
         prediction,

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::FilmSwitches;
+use crate::chamber::FilmSwitches;
 
 /// Something that a reader of the answer should know.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -19,7 +19,7 @@ pub enum Caution {
     WrongCoil { record: String },
     #[error("the winding {winding} explains the records without any effect: is the declared pattern the coil's?")]
     OtherWinding { winding: &'static str },
-    #[error("{}", switched_in_words(.0))]
+    #[error("{}: {}: was a fan switched? What is said of the coil takes this into account", .0.record, .0)]
     FilmSwitched(FilmSwitches),
     #[error("no hold-out record: effects were confirmed on blocks in time that they were not fitted to")]
     NoHoldout,
@@ -29,17 +29,6 @@ pub enum Caution {
     FittedToHoldout,
     #[error("{kind} was not accepted: {reason}")]
     Refused { kind: String, reason: Refusal },
-}
-
-fn switched_in_words(switches: &FilmSwitches) -> String {
-    let times: Vec<String> = switches.times_s.iter().map(|t| format!("{t:.0}")).collect();
-    let ratio = switches.film_ratio.map_or_else(String::new, |ratio| format!(" to {ratio:.2} times what it is else"));
-    let begins = if switches.begins_switched { ", the record beginning behind the other one" } else { "" };
-    format!(
-        "{}: the film between air and pack changes{ratio} and back, at {} s{begins}: was a fan switched? What is said of the coil takes this into account",
-        switches.record,
-        times.join(", ")
-    )
 }
 
 /// Why an effect that fits was refused.

@@ -41,13 +41,13 @@ use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::units::Unit;
 
+pub use crate::chamber::FilmSwitches;
 pub use caution::{Caution, Refusal};
 use discover::Beyond;
 use experiment::ModelComparison;
 use joint::Question;
 pub(crate) use plain::{Plain, ResidualShape};
 pub(crate) use standing::{Standing, standing};
-pub use switched_film::FilmSwitches;
 pub use terms::Terms;
 pub(crate) use together::{declared_with, extend_together};
 

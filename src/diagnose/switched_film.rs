@@ -9,7 +9,7 @@
 
 use super::DiagnoseError;
 use super::joint::{self, Explanation, Found, Question};
-use crate::chamber::{Assumption, Chamber, ChamberError, Effort, Films, Fit, Quantity};
+use crate::chamber::{Assumption, Chamber, ChamberError, Effort, FilmSwitches, Films, Fit};
 use crate::record::Record;
 
 /// Turns, and what a further one must gain.
@@ -118,32 +118,11 @@ fn settled_where_needed<'a>(
     settled(&switched.with_films_of(usual, &needless)).map(Some)
 }
 
-/// The film between air and pack of a record, which changes to another one and back.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FilmSwitches {
-    /// The record's name.
-    pub record: String,
-    /// Whether it begins behind the other film.
-    pub begins_switched: bool,
-    /// When the film changes \[s\].
-    pub times_s: Vec<f64>,
-    /// The other film over the usual one; None where the record's numbers are not known.
-    pub film_ratio: Option<f64>,
-}
-
 /// Records of the question's chamber whose film is switched, with what a set found it to be.
 pub(super) fn film_switches(question: &Question, named: &Explanation) -> Vec<FilmSwitches> {
     let of = |&r: &usize| {
-        let all = question.chamber.film_switches_s(r);
-        let begin_s = question.chamber.record(r).times_s()[0];
         let day = std::iter::once(&named.fit).chain(&*named.fit.days).find(|fit| fit.records.contains(&r));
-        let (before, times_s): (Vec<f64>, Vec<f64>) = all.iter().partition(|t| **t <= begin_s);
-        (!times_s.is_empty()).then(|| FilmSwitches {
-            record: question.chamber.record(r).name().to_owned(),
-            begins_switched: before.len() % 2 == 1,
-            times_s,
-            film_ratio: day.map(|day| day.number(Quantity::FilmRatio, r)),
-        })
+        question.chamber.film_switches(r, day)
     };
     question.fitted.iter().chain(&question.held_out).filter_map(of).collect()
 }

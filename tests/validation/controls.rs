@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use coilwright::compare::adequacy::Adequacy as Compared;
+use coilwright::compare::adequacy::{Adequacy as Compared, ResidualFinding};
 use coilwright::compare::compare;
 use coilwright::diagnose::{Caution, Diagnosis, FilmSwitches, Request, Terms, Verdict, diagnose};
 use coilwright::io::read::model_file::read_model;
@@ -107,6 +107,11 @@ fn a_film_that_a_fan_switches_behind_a_sensor_in_the_air_is_found_with_its_times
     let record = read_record(&folder.join("calibration.csv")).unwrap();
     let compared = compare(&file.model, &file.pattern.unwrap().pattern, &record).unwrap();
     assert_eq!(compared.verdict, Compared::Adequate);
+    let said = compared.findings.iter().find_map(|finding| match finding {
+        ResidualFinding::FilmSwitched(switches) => Some(switches),
+        _ => None,
+    });
+    assert_eq!(said.unwrap().times_s.len(), 3);
 }
 
 /// A sensor on the pack shows a switch as a jump of the air.

@@ -9,6 +9,7 @@ use crate::compare::regimes::RecordPart;
 use crate::compare::sensors::SensorMisfit;
 use crate::units::deg_per_h_from_rad_per_s;
 
+use super::hypothesis::FilmSwitchesJson;
 use super::inputs::InputsJson;
 use super::metrics::GrossErrorJson;
 
@@ -62,6 +63,9 @@ pub(crate) struct RecordComparisonJson {
     pub(crate) estimated_film_w_per_m2_k: Option<f64>,
     pub(crate) estimated_film_standard_error_w_per_m2_k: Option<f64>,
     pub(crate) estimated_kinks_s: Vec<f64>,
+    /// Null where the film between air and pack is one throughout.
+    #[serde(default)]
+    pub(crate) film_switches: Option<FilmSwitchesJson>,
     /// Thermometers at layers, each beside the model's layer.
     #[serde(default)]
     pub(crate) sensors: Vec<SensorJson>,
@@ -214,6 +218,7 @@ impl RecordComparisonJson {
             estimated_film_w_per_m2_k: found.film_w_per_m2_k.map(|f| f.0),
             estimated_film_standard_error_w_per_m2_k: found.film_w_per_m2_k.map(|f| f.1).filter(|e| e.is_finite()),
             estimated_kinks_s: found.bends_s.clone(),
+            film_switches: found.film_switches.as_ref().map(FilmSwitchesJson::new),
             sensors: found.sensors.iter().map(SensorJson::new).collect(),
             gross_errors,
             gaps,

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::diagnose::{FilmSwitches, Hypothesis, OffsetStep};
+use crate::chamber::FilmSwitches;
+use crate::diagnose::{Hypothesis, OffsetStep};
 use crate::units::deg_per_h_from_rad_per_s;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
