@@ -138,12 +138,12 @@ pub(crate) fn read<'a>(model: &CoilModel, pattern: &Pattern, record: &'a Record)
     let fit;
     if rows == (0..record.rows()) || chamber.times_s(0).len() <= MOST_ROWS_FITTED {
         let assumed = assumed(model, pattern, &chamber);
-        (chamber, fit) = chamber.settled_in_time(&assumed)?;
+        (chamber, fit) = chamber.with_timed_shocks(&assumed)?;
     } else {
         let stretch = record.stretch(rows)?;
         let part = Chamber::of_any(model, &[&stretch])?;
         let assumed = assumed(model, pattern, &part);
-        let (part, found) = part.settled_in_time(&assumed)?;
+        let (part, found) = part.with_timed_shocks(&assumed)?;
         fit = chamber.adopt(&part, &found)?;
         chamber.time_kinks(&fit, 0)?;
     }

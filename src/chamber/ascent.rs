@@ -8,10 +8,10 @@
 //! no other's step.
 //!
 //! Derivatives of innovations change slowly, and cost as many passes as there are coordinates. They serve for several steps,
-//! with the innovations of each place:
+//! with the innovations of each point:
 //!
 //! ```text
-//! g ≈ Σ −v'v/S + ½ (S'/S) (v²/S − 1)           v', S'/S: of an earlier place; v, S: of this one
+//! g ≈ Σ −v'v/S + ½ (S'/S) (v²/S − 1)           v', S'/S: of an earlier point; v, S: of this one
 //! ```
 //!
 //! They are taken anew where they no longer foretell what a step gains, and before an ascent to the top ends. For the same reason
@@ -28,13 +28,13 @@ use super::derivative::{DerivativeColumn, Derivatives};
 use super::filter::Innovation;
 use super::known::Reference;
 use super::layout::Numbers;
+use super::model_point::{ModelPoint, log_likelihood};
 use super::parameter::{Parameter, write};
-use super::place::{ModelPoint, log_likelihood};
 use super::{Assumption, Chamber, ChamberError};
 
-/// Steps that derivatives of one place serve for.
+/// Steps that derivatives of one point serve for.
 const SERVED: usize = 4;
-/// The region's share of the strides at most, and steps in a row that may fail with derivatives of the very place.
+/// The region's share of the strides at most, and steps in a row that may fail with derivatives of the very point.
 const WIDEST: f64 = 4.0;
 const FAILURES: usize = 5;
 /// A step that gains less than this share of what was foretold narrows the region; one that gains more than the other widens it
@@ -66,7 +66,7 @@ impl Effort {
     }
 }
 
-/// Derivatives of innovations at a place, for ascents that begin there or nearby.
+/// Derivatives of innovations at a point, for ascents that begin there or nearby.
 #[derive(Debug, Clone)]
 pub(super) struct KnownDerivatives {
     parameters: Vec<Parameter>,
@@ -102,9 +102,9 @@ impl KnownDerivatives {
     }
 }
 
-/// A place on the way.
+/// A point on the way.
 pub(super) struct Ascent<'c> {
-    pub(super) place: ModelPoint<'c>,
+    pub(super) point: ModelPoint<'c>,
     pub(super) coordinates: Vec<f64>,
     innovations: Vec<Vec<Innovation>>,
     pub(super) log_likelihood: f64,
@@ -126,8 +126,8 @@ pub(super) struct AscentEnd {
 
 impl From<Ascent<'_>> for AscentEnd {
     fn from(ascent: Ascent) -> Self {
-        let Ascent { place, coordinates, log_likelihood, information, known_derivatives, .. } = ascent;
-        let ModelPoint { assumed, numbers, .. } = place;
+        let Ascent { point, coordinates, log_likelihood, information, known_derivatives, .. } = ascent;
+        let ModelPoint { assumed, numbers, .. } = point;
         Self { assumed, numbers, coordinates, log_likelihood, information, known_derivatives }
     }
 }
@@ -142,10 +142,10 @@ pub(super) struct Beginning<'a, 'c> {
 }
 
 impl Chamber<'_> {
-    /// The highest place that an effort reaches from where assumption and numbers are; `known` may be of a place nearby.
+    /// The highest point that an effort reaches from where assumption and numbers are; `known` may be of a point nearby.
     ///
     /// # Errors
-    /// A model that cannot be solved where the ascent begins, or beside a place on it.
+    /// A model that cannot be solved where the ascent begins, or beside a point on it.
     pub(super) fn ascended<'c>(
         &self,
         begin: &Beginning<'_, 'c>,
@@ -171,7 +171,7 @@ impl Chamber<'_> {
             let score = score_of(&derivatives, &state, parameters);
             let step = Step::new(parameters, &state.coordinates, &score, &information, share);
             let next = state.coordinates.iter().zip(step.change.iter()).map(|(x, d)| x + d).collect();
-            let there = self.state(&state.place.assumed, &state.place.numbers, parameters, next, records, courses);
+            let there = self.state(&state.point.assumed, &state.point.numbers, parameters, next, records, courses);
             let gain = there.as_ref().map_or(f64::NEG_INFINITY, |there| there.posterior - state.posterior);
             share = step.next_share(share, gain);
             let (was_fresh, is_up, is_little) = (is_fresh, gain > 0.0, gain < effort.tolerance);
@@ -180,7 +180,7 @@ impl Chamber<'_> {
                 (state, is_fresh, served) = (there, false, served + 1);
             }
             failures = if gain < POOR * step.promised { failures + 1 } else { 0 };
-            // With derivatives of the very place, what they foretell says whether this is the top.
+            // With derivatives of the very point, what they foretell says whether this is the top.
             if was_fresh && is_little && (step.promised < effort.tolerance || failures == FAILURES) {
                 break;
             }
@@ -189,7 +189,7 @@ impl Chamber<'_> {
                     break;
                 }
                 derivatives =
-                    self.derivatives(&state.place, parameters, &state.coordinates, records, &state.innovations)?;
+                    self.derivatives(&state.point, parameters, &state.coordinates, records, &state.innovations)?;
                 information = information_of(&derivatives, &state, parameters);
                 (taken, served, failures, is_fresh) = (taken + 1, 0, 0, true);
             }
@@ -199,7 +199,7 @@ impl Chamber<'_> {
         Ok(Ascent { information, known_derivatives, ..state })
     }
 
-    /// Derivatives at a place: those that are known of one nearby, and the rest taken here; whether all are of the very place.
+    /// Derivatives at a point: those that are known of one nearby, and the rest taken here; whether all are of the very point.
     fn derivatives_beside(
         &self,
         state: &Ascent,
@@ -216,7 +216,7 @@ impl Chamber<'_> {
         let (unknown, rest): (Vec<usize>, Vec<Parameter>) =
             (0..parameters.len()).filter(|&p| carried[p].is_none()).map(|p| (p, parameters[p])).unzip();
         let coordinates: Vec<f64> = unknown.iter().map(|&p| state.coordinates[p]).collect();
-        let mut all = self.derivatives(&state.place, &rest, &coordinates, records, &state.innovations)?;
+        let mut all = self.derivatives(&state.point, &rest, &coordinates, records, &state.innovations)?;
         all.iter_mut().for_each(|own| own.parameters.iter_mut().for_each(|p| *p = unknown[*p]));
         let is_fresh = unknown.len() == parameters.len();
         for (p, columns) in carried.into_iter().enumerate() {
@@ -241,8 +241,8 @@ impl Chamber<'_> {
         if !write(parameters, &coordinates, &mut assumed, &mut numbers) {
             return Err(ChamberError::Unsolvable);
         }
-        let place = self.place(assumed, numbers, records, courses)?;
-        let innovations: Result<Vec<_>, _> = records.par_iter().map(|&r| self.innovations(&place, r)).collect();
+        let point = self.model_point(assumed, numbers, records, courses)?;
+        let innovations: Result<Vec<_>, _> = records.par_iter().map(|&r| self.innovations(&point, r)).collect();
         let innovations = innovations?;
         let log_likelihood: f64 = innovations.iter().map(|i| log_likelihood(i)).sum();
         let log_prior: f64 = parameters.iter().zip(&coordinates).map(|(p, &c)| p.log_prior(c)).sum();
@@ -251,7 +251,7 @@ impl Chamber<'_> {
         }
         let posterior = log_likelihood + log_prior;
         let information = DMatrix::zeros(0, 0);
-        Ok(Ascent { place, coordinates, innovations, log_likelihood, posterior, information, known_derivatives: None })
+        Ok(Ascent { point, coordinates, innovations, log_likelihood, posterior, information, known_derivatives: None })
     }
 }
 
@@ -275,12 +275,12 @@ fn information_of(derivatives: &[Derivatives], state: &Ascent, parameters: &[Par
     information
 }
 
-/// Takes a variance's derivative along to another place, by what the variance is there of what it was: the relative one stays.
+/// Takes a variance's derivative along to another point, by what the variance is there of what it was: the relative one stays.
 fn carry_variance(column: &mut DerivativeColumn, ratios: impl Iterator<Item = f64>) {
     column.variance.iter_mut().zip(ratios).for_each(|(d, ratio)| *d *= ratio);
 }
 
-/// Takes all derivatives along to another place.
+/// Takes all derivatives along to another point.
 fn carry(derivatives: &mut [Derivatives], from: &[Vec<Innovation>], to: &[Vec<Innovation>]) {
     for ((own, from), to) in derivatives.iter_mut().zip(from).zip(to) {
         let ratios: Vec<f64> = from.iter().zip(to).map(|(a, b)| b.variance / a.variance).collect();
@@ -394,7 +394,7 @@ mod tests {
     use crate::pattern::classic::Classic;
 
     #[test]
-    fn an_ascent_ends_at_the_same_top_from_afar_and_with_derivatives_of_another_place() {
+    fn an_ascent_ends_at_the_same_top_from_afar_and_with_derivatives_of_another_point() {
         let (bare, pattern) = (model(Vec::new()), Classic::Zyl.pattern(8).unwrap());
         let record = kinked(&bare, &pattern);
         let chamber = Chamber::new(&bare, &[&record]).unwrap();

@@ -314,7 +314,7 @@ pub(super) mod tests {
             follows: Vec::new(),
         };
         let assumed = Assumption { inputs: vec![input], ..Assumption::new(model.clone(), dip()) };
-        let (chamber, _) = Chamber::new(&model, &[&record]).unwrap().settled(&assumed, &[0]).unwrap();
+        let (chamber, _) = Chamber::new(&model, &[&record]).unwrap().with_shocks(&assumed, &[0]).unwrap();
         assert!(chamber.spikes(0) <= spikes.len() + 1, "{}", chamber.spikes(0));
     }
 
@@ -356,9 +356,9 @@ pub(super) mod tests {
         let free = [Free { effect: 0, parameter: 0, stated: None, deviation: None }];
         let fit =
             chamber.fit(&assumed, &free, &[0], None, Effort { iterations: 0, tolerance: 0.0, rounds: 1 }).unwrap();
-        let place = chamber.place(fit.assumed.clone(), fit.numbers.clone(), &[0], &fit.courses).unwrap();
-        let base = vec![chamber.innovations(&place, 0).unwrap()];
-        let found = chamber.derivatives(&place, &fit.parameters, &fit.coordinates, &[0], &base).unwrap();
+        let point = chamber.model_point(fit.assumed.clone(), fit.numbers.clone(), &[0], &fit.courses).unwrap();
+        let base = vec![chamber.innovations(&point, 0).unwrap()];
+        let found = chamber.derivatives(&point, &fit.parameters, &fit.coordinates, &[0], &base).unwrap();
         let count = fit.parameters.len();
         let (mut score, mut information) = (DVector::zeros(count), DMatrix::zeros(count, count));
         found[0].add_to(&base[0], &mut score, &mut information);
@@ -367,8 +367,8 @@ pub(super) mod tests {
                 let (mut assumed, mut numbers) = (fit.assumed.clone(), fit.numbers.clone());
                 let moved = fit.coordinates[i] + 0.3 * sign * parameter.step();
                 assert!(crate::chamber::parameter::write(&[*parameter], &[moved], &mut assumed, &mut numbers));
-                let there = chamber.place(assumed, numbers, &[0], &fit.courses).unwrap();
-                crate::chamber::place::log_likelihood(&chamber.innovations(&there, 0).unwrap())
+                let there = chamber.model_point(assumed, numbers, &[0], &fit.courses).unwrap();
+                crate::chamber::model_point::log_likelihood(&chamber.innovations(&there, 0).unwrap())
             };
             let slope = (at(1.0) - at(-1.0)) / (0.6 * parameter.step());
             // One-sided differences of the innovations: off by half a step's worth of curvature.

@@ -72,22 +72,22 @@ impl Chamber<'_> {
         let mut courses = from.map_or_else(|| vec![None; self.records()], |f| f.courses.clone());
         courses.resize(self.records(), None);
         let parameters = self.parameters(assumed, free, records)?;
-        self.settle_courses(assumed, &numbers, records, &mut courses, Wanted::WhereNeeded)?;
+        self.smooth_courses(assumed, &numbers, records, &mut courses, Wanted::WhereNeeded)?;
         let known = from.and_then(|f| f.known_derivatives.as_deref());
         let begin = Beginning { assumed, numbers: &numbers, parameters: &parameters, records, courses: &courses };
         let mut state = self.ascended(&begin, effort, known)?;
-        let curved = records.iter().any(|&r| state.place.sides[r].as_ref().is_some_and(CoilSide::needs_reference));
+        let curved = records.iter().any(|&r| state.point.sides[r].as_ref().is_some_and(CoilSide::needs_reference));
         for _ in 1..if curved { effort.rounds.max(1) } else { 1 } {
-            let (assumed, numbers) = (state.place.assumed.clone(), state.place.numbers.clone());
+            let (assumed, numbers) = (state.point.assumed.clone(), state.point.numbers.clone());
             let known = state.known_derivatives.take();
-            self.settle_courses(&assumed, &numbers, records, &mut courses, Wanted::WhereNeeded)?;
+            self.smooth_courses(&assumed, &numbers, records, &mut courses, Wanted::WhereNeeded)?;
             let (assumed, numbers, parameters, courses) = (&assumed, &numbers, &parameters, &courses);
             let begin = Beginning { assumed, numbers, parameters, records, courses };
             state = self.ascended(&begin, effort, known.as_ref())?;
         }
         let end = AscentEnd::from(state);
         let wanted = if effort.is_for_ranking() { Wanted::WhereNeeded } else { Wanted::Everywhere };
-        self.settle_courses(&end.assumed, &end.numbers, records, &mut courses, wanted)?;
+        self.smooth_courses(&end.assumed, &end.numbers, records, &mut courses, wanted)?;
         let is_full = effort == Effort::FULL;
         let days = from.map_or_else(Arc::default, |f| f.days.clone());
         Ok(Fit { is_full, days, ..finished(end, free, records, parameters, courses) })
@@ -135,7 +135,7 @@ impl Chamber<'_> {
     }
 
     /// Smooths the courses of records; only of those for which the model needs one, if no other is wanted.
-    pub(super) fn settle_courses(
+    pub(super) fn smooth_courses(
         &self,
         assumed: &Assumption,
         numbers: &[Numbers],

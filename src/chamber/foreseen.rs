@@ -181,9 +181,9 @@ impl Chamber<'_> {
             return Err(ChamberError::Unsolvable);
         }
         let courses = self.course_of(&assumed, &numbers, record)?;
-        let place = self.place(assumed, numbers, &[record], &courses)?;
-        let deviance = self.innovations(&place, record)?.iter().map(misfit).sum::<f64>();
-        let (assumed, numbers) = (place.assumed, place.numbers);
+        let model_point = self.model_point(assumed, numbers, &[record], &courses)?;
+        let deviance = self.innovations(&model_point, record)?.iter().map(misfit).sum::<f64>();
+        let (assumed, numbers) = (model_point.assumed, model_point.numbers);
         if deviance.is_finite() {
             Ok(Point { deviance, coordinates, assumed, numbers })
         } else {
@@ -217,9 +217,9 @@ impl Chamber<'_> {
         record: usize,
     ) -> Result<(DVector<f64>, DMatrix<f64>), ChamberError> {
         let courses = self.course_of(&point.assumed, &point.numbers, record)?;
-        let place = self.place(point.assumed.clone(), point.numbers.clone(), &[record], &courses)?;
-        let base = vec![self.innovations(&place, record)?];
-        let derivatives = self.derivatives(&place, parameters, point.coordinates.as_slice(), &[record], &base)?;
+        let model_point = self.model_point(point.assumed.clone(), point.numbers.clone(), &[record], &courses)?;
+        let base = vec![self.innovations(&model_point, record)?];
+        let derivatives = self.derivatives(&model_point, parameters, point.coordinates.as_slice(), &[record], &base)?;
         let mut score = DVector::zeros(parameters.len());
         let mut information = DMatrix::zeros(parameters.len(), parameters.len());
         derivatives[0].add_values_to(&base[0], &mut score, &mut information);

@@ -1,6 +1,6 @@
 //! Where the air's slope has its kinks, to a share of a row.
 //!
-//! Readings say near which rows ([`super::settle`]); readings and rates together when: each kink begins where the shocks have
+//! Readings say near which rows ([`super::shocks`]); readings and rates together when: each kink begins where the shocks have
 //! their centre that the measurements imply when it may be anywhere near, and goes to the likelihood's maximum along time. A
 //! kink without which the likelihood falls by less than the logarithm of the rows, where it might have been, is none.
 
@@ -34,26 +34,26 @@ const MOVED_ROWS: f64 = 0.02;
 const NO_SHARE: f64 = 1e-3;
 
 impl Chamber<'_> {
-    /// As [`Chamber::settled`] for the first record, with its kinks, and its film's switches, at the times that readings and rates have
+    /// As [`Chamber::with_shocks`] for the first record, with its kinks, and its film's switches, at the times that readings and rates have
     /// them at.
     ///
     /// # Errors
     /// As [`Chamber::fit`].
-    pub(crate) fn settled_in_time(self, assumed: &Assumption) -> Result<(Self, Fit), ChamberError> {
+    pub(crate) fn with_timed_shocks(self, assumed: &Assumption) -> Result<(Self, Fit), ChamberError> {
         let whole = self.clone();
-        let (chamber, fit) = self.settled_as_it_is(assumed)?;
+        let (chamber, fit) = self.with_timed_shocks_as_it_is(assumed)?;
         // What rates say nothing of is one film's.
         if whole.observed[0].blind {
             return Ok((chamber, fit));
         }
         let Some((switched, _)) = whole.with_switched_film(&fit)? else { return Ok((chamber, fit)) };
-        let (switched, other) = switched.settled_as_it_is(assumed)?;
+        let (switched, other) = switched.with_timed_shocks_as_it_is(assumed)?;
         let is_better = switched.gain_over(&other, (&chamber, &fit), 0)? > 0.0;
         Ok(if is_better { (switched, other) } else { (chamber, fit) })
     }
 
     /// With the film switched, or not, as it is.
-    fn settled_as_it_is(mut self, assumed: &Assumption) -> Result<(Self, Fit), ChamberError> {
+    fn with_timed_shocks_as_it_is(mut self, assumed: &Assumption) -> Result<(Self, Fit), ChamberError> {
         let fit = self.best_start(assumed, &[], &[0])?;
         let fit = self.looked_through(fit, &[0])?;
         let mut kinks = self.time_kinks(&fit, 0)?;
@@ -397,7 +397,7 @@ pub(super) mod tests {
         let (model, pattern) = (model(Vec::new()), Classic::Zyl.pattern(8).unwrap());
         let (record, knots_s) = (kinked(&model, &pattern), knots_s());
         let assumed = Assumption { drift: true, ..Assumption::new(model.clone(), pattern) };
-        let (chamber, fit) = Chamber::new(&model, &[&record]).unwrap().settled_in_time(&assumed).unwrap();
+        let (chamber, fit) = Chamber::new(&model, &[&record]).unwrap().with_timed_shocks(&assumed).unwrap();
         let slopes = chamber.slopes(&fit, 0).unwrap();
         let found = chamber.bends(0, |k| slopes[k]);
         println!("{found:?}");

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::fit::{Fit, Wanted};
-use super::settle::GROSS_ROUNDS;
+use super::shocks::GROSS_ROUNDS;
 use super::{Chamber, ChamberError};
 
 /// Numbers of a chamber are fitted to at most so many of its rows: a day of half-minute rows, more than they need.
@@ -46,11 +46,11 @@ impl Chamber<'_> {
     pub(crate) fn adopt(&mut self, stretch: &Chamber, found: &Fit) -> Result<Fit, ChamberError> {
         let mut fit = found.of_record(found.records[0]);
         self.observed[0].series.approaches = stretch.observed[0].series.approaches;
-        let settle = |chamber: &Self, fit: &mut Fit| {
+        let smooth = |chamber: &Self, fit: &mut Fit| {
             let (assumed, numbers) = (fit.assumed.clone(), fit.numbers.clone());
-            chamber.settle_courses(&assumed, &numbers, &[0], &mut fit.courses, Wanted::Everywhere)
+            chamber.smooth_courses(&assumed, &numbers, &[0], &mut fit.courses, Wanted::Everywhere)
         };
-        settle(self, &mut fit)?;
+        smooth(self, &mut fit)?;
         for _ in 0..GROSS_ROUNDS {
             let gross = self.gross(&fit, 0)?;
             if gross.is_empty() {
@@ -63,7 +63,7 @@ impl Chamber<'_> {
             let bends = stretch.observed[0].series.rows.iter().any(|row| row.bend > 0.0);
             self.place_kinks(&fit, 0, bends)?;
         }
-        settle(self, &mut fit)?;
+        smooth(self, &mut fit)?;
         Ok(fit)
     }
 }

@@ -50,9 +50,9 @@ mod known;
 mod layout;
 mod learned;
 mod long;
+mod model_point;
 mod noise;
 mod parameter;
-mod place;
 mod point;
 pub(crate) mod prior;
 mod readings;
@@ -62,7 +62,7 @@ mod row;
 mod score;
 mod scorer;
 mod series;
-mod settle;
+mod shocks;
 mod shows;
 mod sparse;
 mod start;
@@ -270,43 +270,43 @@ impl<'a> Chamber<'a> {
         self.observed.len()
     }
 
-    pub(crate) fn record(&self, place: usize) -> &'a Record {
-        self.observed[place].record
+    pub(crate) fn record(&self, record: usize) -> &'a Record {
+        self.observed[record].record
     }
 
     /// Ends of the chamber's rows of one record.
-    pub(crate) fn times_s(&self, place: usize) -> &[f64] {
-        &self.observed[place].series.times_s
+    pub(crate) fn times_s(&self, record: usize) -> &[f64] {
+        &self.observed[record].series.times_s
     }
 
     /// The first and last of a record's rows that are in one of the chamber's.
-    pub(crate) fn span(&self, place: usize, row: usize) -> (usize, usize) {
-        self.observed[place].series.spans[row]
+    pub(crate) fn span(&self, record: usize, row: usize) -> (usize, usize) {
+        self.observed[record].series.spans[row]
     }
 
     /// What courses count their temperatures from.
-    pub(crate) fn reference_k(&self, place: usize) -> f64 {
-        self.observed[place].series.reference_k
+    pub(crate) fn reference_k(&self, record: usize) -> f64 {
+        self.observed[record].series.reference_k
     }
 
     /// Readings and rates left out as gross errors.
-    pub(crate) fn spikes(&self, place: usize) -> usize {
-        self.observed[place].series.spikes
+    pub(crate) fn spikes(&self, record: usize) -> usize {
+        self.observed[record].series.spikes
     }
 
     /// Rows of a record in one row of the chamber.
-    pub(crate) fn averaged(&self, place: usize) -> usize {
-        self.observed[place].series.averaged
+    pub(crate) fn averaged(&self, record: usize) -> usize {
+        self.observed[record].series.averaged
     }
 
     /// The sensor's resolution; 0 where readings lie on no grid.
-    pub(crate) fn resolution_k(&self, place: usize) -> f64 {
-        self.observed[place].series.resolution_k
+    pub(crate) fn resolution_k(&self, record: usize) -> f64 {
+        self.observed[record].series.resolution_k
     }
 
     /// The record's noise by windows too short for anything else.
-    pub(crate) fn noise_floor_rad_per_s(&self, place: usize) -> f64 {
-        self.observed[place].series.noise_floor_rad_per_s
+    pub(crate) fn noise_floor_rad_per_s(&self, record: usize) -> f64 {
+        self.observed[record].series.noise_floor_rad_per_s
     }
 }
 

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::abreast;
 use super::derivative::DerivativeColumn;
 use super::fit::Fit;
-use super::place::MovedRecord;
+use super::model_point::MovedRecord;
 use super::prior::Quantity;
 use super::system::system;
 use super::{Chamber, ChamberError};
@@ -42,32 +42,32 @@ impl Chamber<'_> {
         let mut numbers = fit.numbers.clone();
         numbers[record].set(Quantity::RippleSize, NONE_K);
         numbers[record].set(Quantity::RippleCoherence, Quantity::RippleCoherence.prior().median);
-        let place = self.place(fit.assumed.clone(), numbers, &[record], &fit.courses)?;
-        let base = vec![self.innovations(&place, record)?];
+        let point = self.model_point(fit.assumed.clone(), numbers, &[record], &fit.courses)?;
+        let base = vec![self.innovations(&point, record)?];
         let of_ripple = [Quantity::RippleSize, Quantity::RipplePeriod, Quantity::RippleCoherence];
         let (parameters, coordinates): (Vec<_>, Vec<_>) = (fit.parameters.iter().zip(&fit.coordinates))
             .filter(|(p, _)| p.concerns(record) && !of_ripple.iter().any(|q| p.is_quantity(*q)))
             .map(|(p, x)| (*p, *x))
             .unzip();
-        let derivatives = self.derivatives(&place, &parameters, &coordinates, &[record], &base)?;
+        let derivatives = self.derivatives(&point, &parameters, &coordinates, &[record], &base)?;
         let count = parameters.len();
         // A prior of one deviation on each, so that what the record says nothing of is no matter.
         let (mut slope, mut own) = (DVector::zeros(count), DMatrix::identity(count, count));
         derivatives[0].add_to(&base[0], &mut slope, &mut own);
         let Some(factor) = own.cholesky() else { return Err(ChamberError::Unsolvable) };
-        let Some(side) = &place.sides[record] else { return Err(ChamberError::Unsolvable) };
+        let Some(side) = &point.sides[record] else { return Err(ChamberError::Unsolvable) };
         let series = &self.observed[record].series;
         let periods = periods_s(series.shortest_s());
         let columns: Vec<Result<Vec<DerivativeColumn>, ChamberError>> = periods
             .par_chunks(abreast::LANES)
             .map(|periods| {
                 let with = |period_s: &f64| {
-                    let mut numbers = place.numbers[record];
+                    let mut numbers = point.numbers[record];
                     numbers.set(Quantity::RippleSize, TESTED_K);
                     numbers.set(Quantity::RipplePeriod, *period_s);
-                    MovedRecord { system: system(&side.parts(&place.assumed), &numbers, series), values: None }
+                    MovedRecord { system: system(&side.parts(&point.assumed), &numbers, series), values: None }
                 };
-                let there = self.innovations_abreast(&place, periods.iter().map(with).collect(), record)?;
+                let there = self.innovations_abreast(&point, periods.iter().map(with).collect(), record)?;
                 Ok(there.iter().map(|there| DerivativeColumn::new(&base[0], there, 1.0)).collect())
             })
             .collect();

@@ -89,7 +89,7 @@ impl Chamber<'_> {
     /// # Errors
     /// A model that cannot be solved.
     pub(crate) fn score(&self, fit: &Fit, columns: &[Column]) -> Result<Scores, ChamberError> {
-        let place = self.place(fit.assumed.clone(), fit.numbers.clone(), &fit.records, &fit.courses)?;
+        let point = self.model_point(fit.assumed.clone(), fit.numbers.clone(), &fit.records, &fit.courses)?;
         let (count, fitted) = (columns.len(), fit.parameters.len());
         let mut score = DVector::zeros(count);
         let mut information = DMatrix::zeros(count, count);
@@ -97,13 +97,13 @@ impl Chamber<'_> {
         let mut slope = DVector::zeros(fitted);
         let mut own_information = DMatrix::zeros(fitted, fitted);
         for &record in &fit.records {
-            let (Some(side), Some(values)) = (&place.sides[record], &place.values[record]) else {
+            let (Some(side), Some(values)) = (&point.sides[record], &point.values[record]) else {
                 return Err(ChamberError::Unsolvable);
             };
             let observed = &self.observed[record];
-            let (system, trace) = run_kept(side, &place.assumed, &place.numbers[record], observed, values);
+            let (system, trace) = run_kept(side, &point.assumed, &point.numbers[record], observed, values);
             let base = vec![trace.innovations.clone()];
-            let derivatives = self.derivatives(&place, &fit.parameters, &fit.coordinates, &[record], &base)?;
+            let derivatives = self.derivatives(&point, &fit.parameters, &fit.coordinates, &[record], &base)?;
             let responses: Vec<Vec<f64>> = columns
                 .par_iter()
                 .map(|column| {
@@ -139,7 +139,7 @@ impl Chamber<'_> {
         Ok(Scores { score, information })
     }
 
-    /// What changes of the whole model would gain, each computed at one other place and taken as a direction from the fit:
+    /// What changes of the whole model would gain, each computed at one other point and taken as a direction from the fit:
     /// one evaluation a record and change. None where the changed model cannot be solved.
     ///
     /// # Errors
@@ -149,10 +149,10 @@ impl Chamber<'_> {
         fit: &Fit,
         changed: &[&Assumption],
     ) -> Result<Vec<Option<Direction>>, ChamberError> {
-        let place = self.place(fit.assumed.clone(), fit.numbers.clone(), &fit.records, &fit.courses)?;
-        let base: Result<Vec<_>, _> = fit.records.iter().map(|&r| self.innovations(&place, r)).collect();
+        let point = self.model_point(fit.assumed.clone(), fit.numbers.clone(), &fit.records, &fit.courses)?;
+        let base: Result<Vec<_>, _> = fit.records.iter().map(|&r| self.innovations(&point, r)).collect();
         let base = base?;
-        let derivatives = self.derivatives(&place, &fit.parameters, &fit.coordinates, &fit.records, &base)?;
+        let derivatives = self.derivatives(&point, &fit.parameters, &fit.coordinates, &fit.records, &base)?;
         let fitted = fit.parameters.len();
         let mut slope = DVector::zeros(fitted);
         let mut own = DMatrix::zeros(fitted, fitted);
@@ -169,7 +169,8 @@ impl Chamber<'_> {
                 let mut score = 0.0;
                 let mut information = 0.0;
                 let mut cross = DVector::zeros(fitted);
-                let there = self.place((*assumed).clone(), fit.numbers.clone(), &fit.records, &fit.courses).ok()?;
+                let there =
+                    self.model_point((*assumed).clone(), fit.numbers.clone(), &fit.records, &fit.courses).ok()?;
                 for (i, &record) in fit.records.iter().enumerate() {
                     let moved = self.innovations(&there, record).ok()?;
                     let column = DerivativeColumn::new(&base[i], &moved, 1.0);

@@ -127,19 +127,19 @@ impl<'a> Chamber<'a> {
         let whole = kept.len() == fit.parameters.len();
         let parameters: Vec<Parameter> = kept.iter().map(|&i| fit.parameters[i]).collect();
         let coordinates: Vec<f64> = kept.iter().map(|&i| fit.coordinates[i]).collect();
-        let place = self.place(fit.assumed.clone(), fit.numbers.clone(), &fit.records, &fit.courses)?;
+        let point = self.model_point(fit.assumed.clone(), fit.numbers.clone(), &fit.records, &fit.courses)?;
         let fitted = parameters.len();
         let mut slope = DVector::zeros(fitted);
         let mut information = DMatrix::zeros(fitted, fitted);
         let mut records = Vec::with_capacity(fit.records.len());
         for &record in &fit.records {
-            let (Some(side), Some(values)) = (&place.sides[record], &place.values[record]) else {
+            let (Some(side), Some(values)) = (&point.sides[record], &point.values[record]) else {
                 return Err(ChamberError::Unsolvable);
             };
             let (system, trace) =
-                run_kept(side, &place.assumed, &place.numbers[record], &self.observed[record], values);
+                run_kept(side, &point.assumed, &point.numbers[record], &self.observed[record], values);
             let base = vec![trace.innovations.clone()];
-            let derivatives = self.derivatives(&place, &parameters, &coordinates, &[record], &base)?;
+            let derivatives = self.derivatives(&point, &parameters, &coordinates, &[record], &base)?;
             let own = &derivatives[0];
             let deviations: Vec<f64> = trace.innovations.iter().map(|i| i.variance.sqrt()).collect();
             let innovations = trace.innovations.iter().zip(&deviations).map(|(i, d)| i.value / d);
@@ -192,7 +192,7 @@ impl Scorer<'_, '_> {
     /// A changed model that cannot be solved.
     pub(crate) fn score_model(&self, changed: &Assumption) -> Result<Scored, ChamberError> {
         let fit = &self.fit;
-        let there = self.chamber.place(changed.clone(), fit.numbers.clone(), &fit.records, &fit.courses)?;
+        let there = self.chamber.model_point(changed.clone(), fit.numbers.clone(), &fit.records, &fit.courses)?;
         let of = |prepared: &Prepared| {
             let moved = self.chamber.innovations(&there, prepared.record)?;
             Ok(prepared.trace.innovations.iter().zip(&moved).map(|(here, there)| here.value - there.value).collect())

@@ -141,7 +141,7 @@ fn surroundings(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result
     let assumed = Assumption::new(model.clone(), pattern.clone());
     let busiest = Chamber::of_any(model, &[record])?.busiest(0, MOST_ROWS_FITTED);
     let stretch = record.stretch(busiest)?;
-    let (chamber, fit) = Chamber::of_any(model, &[&stretch])?.settled(&assumed, &[0])?;
+    let (chamber, fit) = Chamber::of_any(model, &[&stretch])?.with_shocks(&assumed, &[0])?;
     Ok((chamber.surroundings(&fit, 0), Chamber::film_error(&fit)))
 }
 

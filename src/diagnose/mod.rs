@@ -316,7 +316,7 @@ pub(crate) fn extend(request: &Request, effect: &DeclaredEffect) -> Result<Exten
     let records = checked(request)?;
     let fitted: Vec<usize> = (0..request.records.len()).collect();
     let declared = Assumption::new(without.clone(), request.pattern.clone());
-    let (chamber, base) = Chamber::new(&without, &records)?.settled(&declared, &fitted)?;
+    let (chamber, base) = Chamber::new(&without, &records)?.with_shocks(&declared, &fitted)?;
     let all = candidate::of_kind(&without, &records, effect);
     let question = Question {
         chamber: &chamber,
@@ -327,7 +327,7 @@ pub(crate) fn extend(request: &Request, effect: &DeclaredEffect) -> Result<Exten
         held_out: Vec::new(),
         depth: 1,
     };
-    let best = joint::settle_one(&question, &base).ok_or_else(|| DiagnoseError::NoFit { kind: effect.kind() })?;
+    let best = joint::fit_one(&question, &base).ok_or_else(|| DiagnoseError::NoFit { kind: effect.kind() })?;
     Ok(Extension {
         finding: describe::alone(&question, &best, &base),
         extended: best.fit.assumed.model.clone(),
@@ -376,7 +376,7 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
     let given = request.records.len();
     let declared = Assumption::new(request.model.clone(), request.pattern.clone());
     let fitted: Vec<usize> = (0..given).collect();
-    let (chamber, null) = Chamber::new(request.model, &records)?.settled(&declared, &fitted)?;
+    let (chamber, null) = Chamber::new(request.model, &records)?.with_shocks(&declared, &fitted)?;
     let candidates = candidate::candidates(request.model, &records);
     let question = Question {
         chamber: &chamber,
@@ -442,7 +442,7 @@ fn looked_through_again<'a>(
     let best = found.explanations.first().filter(|e| !e.members.is_empty() || found.is_elsewhere);
     let Some(best) = best else { return Ok(None) };
     let whole = Chamber::new(request.model, records)?.switched_like(question.chamber, Films::Same);
-    Ok(Some(whole.settled_from(best.fit.clone(), &question.fitted)?))
+    Ok(Some(whole.with_timed_shocks_by(best.fit.clone(), &question.fitted)?))
 }
 
 /// The chamber with its kinks at the times that the likeliest set has them at.

@@ -44,7 +44,7 @@ pub(crate) fn is_adequate(probability: f64, noise: &[Noise], declared_white_rad_
     probability >= CERTAIN && white
 }
 
-/// How the declared model stands, by a fit of it ([`Chamber::settled`]) to records of a chamber and one with a wander beside it.
+/// How the declared model stands, by a fit of it ([`Chamber::with_shocks`]) to records of a chamber and one with a wander beside it.
 ///
 /// # Errors
 /// A model that cannot be solved.

@@ -65,7 +65,8 @@ fn better<'a>(
             continue;
         }
         let usual = whole.switched_like(question.chamber, Films::Same);
-        let Some((chamber, fit)) = settled_where_needed(&switched, &usual, &explanation.fit, &question.fitted)? else {
+        let Some((chamber, fit)) = with_shocks_where_needed(&switched, &usual, &explanation.fit, &question.fitted)?
+        else {
             continue;
         };
         let there = Question { chamber: &chamber, ..question.clone() };
@@ -84,22 +85,22 @@ fn better<'a>(
     let states_a_film = !question.model.heat_path()?.film_is_unknown();
     let exchanged = states_a_film.then(|| {
         let exchanged = whole.switched_like(&chamber, Films::Exchanged);
-        let (exchanged, there) = exchanged.settled_with(fit.clone(), &question.fitted)?;
+        let (exchanged, there) = exchanged.with_shocks_by(fit.clone(), &question.fitted)?;
         of_declared(exchanged, &there)
     });
     std::iter::once(of_declared(chamber, &fit)).chain(exchanged).collect()
 }
 
 /// The records with those switches that explain one better than it is explained without them, and a fit there; None where none does.
-/// Either chamber is settled by the same fit, because being looked through once more explains a record better by itself.
-fn settled_where_needed<'a>(
+/// Shocks of either chamber are found by the same fit, because being looked through once more explains a record better by itself.
+fn with_shocks_where_needed<'a>(
     switched: &Chamber<'a>,
     usual: &Chamber<'a>,
     fit: &Fit,
     fitted: &[usize],
 ) -> Result<Option<(Chamber<'a>, Fit)>, ChamberError> {
-    let settled = |chamber: &Chamber<'a>| chamber.clone().settled_with(fit.clone(), fitted);
-    let (with, without) = rayon::join(|| settled(switched), || settled(usual));
+    let shocked = |chamber: &Chamber<'a>| chamber.clone().with_shocks_by(fit.clone(), fitted);
+    let (with, without) = rayon::join(|| shocked(switched), || shocked(usual));
     let ((with, with_fit), (without, without_fit)) = (with?, without?);
     let changed: Vec<usize> =
         (0..with.records()).filter(|&r| with.film_switches_s(r) != without.film_switches_s(r)).collect();
@@ -115,7 +116,7 @@ fn settled_where_needed<'a>(
     if needless.len() == changed.len() {
         return Ok(None);
     }
-    settled(&switched.with_films_of(usual, &needless)).map(Some)
+    shocked(&switched.with_films_of(usual, &needless)).map(Some)
 }
 
 /// Records of the question's chamber whose film is switched, with what a set found it to be.

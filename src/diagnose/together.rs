@@ -38,7 +38,7 @@ pub(crate) fn extend_together(request: &Request, effects: &[DeclaredEffect]) -> 
     without.effects.truncate(first);
     let fitted: Vec<usize> = (0..request.records.len()).collect();
     let declared = Assumption::new(without.clone(), request.pattern.clone());
-    let (chamber, mut base) = Chamber::new(&without, &records)?.settled(&declared, &fitted)?;
+    let (chamber, mut base) = Chamber::new(&without, &records)?.with_shocks(&declared, &fitted)?;
     base.calm(&fitted);
     let free: Vec<Free> = effects
         .iter()

@@ -52,7 +52,7 @@ pub(crate) fn anew<'a>(
 
 fn looked_through<'a>(question: &Question<'a>, fit: &Fit) -> Result<Chamber<'a>, ChamberError> {
     let records: Vec<_> = (0..question.chamber.records()).map(|r| question.chamber.record(r)).collect();
-    Chamber::new(question.model, &records)?.settled_from(fit.clone(), &question.fitted)
+    Chamber::new(question.model, &records)?.with_timed_shocks_by(fit.clone(), &question.fitted)
 }
 
 /// What listed sets are worth where a set with a formula was found: what it found of the air may be better for them, too.

@@ -30,7 +30,7 @@ impl Tools<'_, '_> {
             all.extend(
                 near.collect::<Vec<_>>()
                     .into_par_iter()
-                    .map(|s| self.as_confirmed_as(set, self.judged(self.settled(s))))
+                    .map(|s| self.as_confirmed_as(set, self.judged(self.consistent(s))))
                     .collect::<Vec<_>>(),
             );
         }

@@ -187,7 +187,7 @@ impl Tools<'_, '_> {
     }
 
     /// With numbers and variables that follow its fit.
-    pub(crate) fn settled(&self, set: Set) -> Set {
+    pub(crate) fn consistent(&self, set: Set) -> Set {
         self.followed(self.grounded(set))
     }
 
@@ -226,7 +226,7 @@ impl Tools<'_, '_> {
         listed.truncate(PAIRED);
         let found: Vec<Set> = listed.par_iter().filter_map(|p| self.with_listed(foremost, p)).collect();
         let gains = found.into_iter().filter(|s| s.merit > foremost.merit);
-        gains.collect::<Vec<_>>().into_par_iter().map(|s| self.judged(self.settled(s))).collect()
+        gains.collect::<Vec<_>>().into_par_iter().map(|s| self.judged(self.consistent(s))).collect()
     }
 
     /// The score test of every listed effect beside a set, with what it makes of the variables of its terms.

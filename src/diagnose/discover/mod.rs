@@ -263,7 +263,7 @@ fn refined(tools: &Tools, best: &Set) -> (Set, Vec<Vec<f64>>) {
     let set = match again {
         Some(fit) => {
             let explanation = Explanation::new(&everything, tools.windings, best.explanation.members.clone(), fit);
-            all.settled(all.set(explanation, best.terms.clone(), &best.grounds))
+            all.consistent(all.set(explanation, best.terms.clone(), &best.grounds))
         }
         None => best.clone(),
     };

@@ -337,7 +337,7 @@ impl Tools<'_, '_> {
         let near = sets.first().map_or(f64::NEG_INFINITY, |best| best.merit - NEAR);
         let alike = sets.iter().take(ALIKE_TRIED).filter(|s| s.merit > near).count();
         sets.truncate(alike.max(HELD_OUT_TRIED));
-        let mut sets: Vec<Set> = sets.into_par_iter().map(|s| self.judged(self.settled(s))).collect();
+        let mut sets: Vec<Set> = sets.into_par_iter().map(|s| self.judged(self.consistent(s))).collect();
         sets.sort_by(|a, b| b.total().total_cmp(&a.total()));
         sets
     }

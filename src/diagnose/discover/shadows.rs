@@ -35,7 +35,7 @@ impl Tools<'_, '_> {
             with.into_iter().map(move |with| (with, set.clone())).collect::<Vec<_>>()
         });
         let (best, bare) = sets.max_by(|(a, _), (b, _)| a.merit.total_cmp(&b.merit))?;
-        let mut best = self.judged(self.settled(best));
+        let mut best = self.judged(self.consistent(best));
         if best.total() < best_listed - WITHIN_REACH {
             return None;
         }

@@ -45,7 +45,7 @@ impl ModelComparison {
         let fitted: Vec<usize> = (0..request.records.len()).collect();
         let held_out: Vec<usize> = (request.records.len()..records.len()).collect();
         let declared = Assumption::new(request.model.clone(), request.pattern.clone());
-        let (chamber, mut from) = Chamber::new(request.model, &records)?.settled(&declared, &fitted)?;
+        let (chamber, mut from) = Chamber::new(request.model, &records)?.with_shocks(&declared, &fitted)?;
         let mut alternative = |(name, model): (String, CoilModel)| -> Result<FittedAlternative, DiagnoseError> {
             let free = free_numbers(request.model, &model);
             let assumed = Assumption::new(model, request.pattern.clone());

@@ -1,6 +1,6 @@
 //! Sets of explanations, each with its own kinks of the air.
 //!
-//! Where the air is straight but for kinks, readings place them ([`crate::chamber::Chamber::settled`]), by what a set makes of the
+//! Where the air is straight but for kinks, readings place them ([`crate::chamber::Chamber::with_shocks`]), by what a set makes of the
 //! coil and the sensor. Placed by one set they favour it: another sees the air turn at other times and has to bend it there. So
 //! the foremost sets are compared with the kinks that each would have placed,
 //!

@@ -124,7 +124,7 @@ pub(crate) fn ranked(question: &Question, null: Fit, progress: &(dyn Fn(f64) + S
     Ok(Found { explanations, promised, windings, is_elsewhere })
 }
 
-/// What was found, judged again in a chamber that is looked through with the best of it ([`crate::chamber::Chamber::settled_from`]).
+/// What was found, judged again in a chamber that is looked through with the best of it ([`crate::chamber::Chamber::with_timed_shocks_by`]).
 ///
 /// # Errors
 /// A declared model that cannot be solved for these records.
@@ -443,7 +443,7 @@ pub(crate) fn promise(question: &Question, null: &Fit) -> Outcome<f64> {
 }
 
 /// The best fit of the only kind among the candidates, and mean squares of standardised innovations before and after.
-pub(crate) fn settle_one(question: &Question, base: &Fit) -> Option<Explanation> {
+pub(crate) fn fit_one(question: &Question, base: &Fit) -> Option<Explanation> {
     let null = Explanation::new(question, &[], Vec::new(), base.clone());
     let begins: Vec<(usize, Vec<f64>)> = question
         .candidates

@@ -25,7 +25,7 @@ pub(super) struct ModelPoint<'a> {
 
 impl Chamber<'_> {
     /// Everything at one point; only the `records` are computed.
-    pub(super) fn place<'c>(
+    pub(super) fn model_point<'c>(
         &self,
         assumed: Assumption,
         numbers: Vec<Numbers>,
@@ -48,34 +48,34 @@ impl Chamber<'_> {
         Ok(ModelPoint { assumed, numbers, sides, values, courses })
     }
 
-    /// Of one record that was computed for the place.
-    pub(super) fn innovations(&self, place: &ModelPoint, record: usize) -> Result<Vec<Innovation>, ChamberError> {
-        let (Some(side), Some(values)) = (&place.sides[record], &place.values[record]) else {
+    /// Of one record that the point was computed for.
+    pub(super) fn innovations(&self, point: &ModelPoint, record: usize) -> Result<Vec<Innovation>, ChamberError> {
+        let (Some(side), Some(values)) = (&point.sides[record], &point.values[record]) else {
             return Err(ChamberError::Unsolvable);
         };
-        Ok(run(side, &place.assumed, &place.numbers[record], &self.observed[record], values))
+        Ok(run(side, &point.assumed, &point.numbers[record], &self.observed[record], values))
     }
 
     /// One record with one coordinate moved.
     fn moved(
         &self,
-        place: &ModelPoint,
+        point: &ModelPoint,
         parameter: &Parameter,
         coordinate: f64,
         record: usize,
     ) -> Result<MovedRecord, ChamberError> {
-        let mut numbers = place.numbers.clone();
-        let mut assumed = place.assumed.clone();
+        let mut numbers = point.numbers.clone();
+        let mut assumed = point.assumed.clone();
         if !write(std::slice::from_ref(parameter), &[coordinate], &mut assumed, &mut numbers) {
             return Err(ChamberError::Unsolvable);
         }
         let series = &self.observed[record].series;
         if parameter.leaves_coil() {
-            let Some(side) = &place.sides[record] else { return Err(ChamberError::Unsolvable) };
-            let system = system(&side.parts(&place.assumed), &numbers[record], series);
+            let Some(side) = &point.sides[record] else { return Err(ChamberError::Unsolvable) };
+            let system = system(&side.parts(&point.assumed), &numbers[record], series);
             return Ok(MovedRecord { system, values: None });
         }
-        let mut there = self.place(assumed, numbers, &[record], place.courses)?;
+        let mut there = self.model_point(assumed, numbers, &[record], point.courses)?;
         let (Some(side), values) = (&there.sides[record], there.values[record].take()) else {
             return Err(ChamberError::Unsolvable);
         };
@@ -83,10 +83,10 @@ impl Chamber<'_> {
         Ok(MovedRecord { system, values })
     }
 
-    /// Derivatives of each record's innovations by its coordinates, at a place whose innovations (`base`) are known.
+    /// Derivatives of each record's innovations by its coordinates, at a point whose innovations (`base`) are known.
     pub(super) fn derivatives(
         &self,
-        place: &ModelPoint,
+        point: &ModelPoint,
         parameters: &[Parameter],
         coordinates: &[f64],
         records: &[usize],
@@ -104,10 +104,10 @@ impl Chamber<'_> {
             .map(|(i, own)| {
                 let moved: Result<Vec<(f64, MovedRecord)>, ChamberError> = own
                     .iter()
-                    .map(|&p| self.moved_a_step(place, &parameters[p], coordinates[p], records[*i]))
+                    .map(|&p| self.moved_a_step(point, &parameters[p], coordinates[p], records[*i]))
                     .collect();
                 let (steps, moved): (Vec<f64>, Vec<MovedRecord>) = moved?.into_iter().unzip();
-                let there = self.innovations_abreast(place, moved, records[*i])?;
+                let there = self.innovations_abreast(point, moved, records[*i])?;
                 Ok(there.iter().zip(steps).map(|(t, step)| DerivativeColumn::new(&base[*i], t, step)).collect())
             })
             .collect();
@@ -122,24 +122,24 @@ impl Chamber<'_> {
     /// One record with one coordinate moved by a step, up or, where that is out of bounds, down; and the step.
     fn moved_a_step(
         &self,
-        place: &ModelPoint,
+        point: &ModelPoint,
         parameter: &Parameter,
         coordinate: f64,
         record: usize,
     ) -> Result<(f64, MovedRecord), ChamberError> {
         let step = if coordinate + parameter.step() > parameter.upper { -parameter.step() } else { parameter.step() };
-        let by = |step: f64| Ok((step, self.moved(place, parameter, coordinate + step, record)?));
+        let by = |step: f64| Ok((step, self.moved(point, parameter, coordinate + step, record)?));
         by(step).or_else(|_| by(-step))
     }
 
     /// The innovations of one record by several systems, those of one structure at once.
     pub(super) fn innovations_abreast(
         &self,
-        place: &ModelPoint,
+        point: &ModelPoint,
         moved: Vec<MovedRecord>,
         record: usize,
     ) -> Result<Vec<Vec<Innovation>>, ChamberError> {
-        let Some(unmoved) = &place.values[record] else { return Err(ChamberError::Unsolvable) };
+        let Some(unmoved) = &point.values[record] else { return Err(ChamberError::Unsolvable) };
         let rows = &self.observed[record].series.rows;
         let (systems, values): (Vec<System>, Vec<Option<Values>>) =
             moved.into_iter().map(|m| (m.system, m.values)).unzip();
@@ -155,7 +155,7 @@ impl Chamber<'_> {
     }
 }
 
-/// A record's system somewhere beside a place, and its values where they are others there.
+/// A record's system somewhere beside a point, and its values where they are others there.
 pub(super) struct MovedRecord {
     pub(super) system: System,
     pub(super) values: Option<Values>,

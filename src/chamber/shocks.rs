@@ -1,4 +1,4 @@
-//! Before anything is concluded: what does not belong to a record, and where its air has kinks.
+//! Shocks: gross errors, which do not belong to a record, and kinks, where the slope of its air changes.
 //!
 //! Both are asked of the model itself, by what all other measurements make of each one ([`super::filter::doubts`]): a steep
 //! signal is no gross error to a model that has its slope, and a spike on it is none the less one.
@@ -34,9 +34,9 @@ impl<'a> Chamber<'a> {
     ///
     /// # Errors
     /// As [`Chamber::fit`].
-    pub(crate) fn settled(self, assumed: &Assumption, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
+    pub(crate) fn with_shocks(self, assumed: &Assumption, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
         let fit = self.best_start(assumed, &[], records)?;
-        self.settled_about(fit, records)
+        self.with_shocks_about(fit, records)
     }
 
     /// The same chamber by a fit that is there already, what is free of its effects included: where a model shows the air at other
@@ -44,18 +44,18 @@ impl<'a> Chamber<'a> {
     ///
     /// # Errors
     /// As [`Chamber::fit`].
-    pub(crate) fn settled_from(self, fit: Fit, records: &[usize]) -> Result<Self, ChamberError> {
-        let (chamber, fit) = self.settled_with(fit, records)?;
+    pub(crate) fn with_timed_shocks_by(self, fit: Fit, records: &[usize]) -> Result<Self, ChamberError> {
+        let (chamber, fit) = self.with_shocks_by(fit, records)?;
         chamber.with_timed_kinks(&fit)
     }
 
-    /// As [`Chamber::settled_from`], with the fit there and kinks near which rows they are.
+    /// As [`Chamber::with_timed_shocks_by`], with the fit there and kinks near which rows they are.
     ///
     /// # Errors
     /// As [`Chamber::fit`].
-    pub(crate) fn settled_with(self, fit: Fit, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
+    pub(crate) fn with_shocks_by(self, fit: Fit, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
         let curved = self.curved(fit, records)?;
-        self.settled_about(curved, records)
+        self.with_shocks_about(curved, records)
     }
 
     /// A fit in an air that bends wherever readings do, whatever the air was.
@@ -69,7 +69,7 @@ impl<'a> Chamber<'a> {
 
     /// By a fit whose air bends wherever readings do: to one that is straight but for its kinks, what does not know them yet is full of
     /// gross errors.
-    fn settled_about(mut self, curved: Fit, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
+    fn with_shocks_about(mut self, curved: Fit, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
         let whole = self.observed.iter().map(|o| o.series.clone()).collect::<Vec<_>>();
         let curved = self.without_gross_errors(curved, records)?;
         let others: Vec<usize> = (0..self.records()).filter(|r| !records.contains(r)).collect();
@@ -123,13 +123,13 @@ impl<'a> Chamber<'a> {
 
     /// Rows and measurements that are gross errors beside what all others say.
     pub(super) fn gross(&self, fit: &Fit, record: usize) -> Result<Vec<(usize, usize)>, ChamberError> {
-        let place = self.place(fit.assumed.clone(), fit.numbers.clone(), &[record], &fit.courses)?;
-        let (Some(side), Some(values)) = (&place.sides[record], &place.values[record]) else {
+        let point = self.model_point(fit.assumed.clone(), fit.numbers.clone(), &[record], &fit.courses)?;
+        let (Some(side), Some(values)) = (&point.sides[record], &point.values[record]) else {
             return Err(ChamberError::Unsolvable);
         };
         let observed = &self.observed[record];
         let rows = &observed.series.rows;
-        let (system, trace) = run_kept(side, &place.assumed, &place.numbers[record], observed, values);
+        let (system, trace) = run_kept(side, &point.assumed, &point.numbers[record], observed, values);
         let doubts = filter::doubts(&system, rows, &trace);
         let mut by_measurement: Vec<Vec<f64>> = vec![vec![0.0; rows.len()]; filter::MEASURED];
         let mut next = 0;
@@ -398,9 +398,9 @@ mod tests {
         let declared = Assumption::new(bare.clone(), pattern.clone());
         for approach_s in [40.0, 220.0] {
             let record = in_air(&bare, &pattern, &staged(approach_s));
-            let (_, fit) = Chamber::new(&bare, &[&record]).unwrap().settled(&declared, &[0]).unwrap();
+            let (_, fit) = Chamber::new(&bare, &[&record]).unwrap().with_shocks(&declared, &[0]).unwrap();
             // Looked through again by numbers of air whose kinks are known, a chamber that does not know them leaves nothing out.
-            let chamber = Chamber::new(&bare, &[&record]).unwrap().settled_from(fit, &[0]).unwrap();
+            let chamber = Chamber::new(&bare, &[&record]).unwrap().with_timed_shocks_by(fit, &[0]).unwrap();
             let fit = chamber.fit_anew(&declared, &[], &[0]).unwrap();
             let series = &chamber.observed[0].series;
             let (found_s, film) = (fit.number(Quantity::ApproachTime, 0), fit.number(Quantity::Film, 0));
@@ -423,7 +423,7 @@ mod tests {
             }
         }
         let ramps = kinked(&bare, &pattern);
-        let (chamber, _) = Chamber::new(&bare, &[&ramps]).unwrap().settled(&declared, &[0]).unwrap();
+        let (chamber, _) = Chamber::new(&bare, &[&ramps]).unwrap().with_shocks(&declared, &[0]).unwrap();
         assert!(!chamber.observed[0].series.approaches);
     }
 
