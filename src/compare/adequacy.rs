@@ -80,6 +80,8 @@ pub enum ResidualFinding {
     NothingStandsOut {
         /// Against the noise alone.
         reduced_chi_square: f64,
+        /// Readings and rates that are none of the coil's, and are in it all the same.
+        gross_errors: usize,
     },
     /// A part of χ² is what the estimated boundary leaves open.
     Boundary {
@@ -150,9 +152,13 @@ impl std::fmt::Display for ResidualFinding {
                 f,
                 "neighbouring residuals hang together (autocorrelation {lag_one:.2} at lag 1, white within {band:.2})"
             ),
-            ResidualFinding::NothingStandsOut { reduced_chi_square } => write!(
+            ResidualFinding::NothingStandsOut { reduced_chi_square, gross_errors: 0 } => write!(
                 f,
                 "nothing stands out: the residual is the record's noise (reduced chi-square {reduced_chi_square:.3})"
+            ),
+            ResidualFinding::NothingStandsOut { reduced_chi_square, gross_errors } => write!(
+                f,
+                "nothing stands out but gross errors in {gross_errors} readings or rates: the rest of the residual is the record's noise (reduced chi-square {reduced_chi_square:.3} with them)"
             ),
             ResidualFinding::Boundary { reduced_chi_square, boundary_chi_square } => write!(
                 f,
@@ -243,7 +249,8 @@ pub(super) fn judge(found: &Comparison, transient_s: f64) -> (Adequacy, Vec<Resi
     }
     let lag_one = found.autocorrelation.get(1).copied().unwrap_or(0.0);
     if verdict == Adequacy::Adequate {
-        findings.push(ResidualFinding::NothingStandsOut { reduced_chi_square: found.reduced_chi_square });
+        let Comparison { reduced_chi_square, gross_errors, .. } = *found;
+        findings.push(ResidualFinding::NothingStandsOut { reduced_chi_square, gross_errors });
     } else if lag_one.abs() > found.autocorrelation_band {
         findings.push(ResidualFinding::Coloured { lag_one, band: found.autocorrelation_band });
     }

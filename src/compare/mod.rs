@@ -88,6 +88,8 @@ pub struct Comparison {
     pub(crate) film_switches: Option<FilmSwitches>,
     /// What readings and rates together say of model and noise; None where the rates have none.
     pub(crate) standing: Option<Standing>,
+    /// Readings and rates that are none of the coil's; the residual has them all the same.
+    pub(crate) gross_errors: usize,
     /// Thermometers at layers.
     pub(crate) sensors: Vec<SensorMisfit>,
 }
@@ -148,16 +150,17 @@ const MAX_LAGS: usize = 60;
 /// A pattern of another layer count, a heat path that cannot be solved, a record whose temperature says nothing.
 pub fn compare(model: &CoilModel, pattern: &Pattern, record: &Record) -> Result<Comparison, PredictError> {
     let read = predict::read(model, pattern, record)?;
-    let (mut whitened, mut together) = (Some(0.0), None);
+    let mut together =
+        Together { whitened_chi_square: Some(0.0), standing: None, gross_errors: read.chamber.spikes(0) };
     let noise = predict::noise_floor_rad_per_s(record);
     if noise > 0.0 {
         let declared = read.declared(|chamber, fit, wandering| {
             let beyond = chamber.chi_square_beyond_readings(fit, 0, noise)?;
             Ok((beyond, standing(model, pattern, chamber, fit, wandering, None)?))
         })?;
-        (whitened, together) = (Some(declared.0), Some(declared.1));
+        (together.whitened_chi_square, together.standing) = (Some(declared.0), Some(declared.1));
     }
-    judged(model, pattern, record, &read.boundary, whitened, together)
+    judged(model, pattern, record, &read.boundary, together)
 }
 
 /// Compares a model with a record whose layers' temperatures are known.
@@ -170,17 +173,24 @@ pub(crate) fn compare_under(
     record: &Record,
     field: &GivenField,
 ) -> Result<Comparison, PredictError> {
-    judged(model, pattern, record, &Boundary::given(model, field, record)?, None, None)
+    judged(model, pattern, record, &Boundary::given(model, field, record)?, Together::default())
 }
 
-/// `whitened_chi_square` is that against noise and boundary; none where the noise is all that there is.
+/// What readings and rates say together.
+#[derive(Default)]
+struct Together {
+    /// Against noise and boundary; None where the noise is all that there is.
+    whitened_chi_square: Option<f64>,
+    standing: Option<Standing>,
+    gross_errors: usize,
+}
+
 fn judged(
     model: &CoilModel,
     pattern: &Pattern,
     record: &Record,
     boundary: &Boundary,
-    whitened_chi_square: Option<f64>,
-    standing: Option<Standing>,
+    together: Together,
 ) -> Result<Comparison, PredictError> {
     let prediction = predict::predict_from(model, pattern, record, boundary)?;
     let measured = record.rate_rad_per_s();
@@ -211,7 +221,7 @@ fn judged(
         r_squared: explained.map(|e| 1.0 - e),
         reduced_chi_square,
         boundary_chi_square: variances.iter().sum::<f64>() / (noise * noise) / freedom,
-        whitened_chi_square: whitened_chi_square.unwrap_or(reduced_chi_square),
+        whitened_chi_square: together.whitened_chi_square.unwrap_or(reduced_chi_square),
         largest: LargestError { time_s: record.times_s()[largest_row], residual_rad_per_s: residual[largest_row] },
         ljung_box: LjungBox::new(&autocorrelation, rows),
         autocorrelation_band: autocorrelation_band_99(rows),
@@ -227,7 +237,8 @@ fn judged(
         film_w_per_m2_k,
         bends_s: bends.iter().map(|b| b.time_s).collect(),
         film_switches,
-        standing,
+        standing: together.standing,
+        gross_errors: together.gross_errors,
         sensors: sensors::misfits(model, record, boundary)?,
         prediction,
     };
