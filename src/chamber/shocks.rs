@@ -393,6 +393,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "long: --include-ignored"]
     fn a_stages_air_is_told_by_the_time_of_its_approach_and_nothing_in_it_is_a_gross_error() {
         let (bare, pattern) = (model(Vec::new()), Classic::Zyl.pattern(8).unwrap());
         let declared = Assumption::new(bare.clone(), pattern.clone());

@@ -46,6 +46,7 @@ fn bare_day(model: &CoilModel, swing_k: f64, seed: u64) -> Record {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn what_only_the_hold_out_shows_is_found() {
     let complete = model(vec![effect("strain_mismatch", &[0.004])]);
     let (gentle, wild) = ([bare_day(&complete, 0.6, 1)], [bare_day(&complete, 20.0, 2)]);
@@ -72,6 +73,7 @@ fn what_only_the_hold_out_shows_is_found() {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_declared_film_that_is_wrong_is_said_with_what_it_is() {
     let behind = |film: f64| {
         let effects = vec![effect("surface_film", &[film])];
@@ -106,6 +108,7 @@ fn wandering_day(model: &CoilModel, time_constant_s: f64, seed: u64) -> Record {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_wander_that_nothing_explains_is_told_with_its_size_and_its_time_constant() {
     let (declared, pattern) = (model(Vec::new()), pattern());
     let records = [wandering_day(&declared, 300.0, 3), wandering_day(&declared, 300.0, 4)];
@@ -123,6 +126,7 @@ fn a_wander_that_nothing_explains_is_told_with_its_size_and_its_time_constant() 
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn two_thermometers_show_a_lag_that_the_rate_does_not() {
     let pattern = pattern();
     let declared = model(Vec::new());

@@ -19,6 +19,7 @@ fn coilwright(folder: &Path, arguments: &[&str]) -> Output {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn every_command_of_the_book_runs() {
     let mut ran = 0;
     for entry in std::fs::read_dir("docs/src").unwrap() {

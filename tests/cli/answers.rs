@@ -132,6 +132,7 @@ fn small_answers_are_as_their_schemas_say() {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn files_that_hold_an_answer_are_as_its_schema_says() {
     let folder = tempfile::tempdir().unwrap();
     let inside = |name: &str| folder.path().join(name).display().to_string();

@@ -106,6 +106,7 @@ fn run(browser: &str, profile: &Path, arguments: &[&str]) -> (String, String) {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn pages_hold_everything_themselves_and_open_without_a_script_error_on_desktop_phone_and_paper() {
     let folder = tempfile::tempdir().unwrap();
     let pages = pages(folder.path());

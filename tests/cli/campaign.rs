@@ -48,6 +48,7 @@ fn ids(found: &Document) -> Vec<String> {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn parts_and_single_cells_together_are_the_whole_and_what_is_done_is_skipped() {
     let root = tempfile::tempdir().unwrap();
     let campaign = campaign_file(root.path());
@@ -246,6 +247,7 @@ fn a_campaign_file_with_faults_names_them_all() {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn every_point_of_the_front_is_a_pattern_that_schedule_takes_and_none_is_beaten_in_every_respect() {
     let root = tempfile::tempdir().unwrap();
     let folder = root.path().join("front");

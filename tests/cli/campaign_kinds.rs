@@ -141,6 +141,7 @@ fn a_fleet_s_data_sheets_are_those_of_metrics_and_who_stands_apart_is_named() {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_fleet_s_diagnoses_are_those_of_diagnose_and_a_record_that_says_nothing_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let own = root().join("tests/data/records/c-spool");

@@ -65,6 +65,7 @@ fn spread_model(folder: &std::path::Path, spreads: &str) -> String {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_search_for_p95_reports_what_tolerance_reports_and_writes_the_same_bytes_at_any_number_of_threads() {
     let root = tempfile::tempdir().unwrap();
     let spreads = "\n[tolerance]\nturns_per_layer_sd = 0.3\nmismatch_sd = 0.001\nsamples = 20\n";
@@ -197,6 +198,7 @@ fn a_group_index_scales_every_rate_error_by_how_much_longer_light_takes() {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn turns_at_the_ends_and_a_split_layer_are_chosen_scheduled_and_verified() {
     let folder = tempfile::tempdir().unwrap();
     let run = folder.path().join("run");
@@ -225,6 +227,7 @@ fn turns_at_the_ends_and_a_split_layer_are_chosen_scheduled_and_verified() {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn trim_says_which_cut_leaves_the_smallest_error_and_where_a_cut_makes_it_larger() {
     let arguments = ["trim", "examples/chamber-coil.toml", "examples/chamber-day-1.csv"];
     let found = json(&arguments);

@@ -6,6 +6,7 @@ const COIL: &str = "tests/data/records/c-spool/coil.toml";
 const RECORD: &str = "tests/data/records/c-spool/calibration.csv";
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn the_words_name_the_regime_in_which_a_hidden_spool_acts() {
     let output = run(&["compare", COIL, RECORD]);
     assert_eq!(code(&output), 0, "{}", stderr(&output));
@@ -18,6 +19,7 @@ fn the_words_name_the_regime_in_which_a_hidden_spool_acts() {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn the_words_name_the_dependence_through_which_a_mismatch_of_the_halves_acts() {
     let folder = "tests/data/records/d-mismatch";
     let output = run(&["compare", &format!("{folder}/coil.toml"), &format!("{folder}/calibration.csv")]);
@@ -26,6 +28,7 @@ fn the_words_name_the_dependence_through_which_a_mismatch_of_the_halves_acts() {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn the_document_has_the_keys_that_scripts_read() {
     let answer = json(&["compare", COIL, RECORD]);
     assert_eq!(answer["schema_version"], 1);
@@ -53,6 +56,7 @@ fn the_document_has_the_keys_that_scripts_read() {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_folder_gets_document_tables_pictures_and_a_page_that_report_makes_again() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("day").display().to_string();
@@ -128,6 +132,7 @@ fn with_thermometers() -> (tempfile::TempDir, String) {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn further_thermometers_are_set_beside_their_layers_and_none_is_dropped_unsaid() {
     let (_folder, record) = with_thermometers();
     let columns = "--columns=layer_12=Tk:k,spool=Ts:f";

@@ -101,6 +101,7 @@ fn day_that_follows(start_c: f64, bias_deg_per_h: f64, slope: f64, seed: u32) ->
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn each_of_several_records_is_left_out_in_turn_and_what_only_fits_is_said() {
     let (folder, _) = folder_with("1.csv", day_that_follows(20.0, 0.3, 0.5, 1));
     let place = |name: &str| folder.path().join(name).display().to_string();
@@ -150,6 +151,7 @@ fn each_of_several_records_is_left_out_in_turn_and_what_only_fits_is_said() {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_physical_compensator_is_fitted_to_several_records_at_once() {
     let validation = "tests/data/records/a-control/validation.csv";
     let rms = |fits: &[&str]| {
@@ -163,6 +165,7 @@ fn a_physical_compensator_is_fitted_to_several_records_at_once() {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_compensator_that_makes_a_record_worse_says_so() {
     let at = |name: &str| format!("examples/{name}");
     let (coil, first, second) = (at("chamber-coil.toml"), at("chamber-day-1.csv"), at("chamber-day-2.csv"));

@@ -6,6 +6,7 @@ const COIL: &str = "examples/chamber-coil.toml";
 const RECORD: &str = "examples/chamber-day-1.csv";
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_diagnosis_leaves_its_ladder_its_page_the_extended_model_and_an_experiment_that_can_be_run() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).display().to_string();

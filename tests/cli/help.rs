@@ -115,6 +115,7 @@ fn shell(folder: &Path, line: &str) -> Output {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn every_example_of_every_help_text_runs() {
     let (mut ran, mut parsed) = (0, 0);
     let folder = tempfile::tempdir().unwrap();

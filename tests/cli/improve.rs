@@ -23,6 +23,7 @@ pub(super) fn prepare(folder: &Path) {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn the_example_of_improve_runs_from_records_to_a_schedule_and_takes_no_step_twice() {
     let folder = tempfile::tempdir().unwrap();
     prepare(folder.path());
@@ -118,6 +119,7 @@ fn cutting_planes_list_the_profiles_that_joined_and_are_refused_where_they_mean_
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_formula_that_predicts_is_in_what_the_next_coil_should_show_and_not_in_the_search() {
     let folder = tempfile::tempdir().unwrap();
     let read = |name: &str| std::fs::read_to_string(root().join("examples").join(name)).unwrap();

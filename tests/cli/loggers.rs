@@ -162,6 +162,7 @@ fn same(a: &Value, b: &Value, place: &str) {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn every_way_to_write_a_record_gives_the_plain_files_answer() {
     let (folder, plain) = folder_with("plain.csv", numbers("time_s,temperature_c,rate_deg_per_h", |t, c, r| [t, c, r]));
     let other = folder.path().join("other.csv");

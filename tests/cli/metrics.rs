@@ -113,6 +113,7 @@ fn the_angle_random_walk_of_white_noise_lies_within_its_interval_and_nothing_els
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn what_compensate_writes_is_measured_by_its_compensated_rate() {
     let coil = "tests/data/records/a-control/coil.toml";
     let compensated = run(&["compensate", coil, RECORD, "-q"]);

@@ -192,11 +192,13 @@ fn shown_names() -> Vec<&'static str> {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn every_other_name_is_the_same_in_every_file_that_the_quick_commands_write() {
     through(&shown_names(), |way| if let Way::Quick(way) = way { Some(*way) } else { None });
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn searches_and_measurements_keep_names_as_they_are() {
     let names = if std::env::var_os("COILWRIGHT_ALL_NAMES").is_some() { shown_names() } else { WORST.to_vec() };
     through(&names, |way| match way {
@@ -211,6 +213,7 @@ fn searches_and_measurements_keep_names_as_they_are() {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_path_and_an_argument_are_shown_and_not_obeyed() {
     for name in NAMES.iter().copied().filter(|name| !name.contains('\0')) {
         for arguments in [

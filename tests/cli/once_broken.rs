@@ -21,6 +21,7 @@ fn noise(row: usize) -> f64 {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn gaps_close_stamps_and_a_constant_rate_end_in_numbers_or_one_error() {
     let folder = tempfile::tempdir().unwrap();
     bench(folder.path());

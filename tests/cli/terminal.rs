@@ -222,6 +222,7 @@ fn quiet_leaves_only_errors_on_stderr_and_verbose_adds_version_threads_and_time(
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn progress_comes_as_one_json_object_a_line_on_request_only_and_on_stderr_only() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("run").display().to_string();

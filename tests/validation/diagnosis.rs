@@ -44,22 +44,26 @@ fn assert_found(name: &str, expected: &[(&str, &[(&str, f64)])]) {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_complete_model_of_a_cylindrical_coil_is_given_no_effect() {
     assert_found("g-control-zyl", &[]);
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_mismatch_of_the_halves_is_found_with_its_size() {
     assert_found("d-mismatch", &[("strain_mismatch", &[("mismatch", 0.004)])]);
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_spool_is_found_with_its_numbers_where_the_air_has_its_kinks_by_the_spool() {
     let numbers = [("heat_capacity_j_per_m2_k", 5500.0), ("contact_w_per_m2_k", 400.0)];
     assert_found("c-spool", &[("spool_mass", &numbers)]);
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_model_file_that_declares_another_winding_is_told_which_one_explains_the_record() {
     let file = model("a-control");
     let declared = Classic::Qua.pattern(file.model.coil.layers()).unwrap();

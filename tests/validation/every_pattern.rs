@@ -305,6 +305,7 @@ fn tried(
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn the_search_finds_the_best_of_all_patterns_under_every_objective_and_class() {
     use WindabilityClass::{Any, Captive, Standard};
     if let Ok(asked) = std::env::var("COILWRIGHT_EVERY_PATTERN") {

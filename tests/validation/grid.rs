@@ -281,6 +281,7 @@ fn best_of_all(fine: &CoilModel, pattern: &Pattern, durations_s: &[f64]) -> Prof
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn no_profile_that_is_optimised_on_the_finest_grid_exceeds_what_is_guaranteed() {
     let mut random = ChaCha8Rng::seed_from_u64(17);
     let (mut tried, mut attained) = (0, Vec::new());

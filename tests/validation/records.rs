@@ -84,6 +84,7 @@ fn names(found: &Comparison, wanted: &Covariate) -> bool {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_complete_model_is_adequate_and_no_regime_stands_out() {
     for name in ["a-control", "g-control-zyl"] {
         let found = compared(name);
@@ -94,6 +95,7 @@ fn a_complete_model_is_adequate_and_no_regime_stands_out() {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_hidden_spool_and_a_lagging_sensor_show_after_each_change_of_ramp() {
     for name in ["c-spool", "e-sensor"] {
         let found = compared(name);
@@ -103,6 +105,7 @@ fn a_hidden_spool_and_a_lagging_sensor_show_after_each_change_of_ramp() {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_hidden_mismatch_of_the_halves_shows_as_a_dependence_on_the_rate_of_temperature() {
     let found = compared("d-mismatch");
     assert_eq!(found.verdict, Adequacy::Missing);
@@ -110,6 +113,7 @@ fn a_hidden_mismatch_of_the_halves_shows_as_a_dependence_on_the_rate_of_temperat
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn stress_and_a_temperature_bias_show_as_dependences_on_rate_and_temperature() {
     let found = compared("f-two");
     assert_eq!(found.verdict, Adequacy::Missing);
@@ -117,6 +121,7 @@ fn stress_and_a_temperature_bias_show_as_dependences_on_rate_and_temperature() {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_half_space_for_a_pack_that_ends_shows_as_a_wrong_prediction() {
     let found = compared("b-half-space");
     assert_eq!(found.verdict, Adequacy::Missing);
@@ -136,6 +141,7 @@ fn spoilt(record: &Record) -> (Record, Vec<usize>) {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn irregular_rows_a_gap_and_gross_errors_leave_a_complete_model_adequate() {
     let file = model("g-control-zyl");
     let (spoilt, rows) = spoilt(&record("g-control-zyl", "validation.csv"));
@@ -150,6 +156,7 @@ fn irregular_rows_a_gap_and_gross_errors_leave_a_complete_model_adequate() {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_rate_that_is_a_mean_over_its_interval_is_taken_as_one() {
     let mut file = model("g-control-zyl");
     let record = record("g-control-zyl", "validation.csv");

@@ -34,6 +34,7 @@ fn beginning(whole: &Record) -> Record {
 const GROSS: f64 = 6.0;
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn with_the_hidden_effect_declared_at_its_true_size_only_the_noise_is_left() {
     for (name, hidden, noise_deg_per_h, offset_deg_per_h) in CASES {
         let file = model(name);

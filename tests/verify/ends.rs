@@ -29,6 +29,7 @@ fn holds(file: &ModelFile, document: &ScheduleJson) -> bool {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn schedules_with_turns_of_their_own_at_the_ends_hold_in_every_form() {
     for text in [PAPER, LONG] {
         let file = model(text);
@@ -53,6 +54,7 @@ fn schedules_with_turns_of_their_own_at_the_ends_hold_in_every_form() {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn their_rate_error_is_found_again_turn_by_turn_with_effects_that_weigh_layers_and_halves() {
     for effect in [
         "kind = 'axial_gradient'\nfilm_w_per_m2_k = 20.0\nflange = 'first'",

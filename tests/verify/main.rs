@@ -42,6 +42,7 @@ fn schedules_of_classic_and_arbitrary_windings_hold_in_every_form() {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn schedules_of_the_shipped_coils_hold_in_every_form_for_classic_and_searched_windings() {
     for (example, searched) in
         [("paper-200m", &["searched-standard-12", "searched-any-12"][..]), ("coil-998m", &["searched-standard-40"][..])]
@@ -65,6 +66,7 @@ fn schedules_of_the_shipped_coils_hold_in_every_form_for_classic_and_searched_wi
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_schedule_over_profiles_of_a_thousand_ramps_holds_like_any_other() {
     for text in [PAPER, WARM] {
         let text = text.replace("segments = 2", "segments = 1_000").replace("segments = 3", "segments = 1_000");
@@ -250,6 +252,7 @@ fn a_rate_error_that_is_not_worked_out_again_is_said_to_be_taken_as_given() {
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn the_rate_error_of_every_effect_is_found_again_by_code_of_its_own() {
     let stated = [EFFECTS, GIVEN].concat().concat();
     for spec in coilwright::effect::CATALOGUE.iter().filter(|spec| spec.kind != "finite_pack") {
@@ -281,6 +284,7 @@ fn the_rate_error_of_every_effect_is_found_again_by_code_of_its_own() {
 
 /// A sensor on the spool, or on a flange, makes that part's temperature the profile.
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_sensor_on_the_spool_or_a_flange_is_worked_out_again() {
     let spool = "[[effect]]\nkind = 'spool_mass'\nheat_capacity_j_per_m2_k = 4000.0\ncontact_w_per_m2_k = 300.0\n\
                  mount_w_per_m2_k = 20.0\n[[effect]]\nkind = 'surface_film'\nfilm_w_per_m2_k = 30.0\n";
@@ -304,6 +308,7 @@ fn a_sensor_on_the_spool_or_a_flange_is_worked_out_again() {
 /// A heated flange whose material's conductivity depends on temperature is stepped on both sides; what emits schedules
 /// takes long, so the pack is small and its profile short.
 #[test]
+#[ignore = "long: --include-ignored"]
 fn a_heated_flange_with_a_conductivity_that_depends_on_temperature_is_worked_out_again() {
     let small = WARM.replace("layers = 12", "layers = 4").replace("turns_per_layer = 50", "turns_per_layer = 10");
     let small = small.replace("duration_s = 1500.0", "duration_s = 30.0").replace("segments = 3", "segments = 1");

@@ -330,6 +330,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "long: --include-ignored"]
     fn a_current_acts_on_a_rate_by_what_it_was_since_the_row_before() {
         let (declared, pattern) = (model(Vec::new()), pattern());
         assert_eq!(declared.rate_mean_s, 10.0);
@@ -357,6 +358,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "long: --include-ignored"]
     fn the_middle_of_a_columns_saturation_is_found_with_it() {
         let (declared, pattern) = (model(Vec::new()), pattern());
         let day = |seed: u64| {
@@ -380,6 +382,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "long: --include-ignored"]
     fn the_lagged_size_of_a_current_is_found_with_its_numbers_and_a_record_without_it_shows_nothing() {
         let (declared, pattern) = (model(Vec::new()), pattern());
         let asked = |gain: f64, terms: Terms| {

@@ -229,6 +229,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "long: --include-ignored"]
     fn rivals_that_are_the_same_but_for_their_size_are_told_apart_by_no_profile_and_by_no_number_of_runs() {
         let larger = alternative("larger", model(vec![effect("strain_mismatch", &[0.012])]));
         let found = design(&comparison(vec![mismatch(), larger]), &CHAMBER, 1).unwrap();
@@ -240,6 +241,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "long: --include-ignored"]
     fn a_profile_that_tells_rivals_apart_is_found_where_there_is_one() {
         let bias = alternative("bias", model(vec![effect("bias_temperature", &[5e-9, 0.0])]));
         let found = design(&comparison(vec![mismatch(), bias]), &CHAMBER, 1).unwrap();

@@ -247,6 +247,7 @@ fn many_moves_at_once_end_on_the_best_of_every_standard_pattern_from_a_poor_one_
 }
 
 #[test]
+#[ignore = "long: --include-ignored"]
 fn many_moves_at_once_stay_in_their_class_and_find_what_few_patterns_beat_also_where_their_sum_is_not_exact() {
     // Every so many-th pattern of 40 320 is weighed.
     const MOST_WEIGHED: usize = 400;
