@@ -210,7 +210,15 @@ pub(super) mod tests {
         assert!(series.rows[14].is_kinked_within());
         assert_eq!(series.averaged > 1, averaged);
         let numbers = Numbers::medians(&series);
-        let seen = Observed { record, series, channels: Vec::new(), mean_k, blind: false, day: None };
+        let seen = Observed {
+            record,
+            series,
+            channels: Vec::new(),
+            mean_k,
+            blind: false,
+            day: None,
+            solved: Solved::default(),
+        };
         let side = CoilSide::new(assumed, numbers.get(Quantity::Film), 4, &seen).unwrap();
         let system = system(&side.parts(assumed), &numbers, &seen.series);
         let values = filter::Values { of: seen.series.values.clone() };
@@ -324,7 +332,15 @@ pub(super) mod tests {
         let assumed = Assumption::new(model(Vec::new()), dip());
         let (series, mean_k) = observed(&assumed.model, &record);
         let numbers = Numbers::medians(&series);
-        let mut seen = Observed { record: &record, series, channels: Vec::new(), mean_k, blind: false, day: None };
+        let mut seen = Observed {
+            record: &record,
+            series,
+            channels: Vec::new(),
+            mean_k,
+            blind: false,
+            day: None,
+            solved: Solved::default(),
+        };
         let side = CoilSide::new(&assumed, 25.0, 5, &seen).unwrap();
         let values = filter::Values { of: seen.series.values.clone() };
         let system = system(&side.parts(&assumed), &numbers, &seen.series);

@@ -64,6 +64,7 @@ mod scorer;
 mod series;
 mod shocks;
 mod shows;
+mod solved;
 mod sparse;
 mod start;
 mod states;
@@ -80,6 +81,7 @@ use crate::record::Record;
 use crate::thermal::ThermalError;
 use point::Observed;
 use series::{Origin, Series};
+use solved::Solved;
 use system::driven_by_air;
 
 pub(crate) use adjustment::DifferenceVariance;
@@ -255,7 +257,15 @@ impl<'a> Chamber<'a> {
                 return Err(ChamberError::TooFew { record: record.name().to_owned(), row_s, found });
             }
             let channels = record.channels().iter().map(|c| c.name.clone()).collect();
-            observed.push(Observed { record, mean_k: 0.5 * (low + high), series, channels, blind: false, day: None });
+            observed.push(Observed {
+                record,
+                mean_k: 0.5 * (low + high),
+                series,
+                channels,
+                blind: false,
+                day: None,
+                solved: Solved::default(),
+            });
         }
         let modes = if path.extent == crate::thermal::Extent::HalfSpace {
             HALF_SPACE_MODES

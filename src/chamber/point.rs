@@ -1,5 +1,7 @@
 //! A model with all its numbers, and what the filter makes of a record with it.
 
+use std::sync::Arc;
+
 use super::film::drive;
 use super::filter::{self, Innovation, Trace, Values};
 use super::known::{Asked, Reference, known, taken_off};
@@ -9,6 +11,7 @@ use super::row::Film;
 use super::series::Series;
 
 use super::shows::Shows;
+use super::solved::Solved;
 use super::system::{driven_by_air, system};
 use super::{Assumption, ChamberError};
 use crate::effect::PackState;
@@ -23,7 +26,7 @@ pub(super) struct CoilSide {
     path: HeatPath,
     film_w_per_m2_k: f64,
     modes: usize,
-    pub(crate) reduced: Reduced,
+    pub(crate) reduced: Arc<Reduced>,
     pub(crate) gains: OutputGains,
     rate: RateModel,
     skin_s: Option<f64>,
@@ -43,6 +46,7 @@ pub(super) struct Observed<'a> {
     pub(crate) blind: bool,
     /// What its own air was found to be, by itself.
     pub(crate) day: Option<Numbers>,
+    pub(crate) solved: Solved,
 }
 
 impl CoilSide {
@@ -60,8 +64,7 @@ impl CoilSide {
         let film_w_per_m2_k = if path.film_is_unknown() { film } else { path.film_w_per_m2_k.unwrap_or(f64::INFINITY) };
         check(&path)?;
         let (driven, skin_s) = driven_by_air(&path, film_w_per_m2_k);
-        let (shortest_s, longest_s) = (observed.series.shortest_s(), observed.series.duration_s.max(1.0));
-        let reduced = Reduced::new(&driven, path.sensors_part(), modes, shortest_s, longest_s)?;
+        let reduced = observed.solved.reduced(driven, path.sensors_part(), modes, &observed.series)?;
         let rate = RateModel::new(model, &assumed.pattern, &observed.channels)?;
         let gains = gains(&rate, &reduced, observed);
         let beyond_linear = model.effects.iter().any(|e| {
