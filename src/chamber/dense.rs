@@ -217,7 +217,7 @@ pub(super) mod tests {
             mean_k,
             blind: false,
             day: None,
-            solved: Solved::default(),
+            solved: super::super::solved::Solved::default(),
         };
         let side = CoilSide::new(assumed, numbers.get(Quantity::Film), 4, &seen).unwrap();
         let system = system(&side.parts(assumed), &numbers, &seen.series);
@@ -339,7 +339,7 @@ pub(super) mod tests {
             mean_k,
             blind: false,
             day: None,
-            solved: Solved::default(),
+            solved: super::super::solved::Solved::default(),
         };
         let side = CoilSide::new(&assumed, 25.0, 5, &seen).unwrap();
         let values = filter::Values { of: seen.series.values.clone() };
