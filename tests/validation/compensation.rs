@@ -1,6 +1,5 @@
-//! References: the seven records of [`crate::records`], fitted on calibration and applied to validation; the thesis
-//! chapter's piecewise-linear compensation (Eqs. 3-4, 3-8 to 3-11) on a synthetic record with its coefficients; and a C
-//! compiler for the exported header.
+//! References: the seven records of [`crate::records`], fitted on calibration and applied to validation; the thesis chapter's
+//! piecewise-linear compensation (Eqs. 3-4, 3-8 to 3-11) on a synthetic record with its coefficients; a C compiler for the header.
 //! Tolerance: physical compensation best where the model is complete; break points within 0.02 K in a twentieth of the
 //! chapter's noise band; in all of it within 2 K, in the median within 0.5 and 0.2 K, and within their own 95 % intervals;
 //! the chapter's rounded figures to their printed digits or within 10 %; exported and own output equal to 1e-8 °/h.
