@@ -120,6 +120,11 @@ fn a_film_that_a_fan_switches_behind_a_sensor_in_the_air_is_found_with_its_times
         _ => None,
     });
     assert_eq!(said.unwrap().times_s.len(), 3);
+    let spikes = compared.findings.iter().find_map(|finding| match finding {
+        ResidualFinding::NothingStandsOut { gross_errors, .. } => Some(*gross_errors),
+        _ => None,
+    });
+    assert!((15..=25).contains(&spikes.unwrap()), "{spikes:?}");
 }
 
 /// A sensor on the pack shows a switch as a jump of the air.

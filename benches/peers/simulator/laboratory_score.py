@@ -204,6 +204,48 @@ def row(name, truth, answer):
     return word, "| " + " | ".join(cells) + " |", (value / sigma if value else None), test / sigma if test else None
 
 
+def leading_right(truth, answer):
+    """Whether the set that holds most is what was hidden; None where the verdict does not stand behind it (`unexplained`) or where a formula was hidden."""
+    first = (answer.get("posterior") or [None])[0]
+    hypothesis = {k: v for k, v in ((first or {}).get("hypothesis") or {}).items() if v}
+    if first is None or truth["answers"] is None or truth.get("extra") or (answer["verdict"] == "unexplained" and not hypothesis):
+        return None
+    expects = dict(truth.get("expects") or {})
+    if "wound_as" in truth and truth["wound_as"] != truth["declared_as"]:
+        expects["winding"] = truth["wound_as"]
+    asked = hypothesis_right(expects, first)
+    # What is said in words, with a space in it, is a hypothesis or a refitted number.
+    said = frozenset(plain_kind(e) for e in first["effects"] if " " not in e)
+    beside = expects.get("refitted", {}).get("kind")
+    wanted = [frozenset(truth["answers"]), frozenset(truth["answers"]) | {beside}] + ([frozenset()] if faint(truth) else [])
+    return (asked if asked is not None else not hypothesis) and said in wanted
+
+
+BINS = [(0.0, 0.5), (0.5, 0.8), (0.8, 0.95), (0.95, 1.01)]
+SIZES = [(0.0, 0.15), (0.15, 0.5), (0.5, 1.0), (1.0, 3.0), (3.0, float("inf"))]
+
+
+def calibration(truths, answers):
+    """Tables: what is stated against how often it is right; what is found by its size."""
+    judged = [(n, answers[n]["posterior"][0]["probability"], leading_right(truths[n], answers[n])) for n in truths if n in answers and answers[n].get("posterior")]
+    judged = [j for j in judged if j[2] is not None]
+    lines = ["", "| stated | leading sets | right |", "|---|---|---|"]
+    for low, high in BINS:
+        of = [right for _, p, right in judged if low <= p < high]
+        lines.append(f"| {low:.2f} to {min(high, 1):.2f} | {len(of)} | {sum(of)} |")
+    lines += ["", "| condition | stated at 0.95 or more | right |", "|---|---|---|"]
+    for condition in dict.fromkeys(c for n, _, _ in judged for c in truths[n].get("conditions") or []):
+        of = [right for n, p, right in judged if p >= 0.95 and condition in (truths[n].get("conditions") or [])]
+        lines.append(f"| {condition} | {len(of)} | {sum(of)} |")
+    lines += ["", "| listed effects alone, rms in white noises | cases | right, or a right set |", "|---|---|---|"]
+    for low, high in SIZES:
+        def is_of(t):
+            return len(t["answers"] or []) == 1 and not t.get("extra") and low <= t.get("listed_rms_deg_per_h", -1) / t["noise_sigma_deg_per_h"] < high
+        words = [judge(truths[n], answers[n]) for n in truths if n in answers and is_of(truths[n])]
+        lines.append(f"| {low:g} to {high:g} | {len(words)} | {sum(w.startswith('right') for w in words)} |")
+    return lines
+
+
 def write_table(truths, answers, file):
     rows, counts, total, found = [], {}, {}, {}
     for name in (n for n in truths if n in answers):
@@ -223,7 +265,7 @@ def write_table(truths, answers, file):
         lines.append(f"| {condition} | {sum(of.values())} | " + " | ".join(str(of.get(w, "")) for w in ORDER) + f" | {ratios[len(ratios) // 2]:.3f} |" if ratios else
                      f"| {condition} | {sum(of.values())} | " + " | ".join(str(of.get(w, "")) for w in ORDER) + " | |")
     lines += ["", "| case | hidden | rms/noise: listed, unlisted | judged | answer | posterior of the first | white noise found/true | test error/noise | wall s |", "|---" * 9 + "|"]
-    open(file, "w").write("\n".join(lines + rows) + "\n")
+    open(file, "w").write("\n".join(lines + rows + calibration(truths, answers)) + "\n")
     return total
 
 
