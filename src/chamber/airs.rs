@@ -3,9 +3,9 @@
 use rayon::prelude::*;
 
 use super::ascent::Effort;
+use super::coil_side::CoilSide;
 use super::fit::Fit;
 use super::layout::Numbers;
-use super::point::CoilSide;
 use super::prior::Quantity;
 use super::series::Series;
 use super::{Chamber, ChamberError};

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use super::ascent::Effort;
+use super::coil_side::{BLIND_RAD2_PER_S2, CoilSide, Rates, smoothed};
 use super::filter::{Innovation, RATE};
 use super::fit::Fit;
 use super::known::Reference;
 use super::layout::Numbers;
 use super::noise::Remedy;
-use super::point::{BLIND_RAD2_PER_S2, CoilSide, Rates, smoothed};
 use super::prior::Quantity;
 use super::{Chamber, ChamberError};
 

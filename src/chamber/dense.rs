@@ -6,10 +6,10 @@ pub(super) mod tests {
     use nalgebra::{DMatrix, DVector};
 
     use crate::chamber::abreast;
+    use crate::chamber::coil_side::{CoilSide, Observed};
     use crate::chamber::filter::{self, Move, System};
     use crate::chamber::kinks::Bend;
     use crate::chamber::layout::{Numbers, Parts};
-    use crate::chamber::point::{CoilSide, Observed};
     use crate::chamber::prior::Quantity;
     use crate::chamber::series::{Origin, Series};
     use crate::chamber::system::system;
@@ -210,15 +210,7 @@ pub(super) mod tests {
         assert!(series.rows[14].is_kinked_within());
         assert_eq!(series.averaged > 1, averaged);
         let numbers = Numbers::medians(&series);
-        let seen = Observed {
-            record,
-            series,
-            channels: Vec::new(),
-            mean_k,
-            blind: false,
-            day: None,
-            solved: super::super::solved::Solved::default(),
-        };
+        let seen = Observed::new(record, series, mean_k);
         let side = CoilSide::new(assumed, numbers.get(Quantity::Film), 4, &seen).unwrap();
         let system = system(&side.parts(assumed), &numbers, &seen.series);
         let values = filter::Values { of: seen.series.values.clone() };
@@ -332,15 +324,7 @@ pub(super) mod tests {
         let assumed = Assumption::new(model(Vec::new()), dip());
         let (series, mean_k) = observed(&assumed.model, &record);
         let numbers = Numbers::medians(&series);
-        let mut seen = Observed {
-            record: &record,
-            series,
-            channels: Vec::new(),
-            mean_k,
-            blind: false,
-            day: None,
-            solved: super::super::solved::Solved::default(),
-        };
+        let mut seen = Observed::new(&record, series, mean_k);
         let side = CoilSide::new(&assumed, 25.0, 5, &seen).unwrap();
         let values = filter::Values { of: seen.series.values.clone() };
         let system = system(&side.parts(&assumed), &numbers, &seen.series);

@@ -1,8 +1,8 @@
 //! What a step of the film between air and pack makes of readings and rates, to first order.
 
+use super::coil_side::CoilSide;
 use super::filter::{RATE, Values};
 use super::known::lagged;
-use super::point::CoilSide;
 use super::series::Series;
 
 /// Steps of the film's logarithm by one from some row on, as the pack follows.

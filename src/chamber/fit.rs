@@ -6,10 +6,10 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::ascent::{AscentEnd, Beginning, Effort, KnownDerivatives};
+use super::coil_side::{CoilSide, Rates, quantities, smoothed};
 use super::known::Reference;
 use super::layout::Numbers;
 use super::parameter::{Free, Parameter};
-use super::point::{CoilSide, Rates, quantities, smoothed};
 use super::prior::Quantity;
 use super::{Assumption, Chamber, ChamberError};
 

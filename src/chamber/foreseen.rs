@@ -2,12 +2,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::coil_side::{CoilSide, Rates, smoothed};
 use super::filter::Innovation;
 use super::fit::Fit;
 use super::kinks::Bend;
 use super::layout::Numbers;
 use super::parameter::{Parameter, Place, write};
-use super::point::{CoilSide, Rates, smoothed};
 use super::prior::Quantity;
 use super::series::Origin;
 use super::{Assumption, Chamber, ChamberError};

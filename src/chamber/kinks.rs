@@ -41,19 +41,19 @@ impl Chamber<'_> {
     /// As [`Chamber::fit`].
     pub(crate) fn with_timed_shocks(self, assumed: &Assumption) -> Result<(Self, Fit), ChamberError> {
         let whole = self.clone();
-        let (chamber, fit) = self.with_timed_shocks_as_it_is(assumed)?;
+        let (chamber, fit) = self.with_timed_shocks_behind_these_films(assumed)?;
         // What rates say nothing of is one film's.
         if whole.observed[0].blind {
             return Ok((chamber, fit));
         }
         let Some((switched, _)) = whole.with_switched_film(&fit)? else { return Ok((chamber, fit)) };
-        let (switched, other) = switched.with_timed_shocks_as_it_is(assumed)?;
+        let (switched, other) = switched.with_timed_shocks_behind_these_films(assumed)?;
         let is_better = switched.gain_over(&other, (&chamber, &fit), 0)? > 0.0;
         Ok(if is_better { (switched, other) } else { (chamber, fit) })
     }
 
     /// With the film switched, or not, as it is.
-    fn with_timed_shocks_as_it_is(mut self, assumed: &Assumption) -> Result<(Self, Fit), ChamberError> {
+    fn with_timed_shocks_behind_these_films(mut self, assumed: &Assumption) -> Result<(Self, Fit), ChamberError> {
         let fit = self.best_start(assumed, &[], &[0])?;
         let fit = self.looked_through(fit, &[0])?;
         let mut kinks = self.time_kinks(&fit, 0)?;

@@ -33,6 +33,7 @@ mod adjustment;
 mod airs;
 mod ascent;
 mod causal;
+mod coil_side;
 mod course;
 #[cfg(test)]
 mod dense;
@@ -53,7 +54,6 @@ mod long;
 mod model_point;
 mod noise;
 mod parameter;
-mod point;
 pub(crate) mod prior;
 mod readings;
 mod responses;
@@ -79,9 +79,8 @@ use crate::pattern::Pattern;
 use crate::rate::{CoilModel, RateError};
 use crate::record::Record;
 use crate::thermal::ThermalError;
-use point::Observed;
+use coil_side::Observed;
 use series::{Origin, Series};
-use solved::Solved;
 use system::driven_by_air;
 
 pub(crate) use adjustment::DifferenceVariance;
@@ -256,16 +255,7 @@ impl<'a> Chamber<'a> {
                 let (row_s, found) = (series.averaged as f64 * record.interval_s(), series.rows.len());
                 return Err(ChamberError::TooFew { record: record.name().to_owned(), row_s, found });
             }
-            let channels = record.channels().iter().map(|c| c.name.clone()).collect();
-            observed.push(Observed {
-                record,
-                mean_k: 0.5 * (low + high),
-                series,
-                channels,
-                blind: false,
-                day: None,
-                solved: Solved::default(),
-            });
+            observed.push(Observed::new(record, series, 0.5 * (low + high)));
         }
         let modes = if path.extent == crate::thermal::Extent::HalfSpace {
             HALF_SPACE_MODES

@@ -3,12 +3,12 @@
 use rayon::prelude::*;
 
 use super::abreast;
+use super::coil_side::{CoilSide, run};
 use super::derivative::{DerivativeColumn, Derivatives};
 use super::filter::{self, Innovation, System, Values};
 use super::known::Reference;
 use super::layout::Numbers;
 use super::parameter::{Parameter, write};
-use super::point::{CoilSide, run};
 use super::prior::Quantity;
 
 use super::system::system;

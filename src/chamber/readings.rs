@@ -8,12 +8,12 @@
 //! # Source
 //! de Jong, J. Am. Stat. Assoc. 84 (1989) 1085.
 
+use super::coil_side::{CoilSide, run_kept};
 use super::filter::{self, Innovation, MEASURED, Move, RATE, Row, System, Trace, Values};
 use super::fit::Fit;
 use super::kinks::Bend;
 use super::known::Reference;
 use super::layout::{Layout, Numbers};
-use super::point::{CoilSide, run_kept};
 use super::prior::Quantity;
 use super::series::{Origin, Series};
 

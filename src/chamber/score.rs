@@ -16,10 +16,10 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::coil_side::run_kept;
 use super::derivative::{DerivativeColumn, Derivatives};
 use super::filter::{RATE, Values, respond};
 use super::fit::Fit;
-use super::point::run_kept;
 use super::{Assumption, Chamber, ChamberError};
 
 /// A course that might add to the rate [rad/s at unit amplitude].

@@ -14,11 +14,11 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+use super::coil_side::run_kept;
 use super::derivative::Derivatives;
 use super::filter::{RATE, System, Trace, Values, respond};
 use super::fit::Fit;
 use super::parameter::{Parameter, Place};
-use super::point::run_kept;
 use super::prior::Quantity;
 use super::{Assumption, Chamber, ChamberError, Column};
 

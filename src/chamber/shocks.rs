@@ -6,11 +6,11 @@
 use rayon::prelude::*;
 
 use super::ascent::Effort;
+use super::coil_side::{BLIND_RAD2_PER_S2, CoilSide, run_kept};
 use super::filter::{self, RATE};
 use super::fit::Fit;
 use super::kinks::Bend;
 use super::layout::Numbers;
-use super::point::{BLIND_RAD2_PER_S2, CoilSide, run_kept};
 use super::prior::{GROSS_FACTOR, GROSS_SHARE, KINKS_PER_ROW, Quantity};
 use super::series::Series;
 

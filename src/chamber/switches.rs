@@ -13,12 +13,12 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::ascent::Effort;
+use super::coil_side::film_is_free;
 use super::film_step::FilmStep;
 use super::filter;
 use super::fit::Fit;
 use super::kinks::highest;
 use super::layout::Numbers;
-use super::point::film_is_free;
 use super::prior::{Quantity, SWITCHED_LOG};
 use super::responses::responses;
 use super::row::Film;
@@ -69,7 +69,8 @@ impl std::fmt::Display for FilmSwitches {
             write!(f, " to {ratio:.2} times what it is else")?;
         }
         let times: Vec<String> = self.times_s.iter().map(|t| format!("{t:.0}")).collect();
-        write!(f, " and back, at {} s", times.join(", "))?;
+        f.write_str(if times.len() > 1 { " and back" } else { "" })?;
+        write!(f, ", at {} s", times.join(", "))?;
         f.write_str(if self.begins_switched { ", the record beginning behind the other one" } else { "" })
     }
 }

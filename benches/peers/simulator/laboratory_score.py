@@ -104,16 +104,20 @@ def faint(truth):
     return not through_readings and truth.get("listed_rms_deg_per_h", 1e9) < 0.15 * truth["noise_sigma_deg_per_h"]
 
 
+def expected(truth):
+    """What is to be said beside listed effects, another winding included."""
+    winding = {"winding": truth["wound_as"]} if "wound_as" in truth and truth["wound_as"] != truth["declared_as"] else {}
+    return (truth.get("expects") or {}) | winding
+
+
 def judge(truth, answer):
     """One word of ORDER."""
     if "verdict" not in answer:
         return "error"
     verdict, wanted = answer["verdict"], truth["answers"]
-    expects, discoverable = truth.get("expects") or {}, truth.get("discoverable")
+    expects, discoverable = expected(truth), truth.get("discoverable")
     sets = named(answer) if answer.get("effects") else []
     truth_set = None if wanted is None else frozenset(wanted)
-    if "wound_as" in truth and truth["wound_as"] != truth["declared_as"]:
-        expects = dict(expects, winding=truth["wound_as"])
     hypothesis = hypothesis_right(expects, answer)
     if hypothesis is None and answer.get("hypothesis") and any(v for v in answer["hypothesis"].values()):
         return "CONFIDENT WRONG" if not answer["hypothesis"].get("offset_steps") else "WRONG SET"
@@ -210,14 +214,13 @@ def leading_right(truth, answer):
     hypothesis = {k: v for k, v in ((first or {}).get("hypothesis") or {}).items() if v}
     if first is None or truth["answers"] is None or truth.get("extra") or (answer["verdict"] == "unexplained" and not hypothesis):
         return None
-    expects = dict(truth.get("expects") or {})
-    if "wound_as" in truth and truth["wound_as"] != truth["declared_as"]:
-        expects["winding"] = truth["wound_as"]
+    expects = expected(truth)
     asked = hypothesis_right(expects, first)
     # What is said in words, with a space in it, is a hypothesis or a refitted number.
     said = frozenset(plain_kind(e) for e in first["effects"] if " " not in e)
-    beside = expects.get("refitted", {}).get("kind")
-    wanted = [frozenset(truth["answers"]), frozenset(truth["answers"]) | {beside}] + ([frozenset()] if faint(truth) else [])
+    hidden = frozenset(truth["answers"])
+    beside = {expects["refitted"]["kind"]} if "refitted" in expects else set()
+    wanted = [hidden, hidden | beside] + ([frozenset()] if faint(truth) else [])
     return (asked if asked is not None else not hypothesis) and said in wanted
 
 

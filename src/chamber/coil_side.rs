@@ -49,6 +49,13 @@ pub(super) struct Observed<'a> {
     pub(crate) solved: Solved,
 }
 
+impl<'a> Observed<'a> {
+    pub(super) fn new(record: &'a Record, series: Series, mean_k: f64) -> Self {
+        let channels = record.channels().iter().map(|c| c.name.clone()).collect();
+        Self { record, series, channels, mean_k, blind: false, day: None, solved: Solved::default() }
+    }
+}
+
 impl CoilSide {
     /// # Errors
     /// A model that cannot be solved.
