@@ -166,6 +166,15 @@ pub(crate) fn layers_by_segment(segments: &[usize]) -> Vec<usize> {
     layers
 }
 
+/// The other way round: P(j) of the layers in the order of the fibre.
+pub(crate) fn segments_by_layer(layers_by_segment: &[usize]) -> Vec<usize> {
+    let mut segments = vec![0; layers_by_segment.len()];
+    for (at, &layer) in layers_by_segment.iter().enumerate() {
+        segments[layer] = at + 1;
+    }
+    segments
+}
+
 /// As [`Pattern::axial_direction`], of segments that are known to be a permutation.
 pub(crate) fn axial_direction(segments: &[usize], layer: usize) -> f64 {
     let (first, last) = (segments[0], segments.len());

@@ -7,7 +7,7 @@
 
 use super::anneal::rounds::{FoundPattern, Plan, Rounds, Rules};
 use super::cost::objective::Objective;
-use super::evaluator::{Evaluator, FEWEST_LAYERS, JudgeError, name_of};
+use super::evaluator::{EQUALLY_GOOD, Evaluator, FEWEST_LAYERS, JudgeError, name_of};
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 
@@ -69,12 +69,21 @@ impl<'a> Evaluator<'a> {
                 shared.extend(self.under(objective).short(WindabilityClass::Captive(1), plan, goes_on)?);
             }
         }
-        if self.objective == Objective::P95 && class != WindabilityClass::Standard {
+        if self.objective == Objective::Pointing && class != WindabilityClass::Standard {
+            shared.extend(self.short(class, plan, goes_on)?);
+        }
+        if self.objective == Objective::P95 {
             let usual = self.short_moves_per_restart(self.model.coil.layers());
             // Whoever asks for fewer moves has fewer.
-            let is_usual = plan.moves_per_restart >= usual;
-            let moves = if is_usual { MOVES_OVER_BUILT_COILS.max(usual) } else { plan.moves_per_restart };
-            shared.extend(self.short_with(moves, class, plan, goes_on)?);
+            let is_longer = plan.moves_per_restart >= usual && class != WindabilityClass::Standard;
+            let moves = if is_longer { MOVES_OVER_BUILT_COILS.max(usual) } else { plan.moves_per_restart.min(usual) };
+            if let Some(search) = self.short_search(moves, class, plan, goes_on)? {
+                shared.extend(self.shared_of(search.as_ref(), class, goes_on)?);
+                // From here all searches descend alike.
+                let starts = starts_of(self.judged(search.as_ref(), class, &shared));
+                let reached = search.in_other_orders(&starts, goes_on);
+                shared.extend(reached.and_then(|found| Pattern::new(found.segments).ok()));
+            }
         }
         let mut seen = std::collections::BTreeSet::new();
         shared.retain(|pattern| seen.insert(pattern.segments().to_vec()));
@@ -120,6 +129,18 @@ impl<'a> Evaluator<'a> {
         plan: &Plan,
         goes_on: &dyn Fn() -> bool,
     ) -> Result<Vec<Pattern>, JudgeError> {
+        let search = self.short_search(moves_per_restart, class, plan, goes_on)?;
+        search.map_or(Ok(Vec::new()), |search| self.shared_of(search.as_ref(), class, goes_on))
+    }
+
+    /// A few rounds, at their end.
+    fn short_search(
+        &self,
+        moves_per_restart: u64,
+        class: WindabilityClass,
+        plan: &Plan,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Result<Option<Box<dyn Rounds>>, JudgeError> {
         let plan = Plan {
             seed: plan.seed,
             restarts_per_round: plan.restarts_per_round,
@@ -127,9 +148,19 @@ impl<'a> Evaluator<'a> {
             rules: Rules { rounds: ROUNDS, patience: ROUNDS, moves: None, target: None },
             starts: Vec::new(),
         };
-        let Some(mut search) = self.search(class, plan, None)? else { return Ok(Vec::new()) };
+        let Some(mut search) = self.search(class, plan, None)? else { return Ok(None) };
         while goes_on() && search.advance() {}
         search.gather();
+        Ok(Some(search))
+    }
+
+    /// The best that a short search found, and what bounds make of it.
+    fn shared_of(
+        &self,
+        search: &dyn Rounds,
+        class: WindabilityClass,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Result<Vec<Pattern>, JudgeError> {
         let found = &search.state().found;
         let mut patterns: Vec<Pattern> =
             found.iter().take(SHARED).filter_map(|f| Pattern::new(f.segments.clone()).ok()).collect();
@@ -151,23 +182,43 @@ impl<'a> Evaluator<'a> {
         refine: bool,
         goes_on: &dyn Fn() -> bool,
     ) -> Vec<FoundPattern> {
-        let admitted = shared.iter().filter(|pattern| class.admits(pattern));
-        let judged: Vec<FoundPattern> = admitted.map(|pattern| search.judged(pattern.segments())).collect();
-        let mut found: Vec<FoundPattern> = search.state().found.iter().cloned().chain(judged).collect();
-        let order =
-            |a: &FoundPattern, b: &FoundPattern| a.cost.total_cmp(&b.cost).then_with(|| a.segments.cmp(&b.segments));
-        found.sort_by(order);
-        found.dedup_by(|a, b| a.segments == b.segments);
+        let shared = self.judged(search, class, shared);
+        let least_shared = shared.iter().map(|f| f.cost).fold(f64::INFINITY, f64::min);
+        let mut found = search.state().found.clone();
+        found.extend(shared);
+        let mut found = in_order(found);
         if refine {
-            let starts: Vec<Vec<usize>> = found.iter().take(REFINED).map(|f| f.segments.clone()).collect();
+            let starts = starts_of(found.clone());
             found.extend(search.refined(&starts, search.plan().moves_per_restart / REFINING_SHARE));
-            found.sort_by(order);
-            found.dedup_by(|a, b| a.segments == b.segments);
-            let starts: Vec<Vec<usize>> = found.iter().take(REFINED).map(|f| f.segments.clone()).collect();
-            found.extend(search.in_other_orders(&starts, goes_on));
-            found.sort_by(order);
-            found.dedup_by(|a, b| a.segments == b.segments);
+            found = in_order(found);
+            // What all searches by P95 have in common has descended.
+            let has_descended = self.objective == Objective::P95
+                && found.first().is_some_and(|best| best.cost >= least_shared * (1.0 - EQUALLY_GOOD));
+            // Of standard patterns by other objectives the annealer finds the best, or many moves at once do.
+            let is_worth_it = self.objective == Objective::P95 || class != WindabilityClass::Standard;
+            if is_worth_it && !has_descended {
+                found.extend(search.in_other_orders(&starts_of(found.clone()), goes_on));
+                found = in_order(found);
+            }
         }
         found
     }
+
+    /// Patterns of the class, as a search judges them.
+    fn judged(&self, search: &dyn Rounds, class: WindabilityClass, patterns: &[Pattern]) -> Vec<FoundPattern> {
+        let admitted = patterns.iter().filter(|pattern| class.admits(pattern));
+        admitted.map(|pattern| search.judged(pattern.segments())).collect()
+    }
+}
+
+/// Best first, no two alike.
+fn in_order(mut found: Vec<FoundPattern>) -> Vec<FoundPattern> {
+    found.sort_by(|a, b| a.cost.total_cmp(&b.cost).then_with(|| a.segments.cmp(&b.segments)));
+    found.dedup_by(|a, b| a.segments == b.segments);
+    found
+}
+
+/// What a refinement begins with.
+fn starts_of(found: Vec<FoundPattern>) -> Vec<Vec<usize>> {
+    in_order(found).into_iter().take(REFINED).map(|found| found.segments).collect()
 }

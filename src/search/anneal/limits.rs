@@ -1,5 +1,7 @@
 //! What the winding shop puts up with, and steps between patterns that stay within it.
 
+use std::ops::Range;
+
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::Rng;
 
@@ -114,4 +116,33 @@ pub(crate) fn neighbour(limits: WindingLimits, segments: &[usize], random: &mut 
         candidate[to..=from].rotate_right(1);
     }
     Some(candidate).filter(is_within)
+}
+
+/// Layers that lie at one end of the inner layers that they join and can go to the other, innermost first. All sets of them that go leave as many captive runs as
+/// there were.
+pub(crate) fn layers_at_an_end(segments: &[usize]) -> Vec<usize> {
+    let order = layers_by_segment(segments);
+    (0..segments.len()).filter(|&layer| run_of(&order, segments[layer] - 1).is_some()).collect()
+}
+
+/// A layer goes to the other end of the inner layers that it joins; `order` has the layers along the fibre.
+pub(crate) fn to_other_end(order: &mut [usize], layer: usize) {
+    let at = order.iter().position(|other| *other == layer).unwrap_or_default();
+    match run_of(order, at) {
+        Some(run) if run.start < at => order[run.start..=at].rotate_right(1),
+        Some(run) => order[at..run.end].rotate_left(1),
+        None => {}
+    }
+}
+
+/// The inner layers next to the layer at a place of the fibre; none where they lie at both sides of it or at neither.
+fn run_of(order: &[usize], at: usize) -> Option<Range<usize>> {
+    let layer = order[at];
+    let below = order[..at].iter().rev().take_while(|other| **other < layer).count();
+    let above = order[at + 1..].iter().take_while(|other| **other < layer).count();
+    match (below, above) {
+        (0, 1..) => Some(at + 1..at + 1 + above),
+        (1.., 0) => Some(at - below..at),
+        _ => None,
+    }
 }

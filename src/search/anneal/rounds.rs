@@ -234,8 +234,8 @@ pub trait Rounds {
     /// What short restarts find that begin, hardly warm, at given patterns: each judged on all samples.
     fn refined(&self, starts: &[Vec<usize>], moves: u64) -> Vec<FoundPattern>;
 
-    /// The best that descents from given patterns and from near them come to through all orders of a few neighbours; none
-    /// where patterns are no orders.
+    /// The best that descents from given patterns and from near them come to through all orders of a few neighbours and all ends of a
+    /// few layers.
     fn in_other_orders(&self, starts: &[Vec<usize>], goes_on: &dyn Fn() -> bool) -> Option<FoundPattern>;
 
     /// The best pattern so far, if a round has ended or a start was given.
@@ -390,9 +390,7 @@ impl<C: Cost> Rounds for Optimisation<C> {
     }
 
     fn in_other_orders(&self, starts: &[Vec<usize>], goes_on: &dyn Fn() -> bool) -> Option<FoundPattern> {
-        // The walk's own moves are all that leads from one standard pattern to another.
-        let reached =
-            self.full.is_of_permutations().then(|| windows::followed(&self.full, starts, goes_on)).flatten()?;
+        let reached = windows::followed(&self.full, starts, goes_on)?;
         Some(FoundPattern { cost: reached.cost, segments: reached.segments })
     }
 

@@ -180,9 +180,15 @@ impl Walk {
         Some(&self.changes)
     }
 
-    /// The changes of the coefficients that lead to another pattern of a class of permutations; refuse it afterwards.
+    /// The changes of the coefficients that lead to another pattern of the class; refuse it afterwards.
     pub(crate) fn propose_pattern(&mut self, space: &Space, segments: &[usize]) -> &[Change] {
         self.changes.clear();
+        if space.signs.is_some() {
+            let there = signs_of_segments(segments).unwrap_or_default();
+            let changed = self.high.iter().zip(&there).enumerate().filter(|(_, (here, there))| here != there);
+            self.changes.extend(changed.map(|(column, (&here, _))| Change { column, by: -2.0 * sign_value(here) }));
+            return &self.changes;
+        }
         self.candidate.copy_from_slice(segments);
         self.collect_changes(space);
         &self.changes

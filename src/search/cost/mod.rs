@@ -3,6 +3,7 @@
 //! [`Cost`] is what the annealer sees of it: a position at a pattern, moves from it that stay within what the winding
 //! shop puts up with, and which samples are worth running on.
 
+mod coil_worst;
 pub mod columns;
 mod deviates;
 pub mod grid_margin;

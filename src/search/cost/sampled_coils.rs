@@ -23,10 +23,11 @@
 
 use rayon::prelude::*;
 
+use super::coil_worst::{Arrangement, Part, Scratch, Worst};
 use crate::numeric::statistics::quantile;
-use crate::pattern::{Pattern, axial_direction, layers_by_segment};
+use crate::pattern::Pattern;
 use crate::profile::ProfileSpec;
-use crate::rate::{CoilModel, WeightResponse, segment_weights_m2};
+use crate::rate::CoilModel;
 use crate::search::cost::guaranteed::{GuaranteedError, UnitStep};
 use crate::search::cost::samples::{SampleMatrix, any_rate_model};
 use crate::search::cost::tolerance::{Coils, Measure, SHARE, ToleranceError};
@@ -37,6 +38,9 @@ use crate::units::REFERENCE_TEMPERATURE_K;
 /// Every so many-th time of a unit step's grid is compiled: neighbours are then 9 % apart, and the quantile falls short by
 /// at most 0.04 % (all 128 standard patterns of eight layers under a film, a test allows 0.2 %).
 const STRIDE: usize = 3;
+
+/// Of sums of rows, generously.
+const ROUNDING: f64 = 1e-9;
 
 /// The most instants of profiles that are compiled for models without a guaranteed worst case.
 const MOST_INSTANTS: usize = 256;
@@ -49,186 +53,30 @@ pub struct SampledCoils {
     coils: Vec<SampledCoil>,
 }
 
-/// A linear map from layer weights to samples.
-///
-/// # Shapes
-/// `columns` holds one column a layer, each `rows` long; the columns of half B and of the axial moments follow where they
-/// are needed.
-#[derive(Debug, Clone)]
-struct Part {
-    rows: usize,
-    constant: Vec<f64>,
-    columns: Vec<f64>,
-    /// Where half B's columns are multiples of half A's.
-    half_b_over_a: Option<Vec<f64>>,
-    axial: bool,
-}
-
-#[derive(Debug, Clone)]
-enum Worst {
-    /// Of samples: the largest size.
-    Largest(Part),
-    /// Of G(0+) and its changes: the sum of their sizes.
-    Variation(Part),
-    /// Of changes and of the heat's error at the same times.
-    Heated(Part, Part),
-}
-
 #[derive(Debug, Clone)]
 struct SampledCoil {
     lengths_m: Vec<f64>,
     worst: Worst,
-}
-
-/// Room for the weights and values of one coil.
-#[derive(Debug, Clone, Default)]
-struct Scratch {
-    half_a_m2: Vec<f64>,
-    half_b_m2: Vec<f64>,
-    axial_m2: Vec<f64>,
-    values: Vec<f64>,
-    heat: Vec<f64>,
-}
-
-impl Part {
-    fn new(layers: usize, responses: &[WeightResponse]) -> Self {
-        let column = |part: fn(&WeightResponse) -> &[f64], j: usize| -> Vec<f64> {
-            responses.iter().map(|r| part(r).get(j).copied().unwrap_or(0.0)).collect()
-        };
-        fn half_a(response: &WeightResponse) -> &[f64] {
-            &response.half_a_rad_per_s_m2
-        }
-        fn half_b(response: &WeightResponse) -> &[f64] {
-            &response.half_b_rad_per_s_m2
-        }
-        fn axial(response: &WeightResponse) -> &[f64] {
-            &response.axial_rad_per_s_m2
-        }
-        let mut columns: Vec<f64> = (0..layers).flat_map(|j| column(half_a, j)).collect();
-        let half_b_over_a: Option<Vec<f64>> =
-            (0..layers).map(|j| ratio(&column(half_a, j), &column(half_b, j))).collect();
-        if half_b_over_a.is_none() {
-            columns.extend((0..layers).flat_map(|j| column(half_b, j)));
-        }
-        let has_axial = responses.iter().any(|r| r.axial_rad_per_s_m2.iter().any(|x| *x != 0.0));
-        if has_axial {
-            columns.extend((0..layers).flat_map(|j| column(axial, j)));
-        }
-        Self {
-            rows: responses.len(),
-            constant: responses.iter().map(|r| r.constant_rad_per_s).collect(),
-            columns,
-            half_b_over_a,
-            axial: has_axial,
-        }
-    }
-
-    fn values(&self, scratch: &Scratch, values: &mut Vec<f64>) {
-        values.clone_from(&self.constant);
-        let layers = scratch.half_a_m2.len();
-        let mut add = |index: usize, factor: f64| {
-            let column = &self.columns[index * self.rows..(index + 1) * self.rows];
-            for (v, d) in values.iter_mut().zip(column) {
-                *v += factor * d;
-            }
-        };
-        for j in 0..layers {
-            match &self.half_b_over_a {
-                Some(ratio) => add(j, scratch.half_a_m2[j] + ratio[j] * scratch.half_b_m2[j]),
-                None => {
-                    add(j, scratch.half_a_m2[j]);
-                    add(layers + j, scratch.half_b_m2[j]);
-                }
-            }
-            if self.axial {
-                add(self.columns.len() / self.rows - layers + j, scratch.axial_m2[j]);
-            }
-        }
-    }
-}
-
-/// b/a where b is one multiple of a but for rounding.
-fn ratio(a: &[f64], b: &[f64]) -> Option<f64> {
-    const ROUNDING: f64 = 1e-12;
-    let largest = a.iter().map(|v| v.abs()).fold(0.0, f64::max);
-    let at = a.iter().position(|v| v.abs() == largest)?;
-    if largest == 0.0 {
-        return b.iter().all(|v| *v == 0.0).then_some(1.0);
-    }
-    let ratio = b[at] / a[at];
-    a.iter().zip(b).all(|(a, b)| (b - ratio * a).abs() <= ROUNDING * largest * ratio.abs()).then_some(ratio)
+    /// Never above `worst`, and a fraction of the work: enough to refuse most patterns.
+    at_least: Worst,
 }
 
 impl SampledCoil {
+    fn new(lengths_m: &[f64], worst: Worst) -> Self {
+        Self { lengths_m: lengths_m.to_vec(), at_least: worst.at_least(), worst }
+    }
+
     fn worst(&self, pattern: &Arrangement, scratch: &mut Scratch) -> f64 {
         pattern.weigh(&self.lengths_m, scratch);
-        let mut values = std::mem::take(&mut scratch.values);
-        let worst = match &self.worst {
-            Worst::Largest(part) => {
-                part.values(scratch, &mut values);
-                values.iter().map(|v| v.abs()).fold(0.0, f64::max)
-            }
-            Worst::Variation(part) => {
-                part.values(scratch, &mut values);
-                sum_of_sizes(&values)
-            }
-            Worst::Heated(changes, heat) => {
-                changes.values(scratch, &mut values);
-                let mut heated = std::mem::take(&mut scratch.heat);
-                heat.values(scratch, &mut heated);
-                let mut sum = 0.0;
-                let mut largest = 0.0_f64;
-                for (change, heat) in values.iter().zip(&heated) {
-                    sum += change.abs();
-                    largest = largest.max(sum + heat.abs());
-                }
-                scratch.heat = heated;
-                largest
-            }
-        };
-        scratch.values = values;
-        worst
-    }
-}
-
-/// Eight lanes, so that the order of additions is the same on every machine.
-fn sum_of_sizes(values: &[f64]) -> f64 {
-    let mut lanes = [0.0_f64; 8];
-    let chunks = values.chunks_exact(8);
-    let rest: f64 = chunks.remainder().iter().map(|v| v.abs()).sum();
-    for chunk in chunks {
-        for (lane, v) in lanes.iter_mut().zip(chunk) {
-            *lane += v.abs();
-        }
-    }
-    lanes.iter().sum::<f64>() + rest
-}
-
-/// A pattern as a search handles it.
-struct Arrangement<'a> {
-    segments: &'a [usize],
-    layers_by_segment: Vec<usize>,
-}
-
-impl<'a> Arrangement<'a> {
-    fn new(segments: &'a [usize]) -> Self {
-        Self { segments, layers_by_segment: layers_by_segment(segments) }
+        self.worst.of(scratch)
     }
 
-    fn weigh(&self, lengths_m: &[f64], scratch: &mut Scratch) {
-        let length_m: f64 = lengths_m.iter().sum();
-        for weights in [&mut scratch.half_a_m2, &mut scratch.half_b_m2, &mut scratch.axial_m2] {
-            weights.resize(lengths_m.len(), 0.0);
-        }
-        let mut from_m = 0.0;
-        for &layer in &self.layers_by_segment {
-            let to_m = from_m + lengths_m[layer];
-            let (a, b) = segment_weights_m2(from_m, to_m, length_m);
-            scratch.half_a_m2[layer] = a;
-            scratch.half_b_m2[layer] = b;
-            scratch.axial_m2[layer] = 2.0 * axial_direction(self.segments, layer) * lengths_m[layer].powi(2);
-            from_m = to_m;
-        }
+    /// As [`SampledCoil::worst`]; `None` where a look is enough to see that it is above a limit.
+    fn worst_up_to(&self, pattern: &Arrangement, limit: f64, scratch: &mut Scratch) -> Option<f64> {
+        pattern.weigh(&self.lengths_m, scratch);
+        // Rounding refuses nothing.
+        let is_above = self.at_least.of(scratch) * (1.0 - ROUNDING) > limit;
+        (!is_above).then(|| self.worst.of(scratch))
     }
 }
 
@@ -335,7 +183,7 @@ impl SampledCoil {
         } else {
             Worst::Heated(changes, Part::new(coil.layers(), &parts.heat))
         };
-        Ok(Self { lengths_m: coil.layer_lengths_m().to_vec(), worst })
+        Ok(Self::new(coil.layer_lengths_m(), worst))
     }
 
     fn sampled(model: &CoilModel, profiles: &ProfileSpec, instants: &[Vec<Instant>]) -> Result<Self, SearchError> {
@@ -354,8 +202,7 @@ impl SampledCoil {
                 responses.extend(rows.map(|row| rate_model.weight_response(&rate_model.state(&history, row, &[]))));
             }
         }
-        let worst = Worst::Largest(Part::new(coil.layers(), &responses));
-        Ok(Self { lengths_m: coil.layer_lengths_m().to_vec(), worst })
+        Ok(Self::new(coil.layer_lengths_m(), Worst::Largest(Part::new(coil.layers(), &responses))))
     }
 }
 
@@ -401,6 +248,8 @@ pub(crate) struct QuantileWorst {
     cost: f64,
     proposed_cost: f64,
     scratch: Scratch,
+    /// Coils of the proposal that were seen to be above the limit and are not yet judged.
+    above: Vec<usize>,
     /// Coils judged since the last reading.
     pub(crate) judged: u64,
 }
@@ -418,6 +267,7 @@ impl QuantileWorst {
             cost,
             proposed_cost: cost,
             scratch,
+            above: Vec::new(),
             judged: coils.coils.len() as u64,
         };
         state.sort();
@@ -433,16 +283,23 @@ impl QuantileWorst {
         let pattern = Arrangement::new(segments);
         let count = coils.coils.len();
         let mut left = count - (coils.share * (count - 1) as f64).floor() as usize;
+        self.above.clear();
         for &index in &self.order {
-            let worst = coils.coils[index].worst(&pattern, &mut self.scratch);
             self.judged += 1;
-            self.proposed[index] = worst;
-            if !(worst <= limit) {
+            let worst = coils.coils[index].worst_up_to(&pattern, limit, &mut self.scratch);
+            match worst {
+                Some(worst) => self.proposed[index] = worst,
+                None => self.above.push(index),
+            }
+            if !worst.is_some_and(|worst| worst <= limit) {
                 left -= 1;
                 if left == 0 {
                     return None;
                 }
             }
+        }
+        for &index in &self.above {
+            self.proposed[index] = coils.coils[index].worst(&pattern, &mut self.scratch);
         }
         self.proposed_cost = quantile_of(&self.proposed, coils.share);
         (self.proposed_cost <= limit).then_some(self.proposed_cost)

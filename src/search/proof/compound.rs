@@ -34,8 +34,6 @@
 //! Sets of sums: Horowitz and Sahni, J. ACM 21, 277 (1974). Large neighbourhoods: Ahuja, Ergun, Orlin, Punnen, Discrete Appl.
 //! Math. 123, 75 (2002).
 
-use std::ops::Range;
-
 use rand_chacha::ChaCha8Rng;
 
 use super::box_join::{Matching, Tree};
@@ -43,8 +41,8 @@ use super::candidates::Judge;
 use super::neighbourhood::{Following, Matches, Neighbourhood, followed};
 use super::{PassOutcome, Task};
 use crate::pattern::windability::WindabilityClass;
-use crate::pattern::{Pattern, layers_by_segment};
-use crate::search::anneal::limits::{WindingLimits, pick};
+use crate::pattern::{Pattern, layers_by_segment, segments_by_layer};
+use crate::search::anneal::limits::{WindingLimits, layers_at_an_end, pick, to_other_end};
 use crate::search::cost::worst_case::SearchError;
 
 /// Moves of a neighbourhood at most: both sets of their sums are made in milliseconds.
@@ -110,8 +108,7 @@ impl Neighbourhood for Moves {
             WindabilityClass::Captive(_) | WindabilityClass::Any => pick(random, 2) == 1,
         };
         let mut all: Vec<Move> = if is_of_ends {
-            let order = layers_by_segment(segments);
-            (0..layers).filter(|&layer| run_of(&order, segments[layer] - 1).is_some()).map(Move::End).collect()
+            layers_at_an_end(segments).into_iter().map(Move::End).collect()
         } else {
             cuts(layers, random)
         };
@@ -190,33 +187,10 @@ impl Moves {
         for made in moves {
             match *made {
                 Move::Exchange { from, middle, to } => order[from..to].rotate_left(middle - from),
-                Move::End(layer) => {
-                    let at = order.iter().position(|other| *other == layer).unwrap_or_default();
-                    match run_of(&order, at) {
-                        Some(run) if run.start < at => order[run.start..=at].rotate_right(1),
-                        Some(run) => order[at..run.end].rotate_left(1),
-                        None => {}
-                    }
-                }
+                Move::End(layer) => to_other_end(&mut order, layer),
             }
         }
-        let mut segments = vec![0; order.len()];
-        for (at, &layer) in order.iter().enumerate() {
-            segments[layer] = at + 1;
-        }
-        segments
-    }
-}
-
-/// The inner layers next to the layer at a place of the fibre; none where they lie at both sides of it or at neither.
-fn run_of(order: &[usize], at: usize) -> Option<Range<usize>> {
-    let layer = order[at];
-    let below = order[..at].iter().rev().take_while(|other| **other < layer).count();
-    let above = order[at + 1..].iter().take_while(|other| **other < layer).count();
-    match (below, above) {
-        (0, 1..) => Some(at + 1..at + 1 + above),
-        (1.., 0) => Some(at - below..at),
-        _ => None,
+        segments_by_layer(&order)
     }
 }
 

@@ -1,0 +1,291 @@
+//! The worst case of one coil with any layer weights: columns that are added up, and a cheap bound from below.
+//!
+//! ```text
+//! Σ_i |v_i|  ≥  Σ_g | Σ_{i in g} v_i |          rows looked at by groups g: an eighth of the work, enough to refuse most patterns
+//! max_i |v_i|  ≥  max over some of the rows
+//! ```
+//!
+//! Symbols as in [`sampled_coils`](super::sampled_coils).
+
+use crate::pattern::{axial_direction, layers_by_segment};
+use crate::rate::{WeightResponse, segment_weights_m2};
+
+/// Rows that are looked at as one before all of them are.
+const ROWS_AS_ONE: usize = 8;
+
+/// A linear map from layer weights to samples.
+///
+/// # Shapes
+/// `columns` holds one column a layer, each `rows` long; the columns of half B and of the axial moments follow where they
+/// are needed.
+#[derive(Debug, Clone)]
+pub(super) struct Part {
+    rows: usize,
+    constant: Vec<f64>,
+    columns: Vec<f64>,
+    /// Where half B's columns are multiples of half A's.
+    half_b_over_a: Option<Vec<f64>>,
+    axial: bool,
+}
+
+#[derive(Debug, Clone)]
+pub(super) enum Worst {
+    /// Of samples: the largest size.
+    Largest(Part),
+    /// Of G(0+) and its changes: the sum of their sizes.
+    Variation(Part),
+    /// Of changes and of the heat's error at the same times.
+    Heated(Part, Part),
+}
+
+/// Room for the weights and values of one coil.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Scratch {
+    half_a_m2: Vec<f64>,
+    half_b_m2: Vec<f64>,
+    axial_m2: Vec<f64>,
+    values: Vec<f64>,
+    heat: Vec<f64>,
+}
+
+impl Part {
+    pub(super) fn new(layers: usize, responses: &[WeightResponse]) -> Self {
+        let column = |part: fn(&WeightResponse) -> &[f64], j: usize| -> Vec<f64> {
+            responses.iter().map(|r| part(r).get(j).copied().unwrap_or(0.0)).collect()
+        };
+        fn half_a(response: &WeightResponse) -> &[f64] {
+            &response.half_a_rad_per_s_m2
+        }
+        fn half_b(response: &WeightResponse) -> &[f64] {
+            &response.half_b_rad_per_s_m2
+        }
+        fn axial(response: &WeightResponse) -> &[f64] {
+            &response.axial_rad_per_s_m2
+        }
+        let mut columns: Vec<f64> = (0..layers).flat_map(|j| column(half_a, j)).collect();
+        let half_b_over_a: Option<Vec<f64>> =
+            (0..layers).map(|j| ratio(&column(half_a, j), &column(half_b, j))).collect();
+        if half_b_over_a.is_none() {
+            columns.extend((0..layers).flat_map(|j| column(half_b, j)));
+        }
+        let has_axial = responses.iter().any(|r| r.axial_rad_per_s_m2.iter().any(|x| *x != 0.0));
+        if has_axial {
+            columns.extend((0..layers).flat_map(|j| column(axial, j)));
+        }
+        Self {
+            rows: responses.len(),
+            constant: responses.iter().map(|r| r.constant_rad_per_s).collect(),
+            columns,
+            half_b_over_a,
+            axial: has_axial,
+        }
+    }
+
+    /// Sums of so many rows each.
+    fn summed(&self, rows: usize) -> Self {
+        let sums = |column: &[f64]| -> Vec<f64> { column.chunks(rows).map(|chunk| chunk.iter().sum()).collect() };
+        self.each_column(sums)
+    }
+
+    /// The last of so many rows each.
+    fn last_of(&self, rows: usize) -> Self {
+        self.each_column(|column| column.chunks(rows).filter_map(|chunk| chunk.last().copied()).collect())
+    }
+
+    fn each_column(&self, shorter: impl Fn(&[f64]) -> Vec<f64>) -> Self {
+        let constant = shorter(&self.constant);
+        let columns = self.columns.chunks(self.rows.max(1)).flat_map(&shorter).collect();
+        Self { rows: constant.len(), constant, columns, ..self.clone() }
+    }
+
+    fn values(&self, scratch: &Scratch, values: &mut Vec<f64>) {
+        values.clone_from(&self.constant);
+        let layers = scratch.half_a_m2.len();
+        match &self.half_b_over_a {
+            Some(ratio) => {
+                let weights = ratio.iter().zip(scratch.half_a_m2.iter().zip(&scratch.half_b_m2));
+                self.add_columns(0, weights.map(|(ratio, (a, b))| a + ratio * b), values);
+            }
+            None => self.add_columns(0, scratch.half_a_m2.iter().chain(&scratch.half_b_m2).copied(), values),
+        }
+        if self.axial {
+            self.add_columns(self.columns.len() / self.rows - layers, scratch.axial_m2.iter().copied(), values);
+        }
+    }
+
+    /// Adds columns from a first one on, each with its factor, to values: several in one pass over them, one after the other.
+    fn add_columns(&self, first: usize, factors: impl Iterator<Item = f64>, values: &mut [f64]) {
+        let mut columns = self.columns[first * self.rows..].chunks_exact(self.rows).zip(factors);
+        while let Some((one, x)) = columns.next() {
+            match (columns.next(), columns.next(), columns.next()) {
+                (Some((two, y)), Some((three, z)), Some((four, w))) => {
+                    let rows = values.iter_mut().zip(one).zip(two).zip(three).zip(four);
+                    rows.for_each(|((((v, a), b), c), d)| *v = *v + x * a + y * b + z * c + w * d);
+                }
+                (two, three, _) => {
+                    let rest = [Some((one, x)), two, three];
+                    for (column, factor) in rest.into_iter().flatten() {
+                        values.iter_mut().zip(column).for_each(|(v, d)| *v += factor * d);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// b/a where b is one multiple of a but for rounding.
+fn ratio(a: &[f64], b: &[f64]) -> Option<f64> {
+    const ROUNDING: f64 = 1e-12;
+    let largest = a.iter().map(|v| v.abs()).fold(0.0, f64::max);
+    let at = a.iter().position(|v| v.abs() == largest)?;
+    if largest == 0.0 {
+        return b.iter().all(|v| *v == 0.0).then_some(1.0);
+    }
+    let ratio = b[at] / a[at];
+    a.iter().zip(b).all(|(a, b)| (b - ratio * a).abs() <= ROUNDING * largest * ratio.abs()).then_some(ratio)
+}
+
+impl Worst {
+    /// One that is never above this one: sums of neighbouring changes are no larger than the sum of their sizes, and the largest
+    /// of some no larger than that of all.
+    pub(super) fn at_least(&self) -> Self {
+        match self {
+            Worst::Largest(part) => Worst::Largest(part.last_of(ROWS_AS_ONE)),
+            Worst::Variation(part) => Worst::Variation(part.summed(ROWS_AS_ONE)),
+            Worst::Heated(changes, heat) => Worst::Heated(changes.summed(ROWS_AS_ONE), heat.last_of(ROWS_AS_ONE)),
+        }
+    }
+
+    /// With the weights of a scratch.
+    pub(super) fn of(&self, scratch: &mut Scratch) -> f64 {
+        let mut values = std::mem::take(&mut scratch.values);
+        let worst = match self {
+            Worst::Largest(part) => {
+                part.values(scratch, &mut values);
+                values.iter().map(|v| v.abs()).fold(0.0, f64::max)
+            }
+            Worst::Variation(part) => {
+                part.values(scratch, &mut values);
+                sum_of_sizes(&values)
+            }
+            Worst::Heated(changes, heat) => {
+                changes.values(scratch, &mut values);
+                let mut heated = std::mem::take(&mut scratch.heat);
+                heat.values(scratch, &mut heated);
+                let mut sum = 0.0;
+                let mut largest = 0.0_f64;
+                for (change, heat) in values.iter().zip(&heated) {
+                    sum += change.abs();
+                    largest = largest.max(sum + heat.abs());
+                }
+                scratch.heat = heated;
+                largest
+            }
+        };
+        scratch.values = values;
+        worst
+    }
+}
+
+/// Eight lanes, so that the order of additions is the same on every machine.
+fn sum_of_sizes(values: &[f64]) -> f64 {
+    let mut lanes = [0.0_f64; 8];
+    let chunks = values.chunks_exact(8);
+    let rest: f64 = chunks.remainder().iter().map(|v| v.abs()).sum();
+    for chunk in chunks {
+        for (lane, v) in lanes.iter_mut().zip(chunk) {
+            *lane += v.abs();
+        }
+    }
+    lanes.iter().sum::<f64>() + rest
+}
+
+/// A pattern as a search handles it.
+pub(super) struct Arrangement<'a> {
+    segments: &'a [usize],
+    layers_by_segment: Vec<usize>,
+}
+
+impl<'a> Arrangement<'a> {
+    pub(super) fn new(segments: &'a [usize]) -> Self {
+        Self { segments, layers_by_segment: layers_by_segment(segments) }
+    }
+
+    pub(super) fn weigh(&self, lengths_m: &[f64], scratch: &mut Scratch) {
+        let length_m: f64 = lengths_m.iter().sum();
+        for weights in [&mut scratch.half_a_m2, &mut scratch.half_b_m2, &mut scratch.axial_m2] {
+            weights.resize(lengths_m.len(), 0.0);
+        }
+        let mut from_m = 0.0;
+        for &layer in &self.layers_by_segment {
+            let to_m = from_m + lengths_m[layer];
+            let (a, b) = segment_weights_m2(from_m, to_m, length_m);
+            scratch.half_a_m2[layer] = a;
+            scratch.half_b_m2[layer] = b;
+            scratch.axial_m2[layer] = 2.0 * axial_direction(self.segments, layer) * lengths_m[layer].powi(2);
+            from_m = to_m;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coil::LayerLength;
+    use crate::pattern::windability::WindabilityClass;
+    use crate::search::anneal::limits::draw;
+    use crate::search::anneal::restart::generator;
+    use crate::search::cost::guaranteed::UnitStep;
+    use crate::search::cost::samples::tests::model;
+
+    #[test]
+    fn the_bound_from_groups_of_rows_is_never_above_the_worst_case_and_near_it() {
+        for effects in [&["surface_film"][..], &["strain_mismatch", "surface_film"]] {
+            let model = model(12, LayerLength::Actual, effects);
+            let parts = UnitStep::new(&model, 0.003).unwrap().parts(&model, 3).unwrap();
+            let changes = || Part::new(12, &parts.changes);
+            let coil = model.wound_coil().unwrap();
+            // Heat is of the same shape as changes are.
+            let all = [Worst::Variation(changes()), Worst::Largest(changes()), Worst::Heated(changes(), changes())];
+            for worst in all {
+                let bound = worst.at_least();
+                let mut nearest = 0.0_f64;
+                for stream in 0..20 {
+                    let segments = draw(WindabilityClass::Any, 12, &mut generator(1, stream));
+                    let mut scratch = Scratch::default();
+                    Arrangement::new(&segments).weigh(coil.layer_lengths_m(), &mut scratch);
+                    let share = bound.of(&mut scratch) / worst.of(&mut scratch);
+                    assert!(share <= 1.0 + 1e-12, "{share}");
+                    nearest = nearest.max(share);
+                }
+                assert!(nearest > 0.5, "{nearest}");
+            }
+        }
+    }
+
+    #[test]
+    fn columns_are_added_up_as_one_by_one() {
+        let model = model(10, LayerLength::Actual, &["strain_mismatch"]);
+        let parts = UnitStep::new(&model, 0.003).unwrap().parts(&model, 3).unwrap();
+        let part = Part::new(10, &parts.changes);
+        let segments = draw(WindabilityClass::Any, 10, &mut generator(1, 0));
+        let mut scratch = Scratch::default();
+        Arrangement::new(&segments).weigh(model.wound_coil().unwrap().layer_lengths_m(), &mut scratch);
+        let mut values = Vec::new();
+        part.values(&scratch, &mut values);
+        let of = |columns: &[f64], weights: &[f64]| -> f64 { columns.iter().zip(weights).map(|(d, w)| d * w).sum() };
+        let expected: Vec<f64> = (parts.changes.iter())
+            .map(|response| {
+                response.constant_rad_per_s
+                    + of(&response.half_a_rad_per_s_m2, &scratch.half_a_m2)
+                    + of(&response.half_b_rad_per_s_m2, &scratch.half_b_m2)
+                    + of(&response.axial_rad_per_s_m2, &scratch.axial_m2)
+            })
+            .collect();
+        let largest = expected.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        assert!(expected.len() > 100 && largest > 0.0);
+        for (value, expected) in values.iter().zip(&expected) {
+            assert!((value - expected).abs() <= 1e-10 * largest, "{value} {expected}");
+        }
+    }
+}
