@@ -69,25 +69,36 @@ impl<'a> Evaluator<'a> {
                 shared.extend(self.under(objective).short(WindabilityClass::Captive(1), plan, goes_on)?);
             }
         }
-        if self.objective == Objective::Pointing && class != WindabilityClass::Standard {
-            shared.extend(self.short(class, plan, goes_on)?);
-        }
         if self.objective == Objective::P95 {
-            let usual = self.short_moves_per_restart(self.model.coil.layers());
-            // Whoever asks for fewer moves has fewer.
-            let is_longer = plan.moves_per_restart >= usual && class != WindabilityClass::Standard;
-            let moves = if is_longer { MOVES_OVER_BUILT_COILS.max(usual) } else { plan.moves_per_restart.min(usual) };
-            if let Some(search) = self.short_search(moves, class, plan, goes_on)? {
-                shared.extend(self.shared_of(search.as_ref(), class, goes_on)?);
-                // From here all searches descend alike.
-                let starts = starts_of(self.judged(search.as_ref(), class, &shared));
-                let reached = search.in_other_orders(&starts, goes_on);
-                shared.extend(reached.and_then(|found| Pattern::new(found.segments).ok()));
+            let narrower = is_wider.then_some(WindabilityClass::Captive(1));
+            for class in narrower.into_iter().chain([class]) {
+                shared.extend(self.over_built_coils(class, plan, &shared, goes_on)?);
             }
         }
         let mut seen = std::collections::BTreeSet::new();
         shared.retain(|pattern| seen.insert(pattern.segments().to_vec()));
         Ok(shared)
+    }
+
+    /// What a search by P95 that is the same for every seed finds, and what descents from there come to.
+    fn over_built_coils(
+        &self,
+        class: WindabilityClass,
+        plan: &Plan,
+        known: &[Pattern],
+        goes_on: &dyn Fn() -> bool,
+    ) -> Result<Vec<Pattern>, JudgeError> {
+        let usual = self.short_moves_per_restart(self.model.coil.layers());
+        // Whoever asks for fewer moves has fewer.
+        let is_longer = plan.moves_per_restart >= usual && class != WindabilityClass::Standard;
+        let moves = if is_longer { MOVES_OVER_BUILT_COILS.max(usual) } else { plan.moves_per_restart.min(usual) };
+        let Some(search) = self.short_search(moves, class, plan, goes_on)? else { return Ok(Vec::new()) };
+        let mut found = self.shared_of(search.as_ref(), class, goes_on)?;
+        let mut starts = self.judged(search.as_ref(), class, known);
+        starts.extend(self.judged(search.as_ref(), class, &found));
+        let reached = search.in_other_orders(&starts_of(starts), goes_on);
+        found.extend(reached.and_then(|reached| Pattern::new(reached.segments).ok()));
+        Ok(found)
     }
 
     /// The best of [`Evaluator::companions`], for a proof to begin with; none where the proof itself comes upon the best at once.

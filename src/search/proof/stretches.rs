@@ -53,10 +53,8 @@ const MOST_BETWEEN: usize = 4;
 const FOLLOWING: Following =
     Following { chains: 4, drawn: 8, patience: 2, most_rounds: 16, seed: 0, first_stream: u64::MAX / 8 };
 
-/// Up to so many layers two stretches are all of the fibre, or most of it: as many times more patterns are followed, twice as many
-/// times more neighbourhoods looked at. The pointing error of 14 layers then ends alike with two seeds, 74 % apart before.
-const FEW_LAYERS: usize = 24;
-const MORE_OF_FEW: usize = 4;
+/// Up to so many layers two stretches are all of the fibre.
+const MOST_AS_TWO: usize = 16;
 
 /// Exchanges of two segments by which what is drawn for so few layers is off the pattern at most.
 const MOST_EXCHANGES: usize = 4;
@@ -68,16 +66,15 @@ const MOST_EXCHANGES: usize = 4;
 /// As [`super::prove`].
 pub(crate) fn rearranged(task: &Task, starts: &[Pattern], seed: u64) -> Result<Pattern, SearchError> {
     let layers = task.model.coil.layers();
-    let course = if layers <= MOST_AS_ONE {
+    let drawn = if layers <= MOST_AS_ONE {
         // One neighbourhood is the whole class.
-        Following { drawn: 1, ..FOLLOWING }
-    } else if layers <= FEW_LAYERS {
-        let (chains, drawn) = (MORE_OF_FEW * FOLLOWING.chains, 2 * MORE_OF_FEW * FOLLOWING.drawn);
-        Following { chains, drawn, ..FOLLOWING }
+        1
+    } else if layers <= MOST_AS_TWO {
+        2 * FOLLOWING.drawn
     } else {
-        FOLLOWING
+        FOLLOWING.drawn
     };
-    followed::<Stretches>(task, starts, Following { seed, ..course })
+    followed::<Stretches>(task, starts, Following { drawn, seed, ..FOLLOWING })
 }
 
 /// A pattern, and two sets of stretches of its fibre that do not touch each other.
@@ -109,10 +106,10 @@ impl Neighbourhood for Stretches {
     const SHARES: &'static [f64] = &[0.25, 0.7, 1.0];
     const MOST_JUDGED: usize = 1024;
 
-    /// Around the pattern, or one a few exchanges off it where two stretches are most of the fibre and leave little else to be drawn.
+    /// Around the pattern, or one a few exchanges off it where two stretches are all of the fibre and leave little else to be drawn.
     fn draw(class: WindabilityClass, segments: &[usize], random: &mut ChaCha8Rng) -> Self {
         let mut segments = segments.to_vec();
-        let exchanges = if segments.len() <= FEW_LAYERS { pick(random, MOST_EXCHANGES + 1) } else { 0 };
+        let exchanges = if segments.len() <= MOST_AS_TWO { pick(random, MOST_EXCHANGES + 1) } else { 0 };
         for _ in 0..exchanges {
             let mut exchanged = segments.clone();
             exchanged.swap(pick(random, segments.len()), pick(random, segments.len()));
