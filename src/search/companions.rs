@@ -97,7 +97,8 @@ impl<'a> Evaluator<'a> {
         let mut starts = self.judged(search.as_ref(), class, known);
         starts.extend(self.judged(search.as_ref(), class, &found));
         let reached = search.in_other_orders(&starts_of(starts), goes_on);
-        found.extend(reached.and_then(|reached| Pattern::new(reached.segments).ok()));
+        let pattern = |found: FoundPattern| Pattern::new(found.segments).expect("a descent visits permutations only");
+        found.extend(reached.map(pattern));
         Ok(found)
     }
 
