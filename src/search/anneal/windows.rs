@@ -32,8 +32,8 @@ const BREADTHS: [Breadth; 4] = [Breadth::Orders(4), Breadth::Orders(5), Breadth:
 const ENDS_A_LAYER: usize = 2;
 
 /// Descents of a round, how many steps off the best pattern they begin, and rounds without a better one after which no more
-/// follow. By P95 of 48 standard layers all descents from 6 steps off end where they began, a tenth of those from 16 at something better by 1.4 %, and
-/// none from 40.
+/// follow. By P95 of 48 standard layers no descent from 6 steps off came to anything better, some from 16 to something better by
+/// 1.4 %, and none from 40. Of permutations descents come to more: with twice the patience P95 of 24 layers ends 0.7 % lower.
 const STARTS: u64 = 12;
 const FEWEST_STEPS_OFF: u64 = 4;
 const MORE_STEPS_OFF: u64 = 2;

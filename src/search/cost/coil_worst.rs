@@ -10,7 +10,8 @@
 use crate::pattern::{axial_direction, layers_by_segment};
 use crate::rate::{WeightResponse, segment_weights_m2};
 
-/// Rows that are looked at as one before all of them are.
+/// Rows that are looked at as one before all of them are. By P95 of 48 layers a search takes half the processor time so; with a
+/// further look at 32 as one it takes no less.
 const ROWS_AS_ONE: usize = 8;
 
 /// A linear map from layer weights to samples.
@@ -115,7 +116,8 @@ impl Part {
 
     /// Adds columns from a first one on, each with its factor, to values: several in one pass over them, one after the other.
     fn add_columns(&self, first: usize, factors: impl Iterator<Item = f64>, values: &mut [f64]) {
-        let mut columns = self.columns[first * self.rows..].chunks_exact(self.rows).zip(factors);
+        // Without rows there are no columns either.
+        let mut columns = self.columns[first * self.rows..].chunks_exact(self.rows.max(1)).zip(factors);
         while let Some((one, x)) = columns.next() {
             match (columns.next(), columns.next(), columns.next()) {
                 (Some((two, y)), Some((three, z)), Some((four, w))) => {
@@ -261,6 +263,14 @@ mod tests {
                 assert!(nearest > 0.5, "{nearest}");
             }
         }
+    }
+
+    #[test]
+    fn a_coil_that_is_looked_at_at_no_time_has_no_error() {
+        let worst = Worst::Largest(Part::new(8, &[]));
+        let mut scratch = Scratch::default();
+        Arrangement::new(&[1, 2, 3, 4, 5, 6, 7, 8]).weigh(&[100.0; 8], &mut scratch);
+        assert_eq!([worst.at_least().of(&mut scratch), worst.of(&mut scratch)], [0.0, 0.0]);
     }
 
     #[test]
