@@ -7,8 +7,7 @@
 // Loops over an index that the compiler knows the end of: iterators stay calls in functions as large as these.
 #![allow(clippy::needless_range_loop)]
 
-use pulp::{Arch, NullaryFnOnce};
-
+use super::arithmetic::{Arithmetic, Pass, dispatched};
 use super::filter::{Innovation, MEASURED, Move, Row, SETTLED, SETTLED_ROWS, System, Values};
 use super::sparse::{MOST_STATES, Sparse};
 
@@ -22,7 +21,7 @@ type Covariances<const N: usize> = [[Lanes; N]; N];
 
 /// The innovations of systems of one structure, at most [`LANES`] of them, by the values of each.
 pub(super) fn forward(systems: &[System], rows: &[Row], values: &[&Values]) -> Vec<Vec<Innovation>> {
-    Arch::new().dispatch(Abreast { systems, rows, values })
+    dispatched(Abreast { systems, rows, values })
 }
 
 struct Abreast<'a> {
@@ -31,21 +30,21 @@ struct Abreast<'a> {
     values: &'a [&'a Values],
 }
 
-impl NullaryFnOnce for Abreast<'_> {
+impl Pass for Abreast<'_> {
     type Output = Vec<Vec<Innovation>>;
 
     /// With the least number of states that has room, and as many sums at a time as there are registers for.
     #[inline(always)]
-    fn call(self) -> Self::Output {
+    fn run(self, arithmetic: impl Arithmetic) -> Self::Output {
         match self.systems[0].size {
-            0..=8 => pass::<8, 8, 4>(&self),
-            9..=12 => pass::<12, 12, 6>(&self),
-            13..=16 => pass::<16, 8, 4>(&self),
-            17..=20 => pass::<20, 10, 5>(&self),
-            21..=24 => pass::<24, 12, 6>(&self),
+            0..=8 => pass::<8, 8, 4>(arithmetic, &self),
+            9..=12 => pass::<12, 12, 6>(arithmetic, &self),
+            13..=16 => pass::<16, 8, 4>(arithmetic, &self),
+            17..=20 => pass::<20, 10, 5>(arithmetic, &self),
+            21..=24 => pass::<24, 12, 6>(arithmetic, &self),
             size => {
                 assert!(size <= MOST_STATES, "a model has at most {MOST_STATES} states");
-                pass::<MOST_STATES, 8, 8>(&self)
+                pass::<MOST_STATES, 8, 8>(arithmetic, &self)
             }
         }
     }
@@ -92,12 +91,12 @@ impl WideEntries {
 
     /// One row times a vector.
     #[inline(always)]
-    fn dot(&self, row: usize, vector: &[Lanes]) -> Lanes {
+    fn dot(&self, arithmetic: impl Arithmetic, row: usize, vector: &[Lanes]) -> Lanes {
         let mut sum = [0.0; LANES];
         for (k, v) in self.row(row) {
             let x = &vector[k];
             for l in 0..LANES {
-                sum[l] += v[l] * x[l];
+                sum[l] = arithmetic.add_product(v[l], x[l], sum[l]);
             }
         }
         sum
@@ -105,13 +104,19 @@ impl WideEntries {
 
     /// One row times some columns of X, from one on.
     #[inline(always)]
-    fn sums<const N: usize, const B: usize>(&self, row: usize, x: &Covariances<N>, from: usize) -> [Lanes; B] {
+    fn sums<const N: usize, const B: usize>(
+        &self,
+        arithmetic: impl Arithmetic,
+        row: usize,
+        x: &Covariances<N>,
+        from: usize,
+    ) -> [Lanes; B] {
         let mut sums = [[0.0; LANES]; B];
         for (k, v) in self.row(row) {
             let Some(line) = x[k][from..].first_chunk::<B>() else { break };
             for b in 0..B {
                 for l in 0..LANES {
-                    sums[b][l] += v[l] * line[b][l];
+                    sums[b][l] = arithmetic.add_product(v[l], line[b][l], sums[b][l]);
                 }
             }
         }
@@ -120,10 +125,15 @@ impl WideEntries {
 
     /// One row times X.
     #[inline(always)]
-    fn combine<const N: usize, const B: usize>(&self, row: usize, x: &Covariances<N>) -> [Lanes; N] {
+    fn combine<const N: usize, const B: usize>(
+        &self,
+        arithmetic: impl Arithmetic,
+        row: usize,
+        x: &Covariances<N>,
+    ) -> [Lanes; N] {
         let mut line = [[0.0; LANES]; N];
         for from in (0..N).step_by(B) {
-            line[from..from + B].copy_from_slice(&self.sums::<N, B>(row, x, from));
+            line[from..from + B].copy_from_slice(&self.sums::<N, B>(arithmetic, row, x, from));
         }
         line
     }
@@ -138,7 +148,8 @@ struct WideStep {
 }
 
 /// Systems of one structure, and what a pass over a record knows of each so far.
-struct AbreastPass<'a, const N: usize> {
+struct AbreastPass<'a, A, const N: usize> {
+    arithmetic: A,
     systems: &'a [System],
     steps: Vec<WideStep>,
     measured: WideEntries,
@@ -155,8 +166,8 @@ struct AbreastPass<'a, const N: usize> {
     variances: [Lanes; MEASURED],
 }
 
-impl<'a, const N: usize> AbreastPass<'a, N> {
-    fn new(systems: &'a [System]) -> Self {
+impl<'a, A: Arithmetic, const N: usize> AbreastPass<'a, A, N> {
+    fn new(arithmetic: A, systems: &'a [System]) -> Self {
         let n = systems[0].size;
         let wide = |matrix: &dyn Fn(&'a System) -> &'a [f64]| -> Vec<Lanes> {
             (0..n * n).map(|i| each(systems, |s| matrix(s)[i])).collect()
@@ -174,6 +185,7 @@ impl<'a, const N: usize> AbreastPass<'a, N> {
             covariance[i][..n].copy_from_slice(&begin[i * n..(i + 1) * n]);
         }
         Self {
+            arithmetic,
             systems,
             steps: (0..systems[0].steps.len()).map(step).collect(),
             measured: WideEntries::new(systems, |s| &s.rows),
@@ -199,13 +211,13 @@ impl<'a, const N: usize> AbreastPass<'a, N> {
                     let phi = &self.steps[step as usize].phi;
                     let mut next = [[0.0; LANES]; N];
                     for i in 0..self.systems[0].size {
-                        next[i] = phi.dot(i, &self.mean);
+                        next[i] = phi.dot(self.arithmetic, i, &self.mean);
                     }
                     self.mean = next;
                 }
                 Move::Keep(slot) => {
                     for &(state, kept) in &self.systems[0].keeps[slot as usize] {
-                        self.mean[state] = self.kept.dot(kept, &self.mean);
+                        self.mean[state] = self.kept.dot(self.arithmetic, kept, &self.mean);
                     }
                 }
                 Move::Kink => {}
@@ -250,7 +262,7 @@ impl<'a, const N: usize> AbreastPass<'a, N> {
         let density: Lanes = std::array::from_fn(|l| self.trend.0[l] + bend * (self.trend.1[l] - self.trend.0[l]));
         let own = &self.steps[step as usize];
         for i in 0..n {
-            for j in i / C * C..N {
+            for j in 0..i / C * C + C {
                 let place = i * n + j;
                 let noise = |l: usize| own.noise[place][l] + density[l] * own.trend_noise[place][l];
                 self.noise.push(if j < n { std::array::from_fn(noise) } else { [0.0; LANES] });
@@ -258,14 +270,15 @@ impl<'a, const N: usize> AbreastPass<'a, N> {
         }
     }
 
-    /// P ← Φ P Φᵀ + Q, columns in blocks: first P Φᵀ, and of the second product what is right of the diagonal's block.
+    /// P ← Φ P Φᵀ + Q, columns in blocks: first P Φᵀ, and of the second product what is left of the diagonal, where modes, whose rows have
+    /// most entries, have fewest columns.
     #[inline(always)]
     fn step<const B: usize, const C: usize>(&mut self, step: u16) {
         let n = self.systems[0].size;
         let phi = &self.steps[step as usize].phi;
         for i in 0..n {
             for from in (0..N).step_by(B) {
-                let sums = phi.sums::<N, B>(i, &self.covariance, from);
+                let sums = phi.sums::<N, B>(self.arithmetic, i, &self.covariance, from);
                 for b in 0..B {
                     self.room[from + b][i] = sums[b];
                 }
@@ -273,8 +286,8 @@ impl<'a, const N: usize> AbreastPass<'a, N> {
         }
         let mut noise = self.noise.chunks_exact(C);
         for i in 0..n {
-            for from in (i / C * C..N).step_by(C) {
-                let mut sums = phi.sums::<N, C>(i, &self.room, from);
+            for from in (0..=i).step_by(C) {
+                let mut sums = phi.sums::<N, C>(self.arithmetic, i, &self.room, from);
                 let Some(added) = noise.next() else { break };
                 for b in 0..C {
                     for l in 0..LANES {
@@ -293,12 +306,12 @@ impl<'a, const N: usize> AbreastPass<'a, N> {
         let keeps = &self.systems[0].keeps[slot as usize];
         for (place, &(state, row)) in keeps.iter().enumerate() {
             // Cov(c·x, x), the state's own former content being forgotten.
-            let mut along = self.kept.combine::<N, B>(row, &self.covariance);
+            let mut along = self.kept.combine::<N, B>(self.arithmetic, row, &self.covariance);
             along[state] = [0.0; LANES];
             for &(other, _) in &keeps[place + 1..] {
                 along[other] = [0.0; LANES];
             }
-            let own = self.kept.dot(row, &along);
+            let own = self.kept.dot(self.arithmetic, row, &along);
             for i in 0..n {
                 self.covariance[i][state] = along[i];
                 self.covariance[state][i] = along[i];
@@ -311,9 +324,8 @@ impl<'a, const N: usize> AbreastPass<'a, N> {
     #[inline(always)]
     fn weigh<const B: usize>(&mut self, m: usize, h: usize, averaged: f64) -> f64 {
         let n = self.systems[0].size;
-        let along = self.measured.combine::<N, B>(h, &self.covariance);
-        let mut variance = self.measured.dot(h, &along);
-        let mut gain = along;
+        let along = self.measured.combine::<N, B>(self.arithmetic, h, &self.covariance);
+        let mut variance = self.measured.dot(self.arithmetic, h, &along);
         let mut change: f64 = 0.0;
         for l in 0..LANES {
             variance[l] += self.noises[m][l] / averaged;
@@ -322,29 +334,29 @@ impl<'a, const N: usize> AbreastPass<'a, N> {
             }
         }
         for i in 0..n {
-            let own: Lanes = std::array::from_fn(|l| gain[i][l] / variance[l]);
-            gain[i] = own;
+            let own: Lanes = std::array::from_fn(|l| along[i][l] / variance[l]);
+            self.gains[m][i] = own;
             for j in i..n {
                 let mut left = self.covariance[i][j];
                 for l in 0..LANES {
-                    left[l] -= own[l] * along[j][l];
+                    left[l] = self.arithmetic.add_product(-own[l], along[j][l], left[l]);
                 }
                 self.covariance[i][j] = left;
                 self.covariance[j][i] = left;
             }
         }
-        (self.variances[m], self.gains[m]) = (variance, gain);
+        self.variances[m] = variance;
         change
     }
 
     /// Takes one measurement in; its innovations.
     #[inline(always)]
     fn take_in(&mut self, m: usize, h: usize, values: Lanes) -> Lanes {
-        let expected = self.measured.dot(h, &self.mean);
+        let expected = self.measured.dot(self.arithmetic, h, &self.mean);
         let innovation: Lanes = std::array::from_fn(|l| values[l] - expected[l]);
         for i in 0..N {
             for l in 0..LANES {
-                self.mean[i][l] += self.gains[m][i][l] * innovation[l];
+                self.mean[i][l] = self.arithmetic.add_product(self.gains[m][i][l], innovation[l], self.mean[i][l]);
             }
         }
         innovation
@@ -352,9 +364,12 @@ impl<'a, const N: usize> AbreastPass<'a, N> {
 }
 
 #[inline(always)]
-fn pass<const N: usize, const B: usize, const C: usize>(asked: &Abreast) -> Vec<Vec<Innovation>> {
+fn pass<const N: usize, const B: usize, const C: usize>(
+    arithmetic: impl Arithmetic,
+    asked: &Abreast,
+) -> Vec<Vec<Innovation>> {
     let rows = asked.rows;
-    let mut pass = AbreastPass::<N>::new(asked.systems);
+    let mut pass = AbreastPass::<_, N>::new(arithmetic, asked.systems);
     let mut found: Vec<Vec<Innovation>> = asked.systems.iter().map(|_| Vec::with_capacity(2 * rows.len())).collect();
     let mut settled = 0;
     for (k, row) in rows.iter().enumerate() {

@@ -12,7 +12,7 @@ use super::series::Series;
 
 use super::shows::Shows;
 use super::solved::Solved;
-use super::system::{driven_by_air, system};
+use super::system::{decoupled_system, driven_by_air, system};
 use super::{Assumption, ChamberError};
 use crate::effect::PackState;
 use crate::rate::{Past, RateModel};
@@ -50,9 +50,9 @@ pub(super) struct Observed<'a> {
 }
 
 impl<'a> Observed<'a> {
-    pub(super) fn new(record: &'a Record, series: Series, mean_k: f64) -> Self {
+    pub(super) fn new(record: &'a Record, series: Series, mean_k: f64, solved: Solved) -> Self {
         let channels = record.channels().iter().map(|c| c.name.clone()).collect();
-        Self { record, series, channels, mean_k, blind: false, day: None, solved: Solved::default() }
+        Self { record, series, channels, mean_k, blind: false, day: None, solved }
     }
 }
 
@@ -195,13 +195,15 @@ impl CoilSide {
         let layout = Layout::new(&self.parts(assumed), series);
         let rows = series.times_s.len();
         let outputs = self.reduced.outputs;
-        // Of each film what the modes follow, and the outputs.
+        // Of each film what the modes follow, and of each state that shows in the outputs what it makes of them.
         let behind = |film: &Film| {
             let drive = drive(&layout, &self.reduced, numbers.film_ratio(*film));
             let of: Vec<Vec<f64>> = (0..outputs).map(|j| layout.output(&self.reduced, j, &drive)).collect();
-            (drive, of)
+            let shares = (0..layout.size).map(|i| (i, of.iter().map(|row| row[i]).collect::<Vec<f64>>()));
+            let shown = shares.filter(|(_, shares)| shares.iter().any(|share| *share != 0.0));
+            (drive, shown.collect::<Vec<(usize, Vec<f64>)>>())
         };
-        let behind: Vec<(Vec<f64>, Vec<Vec<f64>>)> = series.films().iter().map(behind).collect();
+        let behind: Vec<_> = series.films().iter().map(behind).collect();
         let dot = |row: &[f64], x: &[f64]| row.iter().zip(x).map(|(a, b)| a * b).sum::<f64>();
         let mut found = Reference {
             layers: self.reduced.layers,
@@ -211,10 +213,13 @@ impl CoilSide {
             outputs_k: Vec::with_capacity(rows * outputs),
         };
         for (k, x) in states.chunks_exact(layout.size).enumerate() {
-            let (drive, of) = &behind[series.film_at(k) as usize];
+            let (drive, shown) = &behind[series.film_at(k) as usize];
             found.air_k.push(layout.air().into_iter().map(|i| x[i]).sum());
             found.drive_k.push(dot(drive, x));
-            found.outputs_k.extend(of.iter().map(|row| dot(row, x)));
+            found.outputs_k.resize((k + 1) * outputs, 0.0);
+            for (state, shares) in shown {
+                found.outputs_k[k * outputs..].iter_mut().zip(shares).for_each(|(o, share)| *o += share * x[*state]);
+            }
         }
         // Known changes of the layers belong to the course; they were taken off the readings.
         let asked = self.asked();
@@ -274,7 +279,7 @@ pub(super) fn run(
     observed: &Observed,
     values: &Values,
 ) -> Vec<Innovation> {
-    let system = system(&side.parts(assumed), numbers, &observed.series);
+    let system = decoupled_system(&side.parts(assumed), numbers, &observed.series);
     filter::forward(&system, &observed.series.rows, values, false).innovations
 }
 

@@ -120,7 +120,7 @@ impl Chamber<'_> {
         if let Some(remedy) = otherwise {
             remedy.apply(&mut parts, &mut numbers);
         }
-        let mut system = super::system::system(&parts, &numbers, &observed.series);
+        let mut system = super::system::decoupled_system(&parts, &numbers, &observed.series);
         if let Some(Remedy::FinerResolution) = otherwise {
             system.variances[0] -= observed.series.resolution_k.powi(2) / 12.0;
         }

@@ -12,7 +12,8 @@ pub(super) mod tests {
     use crate::chamber::layout::{Numbers, Parts};
     use crate::chamber::prior::Quantity;
     use crate::chamber::series::{Origin, Series};
-    use crate::chamber::system::system;
+    use crate::chamber::solved::Solved;
+    use crate::chamber::system::{decoupled_system, system};
     use crate::chamber::{Assumption, Chamber, Effort, Free, Input};
     use crate::coil::{Coil, CoilSpec, Fibre, LayerLength};
     use crate::effect::{DeclaredEffect, find};
@@ -181,21 +182,26 @@ pub(super) mod tests {
         check_on(assumed, &if averaged { one_hertz() } else { record(48) }, averaged);
     }
 
-    /// Systems that go abreast find what each finds by itself.
+    /// Systems that go abreast, and those in other coordinates, find what each finds by itself.
     fn abreast_is_one_by_one(parts: &Parts, numbers: &Numbers, series: &Series) {
-        let with = |quantity: Quantity, factor: f64| {
+        let moved = |quantity: Quantity, factor: f64| {
             let mut moved = *numbers;
             moved.set(quantity, factor * numbers.get(quantity));
-            system(parts, &moved, series)
+            moved
         };
-        let systems =
-            [with(Quantity::RateNoise, 1.0), with(Quantity::RipplePeriod, 0.7), with(Quantity::TurbulenceSize, 0.0)];
+        let all =
+            [moved(Quantity::RateNoise, 1.0), moved(Quantity::RipplePeriod, 0.7), moved(Quantity::TurbulenceSize, 0.0)];
         let values = filter::Values { of: series.values.clone() };
-        let found = abreast::forward(&systems, &series.rows, &[&values; 3]);
-        for (own, system) in found.iter().zip(&systems) {
-            let alone = filter::forward(system, &series.rows, &values, false).innovations;
+        let systems = all.each_ref().map(|numbers| system(parts, numbers, series));
+        let decoupled = all.each_ref().map(|numbers| decoupled_system(parts, numbers, series));
+        let entries = |system: &System| (0..system.size).map(|i| system.steps[0].phi.row(i).len()).sum::<usize>();
+        assert!(entries(&decoupled[0]) < entries(&systems[0]), "{} entries", entries(&decoupled[0]));
+        let alone = systems.each_ref().map(|s| filter::forward(s, &series.rows, &values, false).innovations);
+        let one_by_one = decoupled.each_ref().map(|s| filter::forward(s, &series.rows, &values, false).innovations);
+        let pairs = [&systems, &decoupled].map(|s| abreast::forward(s, &series.rows, &[&values; 3]));
+        for (own, alone) in one_by_one.iter().chain(pairs.iter().flatten()).zip(alone.iter().cycle()) {
             assert_eq!(own.len(), alone.len());
-            for (a, b) in own.iter().zip(&alone) {
+            for (a, b) in own.iter().zip(alone) {
                 let apart = (a.value - b.value).abs() / b.variance.sqrt();
                 assert!(apart < 1e-8 && (a.variance / b.variance - 1.0).abs() < 1e-8, "{a:?} for {b:?}");
             }
@@ -210,7 +216,7 @@ pub(super) mod tests {
         assert!(series.rows[14].is_kinked_within());
         assert_eq!(series.averaged > 1, averaged);
         let numbers = Numbers::medians(&series);
-        let seen = Observed::new(record, series, mean_k);
+        let seen = Observed::new(record, series, mean_k, Solved::default());
         let side = CoilSide::new(assumed, numbers.get(Quantity::Film), 4, &seen).unwrap();
         let system = system(&side.parts(assumed), &numbers, &seen.series);
         let values = filter::Values { of: seen.series.values.clone() };
@@ -324,7 +330,7 @@ pub(super) mod tests {
         let assumed = Assumption::new(model(Vec::new()), dip());
         let (series, mean_k) = observed(&assumed.model, &record);
         let numbers = Numbers::medians(&series);
-        let mut seen = Observed::new(&record, series, mean_k);
+        let mut seen = Observed::new(&record, series, mean_k, Solved::default());
         let side = CoilSide::new(&assumed, 25.0, 5, &seen).unwrap();
         let values = filter::Values { of: seen.series.values.clone() };
         let system = system(&side.parts(&assumed), &numbers, &seen.series);

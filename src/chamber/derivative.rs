@@ -5,6 +5,7 @@
 //! ```
 
 use nalgebra::{DMatrix, DVector};
+use pulp::Arch;
 
 use super::filter::Innovation;
 
@@ -23,10 +24,7 @@ impl DerivativeColumn {
 
     /// Slope of the log likelihood along it.
     pub(crate) fn score(&self, base: &[Innovation]) -> f64 {
-        let of = |(b, (dv, ds)): (&Innovation, (&f64, &f64))| {
-            (0.5 * ds / b.variance * (b.value * b.value / b.variance - 1.0)) - dv * b.value / b.variance
-        };
-        base.iter().zip(self.value.iter().zip(&self.variance)).map(of).sum()
+        WeightedColumn::slope(base).dot(self)
     }
 }
 
@@ -57,10 +55,18 @@ impl Derivatives {
     }
 
     pub(crate) fn add_score_to(&self, base: &[Innovation], score: &mut DVector<f64>) {
-        self.parameters.iter().zip(&self.columns).for_each(|(&p, column)| score[p] += column.score(base));
+        Arch::new().dispatch(|| {
+            let slope = WeightedColumn::slope(base);
+            self.parameters.iter().zip(&self.columns).for_each(|(&p, column)| score[p] += slope.dot(column));
+        });
     }
 
     pub(crate) fn add_information_to(&self, base: &[Innovation], information: &mut DMatrix<f64>) {
+        Arch::new().dispatch(|| self.add_products_to(base, information));
+    }
+
+    #[inline(always)]
+    fn add_products_to(&self, base: &[Innovation], information: &mut DMatrix<f64>) {
         let weighted: Vec<WeightedColumn> = self.columns.iter().map(|c| WeightedColumn::new(c, base)).collect();
         for (i, &p) in self.parameters.iter().enumerate() {
             for (k, &q) in self.parameters.iter().enumerate().take(i + 1) {
@@ -81,25 +87,36 @@ impl Derivatives {
     }
 }
 
-/// A column over the innovations' variances: v'/S and S'/2S².
+/// What columns are multiplied by: another one over the innovations' variances, v'/S and S'/2S², or the slope's weights.
 struct WeightedColumn {
     value: Vec<f64>,
     variance: Vec<f64>,
 }
 
 impl WeightedColumn {
+    #[inline(always)]
     fn new(column: &DerivativeColumn, base: &[Innovation]) -> Self {
         let value = column.value.iter().zip(base).map(|(d, i)| d / i.variance).collect();
         let variance = column.variance.iter().zip(base).map(|(d, i)| 0.5 * d / (i.variance * i.variance)).collect();
         Self { value, variance }
     }
 
+    /// −v/S and ½ (v²/S − 1)/S.
+    #[inline(always)]
+    fn slope(base: &[Innovation]) -> Self {
+        let value = base.iter().map(|i| -i.value / i.variance).collect();
+        let variance = base.iter().map(|i| 0.5 * (i.value * i.value / i.variance - 1.0) / i.variance).collect();
+        Self { value, variance }
+    }
+
+    #[inline(always)]
     fn dot(&self, other: &DerivativeColumn) -> f64 {
         dot(&self.value, &other.value) + dot(&self.variance, &other.variance)
     }
 }
 
 /// Σ a b, in as many sums at a time as a processor has room for.
+#[inline(always)]
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (a, b) = (a.chunks_exact(SUMS), b.chunks_exact(SUMS));
     let mut rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();

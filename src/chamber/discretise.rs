@@ -19,8 +19,7 @@
 // Loops over an index that the compiler knows the end of: iterators stay calls in functions as large as these.
 #![allow(clippy::needless_range_loop)]
 
-use pulp::{Arch, NullaryFnOnce};
-
+use super::arithmetic::{Arithmetic, Pass, dispatched};
 use super::sparse::{MOST_STATES, Sparse, Square, dispatch, turned, wide_square};
 
 /// Terms of the series; what they leave out is below ½^13/13! = 2e-14.
@@ -39,9 +38,9 @@ pub(super) struct Discrete {
 /// The system over each of the steps, in their order.
 ///
 /// # Shapes
-/// `system` row-major n × n \[1/s\]; each of `noises` the diagonal of a G; one entry of the answer a step.
+/// `system` row-major n × n \[1/s\]; each of `noises` a G, likewise; one entry of the answer a step.
 pub(super) fn discretise(system: &[f64], noises: [&[f64]; NOISES], n: usize, steps_s: &[f64]) -> Vec<Discrete> {
-    Arch::new().dispatch(Discretise { system, noises, n, steps_s })
+    dispatched(Discretise { system, noises, n, steps_s })
 }
 
 struct Discretise<'a> {
@@ -51,12 +50,12 @@ struct Discretise<'a> {
     steps_s: &'a [f64],
 }
 
-impl NullaryFnOnce for Discretise<'_> {
+impl Pass for Discretise<'_> {
     type Output = Vec<Discrete>;
 
     #[inline(always)]
-    fn call(self) -> Self::Output {
-        dispatch!(self.n, discretise_of(&self))
+    fn run(self, arithmetic: impl Arithmetic) -> Self::Output {
+        dispatch!(self.n, discretise_of(arithmetic, &self))
     }
 }
 
@@ -87,11 +86,11 @@ impl<const N: usize> Over<N> {
 
     /// This time, and then another.
     #[inline(always)]
-    fn then(&self, other: &Self, n: usize) -> Self {
+    fn then(&self, arithmetic: impl Arithmetic, other: &Self, n: usize) -> Self {
         let phi = Sparse::of_square(&other.transition, n);
         let mut both = Self {
-            transition: phi.times_square(&self.transition),
-            noises: [phi.surround(&self.noises[0]), phi.surround(&self.noises[1])],
+            transition: phi.times_square(arithmetic, &self.transition),
+            noises: [phi.surround(arithmetic, &self.noises[0]), phi.surround(arithmetic, &self.noises[1])],
         };
         for k in 0..NOISES {
             for i in 0..N {
@@ -110,13 +109,13 @@ impl<const N: usize> Over<N> {
 }
 
 #[inline(always)]
-fn discretise_of<const N: usize>(of: &Discretise) -> Vec<Discrete> {
+fn discretise_of<const N: usize>(arithmetic: impl Arithmetic, of: &Discretise) -> Vec<Discrete> {
     let n = of.n;
     let norm = of.system.chunks_exact(n).map(|row| row.iter().map(|v| v.abs()).sum::<f64>()).fold(0.0, f64::max);
     let longest_s = of.steps_s.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     // The longest time for which the series serves.
     let unit_s = if norm.is_finite() { longest_s.min(LARGEST_NORM / norm) } else { longest_s };
-    let series = series_of::<N>(of, unit_s);
+    let series = series_of::<N>(arithmetic, of, unit_s);
     let mut order: Vec<usize> = (0..of.steps_s.len()).collect();
     order.sort_by(|a, b| of.steps_s[*a].total_cmp(&of.steps_s[*b]));
     let mut found: Vec<(usize, Discrete)> = Vec::with_capacity(order.len());
@@ -124,9 +123,9 @@ fn discretise_of<const N: usize>(of: &Discretise) -> Vec<Discrete> {
     for place in order {
         let step_s = of.steps_s[place];
         let more_s = step_s - known.as_ref().map_or(0.0, |k| k.0);
-        let more = over(&series, more_s / unit_s, n);
+        let more = over(arithmetic, &series, more_s / unit_s, n);
         let whole = match &known {
-            Some((_, before)) => before.then(&more, n),
+            Some((_, before)) => before.then(arithmetic, &more, n),
             None => more,
         };
         found.push((place, whole.discrete(n)));
@@ -138,7 +137,7 @@ fn discretise_of<const N: usize>(of: &Discretise) -> Vec<Discrete> {
 
 /// So many units of time, of whose powers the series' terms are.
 #[inline(always)]
-fn over<const N: usize>(series: &[Over<N>], units: f64, n: usize) -> Over<N> {
+fn over<const N: usize>(arithmetic: impl Arithmetic, series: &[Over<N>], units: f64, n: usize) -> Over<N> {
     let doublings = units.log2().ceil().clamp(0.0, 60.0) as i32;
     let share = units / 2.0_f64.powi(doublings);
     let mut sum = Over::nothing(n);
@@ -148,29 +147,27 @@ fn over<const N: usize>(series: &[Over<N>], units: f64, n: usize) -> Over<N> {
         sum.add(term, power);
     }
     for _ in 0..doublings {
-        sum = sum.then(&sum, n);
+        sum = sum.then(arithmetic, &sum, n);
     }
     sum
 }
 
 /// The terms of Φ's and Q's series at one unit of time.
 #[inline(always)]
-fn series_of<const N: usize>(of: &Discretise, unit_s: f64) -> Vec<Over<N>> {
+fn series_of<const N: usize>(arithmetic: impl Arithmetic, of: &Discretise, unit_s: f64) -> Vec<Over<N>> {
     let n = of.n;
     let scaled: Vec<f64> = of.system.iter().map(|v| v * unit_s).collect();
     let f = Sparse::new(&scaled, n);
-    let mut first = Over { transition: wide_square(&scaled, n), noises: [[[0.0; N]; N]; NOISES] };
-    for (noise, diagonal) in first.noises.iter_mut().zip(of.noises) {
-        diagonal.iter().enumerate().for_each(|(i, g)| noise[i][i] = g * unit_s);
-    }
+    let mut first = Over { transition: wide_square(&scaled, n), noises: of.noises.map(|g| wide_square(g, n)) };
+    first.noises.iter_mut().flatten().flatten().for_each(|g| *g *= unit_s);
     let mut terms = vec![first];
     for order in 2..=TERMS {
         let (before, share) = (&terms[order - 2], 1.0 / order as f64);
-        let mut next = Over { transition: f.times_square(&before.transition), noises: before.noises };
+        let mut next = Over { transition: f.times_square(arithmetic, &before.transition), noises: before.noises };
         next.transition.iter_mut().flatten().for_each(|v| *v *= share);
         for noise in &mut next.noises {
             // The terms are symmetric: F t + (F t)ᵀ.
-            let product = f.times_square(noise);
+            let product = f.times_square(arithmetic, noise);
             let other = turned(&product);
             for i in 0..N {
                 for j in 0..N {
@@ -186,12 +183,13 @@ fn series_of<const N: usize>(of: &Discretise, unit_s: f64) -> Vec<Over<N>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chamber::system::diagonal;
 
     #[test]
     fn a_stiff_mode_behind_a_random_walk_is_the_closed_form() {
         // x' = −λ (x − w), w' = noise of density q.
         let (l, q, step) = (3.0_f64, 0.2, 20.0);
-        let found = &discretise(&[-l, l, 0.0, 0.0], [&[0.0, q], &[0.0, 0.0]], 2, &[step])[0];
+        let found = &discretise(&[-l, l, 0.0, 0.0], [&[0.0, 0.0, 0.0, q], &[0.0; 4]], 2, &[step])[0];
         let left = (-l * step).exp();
         assert!((found.transition[0] - left).abs() < 1e-14 && (found.transition[1] - 1.0 + left).abs() < 1e-13);
         let cross = q * (step - (1.0 - left) / l);
@@ -205,7 +203,7 @@ mod tests {
     fn a_step_is_the_same_beside_any_others() {
         // A stiff mode, an oscillator that noise drives, and a random walk that both follow.
         let f = [[-2.5, 0.0, 0.0, 2.5], [0.0, -0.01, 0.05, 0.3], [0.0, -0.05, -0.01, 0.0], [0.0, 0.0, 0.0, -0.002]];
-        let (f, rest, bend) = (f.concat(), [0.0, 0.0, 0.4, 0.0], [0.0, 0.0, 0.0, 1.0]);
+        let (f, rest, bend) = (f.concat(), diagonal(&[0.0, 0.0, 0.4, 0.0]), diagonal(&[0.0, 0.0, 0.0, 1.0]));
         let steps_s = [10.0, 3.7, 9.8, 3.701, 60.0, 10.0, 0.02];
         let all = discretise(&f, [&rest, &bend], 4, &steps_s);
         for (step_s, found) in steps_s.iter().zip(&all) {

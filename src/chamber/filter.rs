@@ -21,10 +21,9 @@
 // Loops over an index that the compiler knows the end of: iterators stay calls in functions as large as these.
 #![allow(clippy::needless_range_loop)]
 
-use pulp::{Arch, NullaryFnOnce};
-
+use super::arithmetic::{Arithmetic, Pass, dispatched};
 pub(super) use super::row::{AMBIENT, MEASURED, Move, RATE, Row};
-use super::sparse::{MOST_STATES, Sparse, Square, dispatch, wide, wide_square};
+use super::sparse::{MOST_STATES, Sparse, Square, dispatch, turn, wide, wide_square};
 
 /// Relative change of every S from row to row below which a row counts as settled, and how many of them freeze the gains:
 /// together they cost less than 0.2 of log likelihood on 1 500 rows (a test).
@@ -102,23 +101,23 @@ pub(super) struct Trace {
 
 /// The forward pass; gains and means are kept for the other passes if `keep`.
 pub(super) fn forward(system: &System, rows: &[Row], values: &Values, keep: bool) -> Trace {
-    Arch::new().dispatch(Forward { system, rows, values, keep })
+    dispatched(Forward { system, rows, values, keep })
 }
 
 /// The smoothed states, row-major rows × states, from a trace that kept its gains.
 pub(super) fn smooth(system: &System, rows: &[Row], trace: &Trace) -> Vec<f64> {
-    dispatch!(system.size, smooth_of(system, rows, trace))
+    dispatched(Smooth { system, rows, trace })
 }
 
 /// What known inputs to the measurements make of the innovations, by the gains of a trace that kept them: their
 /// innovations if they were measured themselves and all states began at zero.
 pub(super) fn respond(system: &System, rows: &[Row], trace: &Trace, inputs: &Values) -> Vec<f64> {
-    Arch::new().dispatch(Respond { system, rows, trace, inputs })
+    dispatched(Respond { system, rows, trace, inputs })
 }
 
 /// What does not belong to a record, by a trace that kept its gains.
 pub(super) fn doubts(system: &System, rows: &[Row], trace: &Trace) -> Doubts {
-    Arch::new().dispatch(Doubt { system, rows, trace })
+    dispatched(Doubt { system, rows, trace })
 }
 
 /// Standardised values of what every measurement, and every row's change of the slope, is beyond what all others say.
@@ -136,12 +135,27 @@ struct Doubt<'a> {
     trace: &'a Trace,
 }
 
-impl NullaryFnOnce for Doubt<'_> {
+impl Pass for Doubt<'_> {
     type Output = Doubts;
 
     #[inline(always)]
-    fn call(self) -> Doubts {
-        dispatch!(self.system.size, doubts_of(self.system, self.rows, self.trace))
+    fn run(self, arithmetic: impl Arithmetic) -> Doubts {
+        dispatch!(self.system.size, doubts_of(arithmetic, self.system, self.rows, self.trace))
+    }
+}
+
+struct Smooth<'a> {
+    system: &'a System,
+    rows: &'a [Row],
+    trace: &'a Trace,
+}
+
+impl Pass for Smooth<'_> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn run(self, arithmetic: impl Arithmetic) -> Vec<f64> {
+        dispatch!(self.system.size, smooth_of(arithmetic, self.system, self.rows, self.trace))
     }
 }
 
@@ -152,12 +166,12 @@ struct Forward<'a> {
     keep: bool,
 }
 
-impl NullaryFnOnce for Forward<'_> {
+impl Pass for Forward<'_> {
     type Output = Trace;
 
     #[inline(always)]
-    fn call(self) -> Trace {
-        dispatch!(self.system.size, forward_of(self.system, self.rows, self.values, self.keep))
+    fn run(self, arithmetic: impl Arithmetic) -> Trace {
+        dispatch!(self.system.size, forward_of(arithmetic, self.system, self.rows, self.values, self.keep))
     }
 }
 
@@ -168,43 +182,72 @@ struct Respond<'a> {
     inputs: &'a Values,
 }
 
-impl NullaryFnOnce for Respond<'_> {
+impl Pass for Respond<'_> {
     type Output = Vec<f64>;
 
     #[inline(always)]
-    fn call(self) -> Vec<f64> {
-        dispatch!(self.system.size, respond_of(self.system, self.rows, self.trace, self.inputs))
+    fn run(self, arithmetic: impl Arithmetic) -> Vec<f64> {
+        dispatch!(self.system.size, respond_of(arithmetic, self.system, self.rows, self.trace, self.inputs))
     }
 }
 
+/// P ← Φ P Φᵀ + Q.
 #[inline(always)]
-fn predict<const N: usize>(step: &Noise<N>, density: f64, covariance: &mut Square<N>) {
-    *covariance = step.phi.surround(covariance);
-    for i in 0..N {
-        for j in 0..N {
-            covariance[i][j] += step.noise[i][j] + density * step.trend_noise[i][j];
+fn predict<const N: usize>(
+    arithmetic: impl Arithmetic,
+    phi: &Sparse,
+    noise: &Square<N>,
+    covariance: &mut Square<N>,
+    [room, turned]: &mut [Square<N>; 2],
+) {
+    for i in 0..phi.rows() {
+        room[i] = phi.combine(arithmetic, i, covariance);
+    }
+    turn(room, turned);
+    for i in 0..phi.rows() {
+        covariance[i] = phi.combine_onto(arithmetic, i, turned, &noise[i]);
+    }
+}
+
+/// The noise of one step and how much the trend has.
+struct StepNoise<const N: usize> {
+    of: Option<(u16, f64)>,
+    noise: Square<N>,
+}
+
+impl<const N: usize> StepNoise<N> {
+    #[inline(always)]
+    fn at(&mut self, steps: &[Noise<N>], step: u16, density: f64) -> &Square<N> {
+        if self.of != Some((step, density)) {
+            self.of = Some((step, density));
+            let own = &steps[step as usize];
+            for i in 0..N {
+                for j in 0..N {
+                    self.noise[i][j] = own.noise[i][j] + density * own.trend_noise[i][j];
+                }
+            }
         }
+        &self.noise
     }
 }
 
 /// A step with its noises as wide as the compiler knows.
-struct Noise<'a, const N: usize> {
-    phi: &'a Sparse,
+struct Noise<const N: usize> {
     noise: Square<N>,
     trend_noise: Square<N>,
 }
 
 #[inline(always)]
-fn keep_window<const N: usize>(system: &System, slot: u8, covariance: &mut Square<N>) {
+fn keep_window<const N: usize>(arithmetic: impl Arithmetic, system: &System, slot: u8, covariance: &mut Square<N>) {
     let keeps = &system.keeps[slot as usize];
     for (place, &(state, row)) in keeps.iter().enumerate() {
         // Cov(c·x, x), the state's own former content being forgotten.
-        let mut along = system.kept.combine(row, covariance);
+        let mut along = system.kept.combine(arithmetic, row, covariance);
         along[state] = 0.0;
         for &(other, _) in &keeps[place + 1..] {
             along[other] = 0.0;
         }
-        let own = system.kept.dot(row, &along);
+        let own = system.kept.dot(arithmetic, row, &along);
         for i in 0..N {
             covariance[i][state] = along[i];
             covariance[state][i] = along[i];
@@ -214,13 +257,13 @@ fn keep_window<const N: usize>(system: &System, slot: u8, covariance: &mut Squar
 }
 
 #[inline(always)]
-fn advance<const N: usize>(system: &System, row: &Row, mean: &mut [f64; N]) {
+fn advance<const N: usize>(arithmetic: impl Arithmetic, system: &System, row: &Row, mean: &mut [f64; N]) {
     for &movement in &row.moves {
         match movement {
-            Move::Step(step) => *mean = system.steps[step as usize].phi.times(mean),
+            Move::Step(step) => *mean = system.steps[step as usize].phi.times(arithmetic, mean),
             Move::Keep(slot) => {
                 for &(state, kept) in &system.keeps[slot as usize] {
-                    mean[state] = system.kept.dot(kept, mean);
+                    mean[state] = system.kept.dot(arithmetic, kept, mean);
                 }
             }
             Move::Kink => {}
@@ -230,9 +273,9 @@ fn advance<const N: usize>(system: &System, row: &Row, mean: &mut [f64; N]) {
 
 /// r ← Mᵀ r over what happened between the row before and this one.
 #[inline(always)]
-fn retreat<const N: usize>(system: &System, movement: Move, r: &mut [f64; N]) {
+fn retreat<const N: usize>(arithmetic: impl Arithmetic, system: &System, movement: Move, r: &mut [f64; N]) {
     match movement {
-        Move::Step(step) => *r = system.steps[step as usize].phi_turned.times(r),
+        Move::Step(step) => *r = system.steps[step as usize].phi_turned.times(arithmetic, r),
         Move::Keep(slot) => {
             for &(state, kept) in system.keeps[slot as usize].iter().rev() {
                 let weight = std::mem::take(&mut r[state]);
@@ -248,15 +291,23 @@ fn retreat<const N: usize>(system: &System, movement: Move, r: &mut [f64; N]) {
     clippy::too_many_lines,
     reason = "the inner loop of every fit: one pass over a row, unrolled for each size, without a call between"
 )]
-fn forward_of<const N: usize>(system: &System, rows: &[Row], values: &Values, keep: bool) -> Trace {
+fn forward_of<const N: usize>(
+    arithmetic: impl Arithmetic,
+    system: &System,
+    rows: &[Row],
+    values: &Values,
+    keep: bool,
+) -> Trace {
     let n = system.size;
     let steps: Vec<Noise<N>> = system
         .steps
         .iter()
-        .map(|s| Noise { phi: &s.phi, noise: wide_square(&s.noise, n), trend_noise: wide_square(&s.trend_noise, n) })
+        .map(|s| Noise { noise: wide_square(&s.noise, n), trend_noise: wide_square(&s.trend_noise, n) })
         .collect();
+    let mut added = StepNoise { of: None, noise: [[0.0; N]; N] };
     let mut mean: [f64; N] = wide(&system.mean);
     let mut covariance: Square<N> = wide_square(&system.covariance, n);
+    let mut room: [Square<N>; 2] = [[[0.0; N]; N]; 2];
     let mut gains = [[0.0; N]; MEASURED];
     let mut variances = [0.0; MEASURED];
     let mut trace = Trace { innovations: Vec::with_capacity(2 * rows.len()), ..Trace::default() };
@@ -267,7 +318,7 @@ fn forward_of<const N: usize>(system: &System, rows: &[Row], values: &Values, ke
         if !alike {
             settled = 0;
         }
-        advance(system, row, &mut mean);
+        advance(arithmetic, system, row, &mut mean);
         if keep {
             trace.means.extend_from_slice(&mean[..n]);
         }
@@ -280,8 +331,11 @@ fn forward_of<const N: usize>(system: &System, rows: &[Row], values: &Values, ke
             }
             for &movement in &row.moves {
                 match movement {
-                    Move::Step(step) => predict(&steps[step as usize], density, &mut covariance),
-                    Move::Keep(slot) => keep_window(system, slot, &mut covariance),
+                    Move::Step(step) => {
+                        let phi = &system.steps[step as usize].phi;
+                        predict(arithmetic, phi, added.at(&steps, step, density), &mut covariance, &mut room);
+                    }
+                    Move::Keep(slot) => keep_window(arithmetic, system, slot, &mut covariance),
                     Move::Kink => covariance[system.slope][system.slope] += row.kink,
                 }
             }
@@ -296,27 +350,27 @@ fn forward_of<const N: usize>(system: &System, rows: &[Row], values: &Values, ke
         for (m, index) in row.measured.iter().enumerate() {
             let Some(h) = *index else { continue };
             let h = h as usize;
-            let value = values.of[m][k] - system.rows.dot(h, &mean);
+            let value = values.of[m][k] - system.rows.dot(arithmetic, h, &mean);
             if !frozen {
-                let along = system.rows.combine(h, &covariance);
-                let variance = system.rows.dot(h, &along) + system.variances[m] / row.averaged;
+                let along = system.rows.combine(arithmetic, h, &covariance);
+                let variance = system.rows.dot(arithmetic, h, &along) + system.variances[m] / row.averaged;
                 change = change.max((variance / variances[m] - 1.0).abs());
                 variances[m] = variance;
                 frozen_logs += variance.ln();
-                let gain = along.map(|a| a / variance);
+                let gain = &mut gains[m];
                 for i in 0..N {
+                    gain[i] = along[i] / variance;
                     for j in 0..N {
-                        covariance[i][j] -= gain[i] * along[j];
+                        covariance[i][j] = arithmetic.add_product(-gain[i], along[j], covariance[i][j]);
                     }
                 }
-                gains[m] = gain;
                 if keep && let Some(last) = trace.gains.last_mut() {
                     last.gain.extend_from_slice(&gain[..n]);
                     last.gain.push(1.0 / variance);
                 }
             }
             for i in 0..N {
-                mean[i] += gains[m][i] * value;
+                mean[i] = arithmetic.add_product(gains[m][i], value, mean[i]);
             }
             sum += value * value / variances[m];
             trace.innovations.push(Innovation { value, variance: variances[m] });
@@ -334,18 +388,24 @@ fn forward_of<const N: usize>(system: &System, rows: &[Row], values: &Values, ke
 }
 
 #[inline(always)]
-fn respond_of<const N: usize>(system: &System, rows: &[Row], trace: &Trace, inputs: &Values) -> Vec<f64> {
+fn respond_of<const N: usize>(
+    arithmetic: impl Arithmetic,
+    system: &System,
+    rows: &[Row],
+    trace: &Trace,
+    inputs: &Values,
+) -> Vec<f64> {
     let n = system.size;
     let mut mean = [0.0; N];
     let mut out = Vec::with_capacity(trace.innovations.len());
     for (k, row) in rows.iter().enumerate() {
-        advance(system, row, &mut mean);
+        advance(arithmetic, system, row, &mut mean);
         let gains = &trace.gains[trace.gains_of[k] as usize].gain;
         let mut taken = gains.chunks_exact(n + 1);
         for (m, index) in row.measured.iter().enumerate() {
             let (Some(h), Some(gain)) = (*index, index.and_then(|_| taken.next())) else { continue };
             let input = inputs.of[m].get(k).copied().unwrap_or(0.0);
-            let value = input - system.rows.dot(h as usize, &mean);
+            let value = input - system.rows.dot(arithmetic, h as usize, &mean);
             out.push(value);
             for i in 0..n {
                 mean[i] += gain[i] * value;
@@ -355,7 +415,8 @@ fn respond_of<const N: usize>(system: &System, rows: &[Row], trace: &Trace, inpu
     out
 }
 
-fn smooth_of<const N: usize>(system: &System, rows: &[Row], trace: &Trace) -> Vec<f64> {
+#[inline(always)]
+fn smooth_of<const N: usize>(arithmetic: impl Arithmetic, system: &System, rows: &[Row], trace: &Trace) -> Vec<f64> {
     let n = system.size;
     let mut states = vec![0.0; rows.len() * n];
     let mut r = [0.0; N];
@@ -375,13 +436,13 @@ fn smooth_of<const N: usize>(system: &System, rows: &[Row], trace: &Trace) -> Ve
             let correction: f64 = line.iter().zip(&r).map(|(p, r)| p * r).sum();
             states[k * n + i] = trace.means[k * n + i] + correction;
         }
-        row.moves.iter().rev().for_each(|&movement| retreat(system, movement, &mut r));
+        row.moves.iter().rev().for_each(|&movement| retreat(arithmetic, system, movement, &mut r));
     }
     states
 }
 
 #[inline(always)]
-fn doubts_of<const N: usize>(system: &System, rows: &[Row], trace: &Trace) -> Doubts {
+fn doubts_of<const N: usize>(arithmetic: impl Arithmetic, system: &System, rows: &[Row], trace: &Trace) -> Doubts {
     let n = system.size;
     let mut found = Doubts { values: vec![0.0; trace.innovations.len()], kinks: vec![(0.0, 0.0); rows.len()] };
     let mut r = [0.0; N];
@@ -420,9 +481,9 @@ fn doubts_of<const N: usize>(system: &System, rows: &[Row], trace: &Trace) -> Do
             if own > 0.0 { (r[system.slope] / own.sqrt(), r[system.slope] / own) } else { (0.0, 0.0) }
         };
         for &movement in row.moves.iter().rev() {
-            retreat(system, movement, &mut r);
+            retreat(arithmetic, system, movement, &mut r);
             match movement {
-                Move::Step(step) => spread = system.steps[step as usize].phi_turned.surround(&spread),
+                Move::Step(step) => spread = system.steps[step as usize].phi_turned.surround(arithmetic, &spread),
                 Move::Keep(slot) => forget_window(system, slot, &mut spread),
                 Move::Kink => {
                     let here = kink(&r, &spread);

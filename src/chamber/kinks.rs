@@ -12,7 +12,7 @@ use super::ascent::Effort;
 use super::filter::{self, Move};
 use super::fit::Fit;
 use super::series::{SHORT_ROW_S, Series, TimeStep};
-use super::system::system;
+use super::system::decoupled_system;
 use super::{Assumption, Chamber, ChamberError};
 
 /// A change of the air's slope that stands out.
@@ -117,7 +117,7 @@ impl Chamber<'_> {
         let (side, values) = self.side_and_values(fit, record, &numbers)?;
         let likelihood = |kinks: &[Bend]| {
             let series = base.with_kinks(kinks);
-            let system = system(&side.parts(&fit.assumed), &numbers, &series);
+            let system = decoupled_system(&side.parts(&fit.assumed), &numbers, &series);
             filter::forward(&system, &series.rows, &values, false).log_likelihood
         };
         let row_s = base.shortest_s();

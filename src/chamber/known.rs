@@ -47,16 +47,15 @@ impl Reference {
 
     /// Change of an output (None: of the air) over each row's window, per second; zero at the first row.
     pub(super) fn window_rates(&self, series: &Series, output: Option<usize>) -> Vec<f64> {
-        let mut start = Vec::new();
         let rate = |k: usize| {
             if k == 0 {
                 return 0.0;
             }
-            let air = self.at_window_start(series, k, &mut start);
             let at = |k: usize| output.map_or(self.air_k[k], |j| self.row(k)[j]);
             let window_s = series.shapes[series.shape_of(k)].window_s;
             if window_s > 0.0 {
-                (at(k) - output.map_or(air, |j| start[j])) / window_s
+                let (before, share) = window_start(series, k);
+                (at(k) - (at(before) + share * (at(before + 1) - at(before)))) / window_s
             } else {
                 (at(k) - at(k - 1)) / (series.times_s[k] - series.times_s[k - 1])
             }
@@ -66,15 +65,20 @@ impl Reference {
 
     /// At the beginning of a row's window, between the rows where it lies there.
     pub(super) fn at_window_start(&self, series: &Series, row: usize, out: &mut Vec<f64>) -> f64 {
-        let shape = &series.shapes[series.shape_of(row)];
-        let start_s = series.times_s[row] - shape.window_s;
-        let before = series.times_s[..row].partition_point(|&t| t <= start_s + 1e-6).max(1) - 1;
-        let (t0, t1) = (series.times_s[before], series.times_s[before + 1]);
-        let share = ((start_s - t0) / (t1 - t0)).clamp(0.0, 1.0);
+        let (before, share) = window_start(series, row);
         out.clear();
         out.extend(self.row(before).iter().zip(self.row(before + 1)).map(|(a, b)| a + share * (b - a)));
         self.air_k[before] + share * (self.air_k[before + 1] - self.air_k[before])
     }
+}
+
+/// The row after which a row's window begins, and how far to the next one.
+fn window_start(series: &Series, row: usize) -> (usize, f64) {
+    let start_s = series.times_s[row] - series.shapes[series.shape_of(row)].window_s;
+    // Windows begin in the last interval or the one before it.
+    let before = (0..row).rev().find(|&k| series.times_s[k] <= start_s + 1e-6).unwrap_or(0);
+    let (t0, t1) = (series.times_s[before], series.times_s[before + 1]);
+    (before, ((start_s - t0) / (t1 - t0)).clamp(0.0, 1.0))
 }
 
 /// What a model needs to have worked out.
@@ -204,7 +208,7 @@ pub(super) fn beyond_linear(asked: &Asked, series: &Series, reference: &Referenc
     let length_m = asked.rate.coil().length_m();
     let mean = |values: &[f64]| values.iter().zip(lengths_m).map(|(v, l)| v * l).sum::<f64>() / length_m;
     let mut channels = vec![0.0; series.columns.len()];
-    let mut start = Vec::new();
+    let (mut start, mut change, mut temperatures) = (Vec::new(), Vec::new(), Vec::new());
     let mut past = Past::default();
     for (k, rate) in rates.iter_mut().enumerate() {
         channels.iter_mut().zip(&series.columns).for_each(|(value, column)| *value = column[k]);
@@ -219,9 +223,10 @@ pub(super) fn beyond_linear(asked: &Asked, series: &Series, reference: &Referenc
         let window_s = series.shapes[series.shape_of(k)].window_s;
         let window_s = if window_s > 0.0 { window_s } else { series.times_s[k] - series.times_s[k - 1] };
         let end = reference.row(k);
-        let change: Vec<f64> = end.iter().zip(&start).map(|(b, a)| (b - a) / window_s).collect();
-        let temperatures: Vec<f64> =
-            end[..layers].iter().zip(&start).map(|(b, a)| series.reference_k + 0.5 * (a + b)).collect();
+        change.clear();
+        change.extend(end.iter().zip(&start).map(|(b, a)| (b - a) / window_s));
+        temperatures.clear();
+        temperatures.extend(end[..layers].iter().zip(&start).map(|(b, a)| series.reference_k + 0.5 * (a + b)));
         let air_rate = (reference.air_k[k] - air_before) / window_s;
         let state = PackState {
             time_s: series.times_s[k],

@@ -31,10 +31,12 @@
 mod abreast;
 mod adjustment;
 mod airs;
+mod arithmetic;
 mod ascent;
 mod causal;
 mod coil_side;
 mod course;
+mod decoupled;
 #[cfg(test)]
 mod dense;
 mod derivative;
@@ -81,6 +83,7 @@ use crate::record::Record;
 use crate::thermal::ThermalError;
 use coil_side::Observed;
 use series::{Origin, Series};
+use solved::Solved;
 use system::driven_by_air;
 
 pub(crate) use adjustment::DifferenceVariance;
@@ -241,6 +244,7 @@ impl<'a> Chamber<'a> {
         let (driven, _) = driven_by_air(&path, USUAL_FILM_W_PER_M2_K);
         let thickness_m = path.shape.layers as f64 * path.shape.radial_pitch_m;
         let pack_s = (thickness_m / std::f64::consts::PI).powi(2) / path.material.diffusivity_m2_per_s();
+        let solved = Solved::default();
         let mut observed: Vec<Observed> = Vec::with_capacity(records.len());
         for &record in records {
             let (low, high) = record
@@ -255,7 +259,7 @@ impl<'a> Chamber<'a> {
                 let (row_s, found) = (series.averaged as f64 * record.interval_s(), series.rows.len());
                 return Err(ChamberError::TooFew { record: record.name().to_owned(), row_s, found });
             }
-            observed.push(Observed::new(record, series, 0.5 * (low + high)));
+            observed.push(Observed::new(record, series, 0.5 * (low + high), solved.clone()));
         }
         let modes = if path.extent == crate::thermal::Extent::HalfSpace {
             HALF_SPACE_MODES

@@ -11,7 +11,7 @@ use super::layout::Numbers;
 use super::parameter::{Parameter, write};
 use super::prior::Quantity;
 
-use super::system::system;
+use super::system::decoupled_system;
 use super::{Assumption, Chamber, ChamberError};
 
 /// All that a likelihood is computed from.
@@ -35,16 +35,17 @@ impl Chamber<'_> {
         let mut sides: Vec<Option<CoilSide>> = (0..self.records()).map(|_| None).collect();
         let mut values: Vec<Option<Values>> = (0..self.records()).map(|_| None).collect();
         for &r in records {
-            let observed = &self.observed[r];
-            let side = CoilSide::new(&assumed, numbers[r].get(Quantity::Film), self.modes, observed)?;
-            let reference = if side.needs_reference() {
-                courses[r].as_ref().filter(|c| c.outputs == side.reduced.outputs)
-            } else {
-                None
-            };
-            values[r] = Some(side.values(&assumed, observed, r, reference)?);
-            sides[r] = Some(side);
+            // One after another: records behind one film share their heat path.
+            let film = numbers[r].get(Quantity::Film);
+            sides[r] = Some(CoilSide::new(&assumed, film, self.modes, &self.observed[r])?);
         }
+        let taken_off = |&r: &usize| -> Result<Option<Values>, ChamberError> {
+            let Some(side) = &sides[r] else { return Ok(None) };
+            let course = courses[r].as_ref().filter(|c| side.needs_reference() && c.outputs == side.reduced.outputs);
+            side.values(&assumed, &self.observed[r], r, course).map(Some)
+        };
+        let found: Result<Vec<_>, ChamberError> = records.par_iter().map(taken_off).collect();
+        records.iter().zip(found?).for_each(|(&r, own)| values[r] = own);
         Ok(ModelPoint { assumed, numbers, sides, values, courses })
     }
 
@@ -72,14 +73,14 @@ impl Chamber<'_> {
         let series = &self.observed[record].series;
         if parameter.leaves_coil() {
             let Some(side) = &point.sides[record] else { return Err(ChamberError::Unsolvable) };
-            let system = system(&side.parts(&point.assumed), &numbers[record], series);
+            let system = decoupled_system(&side.parts(&point.assumed), &numbers[record], series);
             return Ok(MovedRecord { system, values: None });
         }
         let mut there = self.model_point(assumed, numbers, &[record], point.courses)?;
         let (Some(side), values) = (&there.sides[record], there.values[record].take()) else {
             return Err(ChamberError::Unsolvable);
         };
-        let system = system(&side.parts(&there.assumed), &there.numbers[record], series);
+        let system = decoupled_system(&side.parts(&there.assumed), &there.numbers[record], series);
         Ok(MovedRecord { system, values })
     }
 

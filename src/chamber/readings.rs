@@ -17,7 +17,7 @@ use super::layout::{Layout, Numbers};
 use super::prior::Quantity;
 use super::series::{Origin, Series};
 
-use super::system::system;
+use super::system::{decoupled_system, system};
 use super::{Chamber, ChamberError};
 use crate::rate::CoilModel;
 use crate::record::Record;
@@ -181,7 +181,7 @@ impl Chamber<'_> {
         numbers.set(Quantity::WanderShare, NO_WANDER);
         let (side, values) = self.side_and_values(fit, record, &numbers)?;
         let series = &self.observed[record].series;
-        let system = system(&side.parts(&fit.assumed), &numbers, series);
+        let system = decoupled_system(&side.parts(&fit.assumed), &numbers, series);
         // ln p(rates | readings) = ln p(both) − ln p(readings), squares and all.
         let squares = |rows: &[Row]| {
             let innovations = filter::forward(&system, rows, &values, false).innovations;

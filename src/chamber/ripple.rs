@@ -11,7 +11,7 @@ use super::derivative::DerivativeColumn;
 use super::fit::Fit;
 use super::model_point::MovedRecord;
 use super::prior::Quantity;
-use super::system::system;
+use super::system::decoupled_system;
 use super::{Chamber, ChamberError};
 
 /// Periods that are looked at: so many to a factor of e, as far as the prior reaches both ways in its deviations.
@@ -65,7 +65,10 @@ impl Chamber<'_> {
                     let mut numbers = point.numbers[record];
                     numbers.set(Quantity::RippleSize, TESTED_K);
                     numbers.set(Quantity::RipplePeriod, *period_s);
-                    MovedRecord { system: system(&side.parts(&point.assumed), &numbers, series), values: None }
+                    MovedRecord {
+                        system: decoupled_system(&side.parts(&point.assumed), &numbers, series),
+                        values: None,
+                    }
                 };
                 let there = self.innovations_abreast(&point, periods.iter().map(with).collect(), record)?;
                 Ok(there.iter().map(|there| DerivativeColumn::new(&base[0], there, 1.0)).collect())

@@ -1,4 +1,4 @@
-//! Heat paths of a record that are solved already: a fit asks for the same ones again and again, because few of its numbers are of the
+//! Heat paths of a chamber that are solved already: a fit asks for the same ones again and again, because few of its numbers are of the
 //! heat path.
 
 use std::collections::VecDeque;
@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::series::Series;
 use crate::thermal::reduced::Reduced;
-use crate::thermal::{HeatPath, Location, ThermalError};
+use crate::thermal::{Extent, HeatPath, Location, ThermalError};
 
 /// So many of the last ones are kept: those of a fit's derivatives, and of a few fits side by side.
 const MOST: usize = 32;
@@ -42,7 +42,11 @@ impl Solved {
         modes: usize,
         series: &Series,
     ) -> Result<Arc<Reduced>, ThermalError> {
-        let (shortest_s, longest_s) = (series.shortest_s(), series.duration_s.max(1.0));
+        // Only a half space is fitted to the times of a record: a pack is the same in all.
+        let (shortest_s, longest_s) = match path.extent {
+            Extent::HalfSpace => (series.shortest_s(), series.duration_s.max(1.0)),
+            Extent::Pack => (0.0, 0.0),
+        };
         let asked = AskedPath { path, part, modes, shortest_s, longest_s };
         if let Some(reduced) = self.found(&asked) {
             return Ok(reduced);

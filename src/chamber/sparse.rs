@@ -3,6 +3,8 @@
 // Loops over an index that the compiler knows the end of: iterators stay calls in functions as large as these.
 #![allow(clippy::needless_range_loop)]
 
+use super::arithmetic::Arithmetic;
+
 /// Calls a function with the least number of states that has room.
 macro_rules! dispatch {
     ($size:expr, $function:ident($($argument:expr),*)) => {
@@ -75,10 +77,10 @@ impl Sparse {
 
     /// One row times a vector.
     #[inline(always)]
-    pub(crate) fn dot(&self, row: usize, vector: &[f64]) -> f64 {
+    pub(crate) fn dot(&self, arithmetic: impl Arithmetic, row: usize, vector: &[f64]) -> f64 {
         let mut sum = 0.0;
         for &(k, v) in self.row(row) {
-            sum += v * vector[k];
+            sum = arithmetic.add_product(v, vector[k], sum);
         }
         sum
     }
@@ -93,22 +95,34 @@ impl Sparse {
 
     /// M x.
     #[inline(always)]
-    pub(crate) fn times<const N: usize>(&self, vector: &[f64; N]) -> [f64; N] {
+    pub(crate) fn times<const N: usize>(&self, arithmetic: impl Arithmetic, vector: &[f64; N]) -> [f64; N] {
         let mut out = [0.0; N];
         for row in 0..self.rows() {
-            out[row] = self.dot(row, vector);
+            out[row] = self.dot(arithmetic, row, vector);
         }
         out
     }
 
     /// Σ_k m_k X_k over one row of M: that row times X.
     #[inline(always)]
-    pub(crate) fn combine<const N: usize>(&self, row: usize, x: &Square<N>) -> [f64; N] {
-        let mut sum = [0.0; N];
+    pub(crate) fn combine<const N: usize>(&self, arithmetic: impl Arithmetic, row: usize, x: &Square<N>) -> [f64; N] {
+        self.combine_onto(arithmetic, row, x, &[0.0; N])
+    }
+
+    /// As [`Self::combine`], and a line.
+    #[inline(always)]
+    pub(crate) fn combine_onto<const N: usize>(
+        &self,
+        arithmetic: impl Arithmetic,
+        row: usize,
+        x: &Square<N>,
+        onto: &[f64; N],
+    ) -> [f64; N] {
+        let mut sum = *onto;
         for &(k, v) in self.row(row) {
             let line = &x[k];
             for j in 0..N {
-                sum[j] += v * line[j];
+                sum[j] = arithmetic.add_product(v, line[j], sum[j]);
             }
         }
         sum
@@ -127,30 +141,43 @@ impl Sparse {
 
     /// M X.
     #[inline(always)]
-    pub(crate) fn times_square<const N: usize>(&self, x: &Square<N>) -> Square<N> {
+    pub(crate) fn times_square<const N: usize>(&self, arithmetic: impl Arithmetic, x: &Square<N>) -> Square<N> {
         let mut product = [[0.0; N]; N];
         for row in 0..self.rows() {
-            product[row] = self.combine(row, x);
+            product[row] = self.combine(arithmetic, row, x);
         }
         product
     }
 
     /// M S Mᵀ for a symmetric S.
     #[inline(always)]
-    pub(crate) fn surround<const N: usize>(&self, square: &Square<N>) -> Square<N> {
-        self.times_square(&turned(&self.times_square(square)))
+    pub(crate) fn surround<const N: usize>(&self, arithmetic: impl Arithmetic, square: &Square<N>) -> Square<N> {
+        self.times_square(arithmetic, &turned(&self.times_square(arithmetic, square)))
     }
 }
+
+/// Side of the blocks that are turned one after another.
+const BLOCK: usize = 4;
 
 #[inline(always)]
 pub(super) fn turned<const N: usize>(square: &Square<N>) -> Square<N> {
     let mut turned = [[0.0; N]; N];
-    for i in 0..N {
-        for j in 0..N {
-            turned[i][j] = square[j][i];
+    turn(square, &mut turned);
+    turned
+}
+
+#[inline(always)]
+pub(super) fn turn<const N: usize>(square: &Square<N>, turned: &mut Square<N>) {
+    for i in (0..N).step_by(BLOCK) {
+        for j in (0..N).step_by(BLOCK) {
+            let block: [[f64; BLOCK]; BLOCK] = std::array::from_fn(|b| std::array::from_fn(|c| square[i + b][j + c]));
+            for c in 0..BLOCK {
+                for b in 0..BLOCK {
+                    turned[j + c][i + b] = block[b][c];
+                }
+            }
         }
     }
-    turned
 }
 
 #[inline(always)]

@@ -63,6 +63,7 @@ pub(super) fn followed(
 #[cfg(test)]
 mod tests {
     use super::super::discretise::discretise;
+    use super::super::system::diagonal;
     use super::*;
 
     #[test]
@@ -99,7 +100,7 @@ mod tests {
         let mut noise = vec![0.0; n];
         noise[0] = 2.0 * turbulence * turbulence / turbulence_s;
         (noise[3], noise[4]) = (2.0 * driver / coherence_s, 2.0 * driver / coherence_s);
-        let long = &discretise(&f, [&noise, &vec![0.0; n]], n, &[2e4])[0];
+        let long = &discretise(&f, [&diagonal(&noise), &vec![0.0; n * n]], n, &[2e4])[0];
         let found = followed(&f, n, [0, 1, 2, 3, 4], &own, &[5, 6, 7, 8]);
         for i in 0..n {
             for j in 0..n {

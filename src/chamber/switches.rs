@@ -23,7 +23,7 @@ use super::prior::{Quantity, SWITCHED_LOG};
 use super::responses::responses;
 use super::row::Film;
 use super::series::Series;
-use super::system::system;
+use super::system::decoupled_system;
 use super::{Chamber, ChamberError, Innovation};
 use crate::numeric::pursuit::Pursuit;
 use crate::thermal::Extent;
@@ -268,7 +268,7 @@ impl Chamber<'_> {
             let (side, values) = chamber.side_and_values(&day, record, &numbers)?;
             let likelihood = |times_s: &[f64]| {
                 let series = whole.with_film_switches(times_s);
-                let system = system(&side.parts(&day.assumed), &numbers, &series);
+                let system = decoupled_system(&side.parts(&day.assumed), &numbers, &series);
                 filter::forward(&system, &series.rows, &values, false).log_likelihood
             };
             let (others, here) = (times_s.clone(), likelihood(&times_s));

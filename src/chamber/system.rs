@@ -24,6 +24,7 @@
 //! A half space, or a pack whose heat capacity is unknown, is driven by its outermost layer, which follows the air with the
 //! time that a film over the pack's capacity would have.
 
+use super::decoupled::Decoupling;
 use super::discretise::discretise;
 use super::film::drive;
 use super::filter::{RATE, Step, System};
@@ -65,7 +66,7 @@ pub(super) fn driven_by_air(path: &HeatPath, film_w_per_m2_k: f64) -> (HeatPath,
 
 /// What of the system is another one behind another film.
 struct Behind {
-    /// F, row-major, and what drives it, which is the same behind either: the diagonal of G, and that of the trend's noise.
+    /// F, row-major, and what drives it, which is the same behind either: G, and that of the trend's noise.
     dynamics: Vec<f64>,
     noises: [Vec<f64>; 2],
     response: Vec<f64>,
@@ -77,17 +78,49 @@ impl Behind {
         let drive = drive(layout, parts.reduced, film_ratio);
         let (dynamics, noise, trend_noise) = dynamics(parts, layout, numbers, approach_s, film_ratio);
         let (response, places) = (response(parts, layout, &drive), places(parts, layout, &drive));
-        Self { dynamics, noises: [noise, trend_noise], response, places }
+        Self { dynamics, noises: [diagonal(&noise), diagonal(&trend_noise)], response, places }
+    }
+
+    fn decouple(&mut self, decoupling: &Decoupling) {
+        decoupling.take_dynamics(&mut self.dynamics);
+        self.noises.iter_mut().for_each(|noise| decoupling.take_covariance(noise));
+        decoupling.take_rows(&mut self.response);
+        self.places.iter_mut().for_each(|place| decoupling.take_rows(place));
     }
 }
 
 /// The system for one record.
 pub(super) fn system(parts: &Parts, numbers: &Numbers, series: &Series) -> System {
+    in_coordinates(parts, numbers, series, Coordinates::States)
+}
+
+/// One with the same innovations, whose states are others: for forward passes only.
+pub(super) fn decoupled_system(parts: &Parts, numbers: &Numbers, series: &Series) -> System {
+    in_coordinates(parts, numbers, series, Coordinates::Decoupled)
+}
+
+/// What the states are.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Coordinates {
+    /// As above.
+    States,
+    /// As in [`super::decoupled`].
+    Decoupled,
+}
+
+fn in_coordinates(parts: &Parts, numbers: &Numbers, series: &Series, coordinates: Coordinates) -> System {
     let layout = Layout::new(parts, series);
     let n = layout.size;
     let approach_s = series.approach_s(numbers.get(Quantity::ApproachTime));
     let behind = series.films().iter().map(|film| numbers.film_ratio(*film));
-    let behind: Vec<Behind> = behind.map(|ratio| Behind::new(parts, &layout, numbers, approach_s, ratio)).collect();
+    let mut behind: Vec<Behind> = behind.map(|ratio| Behind::new(parts, &layout, numbers, approach_s, ratio)).collect();
+    let (mut mean, mut covariance) = start(parts, &layout, &behind[0].dynamics, numbers, series);
+    if coordinates == Coordinates::Decoupled {
+        let decoupling = Decoupling::new(&behind[0].dynamics, &layout);
+        behind.iter_mut().for_each(|own| own.decouple(&decoupling));
+        decoupling.take_columns(&mut mean, 1);
+        decoupling.take_covariance(&mut covariance);
+    }
     let steps = steps(&behind, series);
     let mut rows = Vec::new();
     for shape in &series.shapes {
@@ -116,7 +149,6 @@ pub(super) fn system(parts: &Parts, numbers: &Numbers, series: &Series) -> Syste
             kept.extend(&places[0]);
         }
     }
-    let (mean, covariance) = start(parts, &layout, &behind[0].dynamics, numbers, series);
     let square = |q: Quantity| numbers.get(q).powi(2);
     let grid = series.resolution_k.powi(2) / 12.0;
     System {
@@ -145,7 +177,7 @@ fn steps(behind: &[Behind], series: &Series) -> Vec<Step> {
         let own: Vec<usize> = (0..steps.len()).filter(|&i| series.steps[i].film == *film).collect();
         let lengths_s: Vec<f64> = own.iter().map(|&i| series.steps[i].length_s).collect();
         let [noise, trend_noise] = &behind.noises;
-        let n = noise.len();
+        let n = behind.response.len();
         for (i, found) in own.into_iter().zip(discretise(&behind.dynamics, [noise, trend_noise], n, &lengths_s)) {
             let [noise, trend_noise] = found.noises;
             let (phi, phi_turned) = (Sparse::new(&found.transition, n), Sparse::transposed(&found.transition, n));
@@ -153,6 +185,14 @@ fn steps(behind: &[Behind], series: &Series) -> Vec<Step> {
         }
     }
     steps.into_iter().flatten().collect()
+}
+
+/// Row-major n × n.
+pub(super) fn diagonal(entries: &[f64]) -> Vec<f64> {
+    let n = entries.len();
+    let mut square = vec![0.0; n * n];
+    entries.iter().enumerate().for_each(|(i, e)| square[i * n + i] = *e);
+    square
 }
 
 /// c: the rate per kelvin a second of each state.
