@@ -33,6 +33,7 @@ pub(super) struct CoilSide {
     shows: Shows,
     lag_s: f64,
     beyond_linear: bool,
+    solved: Solved,
 }
 
 /// A record as the chamber knows it.
@@ -79,7 +80,8 @@ impl CoilSide {
             !bound.is_linear() || bound.path_depends_on_temperature() || !e.channels().is_empty()
         });
         let lag_s = model.sensor_lag_s();
-        Ok(Self { path, film_w_per_m2_k, modes, reduced, gains, rate, skin_s, shows, lag_s, beyond_linear })
+        let solved = observed.solved.clone();
+        Ok(Self { path, film_w_per_m2_k, modes, reduced, gains, rate, skin_s, shows, lag_s, beyond_linear, solved })
     }
 
     pub(crate) fn parts<'a>(&'a self, assumed: &Assumption) -> Parts<'a> {
@@ -114,6 +116,7 @@ impl CoilSide {
             beyond_linear: self.beyond_linear,
             shows: self.shows,
             lag_s: self.lag_s,
+            solved: &self.solved,
         }
     }
 

@@ -16,8 +16,8 @@
 use super::filter::{MEASURED, RATE, Values};
 use super::layout::OutputGains;
 use super::series::Series;
-
 use super::shows::Shows;
+use super::solved::Solved;
 use super::system::driven_by_air;
 use crate::effect::PackState;
 use crate::rate::{Past, RateModel};
@@ -94,6 +94,8 @@ pub(super) struct Asked<'a> {
     pub(crate) beyond_linear: bool,
     pub(crate) shows: Shows,
     pub(crate) lag_s: f64,
+    /// Where what is solved is kept.
+    pub(super) solved: &'a Solved,
 }
 
 impl Asked<'_> {
@@ -184,7 +186,7 @@ pub(super) fn changes(asked: &Asked, series: &Series, reference: &Reference) -> 
             path = path.driven_only();
             let (path, _) = driven_by_air(&path, asked.film_w_per_m2_k);
             let part = asked.path.sensors_part();
-            let there = Reduced::new(&path, part, asked.modes, series.shortest_s(), series.duration_s)?;
+            let there = asked.solved.reduced(path, part, asked.modes, series)?;
             fields.push(there.driven(&series.times_s, &reference.drive_k));
         }
         let here = asked.reduced.driven(&series.times_s, &reference.drive_k);

@@ -10,7 +10,6 @@ use super::known::Reference;
 use super::layout::Numbers;
 use super::parameter::{Parameter, write};
 use super::prior::Quantity;
-
 use super::system::decoupled_system;
 use super::{Assumption, Chamber, ChamberError};
 
