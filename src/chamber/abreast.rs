@@ -155,7 +155,6 @@ struct AbreastPass<'a, A, const N: usize> {
     measured: WideEntries,
     kept: WideEntries,
     trend: (Lanes, Lanes),
-    noises: [Lanes; MEASURED],
     mean: [Lanes; N],
     covariance: Box<Covariances<N>>,
     room: Box<Covariances<N>>,
@@ -191,7 +190,6 @@ impl<'a, A: Arithmetic, const N: usize> AbreastPass<'a, A, N> {
             measured: WideEntries::new(systems, |s| &s.rows),
             kept: WideEntries::new(systems, |s| &s.kept),
             trend: (each(systems, |s| s.trend.0), each(systems, |s| s.trend.1)),
-            noises: std::array::from_fn(|m| each(systems, |s| s.variances[m])),
             mean,
             covariance,
             room: Box::new([[[0.0; LANES]; N]; N]),
@@ -322,14 +320,14 @@ impl<'a, A: Arithmetic, const N: usize> AbreastPass<'a, A, N> {
 
     /// Gain and variance of one measurement, and what is left of the covariances; the variance's largest relative change.
     #[inline(always)]
-    fn weigh<const B: usize>(&mut self, m: usize, h: usize, averaged: f64) -> f64 {
+    fn weigh<const B: usize>(&mut self, m: usize, h: usize, row: &Row) -> f64 {
         let n = self.systems[0].size;
         let along = self.measured.combine::<N, B>(self.arithmetic, h, &self.covariance);
         let mut variance = self.measured.dot(self.arithmetic, h, &along);
         let mut change: f64 = 0.0;
         for l in 0..LANES {
-            variance[l] += self.noises[m][l] / averaged;
-            if l < self.systems.len() {
+            if let Some(system) = self.systems.get(l) {
+                variance[l] += system.noise(m, row);
                 change = change.max((variance[l] / self.variances[m][l] - 1.0).abs());
             }
         }
@@ -386,7 +384,7 @@ fn pass<const N: usize, const B: usize, const C: usize>(
         for (m, index) in row.measured.iter().enumerate() {
             let Some(h) = *index else { continue };
             if !frozen {
-                change = change.max(pass.weigh::<B>(m, h as usize, row.averaged));
+                change = change.max(pass.weigh::<B>(m, h as usize, row));
             }
             let values = std::array::from_fn(|l| asked.values.get(l).map_or(0.0, |v| v.of[m][k]));
             let innovations = pass.take_in(m, h as usize, values);

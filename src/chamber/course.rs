@@ -122,7 +122,7 @@ impl Chamber<'_> {
         }
         let mut system = super::system::decoupled_system(&parts, &numbers, &observed.series);
         if let Some(Remedy::FinerResolution) = otherwise {
-            system.variances[0] -= observed.series.resolution_k.powi(2) / 12.0;
+            system.grids[0] = 0.0;
         }
         if !with_rates {
             // Rates are looked at, not taken in: their gain is as good as zero.

@@ -7,6 +7,7 @@ pub(super) mod tests {
 
     use crate::chamber::abreast;
     use crate::chamber::coil_side::{CoilSide, Observed};
+    use crate::chamber::doubts::doubts;
     use crate::chamber::filter::{self, Move, System};
     use crate::chamber::kinks::Bend;
     use crate::chamber::layout::{Numbers, Parts};
@@ -151,7 +152,7 @@ pub(super) mod tests {
             for (j, &(l, _, g)) in measured.iter().enumerate() {
                 covariance[(i, j)] = (rows.row(h) * covariance_of(k, l) * rows.row(g).transpose())[(0, 0)];
             }
-            covariance[(i, i)] += system.variances[m] / series.rows[k].averaged;
+            covariance[(i, i)] += system.noise(m, &series.rows[k]);
         }
         let cross = DMatrix::from_columns(
             &measured.iter().map(|&(k, _, h)| covariance_of(asked, k) * rows.row(h).transpose()).collect::<Vec<_>>(),
@@ -232,7 +233,7 @@ pub(super) mod tests {
         assert!((trace.log_likelihood - exact).abs() < 1e-8 * exact.abs());
         abreast_is_one_by_one(&side.parts(assumed), &numbers, &seen.series);
         let inverse = factor.inverse();
-        let doubts = filter::doubts(&system, &seen.series.rows, &trace);
+        let doubts = doubts(&system, &seen.series.rows, &trace);
         for (i, found) in doubts.values.iter().enumerate() {
             let exact = solved[i] / inverse[(i, i)].sqrt();
             assert!((found - exact).abs() < 1e-6 * (1.0 + exact.abs()), "measurement {i}: {found} for {exact}");

@@ -6,17 +6,13 @@
 //! keep     z ← c·x                                             where a rate's window begins
 //! take in  v = y − h·x,  S = h P hᵀ + R,  x ← x + P h v/S,  P ← P − P h hᵀ P/S
 //! smooth   r ← h v/S + (I − K h)ᵀ r,  r ← Φᵀ r,  x̂ = x + P r
-//! doubt    e = v/S − K·r,  D = 1/S + Kᵀ N K,  N ← h hᵀ D + N − h (N K)ᵀ − (N K) hᵀ,  N ← Φᵀ N Φ
-//!          e/D is a measurement less what all others make of it, e/√D its standardised value; r_s/√N_ss likewise says
-//!          whether the slope changed here
 //! ```
 //!
 //! Once S has settled while rows are alike, gains stay as they are until a row differs (a gap, a missing value, another
 //! noise of the trend): the covariance has then converged to the accuracy of [`SETTLED`].
 //!
 //! # Source
-//! Kalman, J. Basic Eng. 82 (1960) 35; de Jong, J. Am. Stat. Assoc. 84 (1989) 1085 (smoothing without inverses); de Jong and
-//! Penzer, J. Am. Stat. Assoc. 93 (1998) 796 (values and shocks that do not belong to a record).
+//! Kalman, J. Basic Eng. 82 (1960) 35; de Jong, J. Am. Stat. Assoc. 84 (1989) 1085 (smoothing without inverses).
 
 // Loops over an index that the compiler knows the end of: iterators stay calls in functions as large as these.
 #![allow(clippy::needless_range_loop)]
@@ -52,11 +48,21 @@ pub(super) struct System {
     /// Rows of the thermometers and of the rate, each for the shares of a window: see [`Row::window`].
     pub(crate) rows: Sparse,
     pub(crate) variances: [f64; MEASURED],
+    /// What a coarse grid adds to the variance of a reading whose neighbours are other values.
+    pub(crate) grids: [f64; MEASURED],
     /// What is kept where a window begins, by the window's slot: states and the rows (of `kept`) that they take.
     pub(crate) keeps: Vec<Vec<(usize, usize)>>,
     pub(crate) kept: Sparse,
     pub(crate) mean: Vec<f64>,
     pub(crate) covariance: Vec<f64>,
+}
+
+impl System {
+    /// Variance of one measurement's own error at a row.
+    #[inline(always)]
+    pub(super) fn noise(&self, m: usize, row: &Row) -> f64 {
+        (self.variances[m] + self.grids[m] * row.repeats[m]) / row.averaged
+    }
 }
 
 /// The values of a record's rows, known inputs already taken off.
@@ -113,35 +119,6 @@ pub(super) fn smooth(system: &System, rows: &[Row], trace: &Trace) -> Vec<f64> {
 /// innovations if they were measured themselves and all states began at zero.
 pub(super) fn respond(system: &System, rows: &[Row], trace: &Trace, inputs: &Values) -> Vec<f64> {
     dispatched(Respond { system, rows, trace, inputs })
-}
-
-/// What does not belong to a record, by a trace that kept its gains.
-pub(super) fn doubts(system: &System, rows: &[Row], trace: &Trace) -> Doubts {
-    dispatched(Doubt { system, rows, trace })
-}
-
-/// Standardised values of what every measurement, and every row's change of the slope, is beyond what all others say.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Doubts {
-    /// In the order of the innovations.
-    pub(crate) values: Vec<f64>,
-    /// One entry a row: standardised, and the change of slope that it stands for [K/s].
-    pub(crate) kinks: Vec<(f64, f64)>,
-}
-
-struct Doubt<'a> {
-    system: &'a System,
-    rows: &'a [Row],
-    trace: &'a Trace,
-}
-
-impl Pass for Doubt<'_> {
-    type Output = Doubts;
-
-    #[inline(always)]
-    fn run(self, arithmetic: impl Arithmetic) -> Doubts {
-        dispatch!(self.system.size, doubts_of(arithmetic, self.system, self.rows, self.trace))
-    }
 }
 
 struct Smooth<'a> {
@@ -273,7 +250,7 @@ fn advance<const N: usize>(arithmetic: impl Arithmetic, system: &System, row: &R
 
 /// r ← Mᵀ r over what happened between the row before and this one.
 #[inline(always)]
-fn retreat<const N: usize>(arithmetic: impl Arithmetic, system: &System, movement: Move, r: &mut [f64; N]) {
+pub(super) fn retreat<const N: usize>(arithmetic: impl Arithmetic, system: &System, movement: Move, r: &mut [f64; N]) {
     match movement {
         Move::Step(step) => *r = system.steps[step as usize].phi_turned.times(arithmetic, r),
         Move::Keep(slot) => {
@@ -353,7 +330,7 @@ fn forward_of<const N: usize>(
             let value = values.of[m][k] - system.rows.dot(arithmetic, h, &mean);
             if !frozen {
                 let along = system.rows.combine(arithmetic, h, &covariance);
-                let variance = system.rows.dot(arithmetic, h, &along) + system.variances[m] / row.averaged;
+                let variance = system.rows.dot(arithmetic, h, &along) + system.noise(m, row);
                 change = change.max((variance / variances[m] - 1.0).abs());
                 variances[m] = variance;
                 frozen_logs += variance.ln();
@@ -439,82 +416,4 @@ fn smooth_of<const N: usize>(arithmetic: impl Arithmetic, system: &System, rows:
         row.moves.iter().rev().for_each(|&movement| retreat(arithmetic, system, movement, &mut r));
     }
     states
-}
-
-#[inline(always)]
-fn doubts_of<const N: usize>(arithmetic: impl Arithmetic, system: &System, rows: &[Row], trace: &Trace) -> Doubts {
-    let n = system.size;
-    let mut found = Doubts { values: vec![0.0; trace.innovations.len()], kinks: vec![(0.0, 0.0); rows.len()] };
-    let mut r = [0.0; N];
-    let mut spread: Square<N> = [[0.0; N]; N];
-    let mut taken = trace.innovations.len();
-    for (k, row) in rows.iter().enumerate().rev() {
-        let gains = &trace.gains[trace.gains_of[k] as usize].gain;
-        let present: Vec<usize> = row.measured.iter().flatten().map(|&h| h as usize).collect();
-        for (place, &h) in present.iter().enumerate().rev() {
-            taken -= 1;
-            let Innovation { value, variance } = trace.innovations[taken];
-            let gain: [f64; N] = wide(&gains[place * (n + 1)..place * (n + 1) + n]);
-            let mut along = [0.0; N];
-            let (mut error, mut precision) = (value / variance, 1.0 / variance);
-            for i in 0..N {
-                for j in 0..N {
-                    along[i] += spread[i][j] * gain[j];
-                }
-                error -= gain[i] * r[i];
-            }
-            for i in 0..N {
-                precision += gain[i] * along[i];
-            }
-            found.values[taken] = error / precision.sqrt();
-            system.rows.add_to(h, error, &mut r);
-            let mut line = [0.0; N];
-            system.rows.add_to(h, 1.0, &mut line);
-            for i in 0..N {
-                for j in 0..N {
-                    spread[i][j] += precision * line[i] * line[j] - line[i] * along[j] - along[i] * line[j];
-                }
-            }
-        }
-        let kink = |r: &[f64; N], spread: &Square<N>| {
-            let own = spread[system.slope][system.slope];
-            if own > 0.0 { (r[system.slope] / own.sqrt(), r[system.slope] / own) } else { (0.0, 0.0) }
-        };
-        for &movement in row.moves.iter().rev() {
-            retreat(arithmetic, system, movement, &mut r);
-            match movement {
-                Move::Step(step) => spread = system.steps[step as usize].phi_turned.surround(arithmetic, &spread),
-                Move::Keep(slot) => forget_window(system, slot, &mut spread),
-                Move::Kink => {
-                    let here = kink(&r, &spread);
-                    if here.0.abs() > found.kinks[k].0.abs() {
-                        found.kinks[k] = here;
-                    }
-                }
-            }
-        }
-        if !row.is_kinked_within() {
-            found.kinks[k] = kink(&r, &spread);
-        }
-    }
-    found
-}
-
-/// N ← Mᵀ N M where a window begins: columns and then rows.
-#[inline(always)]
-fn forget_window<const N: usize>(system: &System, slot: u8, spread: &mut Square<N>) {
-    for &(state, kept) in system.keeps[slot as usize].iter().rev() {
-        for i in 0..N {
-            let weight = std::mem::take(&mut spread[i][state]);
-            system.kept.add_to(kept, weight, &mut spread[i]);
-        }
-        let lost = std::mem::replace(&mut spread[state], [0.0; N]);
-        let mut line = [0.0; N];
-        system.kept.add_to(kept, 1.0, &mut line);
-        for i in 0..N {
-            for j in 0..N {
-                spread[i][j] += line[i] * lost[j];
-            }
-        }
-    }
 }

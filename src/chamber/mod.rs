@@ -41,6 +41,7 @@ mod decoupled;
 mod dense;
 mod derivative;
 mod discretise;
+mod doubts;
 mod film;
 mod film_step;
 mod filter;

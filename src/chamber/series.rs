@@ -96,6 +96,8 @@ const COMPARED_S: f64 = 200.0;
 const EARLIER_S: f64 = 80.0;
 /// A bend of this share of the largest is one.
 const FULL_BEND: f64 = 0.25;
+/// Thermometers whose readings lie on the sensor's grid: itself and that at the bore.
+const GRIDDED: usize = 2;
 /// Levels of the trend's noise; between them gains may stay frozen.
 const LEVELS: f64 = 8.0;
 
@@ -159,7 +161,21 @@ impl Series {
             shape_of: Vec::new(),
         };
         series.plan(rate_mean_s, averaged as f64 * interval_s);
+        if series.resolution_k > 0.0 {
+            series.count_repeats(&columns);
+        }
         series
+    }
+
+    /// How many readings in a row are one value of the sensor's grid, of each row: of a block's readings the mean, as its variance counts them.
+    fn count_repeats(&mut self, columns: &[Vec<f64>; MEASURED]) {
+        for (m, column) in columns.iter().enumerate().take(GRIDDED).filter(|(_, column)| !column.is_empty()) {
+            let lengths = run_lengths(column);
+            for (row, &(from, to)) in self.rows.iter_mut().zip(&self.spans) {
+                let own = &lengths[from..=to];
+                row.repeats[m] = own.iter().sum::<f64>() / own.len() as f64;
+            }
+        }
     }
 
     /// Takes a gross error out.
@@ -274,7 +290,8 @@ impl Series {
                 moves.push(Move::Keep(slot));
             }
             moves.extend(steps.of(rest_s(k)).into_iter().map(Move::Step));
-            self.rows.push(Row { moves, bend: bends[k], kink: 0.0, measured, averaged: self.averaged as f64 });
+            let (bend, averaged) = (bends[k], self.averaged as f64);
+            self.rows.push(Row { moves, bend, kink: 0.0, measured, averaged, repeats: [1.0; MEASURED] });
         }
         let step = |length_s: f64| TimeStep { length_s, film: Film::Usual };
         self.steps = steps.lengths_s.into_iter().map(step).collect();
@@ -391,6 +408,12 @@ impl StepTable {
     }
 }
 
+/// Of each value how many in a row are equal to it, itself included; 1 where there is none.
+fn run_lengths(values: &[f64]) -> Vec<f64> {
+    let runs = values.chunk_by(|a, b| a == b);
+    runs.flat_map(|run| std::iter::repeat_n(run.len() as f64, run.len())).collect()
+}
+
 /// The grid that readings lie on, if they do: the smallest difference of two values.
 fn resolution(readings: &[f64]) -> f64 {
     let mut sorted: Vec<f64> = readings.iter().copied().filter(|v| v.is_finite()).collect();
@@ -438,4 +461,33 @@ fn bends(times_s: &[f64], readings: &[f64], earlier_s: f64) -> Vec<f64> {
             (share * share * LEVELS).round() / LEVELS
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Readings on a grid of 0.1 K at this time between rows.
+    fn on_a_grid(steps: &[i32], interval_s: f64) -> Series {
+        let times_s = (0..steps.len()).map(|k| interval_s * k as f64).collect();
+        let readings = steps.iter().map(|step| 290.0 + 0.1 * f64::from(*step)).collect();
+        let rates = (0..steps.len()).map(|k| 1e-7 * (3.7 * k as f64).sin()).collect();
+        let record = Record::new("gridded", times_s, readings, rates).unwrap();
+        Series::new(&record, interval_s, 20.0, Origin::Measured)
+    }
+
+    #[test]
+    fn readings_that_repeat_a_value_of_the_grid_are_counted_and_averaged_ones_as_their_mean_varies() {
+        let steps = [0, 0, 0, 1, 2, 2, 3, 4, 5, 5, 5, 5];
+        let series = on_a_grid(&steps, 10.0);
+        let repeats: Vec<f64> = series.rows.iter().map(|row| row.repeats[0]).collect();
+        assert_eq!(repeats, [3.0, 3.0, 3.0, 1.0, 2.0, 2.0, 1.0, 1.0, 4.0, 4.0, 4.0, 4.0]);
+        assert!(series.rows.iter().all(|row| row.repeats[AMBIENT] == 1.0 && row.repeats[RATE] == 1.0));
+        // Four rows of 2.5 s in one: the grid's variance times this over four is that of the mean. Errors in a run are one error, which
+        // a run that goes on in the next block shares with it.
+        let series = on_a_grid(&steps, 2.5);
+        assert_eq!(series.averaged, 4);
+        let repeats: Vec<f64> = series.rows.iter().map(|row| row.repeats[0]).collect();
+        assert_eq!(repeats, [(3.0 * 3.0 + 1.0) / 4.0, (2.0 * 2.0 + 1.0 + 1.0) / 4.0, 4.0]);
+    }
 }

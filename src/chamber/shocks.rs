@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::ascent::Effort;
 use super::coil_side::{BLIND_RAD2_PER_S2, CoilSide, run_kept};
+use super::doubts::doubts;
 use super::filter::{self, RATE};
 use super::fit::Fit;
 use super::kinks::Bend;
@@ -130,7 +131,7 @@ impl<'a> Chamber<'a> {
         let observed = &self.observed[record];
         let rows = &observed.series.rows;
         let (system, trace) = run_kept(side, &point.assumed, &point.numbers[record], observed, values);
-        let doubts = filter::doubts(&system, rows, &trace);
+        let doubts = doubts(&system, rows, &trace);
         let mut by_measurement: Vec<Vec<f64>> = vec![vec![0.0; rows.len()]; filter::MEASURED];
         let mut next = 0;
         for (k, row) in rows.iter().enumerate() {
@@ -288,7 +289,7 @@ impl<'a> Chamber<'a> {
         let mut system = system(&side.parts(&fit.assumed), numbers, series);
         system.variances[RATE] += BLIND_RAD2_PER_S2;
         let trace = filter::forward(&system, &series.rows, &values, true);
-        let doubts = filter::doubts(&system, &series.rows, &trace);
+        let doubts = doubts(&system, &series.rows, &trace);
         let sizes: Vec<f64> = doubts.kinks.iter().map(|(z, _)| z.abs()).collect();
         let beside = (BESIDE_S / series.shortest_s()).ceil() as usize;
         // The gain must be worth a place that might have been anywhere, and the uncertainty of its size.
