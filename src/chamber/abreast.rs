@@ -324,10 +324,11 @@ impl<'a, A: Arithmetic, const N: usize> AbreastPass<'a, A, N> {
         let n = self.systems[0].size;
         let along = self.measured.combine::<N, B>(self.arithmetic, h, &self.covariance);
         let mut variance = self.measured.dot(self.arithmetic, h, &along);
+        let noises = each(self.systems, |s| s.noise(m, row));
         let mut change: f64 = 0.0;
         for l in 0..LANES {
-            if let Some(system) = self.systems.get(l) {
-                variance[l] += system.noise(m, row);
+            variance[l] += noises[l];
+            if l < self.systems.len() {
                 change = change.max((variance[l] / self.variances[m][l] - 1.0).abs());
             }
         }
