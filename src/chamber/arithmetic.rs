@@ -12,9 +12,9 @@ pub(super) trait Arithmetic: Copy {
 
 /// Rounded once, by one instruction.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Fused;
+pub(super) struct RoundedOnce;
 
-impl Arithmetic for Fused {
+impl Arithmetic for RoundedOnce {
     #[inline(always)]
     fn add_product(self, a: f64, b: f64, c: f64) -> f64 {
         a.mul_add(b, c)
@@ -23,9 +23,9 @@ impl Arithmetic for Fused {
 
 /// Rounded twice.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Plain;
+pub(super) struct RoundedTwice;
 
-impl Arithmetic for Plain {
+impl Arithmetic for RoundedTwice {
     #[inline(always)]
     fn add_product(self, a: f64, b: f64, c: f64) -> f64 {
         a * b + c
@@ -43,13 +43,13 @@ pub(super) trait Pass {
 pub(super) fn dispatched<P: Pass>(pass: P) -> P::Output {
     #[cfg(target_arch = "x86_64")]
     if let Some(simd) = pulp::x86::V3::try_new() {
-        return simd.vectorize(With(pass, Fused));
+        return simd.vectorize(With(pass, RoundedOnce));
     }
     // Every 64-bit ARM has it.
     #[cfg(target_arch = "aarch64")]
-    return Arch::new().dispatch(With(pass, Fused));
+    return Arch::new().dispatch(With(pass, RoundedOnce));
     #[cfg(not(target_arch = "aarch64"))]
-    Arch::new().dispatch(With(pass, Plain))
+    Arch::new().dispatch(With(pass, RoundedTwice))
 }
 
 struct With<P, A>(P, A);
@@ -81,7 +81,7 @@ mod tests {
     #[test]
     fn both_ways_of_adding_products_agree_but_for_rounding() {
         let values: Vec<f64> = (0..1000).map(|i| (0.37 * f64::from(i)).sin()).collect();
-        let (plain, fused) = (Sum(&values).run(Plain), Sum(&values).run(Fused));
+        let (plain, fused) = (Sum(&values).run(RoundedTwice), Sum(&values).run(RoundedOnce));
         let found = dispatched(Sum(&values));
         assert!(found == plain || found == fused, "{found}");
         assert!((plain / fused - 1.0).abs() < 1e-13, "{plain} {fused}");

@@ -161,14 +161,16 @@ impl Series {
             shape_of: Vec::new(),
         };
         series.plan(rate_mean_s, averaged as f64 * interval_s);
-        if series.resolution_k > 0.0 {
-            series.count_repeats(&columns);
-        }
+        series.count_repeats(&columns, origin);
         series
     }
 
     /// How many readings in a row are one value of the sensor's grid, of each row: of a block's readings the mean, as its variance counts them.
-    fn count_repeats(&mut self, columns: &[Vec<f64>; MEASURED]) {
+    fn count_repeats(&mut self, columns: &[Vec<f64>; MEASURED], origin: Origin) {
+        // What was worked out lies on no grid.
+        if origin == Origin::Planned || self.resolution_k == 0.0 {
+            return;
+        }
         for (m, column) in columns.iter().enumerate().take(GRIDDED).filter(|(_, column)| !column.is_empty()) {
             let lengths = run_lengths(column);
             for (row, &(from, to)) in self.rows.iter_mut().zip(&self.spans) {

@@ -22,9 +22,6 @@ pub struct NotConverged;
 /// Sweeps for one eigenvalue before giving up; two are usual.
 const MAX_SWEEPS: usize = 60;
 
-/// Entries whose squares are finite.
-const LARGEST: f64 = 1e150;
-
 /// The eigenvalues of a full symmetric matrix, in no particular order; `rows` becomes `rows · Q V`.
 ///
 /// # Shapes
@@ -119,7 +116,7 @@ fn reduced(matrix: DMatrix<f64>, rows: &mut DMatrix<f64>) -> (Vec<f64>, Vec<f64>
 /// `diagonal` has n entries, `off_diagonal` n − 1, `rows` n columns.
 ///
 /// # Errors
-/// Entries that are not finite, or beyond 1e150; an iteration that does not end.
+/// Entries that are not finite; an iteration that does not end.
 pub fn diagonalise(diagonal: &mut [f64], off_diagonal: &[f64], rows: &mut DMatrix<f64>) -> Result<(), NotConverged> {
     Arch::new().dispatch(|| rotated(diagonal, off_diagonal, rows))
 }
@@ -127,7 +124,7 @@ pub fn diagonalise(diagonal: &mut [f64], off_diagonal: &[f64], rows: &mut DMatri
 #[inline(always)]
 fn rotated(diagonal: &mut [f64], off_diagonal: &[f64], rows: &mut DMatrix<f64>) -> Result<(), NotConverged> {
     let n = diagonal.len();
-    if diagonal.iter().chain(off_diagonal).any(|v| v.is_nan() || v.abs() > LARGEST) {
+    if diagonal.iter().chain(off_diagonal).any(|v| !v.is_finite()) {
         return Err(NotConverged);
     }
     let mut off = off_diagonal.to_vec();
@@ -149,15 +146,14 @@ fn rotated(diagonal: &mut [f64], off_diagonal: &[f64], rows: &mut DMatrix<f64>) 
                 return Err(NotConverged);
             }
             let half_gap = (diagonal[low + 1] - diagonal[low]) / (2.0 * off[low]);
-            let root = (half_gap * half_gap + 1.0).sqrt();
+            let root = half_gap.hypot(1.0);
             let mut g = diagonal[end] - diagonal[low] + off[low] / (half_gap + root.copysign(half_gap));
             let (mut sine, mut cosine, mut shift) = (1.0, 1.0, 0.0);
             let mut split = false;
             for i in (low..end).rev() {
                 let f = sine * off[i];
                 let b = cosine * off[i];
-                // Not `hypot`, which was a tenth of the time: squares are finite.
-                let radius = (f * f + g * g).sqrt();
+                let radius = f.hypot(g);
                 off[i + 1] = radius;
                 if radius == 0.0 {
                     // An element vanished by itself: the block falls into two.
@@ -285,8 +281,6 @@ mod tests {
     #[test]
     fn numbers_that_are_not_finite_end_in_an_error() {
         let mut rows = DMatrix::identity(2, 2);
-        for entry in [f64::NAN, f64::INFINITY, -1e160] {
-            assert_eq!(diagonalise(&mut [entry, 1.0], &[0.5], &mut rows), Err(NotConverged));
-        }
+        assert_eq!(diagonalise(&mut [f64::NAN, 1.0], &[0.5], &mut rows), Err(NotConverged));
     }
 }
