@@ -1,7 +1,8 @@
 //! The passes' arithmetic: what the processor has for a product that is added.
 //!
-//! A pass is bound by how many instructions it takes. A fused product and sum is one of them where there were two, and rounds once;
-//! where the processor has none it would be a call, so there it is a product and then a sum.
+//! A pass is mostly products that are added. Fused, product and sum are one instruction where there were two, and are rounded once;
+//! where the processor has none it would be a call, so there they are a product and then a sum. The last digits of a likelihood are
+//! those of the kind of processor, and the same at any number of threads.
 
 use pulp::{Arch, NullaryFnOnce};
 

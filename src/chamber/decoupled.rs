@@ -7,7 +7,7 @@
 //!
 //! z are the air's level and its ripple with what drives it, x_k what follows the air: skin, modes, sensor. In these coordinates a mode
 //! is how far it lags behind the level and its own response to the ripple, and depends on itself, the slope and the turbulence only:
-//! half of the entries of Φ are zero. Slope and turbulence stay as they are, since their decays may be those of a mode, where
+//! behind a film that stays, its row of Φ has three entries instead of eight. Slope and turbulence stay as they are, since their decays may be those of a mode, where
 //! A + λ is singular; those of the level (0) and of the ripple (complex) are not.
 //!
 //! Innovations, and so the likelihood, are the same in all coordinates (a test compares them).

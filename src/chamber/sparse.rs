@@ -156,9 +156,6 @@ impl Sparse {
     }
 }
 
-/// Side of the blocks that are turned one after another.
-const BLOCK: usize = 4;
-
 #[inline(always)]
 pub(super) fn turned<const N: usize>(square: &Square<N>) -> Square<N> {
     let mut turned = [[0.0; N]; N];
@@ -168,14 +165,9 @@ pub(super) fn turned<const N: usize>(square: &Square<N>) -> Square<N> {
 
 #[inline(always)]
 pub(super) fn turn<const N: usize>(square: &Square<N>, turned: &mut Square<N>) {
-    for i in (0..N).step_by(BLOCK) {
-        for j in (0..N).step_by(BLOCK) {
-            let block: [[f64; BLOCK]; BLOCK] = std::array::from_fn(|b| std::array::from_fn(|c| square[i + b][j + c]));
-            for c in 0..BLOCK {
-                for b in 0..BLOCK {
-                    turned[j + c][i + b] = block[b][c];
-                }
-            }
+    for i in 0..N {
+        for j in 0..N {
+            turned[i][j] = square[j][i];
         }
     }
 }
