@@ -299,17 +299,11 @@ pub(super) fn run_kept(
     (system, trace)
 }
 
-/// Whether the gyro's rates are taken in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Rates {
-    Seen,
-    Unseen,
-}
-
 /// A rate with this variance says nothing beside any gyro's [(rad/s)²].
 pub(super) const BLIND_RAD2_PER_S2: f64 = 1e-2;
 
-/// The smoothed course of one record.
+/// The smoothed course of one record, as its readings alone have it: a model that is linearised about a course which has seen the
+/// rates would take from each rate a part of what it is to explain, and be likelier for that.
 ///
 /// # Errors
 /// A conductivity that is not positive.
@@ -320,13 +314,10 @@ pub(super) fn smoothed(
     observed: &Observed,
     place: usize,
     before: Option<&Reference>,
-    rates: Rates,
 ) -> Result<Reference, ChamberError> {
     let values = side.values(assumed, observed, place, before)?;
     let mut system = system(&side.parts(assumed), numbers, &observed.series);
-    if rates == Rates::Unseen {
-        system.variances[filter::RATE] += BLIND_RAD2_PER_S2;
-    }
+    system.variances[filter::RATE] += BLIND_RAD2_PER_S2;
     let trace = filter::forward(&system, &observed.series.rows, &values, true);
     let states = filter::smooth(&system, &observed.series.rows, &trace);
     side.reference(assumed, numbers, observed, &states, before)

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::ascent::Effort;
-use super::coil_side::{BLIND_RAD2_PER_S2, CoilSide, Rates, smoothed};
+use super::coil_side::{BLIND_RAD2_PER_S2, CoilSide, smoothed};
 use super::filter::{Innovation, RATE};
 use super::fit::Fit;
 use super::known::Reference;
@@ -84,7 +84,7 @@ impl Chamber<'_> {
         let observed = &self.observed[record];
         let numbers = self.numbers_for(fit, record);
         let side = CoilSide::new(&fit.assumed, numbers.get(Quantity::Film), self.modes, observed)?;
-        let course = |before| smoothed(&side, &fit.assumed, &numbers, observed, record, before, Rates::Unseen);
+        let course = |before| smoothed(&side, &fit.assumed, &numbers, observed, record, before);
         let first = course(None)?;
         if side.needs_reference() { course(Some(&first)) } else { Ok(first) }
     }
@@ -110,7 +110,7 @@ impl Chamber<'_> {
         let mut course = fit.courses[record].clone();
         if course.is_none() && side.needs_reference() {
             for _ in 0..2 {
-                course = Some(smoothed(&side, assumed, numbers, observed, record, course.as_ref(), Rates::Seen)?);
+                course = Some(smoothed(&side, assumed, numbers, observed, record, course.as_ref())?);
             }
         }
         let values = side.values(assumed, observed, record, course.as_ref().filter(|_| side.needs_reference()))?;

@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::ascent::{AscentEnd, Beginning, Effort, KnownDerivatives};
-use super::coil_side::{CoilSide, Rates, quantities, smoothed};
+use super::coil_side::{CoilSide, quantities, smoothed};
 use super::known::Reference;
 use super::layout::Numbers;
 use super::parameter::{Free, Parameter};
@@ -146,7 +146,7 @@ impl Chamber<'_> {
         let of = |r: usize| -> Result<Option<Reference>, ChamberError> {
             let observed = &self.observed[r];
             let side = CoilSide::new(assumed, numbers[r].get(Quantity::Film), self.modes, observed)?;
-            let course = |before| smoothed(&side, assumed, &numbers[r], observed, r, before, Rates::Seen);
+            let course = |before| smoothed(&side, assumed, &numbers[r], observed, r, before);
             if !side.needs_reference() {
                 return if wanted == Wanted::Everywhere { course(None).map(Some) } else { Ok(None) };
             }

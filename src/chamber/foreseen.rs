@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::coil_side::{CoilSide, Rates, smoothed};
+use super::coil_side::{CoilSide, smoothed};
 use super::filter::Innovation;
 use super::fit::Fit;
 use super::kinks::Bend;
@@ -204,7 +204,7 @@ impl Chamber<'_> {
             for _ in 0..2 {
                 let before = courses[record].take();
                 courses[record] =
-                    Some(smoothed(&side, assumed, &numbers[record], observed, record, before.as_ref(), Rates::Seen)?);
+                    Some(smoothed(&side, assumed, &numbers[record], observed, record, before.as_ref())?);
             }
         }
         Ok(courses)

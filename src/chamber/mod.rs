@@ -260,7 +260,8 @@ impl<'a> Chamber<'a> {
                 let (row_s, found) = (series.averaged as f64 * record.interval_s(), series.rows.len());
                 return Err(ChamberError::TooFew { record: record.name().to_owned(), row_s, found });
             }
-            observed.push(Observed::new(record, series, 0.5 * (low + high), solved.clone()));
+            let mean_k = series.mean_k();
+            observed.push(Observed::new(record, series, mean_k, solved.clone()));
         }
         let modes = if path.extent == crate::thermal::Extent::HalfSpace {
             HALF_SPACE_MODES

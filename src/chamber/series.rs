@@ -180,6 +180,12 @@ impl Series {
         }
     }
 
+    /// The mean of the readings \[K\], gross errors left out.
+    pub(super) fn mean_k(&self) -> f64 {
+        let known: Vec<f64> = self.values[0].iter().copied().filter(|v| v.is_finite()).collect();
+        self.reference_k + known.iter().sum::<f64>() / known.len().max(1) as f64
+    }
+
     /// Takes a gross error out.
     pub(crate) fn leave_out(&mut self, row: usize, measurement: usize) {
         self.values[measurement][row] = f64::NAN;
