@@ -6,7 +6,7 @@ pub(super) mod tests {
     use nalgebra::{DMatrix, DVector};
 
     use crate::chamber::abreast;
-    use crate::chamber::coil_side::{CoilSide, Observed};
+    use crate::chamber::coil_side::{CoilSide, Observed, smoothed};
     use crate::chamber::doubts::doubts;
     use crate::chamber::filter::{self, Move, System};
     use crate::chamber::kinks::Bend;
@@ -273,6 +273,33 @@ pub(super) mod tests {
         let effects = vec![effect("sensor_lag", &[40.0]), effect("spool_mass", &[4000.0, 300.0, 5.0])];
         let assumed = Assumption { drift: true, cycle: true, ..Assumption::new(model(effects), dip()) };
         check(&assumed, false);
+    }
+
+    #[test]
+    fn what_a_model_is_linearised_about_hangs_on_no_rate() {
+        let own = record(48);
+        let turned: Vec<f64> = own.rate_rad_per_s().iter().map(|rate| 3e-7 - 2.0 * rate).collect();
+        let (times_s, temperature_k) = (own.times_s().to_vec(), own.temperature_k().to_vec());
+        let other = Record::new("turned", times_s, temperature_k, turned).unwrap();
+        let effects = vec![effect("thermo_optic_temperature", &[0.004]), effect("heating_cooling_asymmetry", &[0.1])];
+        let assumed = Assumption::new(model(effects), dip());
+        let known = |record: &Record| {
+            let (series, mean_k) = observed(&assumed.model, record);
+            let numbers = Numbers::medians(&series);
+            let seen = Observed::new(record, series, mean_k, Solved::default());
+            let side = CoilSide::new(&assumed, numbers.get(Quantity::Film), 4, &seen).unwrap();
+            assert!(side.needs_reference());
+            let course = smoothed(&side, &assumed, &numbers, &seen, 0, None).unwrap();
+            let left = side.values(&assumed, &seen, 0, Some(&course)).unwrap();
+            let rates = seen.series.values[filter::RATE].iter().zip(&left.of[filter::RATE]);
+            rates.map(|(rate, left)| rate - left).collect::<Vec<f64>>()
+        };
+        let (own, other) = (known(&own), known(&other));
+        let most = own.iter().copied().filter(|v| v.is_finite()).map(f64::abs).fold(0.0, f64::max);
+        assert!(most > 1e-9, "{most}");
+        for (a, b) in own.iter().zip(&other).filter(|(a, b)| a.is_finite() && b.is_finite()) {
+            assert!((a - b).abs() < 1e-6 * most, "{a} and {b} of {most}");
+        }
     }
 
     #[test]

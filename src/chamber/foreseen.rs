@@ -203,8 +203,7 @@ impl Chamber<'_> {
         if side.needs_reference() {
             for _ in 0..2 {
                 let before = courses[record].take();
-                courses[record] =
-                    Some(smoothed(&side, assumed, &numbers[record], observed, record, before.as_ref())?);
+                courses[record] = Some(smoothed(&side, assumed, &numbers[record], observed, record, before.as_ref())?);
             }
         }
         Ok(courses)

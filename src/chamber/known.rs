@@ -6,7 +6,8 @@
 //!
 //! δT: the bore's heat, and the difference that a conductivity which depends on temperature makes to the layers while the
 //! reference's air drives the pack; Ω: the full rate error at the reference T̄. Both are second order in what the
-//! reference is wrong by, so a reference smoothed from the record itself, and smoothed again after a fit, is enough.
+//! reference is wrong by, so a reference smoothed from the record's readings, and smoothed again after a fit, is enough. It
+//! sees no rates: what is taken off a rate must not hang on that rate, or the density of what is left is none of the rate.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|

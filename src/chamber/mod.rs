@@ -49,6 +49,7 @@ mod fit;
 mod fitted;
 mod foreseen;
 mod gain;
+mod grid;
 mod kinks;
 mod known;
 mod layout;

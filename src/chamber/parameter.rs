@@ -105,7 +105,7 @@ impl Parameter {
             scale: Scale::Logarithm,
             mean,
             deviation: prior.deviation,
-            lower: mean - 12.0,
+            lower: (mean - 12.0).max(prior.least.ln()),
             upper: (mean + 12.0).min(prior.most.ln()),
         }
     }

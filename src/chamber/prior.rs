@@ -50,7 +50,8 @@ pub(crate) struct Prior {
     /// Of the natural logarithm.
     pub(crate) deviation: f64,
     pub(crate) relative: bool,
-    /// What is larger is not this any more.
+    /// What is smaller, or larger, is not this any more.
+    pub(crate) least: f64,
     pub(crate) most: f64,
     pub(crate) reason: &'static str,
 }
@@ -85,7 +86,15 @@ pub(crate) const PRIORS: [Prior; 21] = [
         1.2,
         "of the size of the noise: smaller is flicker, larger would be seen by eye",
     ),
-    line(Quantity::DriftTime, 1500.0, 1.2, "as the gyro's wander"),
+    Prior {
+        least: 100.0,
+        ..line(
+            Quantity::DriftTime,
+            1500.0,
+            1.2,
+            "as the gyro's wander; what is faster is air that readings do not show",
+        )
+    },
     relative(Quantity::CycleSize, 2.0, 1.2, "as the drift"),
     line(Quantity::CyclePeriod, 5000.0, 0.8, "below a record's length, above what an air conditioning makes"),
     line(Quantity::StartSlope, 2e-4, 2.0, "a record begins at rest, or in a ramp of up to a kelvin or two a minute"),
@@ -94,11 +103,11 @@ pub(crate) const PRIORS: [Prior; 21] = [
 ];
 
 const fn line(quantity: Quantity, median: f64, deviation: f64, reason: &'static str) -> Prior {
-    Prior { quantity, median, deviation, relative: false, most: f64::INFINITY, reason }
+    Prior { quantity, median, deviation, relative: false, least: 0.0, most: f64::INFINITY, reason }
 }
 
 const fn relative(quantity: Quantity, median: f64, deviation: f64, reason: &'static str) -> Prior {
-    Prior { quantity, median, deviation, relative: true, most: f64::INFINITY, reason }
+    Prior { quantity, median, deviation, relative: true, least: 0.0, most: f64::INFINITY, reason }
 }
 
 impl Quantity {

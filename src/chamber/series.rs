@@ -6,6 +6,7 @@
 //! ```
 
 use super::filter::{AMBIENT, MEASURED, Move, RATE, Row};
+use super::grid::{resolution, run_lengths};
 use super::row::Film;
 use crate::numeric::noise::white_noise;
 use crate::numeric::statistics::median;
@@ -414,20 +415,6 @@ impl StepTable {
         let units = (length_s / finest_s).round().max(0.0) as u64;
         (0..self.lengths_s.len()).rev().filter(|i| units >> i & 1 == 1).map(|i| i as u16).collect()
     }
-}
-
-/// Of each value how many in a row are equal to it, itself included; 1 where there is none.
-fn run_lengths(values: &[f64]) -> Vec<f64> {
-    let runs = values.chunk_by(|a, b| a == b);
-    runs.flat_map(|run| std::iter::repeat_n(run.len() as f64, run.len())).collect()
-}
-
-/// The grid that readings lie on, if they do: the smallest difference of two values.
-fn resolution(readings: &[f64]) -> f64 {
-    let mut sorted: Vec<f64> = readings.iter().copied().filter(|v| v.is_finite()).collect();
-    sorted.sort_by(f64::total_cmp);
-    let least = sorted.windows(2).map(|w| w[1] - w[0]).filter(|d| *d > 1e-7).fold(f64::INFINITY, f64::min);
-    if least.is_finite() { least } else { 0.0 }
 }
 
 /// How much the readings bend at each row, from 0 to 1 in a few levels, so much earlier as the air does what bends them.

@@ -363,9 +363,6 @@ fn checked<'a>(request: &Request<'a>) -> Result<Vec<&'a Record>, DiagnoseError> 
     Ok(records)
 }
 
-/// What a score test on held-out records must promise for them to be searched themselves: what an effect costs, twice.
-const PROMISING: f64 = 12.0;
-
 /// Finds what a model lacks; `progress` is told the share that is done.
 ///
 /// # Errors
@@ -406,19 +403,16 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
         Some(chamber) => chamber.clone(),
         None => in_time(chamber, &found)?,
     };
-    let mut diagnosis = answer::answer(&question, &timed, &found, &records)?;
-    beyond(request, &question, &timed, &found, &mut diagnosis, &|share| progress(0.6 + 0.2 * share))?;
+    let mut diagnosis = said(request, &question, &records, &timed, &found, &|share| progress(0.6 + 0.2 * share))?;
     // Where what is to be fitted shows nothing, the other records may; the former then confirm it.
     if let (Verdict::Adequate, Some(declared), false) =
         (diagnosis.verdict, found.declared(), request.holdout.is_empty())
     {
         let other = Question { fitted: question.held_out.clone(), held_out: question.fitted.clone(), ..question };
-        let day = chamber.fit(&declared.fit.assumed, &[], &other.fitted, Some(&declared.fit), Effort::FULL)?;
-        if joint::promise(&other, &day)? > PROMISING {
-            let found = joint::search(&other, day, &|share| progress(0.8 + 0.2 * share))?;
+        let found = joint::search_if_it_promises(&other, &declared.fit, &|share| progress(0.8 + 0.2 * share))?;
+        if let Some(found) = found {
             let timed = in_time(chamber, &found)?;
-            let mut elsewhere = answer::answer(&other, &timed, &found, &records)?;
-            beyond(request, &other, &timed, &found, &mut elsewhere, &|_| ())?;
+            let mut elsewhere = said(request, &other, &records, &timed, &found, &|_| ())?;
             if elsewhere.verdict != Verdict::Adequate {
                 // Columns stay those of the records as they were given.
                 elsewhere.ladder.iter_mut().for_each(Rung::exchange);
@@ -454,30 +448,32 @@ fn in_time<'a>(chamber: &Chamber<'a>, found: &joint::Found) -> Result<Chamber<'a
     })
 }
 
-/// Formulas for what no listed effect explains; what they leave of records is said by the `timed` chamber.
-fn beyond(
+/// What a search found, with formulas for what no listed effect explains; what is left of records is said by the `timed` chamber.
+fn said(
     request: &Request,
     question: &Question,
+    records: &[&Record],
     timed: &Chamber,
     found: &joint::Found,
-    diagnosis: &mut Diagnosis,
     progress: &(dyn Fn(f64) + Sync),
-) -> Result<(), DiagnoseError> {
+) -> Result<Diagnosis, DiagnoseError> {
+    let mut diagnosis = answer::answer(question, timed, found, records)?;
     let allowed = match request.terms {
         Terms::All => discover::Allowed::default(),
         Terms::Among(words) => discover::Allowed { words: words.to_vec() },
-        Terms::None => return Ok(()),
+        Terms::None => return Ok(diagnosis),
     };
     let (discovered, elsewhere) = match discover::discover(question, found, &allowed, progress)? {
-        Beyond::Nothing => return Ok(()),
+        Beyond::Nothing => return Ok(diagnosis),
         Beyond::Alike(alike) => {
-            discover::share_with(question, found, &alike, diagnosis);
-            return Ok(());
+            discover::share_with(question, found, &alike, &mut diagnosis);
+            return Ok(diagnosis);
         }
         Beyond::Found(discovered, elsewhere) => (discovered, elsewhere),
     };
     let timed = elsewhere.as_ref().unwrap_or(timed);
-    discover::amend(&Question { chamber: timed, ..question.clone() }, found, &discovered, diagnosis)
+    discover::amend(&Question { chamber: timed, ..question.clone() }, found, &discovered, &mut diagnosis)?;
+    Ok(diagnosis)
 }
 
 /// What a diagnosis leaves to be told apart by an experiment.

@@ -31,7 +31,7 @@ pub(in crate::diagnose) use explanation::{fitted, with, without};
 pub(in crate::diagnose) use odds::EFFECT;
 pub(in crate::diagnose) use readings::{Readings, changes_readings, is_seen};
 pub(in crate::diagnose) use screen::{Proposal, TestedStart, proposals_along, tested_starts};
-pub(crate) use search::{again, fit_one, judged, promise, ranked, refit_without, search};
+pub(crate) use search::{again, fit_one, judged, ranked, refit_without, search_if_it_promises};
 pub(crate) use winding::Winding;
 
 /// What is asked of the search.

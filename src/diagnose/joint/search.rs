@@ -26,6 +26,8 @@ const MAY_BE_WOUND: f64 = CERTAIN.log - WINDING.log;
 const MAY_WIN: f64 = 1.0 / 3.0;
 /// A set must be better by so much to go on from.
 const WORTH_A_STEP: f64 = 1.0;
+/// What a score test on records that were only judged by must promise for them to be searched themselves: what an effect costs, twice.
+const PROMISING: f64 = 12.0;
 /// Periods of a cycle and times of an offset step, as shares of the record.
 const CYCLES: [f64; 3] = [0.06, 0.15, 0.4];
 const STEPS: usize = 60;
@@ -36,19 +38,30 @@ type Begin = (Assumption, Vec<Free>);
 /// Sets that were fitted, by their members.
 type Cache = BTreeMap<Vec<Member>, Explanation>;
 
-/// Searches sets of explanations from a fit of the declared model, and judges them; `progress` is told the share that is done.
+/// Sets of explanations for records that the declared model, found on others, was only judged by: searched where the score test promises
+/// enough, and judged. `progress` is told the share that is done.
 ///
 /// # Errors
 /// A declared model that cannot be solved for these records.
-pub(crate) fn search(question: &Question, null: Fit, progress: &(dyn Fn(f64) + Sync)) -> Outcome<Found> {
-    let found = ranked(question, null, progress)?;
-    if found.is_elsewhere { again(question, found) } else { judged(question, found) }
+pub(crate) fn search_if_it_promises(
+    question: &Question,
+    declared: &Fit,
+    progress: &(dyn Fn(f64) + Sync),
+) -> Outcome<Option<Found>> {
+    let day = question.chamber.fit(&declared.assumed, &[], &question.fitted, Some(declared), Effort::FULL)?;
+    let null = Explanation::new(question, &[], Vec::new(), day.clone());
+    let most = proposals(question, &null)?.iter().map(|p| p.gain).fold(0.0, f64::max);
+    if most <= PROMISING {
+        return Ok(None);
+    }
+    let found = ranked(question, day, progress)?;
+    Ok(Some(if found.is_elsewhere { again(question, found)? } else { judged(question, found)? }))
 }
 
 /// Sets that were only ranked, judged in the chamber that they were found in.
 ///
 /// # Errors
-/// As [`search`].
+/// As [`search_if_it_promises`].
 pub(crate) fn judged(question: &Question, mut found: Found) -> Outcome<Found> {
     judge(question, &found.windings, &mut found.explanations, Care::InFull)?;
     Ok(found)
@@ -57,7 +70,7 @@ pub(crate) fn judged(question: &Question, mut found: Found) -> Outcome<Found> {
 /// Searches sets of explanations, and ranks them.
 ///
 /// # Errors
-/// As [`search`].
+/// As [`search_if_it_promises`].
 pub(crate) fn ranked(question: &Question, null: Fit, progress: &(dyn Fn(f64) + Sync)) -> Outcome<Found> {
     progress(0.2);
     let mut windings: Vec<Winding> = Vec::new();
@@ -431,15 +444,6 @@ fn complete(question: &Question, windings: &[Winding], best: &Explanation, cache
         .filter_map(|(members, begin)| fitted(question, windings, members, &begin, &best.fit, Effort::QUICK))
         .collect();
     found.into_iter().for_each(|explanation| keep(cache, explanation));
-}
-
-/// The most that the score test promises of any candidate beside a fit of the declared model.
-///
-/// # Errors
-/// A model that cannot be solved for these records.
-pub(crate) fn promise(question: &Question, null: &Fit) -> Outcome<f64> {
-    let null = Explanation::new(question, &[], Vec::new(), null.clone());
-    Ok(proposals(question, &null)?.iter().map(|p| p.gain).fold(0.0, f64::max))
 }
 
 /// The best fit of the only kind among the candidates, and mean squares of standardised innovations before and after.
