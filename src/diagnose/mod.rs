@@ -31,7 +31,7 @@ pub(crate) mod trim;
 
 use thiserror::Error;
 
-use crate::chamber::{Assumption, Chamber, ChamberError, EffectEstimates, Effort, Films, Learned, Noise};
+use crate::chamber::{Assumption, Chamber, ChamberError, EffectEstimates, Films, Learned, Noise};
 use crate::coil::CoilError;
 use crate::effect::DeclaredEffect;
 use crate::numeric::noise::white_noise;

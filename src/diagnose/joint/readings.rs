@@ -6,8 +6,8 @@
 //!
 //! Readings of one thermometer show what the air did and cannot show a coil: whatever a lag or another pack makes of an air that is
 //! known, another air makes without it. What is taken to be likely of the air is a guess; a set that only makes readings
-//! likelier under this guess has said nothing of the coil. So sets are judged by the rates, given the readings. Where a record
-//! has a second thermometer, at the bore or in the air, the two together do show the pack, and nothing is taken off.
+//! likelier, or less likely, under this guess has said nothing of the coil. So sets are judged by the rates, given the readings. Where a
+//! record has a second thermometer, at the bore or in the air, the two together do show the pack, and nothing is taken off.
 
 use std::sync::Arc;
 
@@ -31,8 +31,8 @@ pub(super) fn take_off(question: &Question, declared: &Fit, explanations: &mut [
 /// The readings alone by the declared model, which sets are compared with.
 #[derive(Debug, Clone)]
 pub(in crate::diagnose) struct Readings {
-    /// Of the fitted and of the held-out records.
-    declared: [f64; 2],
+    /// Of the fitted and of the held-out records: with the chamber's kinks, and as much as that or with those that they have by it.
+    declared: [(f64, f64); 2],
     /// Its fit: where those of sets begin.
     fit: Option<Fit>,
 }
@@ -42,14 +42,14 @@ impl Readings {
         let chamber = question.chamber.without_rates();
         let blind = blind(question, &chamber);
         let ((there, fit), own) = (alone(&blind, declared, None), own_kinks(&blind, declared));
-        Self { declared: [there[0].max(own[0]), there[1].max(own[1])], fit }
+        Self { declared: [0, 1].map(|of| (there[of], there[of].max(own[of]))), fit }
     }
 
-    /// What a fit gains beside it.
+    /// What a fit gains beside it, or loses: nothing where it lies between what kinks make of the declared model.
     pub(in crate::diagnose) fn gain(&self, question: &Question, fit: &Fit) -> f64 {
         let chamber = question.chamber.without_rates();
         let (own, _) = alone(&blind(question, &chamber), fit, self.fit.as_ref());
-        let gains = own.iter().zip(&self.declared).map(|(own, none)| (own - none).max(0.0));
+        let gains = own.iter().zip(&self.declared).map(|(own, &(least, most))| own - own.max(least).min(most));
         gains.filter(|gain| gain.is_finite()).sum()
     }
 }
