@@ -25,6 +25,8 @@ pub(super) fn doubts(system: &System, rows: &[Row], trace: &Trace) -> Doubts {
 pub(super) struct Doubts {
     /// In the order of the innovations.
     pub(crate) values: Vec<f64>,
+    /// D, in the same order: one over the variance of a measurement beside what all others say.
+    pub(crate) precisions: Vec<f64>,
     /// One entry a row: standardised, and the change of slope that it stands for [K/s].
     pub(crate) kinks: Vec<(f64, f64)>,
 }
@@ -47,7 +49,8 @@ impl Pass for Doubt<'_> {
 #[inline(always)]
 fn doubts_of<const N: usize>(arithmetic: impl Arithmetic, system: &System, rows: &[Row], trace: &Trace) -> Doubts {
     let n = system.size;
-    let mut found = Doubts { values: vec![0.0; trace.innovations.len()], kinks: vec![(0.0, 0.0); rows.len()] };
+    let none = vec![0.0; trace.innovations.len()];
+    let mut found = Doubts { values: none.clone(), precisions: none, kinks: vec![(0.0, 0.0); rows.len()] };
     let mut r = [0.0; N];
     let mut spread: Square<N> = [[0.0; N]; N];
     let mut taken = trace.innovations.len();
@@ -70,6 +73,7 @@ fn doubts_of<const N: usize>(arithmetic: impl Arithmetic, system: &System, rows:
                 precision += gain[i] * along[i];
             }
             found.values[taken] = error / precision.sqrt();
+            found.precisions[taken] = precision;
             system.rows.add_to(h, error, &mut r);
             let mut line = [0.0; N];
             system.rows.add_to(h, 1.0, &mut line);

@@ -1,5 +1,8 @@
 //! The grid that a sensor's readings lie on: its step, and readings in a row that are one value of it.
 
+/// Thermometers whose readings lie on the sensor's grid: itself and that at the bore.
+pub(super) const GRIDDED: usize = 2;
+
 /// Of each value how many in a row are equal to it, itself included; 1 where there is none.
 pub(super) fn run_lengths(values: &[f64]) -> Vec<f64> {
     let runs = values.chunk_by(|a, b| a == b);

@@ -62,6 +62,7 @@ pub(crate) mod prior;
 mod readings;
 mod responses;
 mod ripple;
+mod rounding;
 mod row;
 mod score;
 mod scorer;

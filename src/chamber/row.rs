@@ -33,7 +33,8 @@ pub(super) struct Row {
     pub(crate) measured: [Option<u16>; MEASURED],
     /// Values that were averaged into this one: variances are divided by it.
     pub(crate) averaged: f64,
-    /// Readings in a row that are one value of the sensor's grid, and so know of each other's error; by measurement.
+    /// Variance of what stands for a reading beside that of even rounding: readings in a row that are one value of the sensor's grid, and
+    /// so know of each other's error, or what [`super::rounding`] makes of them; by measurement.
     pub(crate) repeats: [f64; MEASURED],
 }
 

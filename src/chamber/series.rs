@@ -6,7 +6,7 @@
 //! ```
 
 use super::filter::{AMBIENT, MEASURED, Move, RATE, Row};
-use super::grid::{resolution, run_lengths};
+use super::grid::{GRIDDED, resolution, run_lengths};
 use super::row::Film;
 use crate::numeric::noise::white_noise;
 use crate::numeric::statistics::median;
@@ -97,8 +97,6 @@ const COMPARED_S: f64 = 200.0;
 const EARLIER_S: f64 = 80.0;
 /// A bend of this share of the largest is one.
 const FULL_BEND: f64 = 0.25;
-/// Thermometers whose readings lie on the sensor's grid: itself and that at the bore.
-const GRIDDED: usize = 2;
 /// Levels of the trend's noise; between them gains may stay frozen.
 const LEVELS: f64 = 8.0;
 

@@ -71,6 +71,7 @@ impl<'a> Chamber<'a> {
     /// By a fit whose air bends wherever readings do: to one that is straight but for its kinks, what does not know them yet is full of
     /// gross errors.
     fn with_shocks_about(mut self, curved: Fit, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
+        let curved = self.between_steps(curved, records)?;
         let whole = self.observed.iter().map(|o| o.series.clone()).collect::<Vec<_>>();
         let curved = self.without_gross_errors(curved, records)?;
         let others: Vec<usize> = (0..self.records()).filter(|r| !records.contains(r)).collect();
@@ -97,6 +98,7 @@ impl<'a> Chamber<'a> {
 
     /// Records without gross errors, each with its air as it is likeliest.
     pub(super) fn looked_through(&mut self, fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
+        let fit = self.between_steps(fit, records)?;
         let whole = self.observed.iter().map(|o| o.series.clone()).collect::<Vec<_>>();
         let curved = self.without_gross_errors(fit, records)?;
         self.take_airs(curved, records, &whole)
