@@ -88,10 +88,8 @@ impl Chamber<'_> {
                 let (taken, known) = (values.of[m][k], series.values[m][k] - values.of[m][k]);
                 let own = system.variances[m];
                 let before = rounding * row.repeats[m];
-                let others = Gaussian {
-                    mean: taken - standardised / precision.sqrt(),
-                    variance: 1.0 / precision - before,
-                };
+                let others =
+                    Gaussian { mean: taken - standardised / precision.sqrt(), variance: 1.0 / precision - before };
                 if !(others.variance > own) {
                     continue;
                 }
@@ -124,7 +122,10 @@ impl Gaussian {
         if !(precision > 1.0 / most) {
             return Self { mean: between.mean, variance: most };
         }
-        Self { mean: (between.mean / between.variance - self.mean / self.variance) / precision, variance: 1.0 / precision }
+        Self {
+            mean: (between.mean / between.variance - self.mean / self.variance) / precision,
+            variance: 1.0 / precision,
+        }
     }
 
     /// Mean and variance between bounds.
@@ -156,7 +157,12 @@ const NARROW: f64 = 1e-3;
 
 #[cfg(test)]
 mod tests {
+    use super::super::Assumption;
+    use super::super::dense::tests::model;
+    use super::super::kinks::tests::kinked;
     use super::*;
+    use crate::pattern::classic::Classic;
+    use crate::record::Record;
 
     /// Mean and variance by summing over many points.
     fn summed(of: Gaussian, low: f64, high: f64) -> Gaussian {
@@ -195,5 +201,31 @@ mod tests {
         assert!((mean - between.mean).abs() < 1e-12 && (precision * between.variance - 1.0).abs() < 1e-12);
         // Well within the bounds it says nothing.
         assert_eq!(Gaussian { mean: 0.0, variance: 1e-6 }.said_between(-0.5, 0.5, 1e3).variance, 1e3);
+    }
+
+    #[test]
+    #[ignore = "long: --include-ignored"]
+    fn what_takes_a_coarse_sensors_readings_place_is_nearer_to_what_they_were() {
+        let (bare, pattern) = (model(Vec::new()), Classic::Zyl.pattern(8).unwrap());
+        let fine = kinked(&bare, &pattern);
+        let rounded = fine.temperature_k().iter().map(|t| (t / 0.1).round() * 0.1).collect();
+        let coarse = Record::new("coarse", fine.times_s().to_vec(), rounded, fine.rate_rad_per_s().to_vec()).unwrap();
+        let declared = Assumption::new(bare.clone(), pattern);
+        let (chamber, _) = Chamber::new(&bare, &[&coarse]).unwrap().with_shocks(&declared, &[0]).unwrap();
+        let series = &chamber.observed[0].series;
+        let off = |readings: &dyn Fn(usize) -> f64| {
+            let squares = fine.temperature_k().iter().enumerate().map(|(k, t)| (readings(k) - t).powi(2));
+            squares.sum::<f64>().sqrt() / (fine.temperature_k().len() as f64).sqrt()
+        };
+        let before = off(&|k| coarse.temperature_k()[k]);
+        let after = off(&|k| series.values[0][k] + series.reference_k);
+        println!("{before:.4} K before, {after:.4} K after");
+        assert!(after < 0.6 * before, "{after} of {before}");
+        // A fine sensor's are left as they are.
+        let (chamber, _) = Chamber::new(&bare, &[&fine]).unwrap().with_shocks(&declared, &[0]).unwrap();
+        let series = &chamber.observed[0].series;
+        assert!((0..600).all(
+            |k| series.values[0][k] + series.reference_k == fine.temperature_k()[k] || series.values[0][k].is_nan()
+        ));
     }
 }
