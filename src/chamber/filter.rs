@@ -61,7 +61,7 @@ impl System {
     /// Variance of one measurement's own error at a row.
     #[inline(always)]
     pub(super) fn noise(&self, m: usize, row: &Row) -> f64 {
-        (self.variances[m] + self.grids[m] * row.repeats[m]) / row.averaged
+        (self.variances[m] + self.grids[m] * row.rounding[m]) / row.averaged
     }
 }
 

@@ -207,6 +207,7 @@ mod tests {
         for (place, prior) in PRIORS.iter().enumerate() {
             assert!(std::ptr::eq(prior.quantity.prior(), &PRIORS[place]) || *prior.quantity.prior() == *prior);
             assert_eq!(PRIORS.iter().filter(|p| p.quantity == prior.quantity).count(), 1);
+            assert!(prior.least < prior.median && prior.median < prior.most || prior.relative);
             assert!(prior.median > 0.0 && prior.deviation > 0.0 && prior.reason.len() > 10);
         }
         assert!((SWITCHED_LOG - 0.02_f64.ln()).abs() < 1e-3);

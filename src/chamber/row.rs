@@ -35,7 +35,7 @@ pub(super) struct Row {
     pub(crate) averaged: f64,
     /// Variance of what stands for a reading beside that of even rounding: readings in a row that are one value of the sensor's grid, and
     /// so know of each other's error, or what [`super::rounding`] makes of them; by measurement.
-    pub(crate) repeats: [f64; MEASURED],
+    pub(crate) rounding: [f64; MEASURED],
 }
 
 impl Row {

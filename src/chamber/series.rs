@@ -174,7 +174,7 @@ impl Series {
             let lengths = run_lengths(column);
             for (row, &(from, to)) in self.rows.iter_mut().zip(&self.spans) {
                 let own = &lengths[from..=to];
-                row.repeats[m] = own.iter().sum::<f64>() / own.len() as f64;
+                row.rounding[m] = own.iter().sum::<f64>() / own.len() as f64;
             }
         }
     }
@@ -298,7 +298,7 @@ impl Series {
             }
             moves.extend(steps.of(rest_s(k)).into_iter().map(Move::Step));
             let (bend, averaged) = (bends[k], self.averaged as f64);
-            self.rows.push(Row { moves, bend, kink: 0.0, measured, averaged, repeats: [1.0; MEASURED] });
+            self.rows.push(Row { moves, bend, kink: 0.0, measured, averaged, rounding: [1.0; MEASURED] });
         }
         let step = |length_s: f64| TimeStep { length_s, film: Film::Usual };
         self.steps = steps.lengths_s.into_iter().map(step).collect();
@@ -473,14 +473,14 @@ mod tests {
     fn readings_that_repeat_a_value_of_the_grid_are_counted_and_averaged_ones_as_their_mean_varies() {
         let steps = [0, 0, 0, 1, 2, 2, 3, 4, 5, 5, 5, 5];
         let series = on_a_grid(&steps, 10.0);
-        let repeats: Vec<f64> = series.rows.iter().map(|row| row.repeats[0]).collect();
+        let repeats: Vec<f64> = series.rows.iter().map(|row| row.rounding[0]).collect();
         assert_eq!(repeats, [3.0, 3.0, 3.0, 1.0, 2.0, 2.0, 1.0, 1.0, 4.0, 4.0, 4.0, 4.0]);
-        assert!(series.rows.iter().all(|row| row.repeats[AMBIENT] == 1.0 && row.repeats[RATE] == 1.0));
+        assert!(series.rows.iter().all(|row| row.rounding[AMBIENT] == 1.0 && row.rounding[RATE] == 1.0));
         // Four rows of 2.5 s in one: the grid's variance times this over four is that of the mean. Errors in a run are one error, which
         // a run that goes on in the next block shares with it.
         let series = on_a_grid(&steps, 2.5);
         assert_eq!(series.averaged, 4);
-        let repeats: Vec<f64> = series.rows.iter().map(|row| row.repeats[0]).collect();
+        let repeats: Vec<f64> = series.rows.iter().map(|row| row.rounding[0]).collect();
         assert_eq!(repeats, [(3.0 * 3.0 + 1.0) / 4.0, (2.0 * 2.0 + 1.0 + 1.0) / 4.0, 4.0]);
     }
 }

@@ -40,7 +40,7 @@ pub(crate) struct Explanation {
     pub(crate) merit: f64,
     /// … of the held-out ones; None where it was not computed or nothing was held out.
     pub(crate) held_out: Option<f64>,
-    /// What of both is gained in the readings alone, and says nothing of the coil.
+    /// What of both is gained in the readings alone, or lost where it is negative, and says nothing of the coil.
     pub(crate) in_readings: f64,
     /// What its difference from the best is not worth, because the records' air is not quite as it is taken to be.
     pub(crate) understated: f64,

@@ -17,7 +17,7 @@ use super::{Explanation, Member, Question};
 use crate::chamber::{Assumption, Effort, Fit};
 use crate::rate::CoilModel;
 
-/// Takes off what sets gain beside the `declared` model in the readings alone, with the coil's numbers as they were found.
+/// Takes off what sets gain beside the `declared` model in the readings alone, and gives back what they lose, with the coil's numbers as they were found.
 pub(super) fn take_off(question: &Question, declared: &Fit, explanations: &mut [Explanation]) {
     let mut changing: Vec<&mut Explanation> =
         explanations.iter_mut().filter(|e| changes_readings(question, e)).collect();
@@ -49,9 +49,14 @@ impl Readings {
     pub(in crate::diagnose) fn gain(&self, question: &Question, fit: &Fit) -> f64 {
         let chamber = question.chamber.without_rates();
         let (own, _) = alone(&blind(question, &chamber), fit, self.fit.as_ref());
-        let gains = own.iter().zip(&self.declared).map(|(own, &(least, most))| own - own.max(least).min(most));
+        let gains = own.iter().zip(&self.declared).map(|(own, declared)| beside(*own, *declared));
         gains.filter(|gain| gain.is_finite()).sum()
     }
+}
+
+/// By how much a log evidence lies beyond the least or the most.
+fn beside(own: f64, (least, most): (f64, f64)) -> f64 {
+    own - own.max(least).min(most)
 }
 
 /// The question of the records that have one thermometer, in a chamber that sees readings only.
@@ -136,4 +141,19 @@ fn reduced(question: &Question, fit: &Fit) -> Fit {
         }
     }
     reduced
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_loss_in_the_readings_counts_as_a_gain_does_and_what_kinks_may_make_does_not() {
+        assert_eq!(beside(7.0, (2.0, 5.0)), 2.0);
+        assert_eq!(beside(-1.0, (2.0, 5.0)), -3.0);
+        assert_eq!(beside(3.0, (2.0, 5.0)), 0.0);
+        assert_eq!(beside(1.0, (2.0, 2.0)), -1.0);
+        // Where nothing could be fitted nothing is said.
+        assert!(!beside(f64::NEG_INFINITY, (2.0, 5.0)).is_finite());
+    }
 }
