@@ -3,16 +3,36 @@
 
 use rayon::prelude::*;
 
+use super::NEAR;
 use super::grounds::Sought;
 use super::search::{Set, TRIED, Tools, WITHIN_REACH, WORTH_LISTED};
+use crate::diagnose::joint::Proposal;
 
 /// Effects of the catalogue that follow the pack's mean rate and so look alike in ramps: mismatch, surplus at either end with either lead, the
 /// empirical ones.
 const ALIKE: usize = 6;
 
+/// What an exchange makes is looked at once more: its terms were chosen beside what it took out.
+const MOST_EXCHANGES: usize = 2;
+
 impl Tools<'_, '_> {
+    /// Adds what comes of exchanging members of the best set, if that is as good as what is listed, and of the set that becomes the best.
+    ///
+    /// # Shapes
+    /// `sets`: best first, before and after.
+    pub(super) fn exchange(&self, sets: &mut Vec<Set>, best_listed: f64) {
+        for _ in 0..MOST_EXCHANGES {
+            let Some(best) = sets.first().filter(|best| best.total() > best_listed - NEAR).cloned() else { return };
+            sets.extend(self.exchanged(&best).into_iter().filter(|s| s.total().is_finite()));
+            sets.sort_by(|a, b| b.total().total_cmp(&a.total()));
+            if sets[0].says_the_same(&best) {
+                return;
+            }
+        }
+    }
+
     /// The set with each of its listed effects exchanged for what else promises much in its place.
-    pub(crate) fn exchanged(&self, set: &Set) -> Vec<Set> {
+    fn exchanged(&self, set: &Set) -> Vec<Set> {
         let mut all = Vec::new();
         if set.grounds.moves() {
             // Terms that were chosen before the coil was found that they belong to.
@@ -21,20 +41,39 @@ impl Tools<'_, '_> {
         for place in 0..set.explanation.members.len() {
             let Some(fewer) = self.without(set, place) else { continue };
             all.extend(self.other_terms(set, &fewer));
-            let Ok(mut others) = self.listed_beside(&fewer, Sought::Everything) else { continue };
-            others.retain(|p| p.gain > WORTH_LISTED && p.member != set.explanation.members[place]);
-            others.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-            others.truncate(ALIKE);
-            let sets: Vec<Set> = others.par_iter().filter_map(|p| self.with_listed(&fewer, p)).collect();
+            let sets = self.with_others(&fewer, &|p| p.member != set.explanation.members[place]);
             let near = sets.into_iter().filter(|s| s.merit > set.merit - WITHIN_REACH);
-            all.extend(
-                near.collect::<Vec<_>>()
-                    .into_par_iter()
-                    .map(|s| self.as_confirmed_as(set, self.judged(self.consistent(s))))
-                    .collect::<Vec<_>>(),
-            );
+            all.extend(self.all_judged(set, near.collect()));
+        }
+        if set.explanation.members.len() > 1 {
+            all.extend(self.beside_the_terms_alone(set));
         }
         all
+    }
+
+    /// One effect in the place of all that are listed: together they may stand for one that none of them leads to.
+    fn beside_the_terms_alone(&self, set: &Set) -> Vec<Set> {
+        let mut bare = set.clone();
+        while !bare.explanation.members.is_empty() {
+            let Some(next) = self.without(&bare, 0) else { return Vec::new() };
+            bare = next;
+        }
+        let sets = self.with_others(&bare, &|p| !set.explanation.members.contains(&p.member));
+        self.all_judged(set, sets.into_iter().filter(|s| s.merit > set.merit - WITHIN_REACH).collect())
+    }
+
+    /// A set with each of the listed effects that promise most beside it.
+    fn with_others(&self, fewer: &Set, is_other: &dyn Fn(&Proposal) -> bool) -> Vec<Set> {
+        let Ok(mut others) = self.listed_beside(fewer, Sought::Everything) else { return Vec::new() };
+        others.retain(|p| p.gain > WORTH_LISTED && is_other(p));
+        others.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        others.truncate(ALIKE);
+        others.par_iter().filter_map(|p| self.with_listed(fewer, p)).collect()
+    }
+
+    /// Sets that came of an exchange, with their held-out records looked at.
+    fn all_judged(&self, exchanged: &Set, sets: Vec<Set>) -> Vec<Set> {
+        sets.into_par_iter().map(|s| self.as_confirmed_as(exchanged, self.judged(self.consistent(s)))).collect()
     }
 
     /// Other terms in the place of all of a set's, beside fewer of its listed effects.

@@ -8,6 +8,7 @@
 //! The score test as in [`crate::chamber`]; forms and prices as in the book's chapter on what is missing.
 
 mod anew;
+mod beginnings;
 mod courses;
 mod exchange;
 mod forms;
@@ -30,7 +31,7 @@ pub(crate) use proposal::{FormulaProposal, NO_WINDING, ProposedTerm, Shown, Term
 pub(in crate::diagnose) use proposal::{amend, share_with};
 
 use grounds::Grounds;
-use search::{MOST_TERMS, Set, Tools};
+use search::{Set, Tools};
 
 /// What won against everything that is listed.
 #[derive(Debug)]
@@ -82,48 +83,11 @@ pub(in crate::diagnose) fn discover<'a>(
     let Some(declared) = found.declared() else { return Ok(Beyond::Nothing) };
     let fit = &found.explanations.first().unwrap_or(declared).fit;
     let Some(tools) = tools(question, found, &declared.fit, fit, allowed)? else { return Ok(Beyond::Nothing) };
-    let is_listed = |e: &&Explanation| {
-        !e.members.is_empty() && e.members.iter().all(|m| matches!(m, Member::Effect(_) | Member::Refitted(_)))
-    };
     let best_listed = found.explanations.iter().map(Explanation::total).fold(f64::NEG_INFINITY, f64::max);
-    let listed = found.explanations.iter().find(is_listed);
-    let mut sets: Vec<Set> = Vec::new();
-    // Where a listed set is the answer, leaves nothing, a formula in its place has to do the same for more.
-    let is_answer = |e: &Explanation| !e.is_outside() && e.total() > best_listed - NEAR;
-    let beside = tools.without_shadows(found, best_listed);
-    let mut is_settled = false;
-    if let Some(listed) = listed.filter(|e| is_answer(e)) {
-        sets = tools.search(tools.plain(listed), MOST_TERMS, &|share| progress(0.4 * share));
-        let gains = |s: &Set| !s.terms.is_empty() && s.total() > listed.total();
-        // A wander takes up a slow term before a term is tried.
-        let may_replace = || {
-            tools.may_replace(&umbrella(&tools, found, declared), listed)
-                || tools.may_replace(&tools.plain(declared), listed)
-        };
-        is_settled = !sets.iter().any(gains) && !may_replace();
-        let may_be_pair = listed.members.len() > 1;
-        if is_settled && beside.is_none() && !may_be_pair {
-            return Ok(Beyond::Nothing);
-        }
-    }
-    let from_listed = !sets.is_empty();
-    if let Some(beside) = beside {
-        sets.extend(tools.search(beside, MOST_TERMS, &|_| ()));
-    }
-    if !is_settled {
-        sets.extend(tools.beneath(umbrella(&tools, found, declared), declared, best_listed, progress));
-    }
-    let best_yet = sets.iter().map(Set::total).fold(f64::NEG_INFINITY, f64::max);
-    if let Some(listed) = listed.filter(|e| !from_listed && e.total() + BEATS > best_yet) {
-        sets.extend(tools.search(tools.plain(listed), MOST_TERMS, &|_| ()));
-    }
-    sets.extend(tools.in_the_place_of_two(declared, listed, &sets));
+    let Some(mut sets) = tools.begun(found, declared, best_listed, progress) else { return Ok(Beyond::Nothing) };
     sets.retain(|s| !s.terms.is_empty() && s.total().is_finite());
     sets.sort_by(|a, b| b.total().total_cmp(&a.total()));
-    let near = sets.first().filter(|best| best.total() > best_listed - NEAR);
-    let exchanged = near.map(|best| tools.exchanged(best)).unwrap_or_default();
-    sets.extend(exchanged.into_iter().filter(|s| s.total().is_finite()));
-    sets.sort_by(|a, b| b.total().total_cmp(&a.total()));
+    tools.exchange(&mut sets, best_listed);
     let sets = own_courses::with_own_courses(&tools, sets);
     let listed = match sets.iter().max_by(|a, b| a.total().total_cmp(&b.total())) {
         Some(best) => anew::worth_beside(question, found, best),
@@ -223,22 +187,6 @@ fn tools<'q, 'a>(
     let (windings, readings) = (found.windings.as_slice(), OnceLock::new());
     let tools = Tools { question, windings, declared, readings, grounds, days, families, candidates };
     Ok((candidates > 0).then_some(tools))
-}
-
-/// The declared model with whatever takes up what it leaves: its wander, or one of the sets that say so.
-fn umbrella(tools: &Tools, found: &Found, declared: &Explanation) -> Set {
-    let outside = found.explanations.iter().find(|e| {
-        !e.members.is_empty() && e.members.iter().all(|m| matches!(m, Member::Drift)) && e.merit > declared.merit
-    });
-    let mut set = tools.plain(declared);
-    if let Some(outside) = outside {
-        // Compared with the declared model, scored beneath the umbrella.
-        set.explanation.fit = outside.fit.clone();
-        set.explanation.members = outside.members.clone();
-        set.merit = outside.merit;
-        set.held_out = outside.held_out;
-    }
-    set
 }
 
 /// The set fitted to all records, and the errors of its numbers there.
