@@ -37,8 +37,7 @@ impl Pass for Abreast<'_> {
     #[inline(always)]
     fn run(self, arithmetic: impl Arithmetic) -> Self::Output {
         match self.systems[0].size {
-            0..=8 => pass::<8, 8, 4>(arithmetic, &self),
-            9..=12 => pass::<12, 12, 6>(arithmetic, &self),
+            0..=12 => pass::<12, 12, 6>(arithmetic, &self),
             13..=16 => pass::<16, 8, 4>(arithmetic, &self),
             17..=20 => pass::<20, 10, 5>(arithmetic, &self),
             21..=24 => pass::<24, 12, 6>(arithmetic, &self),

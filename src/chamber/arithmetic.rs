@@ -4,8 +4,6 @@
 //! where the processor has none it would be a call, so there they are a product and then a sum. The last digits of a likelihood are
 //! those of the kind of processor, and the same at any number of threads.
 
-use pulp::{Arch, NullaryFnOnce};
-
 /// a b + c.
 pub(super) trait Arithmetic: Copy {
     fn add_product(self, a: f64, b: f64, c: f64) -> f64;
@@ -40,27 +38,29 @@ pub(super) trait Pass {
     fn run(self, arithmetic: impl Arithmetic) -> Self::Output;
 }
 
-/// Runs a pass with the best that the processor has.
+/// Runs a pass with the best that the processor has; it is compiled for that and, where a processor may lack it, once more.
 pub(super) fn dispatched<P: Pass>(pass: P) -> P::Output {
     #[cfg(target_arch = "x86_64")]
     if let Some(simd) = pulp::x86::V3::try_new() {
-        return simd.vectorize(With(pass, RoundedOnce));
+        return simd.vectorize(Fused(pass));
     }
     // Every 64-bit ARM has it.
     #[cfg(target_arch = "aarch64")]
-    return Arch::new().dispatch(With(pass, RoundedOnce));
+    return pass.run(RoundedOnce);
     #[cfg(not(target_arch = "aarch64"))]
-    Arch::new().dispatch(With(pass, RoundedTwice))
+    pass.run(RoundedTwice)
 }
 
-struct With<P, A>(P, A);
+#[cfg(target_arch = "x86_64")]
+struct Fused<P>(P);
 
-impl<P: Pass, A: Arithmetic> NullaryFnOnce for With<P, A> {
+#[cfg(target_arch = "x86_64")]
+impl<P: Pass> pulp::NullaryFnOnce for Fused<P> {
     type Output = P::Output;
 
     #[inline(always)]
     fn call(self) -> Self::Output {
-        self.0.run(self.1)
+        self.0.run(RoundedOnce)
     }
 }
 

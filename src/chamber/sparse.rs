@@ -9,8 +9,7 @@ use super::arithmetic::Arithmetic;
 macro_rules! dispatch {
     ($size:expr, $function:ident($($argument:expr),*)) => {
         match $size {
-            0..=8 => $function::<8>($($argument),*),
-            9..=12 => $function::<12>($($argument),*),
+            0..=12 => $function::<12>($($argument),*),
             13..=16 => $function::<16>($($argument),*),
             17..=20 => $function::<20>($($argument),*),
             21..=24 => $function::<24>($($argument),*),
