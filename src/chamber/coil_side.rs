@@ -354,6 +354,9 @@ pub(super) fn quantities(assumed: &Assumption, observed: &Observed) -> Result<Ve
         Quantity::RippleCoherence,
         Quantity::StartSlope,
     ]);
+    if observed.series.controlled {
+        all.extend([Quantity::ControlTime, Quantity::ControlDamping]);
+    }
     if observed.series.approaches {
         all.push(Quantity::ApproachTime);
     }

@@ -209,8 +209,15 @@ pub(super) mod tests {
         }
     }
 
+    /// In air that bends by itself, and in air that follows a set point.
     fn check_on(assumed: &Assumption, record: &Record, averaged: bool) {
+        check_in(assumed, record, averaged, false);
+        check_in(assumed, record, averaged, true);
+    }
+
+    fn check_in(assumed: &Assumption, record: &Record, averaged: bool, controlled: bool) {
         let (mut series, mean_k) = observed(&assumed.model, record);
+        series.controlled = controlled;
         series.rows[9].kink = 1e-6;
         let between = 0.7 * series.times_s[14] + 0.3 * series.times_s[13];
         let series = series.with_kinks(&[Bend { time_s: between, slope_change_k_per_s: 2e-3 }]);

@@ -140,7 +140,7 @@ mod tests {
             drift: false,
             cycle: false,
         };
-        let layout = Layout::with(&parts, false, false);
+        let layout = Layout::with(&parts, false, false, false);
         let row = drive(&layout, &one, 60.0 / 25.0);
         // What is as warm as the air stays so.
         let levels: f64 = row[..one.modes()].iter().sum::<f64>() + row[layout.trend];

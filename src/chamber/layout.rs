@@ -65,6 +65,8 @@ pub(super) struct Layout {
     pub(super) skin: Option<usize>,
     /// Level of the air's trend; its slope is the next.
     pub(crate) trend: usize,
+    /// Where the air follows a set point: the slope's own rate, and next the set point's slope.
+    pub(super) control: Option<usize>,
     pub(crate) turbulence: usize,
     pub(crate) ripple: usize,
     /// What drives the ripple.
@@ -83,11 +85,11 @@ pub(super) struct Layout {
 
 impl Layout {
     pub(crate) fn new(parts: &Parts, series: &Series) -> Self {
-        Self::with(parts, series.overlaps, series.averaged > 1)
+        Self::with(parts, series.overlaps, series.averaged > 1, series.controlled)
     }
 
-    /// `overlaps`: rates' windows do; `averaged`: readings are means.
-    pub(crate) fn with(parts: &Parts, overlaps: bool, averaged: bool) -> Self {
+    /// `overlaps`: rates' windows do; `averaged`: readings are means; `controlled`: the air takes time to take on another slope.
+    pub(crate) fn with(parts: &Parts, overlaps: bool, averaged: bool, controlled: bool) -> Self {
         let mut size = 0;
         let mut take = |count: usize| {
             size += count;
@@ -96,7 +98,9 @@ impl Layout {
         let modes = take(parts.reduced.modes());
         let _ = modes;
         let skin = parts.skin_s.map(|_| take(1));
-        let (trend, turbulence, ripple, driver) = (take(2), take(1), take(2), take(2));
+        let trend = take(2);
+        let control = controlled.then(|| take(2));
+        let (turbulence, ripple, driver) = (take(1), take(2), take(2));
         let lag = (parts.lag_s > 0.0).then(|| take(1));
         let wander = take(1);
         let drift = parts.drift.then(|| take(1));
@@ -109,6 +113,7 @@ impl Layout {
             modes,
             skin,
             trend,
+            control,
             turbulence,
             ripple,
             driver,

@@ -90,6 +90,7 @@ use solved::Solved;
 use system::driven_by_air;
 
 pub(crate) use adjustment::DifferenceVariance;
+pub(crate) use airs::OwnAir;
 pub(crate) use ascent::Effort;
 pub(crate) use causal::{Causal, Surroundings};
 pub(crate) use filter::Innovation;

@@ -35,6 +35,9 @@ pub(crate) enum Quantity {
     CyclePeriod,
     /// Deviation of the air's slope where a record begins \[K/s\]; what pack and sensor lag behind it follows.
     StartSlope,
+    /// One over the angular frequency \[s\] and the damping ratio with which a controlled chamber's air follows its set point; only where it does.
+    ControlTime,
+    ControlDamping,
     /// Time in which the air of a stage approaches its set point, its slope dying away \[s\]; only where the air does.
     ApproachTime,
     /// The film while it is switched over the usual one; only where it is.
@@ -57,7 +60,7 @@ pub(crate) struct Prior {
 }
 
 /// Every prior of the chamber.
-pub(crate) const PRIORS: [Prior; 21] = [
+pub(crate) const PRIORS: [Prior; 23] = [
     line(Quantity::Film, 25.0, 0.8, "free to moderately forced convection in a chamber: 8 … 80 W/(m²K)"),
     line(Quantity::ReadingNoise, 0.005, 1.0, "platinum sensors and their bridges read to a few millikelvin"),
     line(Quantity::InnerNoise, 0.005, 1.0, "as the sensor"),
@@ -98,6 +101,20 @@ pub(crate) const PRIORS: [Prior; 21] = [
     relative(Quantity::CycleSize, 2.0, 1.2, "as the drift"),
     line(Quantity::CyclePeriod, 5000.0, 0.8, "below a record's length, above what an air conditioning makes"),
     line(Quantity::StartSlope, 2e-4, 2.0, "a record begins at rest, or in a ramp of up to a kelvin or two a minute"),
+    Prior {
+        least: 5.0,
+        ..line(
+            Quantity::ControlTime,
+            80.0,
+            0.8,
+            "controllers of chambers settle within half a minute to several minutes",
+        )
+    },
+    Prior {
+        least: 0.1,
+        most: 3.0,
+        ..line(Quantity::ControlDamping, 0.7, 0.4, "controllers are tuned to overshoot a little")
+    },
     line(Quantity::ApproachTime, 90.0, 0.8, "thermoelectric stages settle within half a minute to several minutes"),
     line(Quantity::FilmRatio, 1.0, 0.7, "a fan makes twice or thrice of still air's film, or stops doing so"),
 ];
@@ -133,13 +150,15 @@ impl Quantity {
             Self::CycleSize => "cycle_deg_per_h",
             Self::CyclePeriod => "cycle_period_s",
             Self::StartSlope => "start_slope_k_per_s",
+            Self::ControlTime => "control_s",
+            Self::ControlDamping => "control_damping",
             Self::ApproachTime => "approach_s",
             Self::FilmRatio => "switched_film_over_usual",
         }
     }
 
     /// What the air of one day is.
-    pub(super) const AIR: [Self; 10] = [
+    pub(super) const AIR: [Self; 12] = [
         Self::RestNoise,
         Self::BendNoise,
         Self::TurbulenceSize,
@@ -148,6 +167,8 @@ impl Quantity {
         Self::RipplePeriod,
         Self::RippleCoherence,
         Self::StartSlope,
+        Self::ControlTime,
+        Self::ControlDamping,
         Self::ApproachTime,
         Self::FilmRatio,
     ];
@@ -165,7 +186,8 @@ impl Quantity {
     /// Whether it may be learned from one record for the next. What a stage does behind a step, or a fan, is of one record's day, as its kinks are;
     /// what all records share is learned by itself.
     pub(crate) fn is_learned(self) -> bool {
-        !self.is_shared() && !matches!(self, Self::ApproachTime | Self::FilmRatio)
+        !self.is_shared()
+            && !matches!(self, Self::ControlTime | Self::ControlDamping | Self::ApproachTime | Self::FilmRatio)
     }
 
     /// Whether it is one number for all records.

@@ -34,6 +34,8 @@ pub(super) struct Series {
     pub(crate) spikes: usize,
     /// Kinks that were placed in its air.
     pub(super) kinks: usize,
+    /// Whether its air takes time to take on another slope, as that of a controlled chamber does.
+    pub(super) controlled: bool,
     /// Whether its air approaches a set point, as that of a stage does behind a step: its slope dies away.
     pub(super) approaches: bool,
     /// When the film between air and pack changes to another one and back, ascending [s].
@@ -149,6 +151,7 @@ impl Series {
             spans: blocks.iter().map(|b| b.span).collect(),
             spikes,
             kinks: 0,
+            controlled: false,
             approaches: false,
             film_switches_s: Vec::new(),
             averaged,
@@ -195,6 +198,15 @@ impl Series {
     /// The time in which its air approaches set points \[s\]; infinite where it does not.
     pub(super) fn approach_s(&self, where_it_does_s: f64) -> f64 {
         if self.approaches { where_it_does_s } else { f64::INFINITY }
+    }
+
+    /// Values as another series of the same rows has them: what it leaves out, and what a coarse sensor's readings say by it.
+    pub(super) fn take_values_of(&mut self, other: &Self) {
+        self.values.clone_from(&other.values);
+        self.spikes = other.spikes;
+        for (row, there) in self.rows.iter_mut().zip(&other.rows) {
+            (row.measured, row.rounding) = (there.measured, there.rounding);
+        }
     }
 
     /// Takes in again what was left out since.

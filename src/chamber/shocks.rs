@@ -5,6 +5,7 @@
 
 use rayon::prelude::*;
 
+use super::airs::OwnAir;
 use super::ascent::Effort;
 use super::coil_side::{BLIND_RAD2_PER_S2, CoilSide, run_kept};
 use super::doubts::doubts;
@@ -221,11 +222,7 @@ impl<'a> Chamber<'a> {
     ///
     /// # Errors
     /// As [`Chamber::fit`].
-    pub(crate) fn with_own_kinks(
-        &self,
-        fit: &Fit,
-        effort: Effort,
-    ) -> Result<Option<(Self, Fit, Vec<f64>)>, ChamberError> {
+    pub(crate) fn with_own_kinks(&self, fit: &Fit, effort: Effort) -> Result<Option<OwnAir<'a>>, ChamberError> {
         let straight: Vec<usize> = (0..self.records()).filter(|&r| self.observed[r].series.kinks > 0).collect();
         if straight.is_empty() {
             return Ok(None);
@@ -242,9 +239,14 @@ impl<'a> Chamber<'a> {
             }
             fit = chamber.fit(&fit.assumed.clone(), &fit.free.clone(), &fit.records.clone(), Some(&fit), effort)?;
         }
-        let more = |r: usize| chamber.observed[r].series.kinks as f64 - self.observed[r].series.kinks as f64;
-        let prices = (0..self.records()).map(|r| more(r) * -KINKS_PER_ROW.ln()).collect();
+        let prices = chamber.prices_of_kinks(self);
         Ok(Some((chamber, fit, prices)))
+    }
+
+    /// What the kinks that each record has more than in another chamber cost in log prior.
+    pub(super) fn prices_of_kinks(&self, other: &Self) -> Vec<f64> {
+        let kinks = |chamber: &Self, r: usize| chamber.observed[r].series.kinks as f64;
+        (0..self.records()).map(|r| (kinks(self, r) - kinks(other, r)) * -KINKS_PER_ROW.ln()).collect()
     }
 
     /// Places kinks until no more are found with numbers as they are; how many.

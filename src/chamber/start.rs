@@ -34,6 +34,7 @@ pub(super) fn start(
     slow.iter().for_each(|&i| together[i] = 1.0);
     let mut ramp = vec![0.0; n];
     ramp[layout.trend + 1] = 1.0;
+    layout.control.into_iter().for_each(|i| ramp[i + 1] = 1.0);
     let skin_s = parts.skin_s.unwrap_or(0.0);
     parts.reduced.decay_per_s.iter().enumerate().for_each(|(i, l)| ramp[i] = -1.0 / l - skin_s);
     layout.skin.into_iter().for_each(|i| ramp[i] = -skin_s);
@@ -50,6 +51,10 @@ pub(super) fn start(
         add(&direction, size);
     };
     one(layout.trend + 1, slope);
+    if let Some(i) = layout.control {
+        one(i, slope / numbers.get(Quantity::ControlTime));
+        one(i + 1, slope);
+    }
     (0..layout.modes).for_each(|i| one(i, START_APART_MODES * apart));
     one(layout.turbulence, numbers.get(Quantity::TurbulenceSize));
     one(layout.wander, numbers.get(Quantity::WanderShare) * numbers.get(Quantity::RateNoise));

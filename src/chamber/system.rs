@@ -4,6 +4,7 @@
 //! dx_i = λ_i (a − x_i) dt                     modes of the pack behind the film; a = u + f + o, the air
 //! du = s dt,   ds = √q dW                     trend; q between the noise at rest and that where readings bend
 //! ds = −s/τ_a dt + √q dW                      … of a stage, which approaches its set point
+//! ds = b dt,   db = (ω²(v − s) − 2 ζ ω b) dt,   dv = √q dW      … of a controlled chamber, whose air follows a set point
 //! df = −f/τ_f dt + σ_f √(2/τ_f) dW            turbulence
 //! d(o, p) = R (o, p) dt + γ (d, e) dt,   d(d, e) = R (d, e) dt + 2 σ_o √γ dW,   R = (−γ, ω; −ω, −γ)        ripple
 //! dl = (sensor's place − l)/τ dt              lag
@@ -17,6 +18,7 @@
 //! | x_i, λ_i, c | modes, their decays and the rate per kelvin a second of each | K, 1/s, rad |
 //! | τ, W, b | sensor's lag, the rate's window, offset | s, s, rad/s |
 //! | τ_a | time in which the air of a stage approaches its set point | s |
+//! | v, ω, ζ | slope of a controlled chamber's set point; angular frequency and damping ratio of what follows it | K/s, 1/s, |
 //!
 //! The ripple's size and phase are what a compressor makes of its load, and as smooth: driven by noise itself the oscillator
 //! would have a tail that falls as 1/f², which the coil sees as white noise of its own.
@@ -297,7 +299,17 @@ pub(super) fn dynamics(
         f[lag * n + lag] -= 1.0 / parts.lag_s;
     }
     let mut trend = vec![0.0; n];
-    trend[layout.trend + 1] = 1.0;
+    match layout.control {
+        Some(control) => {
+            let (slope, frequency_per_s) = (layout.trend + 1, 1.0 / get(Quantity::ControlTime));
+            f[slope * n + control] = 1.0;
+            f[control * n + control] = -2.0 * get(Quantity::ControlDamping) * frequency_per_s;
+            f[control * n + slope] = -frequency_per_s * frequency_per_s;
+            f[control * n + control + 1] = frequency_per_s * frequency_per_s;
+            trend[control + 1] = 1.0;
+        }
+        None => trend[layout.trend + 1] = 1.0,
+    }
     (f, g, trend)
 }
 
