@@ -59,6 +59,9 @@ fn what_only_the_hold_out_shows_is_found() {
     let says = |d: &Diagnosis| d.cautions.contains(&Caution::FittedToHoldout);
     let found = asked(&gentle, &wild);
     println!("{:?}: {:?}", found.verdict, found.ladder);
+    for share in &found.posterior {
+        println!("{:.4} {:?}", share.probability, share.effects);
+    }
     assert!(found.verdict != Verdict::Adequate);
     let kinds = found
         .effects

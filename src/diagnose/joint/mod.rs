@@ -13,7 +13,7 @@ mod beside;
 mod explanation;
 mod judge;
 mod odds;
-mod own_kinks;
+mod own_air;
 mod readings;
 mod screen;
 mod search;

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use super::explanation::{fitted, with, without};
 use super::judge::{Care, judge};
-use super::odds::{CERTAIN, WINDING};
-use super::own_kinks::best_by_own_kinks;
+use super::odds::{CERTAIN, WINDING, WINDOW};
+use super::own_air::{best_by_own_air, best_by_own_kinks};
 use super::screen::{Proposal, foremost, looked_at, proposals};
 use super::winding::{promise_beside, promising};
 use super::{Explanation, Found, Member, Outcome, Question, Winding};
@@ -24,8 +24,8 @@ const PLAIN: f64 = 25.0;
 const MAY_BE_WOUND: f64 = CERTAIN.log - WINDING.log;
 /// Another winding that promises less than this share of the most is not fitted from several chambers.
 const MAY_WIN: f64 = 1.0 / 3.0;
-/// A set must be better by so much to go on from.
-const WORTH_A_STEP: f64 = 1.0;
+/// A set must be better by so much to go on from: what is better by less gives its mass to the smaller one.
+const WORTH_A_STEP: f64 = CERTAIN.log;
 /// What a score test on records that were only judged by must promise for them to be searched themselves: what an effect costs, twice.
 const PROMISING: f64 = 12.0;
 /// Periods of a cycle and times of an offset step, as shares of the record.
@@ -67,19 +67,44 @@ pub(crate) fn judged(question: &Question, mut found: Found) -> Outcome<Found> {
     Ok(found)
 }
 
-/// Searches sets of explanations, and ranks them.
+/// Searches sets of explanations, and ranks them: from the declared model, and from another heat path that its candidates give it, if one may be
+/// the coil's. What else is missing hangs on which it is.
 ///
 /// # Errors
 /// As [`search_if_it_promises`].
 pub(crate) fn ranked(question: &Question, null: Fit, progress: &(dyn Fn(f64) + Sync)) -> Outcome<Found> {
     progress(0.2);
-    let mut windings: Vec<Winding> = Vec::new();
+    let declared = Explanation::new(question, &[], Vec::new(), null);
     let mut cache = Cache::new();
-    let mut best = Explanation::new(question, &windings, Vec::new(), null);
-    cache.insert(best.key(), best.clone());
+    cache.insert(declared.key(), declared.clone());
+    let (_, best, found) =
+        ranked_from(question, declared.clone(), cache.clone(), &|share| progress(0.2 + 0.6 * share))?;
+    let other = best_by_own_air(question, &declared).filter(|own| own.merit > declared.merit - WINDOW);
+    progress(0.8);
+    let Some(other) = other else { return Ok(found) };
+    let there = Question { chamber: &other.chamber, ..question.clone() };
+    let mut cache = carried(&there, &[], cache);
+    let price = other.explanation.merit - other.merit;
+    keep(&mut cache, other.explanation.clone());
+    let path = other.explanation.members.clone();
+    let (best_there, worth, found_there) = ranked_from(&there, other.explanation, cache, &|_| ())?;
+    // Without the other path in the end it has only gone astray.
+    let is_by_it = path.iter().all(|m| best_there.members.contains(m));
+    Ok(if is_by_it && worth - price > best { Found { is_elsewhere: true, ..found_there } } else { found })
+}
+
+/// Forward and back from a set: the best, what it is worth less what the kinks of its own air cost, and all.
+fn ranked_from(
+    question: &Question,
+    mut best: Explanation,
+    mut cache: Cache,
+    progress: &(dyn Fn(f64) + Sync),
+) -> Outcome<(Explanation, f64, Found)> {
+    let mut windings: Vec<Winding> = Vec::new();
     let mut promised = Vec::new();
     let mut chamber = question.chamber.clone();
     let mut is_elsewhere = false;
+    let mut price = 0.0;
     for stage in 0..question.depth {
         let here = Question { chamber: &chamber, ..question.clone() };
         let mut proposals = looked_at(&here, &best)?;
@@ -95,7 +120,7 @@ pub(crate) fn ranked(question: &Question, null: Fit, progress: &(dyn Fn(f64) + S
         }
         proposals.extend(discrete(&here, &windings, &best));
         let found = tried(&here, &windings, &best, proposals);
-        progress(0.2 + 0.6 * (stage + 1) as f64 / question.depth as f64);
+        progress((stage + 1) as f64 / question.depth as f64);
         let foremost = found.iter().find(|e| !e.is_beyond_physical()).cloned();
         let own = best_by_own_kinks(&chamber, &here, &windings, &found);
         found.into_iter().for_each(|explanation| keep(&mut cache, explanation));
@@ -103,6 +128,7 @@ pub(crate) fn ranked(question: &Question, null: Fit, progress: &(dyn Fn(f64) + S
         let least = foremost.as_ref().map_or(base, |f| f.merit.max(base)) + WORTH_A_STEP;
         let next = match own.filter(|own| own.merit > least) {
             Some(own) => {
+                price += own.explanation.merit - own.merit;
                 chamber = own.chamber;
                 is_elsewhere = true;
                 cache = carried(&Question { chamber: &chamber, ..question.clone() }, &windings, cache);
@@ -133,8 +159,8 @@ pub(crate) fn ranked(question: &Question, null: Fit, progress: &(dyn Fn(f64) + S
     complete(&here, &windings, &best, &mut cache);
     let mut explanations: Vec<Explanation> = cache.into_values().collect();
     judge(&here, &windings, &mut explanations, Care::AsRanked)?;
-    progress(1.0);
-    Ok(Found { explanations, promised, windings, is_elsewhere })
+    let worth = best.merit - price;
+    Ok((best, worth, Found { explanations, promised, windings, is_elsewhere }))
 }
 
 /// What was found, judged again in a chamber that is looked through with the best of it ([`crate::chamber::Chamber::with_timed_shocks_by`]).

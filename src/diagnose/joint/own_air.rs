@@ -1,0 +1,81 @@
+//! Sets of explanations, each in the air that it would have seen: with its own kinks, or, by another heat path, in air of another kind.
+//!
+//! Where the air is straight but for kinks, readings place them ([`crate::chamber::Chamber::with_shocks`]), by what a set makes of the
+//! coil and the sensor. Placed by one set they favour it: another sees the air turn at other times and has to bend it there. So
+//! the foremost sets are compared with the kinks that each would have placed,
+//!
+//! ```text
+//! M(set, its kinks) − n ln(1/p)         n: kinks that it needs more than there were; p: how often a row has one
+//! ```
+//!
+//! and the search goes on in the chamber of the best. A set that is wrong needs kinks that the truth does without.
+
+use rayon::prelude::*;
+
+use super::explanation::with;
+use super::{Explanation, Member, Outcome, Question, Winding};
+use crate::chamber::{Chamber, Effort, Films, OwnAir};
+
+/// Sets that are looked at with kinks of their own after each score test: more are behind by what no kinks make up for.
+const LOOKED_AT: usize = 4;
+
+/// A set in a chamber with its own air.
+pub(super) struct InOwnAir<'a> {
+    pub(crate) chamber: Chamber<'a>,
+    pub(crate) explanation: Explanation,
+    /// With what its kinks cost more than those of the common chamber.
+    pub(crate) merit: f64,
+}
+
+/// The best of the foremost sets, each with its own kinks; None where no air is straight. `found` is in order.
+pub(super) fn best_by_own_kinks<'a>(
+    chamber: &Chamber<'a>,
+    question: &Question,
+    windings: &[Winding],
+    found: &[Explanation],
+) -> Option<InOwnAir<'a>> {
+    let foremost: Vec<&Explanation> = found.iter().filter(|e| !e.is_beyond_physical()).take(LOOKED_AT).collect();
+    let own = foremost.into_par_iter().filter_map(|e| {
+        let own = chamber.with_own_kinks(&e.fit, Effort::QUICK).ok()??;
+        Some(in_own_air(question, windings, e.members.clone(), own))
+    });
+    best(own.collect())
+}
+
+/// The best set of one effect that makes the heat path another one, as a pack that ends does of a half space, in the air that it would have seen.
+/// Where readings look like air of no kind by the declared path, such a set is far behind in the common chamber.
+pub(super) fn best_by_own_air<'a>(question: &Question<'a>, declared: &Explanation) -> Option<InOwnAir<'a>> {
+    let is_whole = |place: &usize| question.candidates[*place].free.is_empty();
+    let places: Vec<usize> = (0..question.candidates.len()).filter(is_whole).collect();
+    let own = places.into_par_iter().filter_map(|place| {
+        // A heat path that cannot be solved speaks against itself alone.
+        by_path(question, declared, place).unwrap_or_default()
+    });
+    best(own.collect())
+}
+
+fn by_path<'a>(question: &Question<'a>, declared: &Explanation, place: usize) -> Outcome<Option<InOwnAir<'a>>> {
+    let member = Member::Effect(place);
+    let Some((assumed, free)) = with(question, &[], &declared.fit, member, None) else { return Ok(None) };
+    let records: Vec<_> = (0..question.chamber.records()).map(|r| question.chamber.record(r)).collect();
+    let whole = Chamber::new(question.model, &records)?.switched_like(question.chamber, Films::Same);
+    let own = whole.with_own_airs(question.chamber, &assumed, &free, &question.fitted)?;
+    Ok(Some(in_own_air(question, &[], vec![member], own)))
+}
+
+fn in_own_air<'a>(
+    question: &Question,
+    windings: &[Winding],
+    members: Vec<Member>,
+    (chamber, fit, prices): OwnAir<'a>,
+) -> InOwnAir<'a> {
+    let price: f64 = question.fitted.iter().map(|&r| prices[r]).sum();
+    let there = Question { chamber: &chamber, ..question.clone() };
+    let explanation = Explanation::new(&there, windings, members, fit);
+    let merit = explanation.merit - price;
+    InOwnAir { chamber, explanation, merit }
+}
+
+fn best(all: Vec<InOwnAir>) -> Option<InOwnAir> {
+    all.into_iter().filter(|o| !o.explanation.is_beyond_physical()).max_by(|a, b| a.merit.total_cmp(&b.merit))
+}
