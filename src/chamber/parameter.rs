@@ -99,14 +99,16 @@ impl Parameter {
     pub(super) fn of_quantity(quantity: Quantity, record: Option<usize>, medians: &Numbers) -> Self {
         let prior = quantity.prior();
         let mean = medians.get(quantity).ln();
+        // Of a multiple of the noise the bounds are such multiples, too.
+        let unit = if prior.relative { mean - prior.median.ln() } else { 0.0 };
         let place = Place::Quantity { quantity, record };
         Self {
             place,
             scale: Scale::Logarithm,
             mean,
             deviation: prior.deviation,
-            lower: (mean - 12.0).max(prior.least.ln()),
-            upper: (mean + 12.0).min(prior.most.ln()),
+            lower: (mean - 12.0).max(unit + prior.least.ln()),
+            upper: (mean + 12.0).min(unit + prior.most.ln()),
         }
     }
 
@@ -254,8 +256,11 @@ pub(super) fn write(
 
 #[cfg(test)]
 mod tests {
+    use super::super::Chamber;
+    use super::super::dense::tests::model;
     use super::*;
     use crate::effect::find;
+    use crate::record::Record;
 
     #[test]
     fn what_a_model_states_is_the_prior_whatever_a_fit_has_made_of_it() {
@@ -263,5 +268,20 @@ mod tests {
         let stated = Some(StatedNumber { value: 12.4, within: 0.25 });
         let parameter = Parameter::of_effect(&fitted, &Free { effect: 0, parameter: 0, stated, deviation: None });
         assert_eq!((parameter.mean, parameter.deviation), (12.4f64.ln(), 0.25));
+    }
+
+    #[test]
+    fn a_drift_is_half_the_noise_or_more_and_a_time_of_it_is_no_multiple_of_the_noise() {
+        let times_s: Vec<f64> = (1..=40).map(|i| 10.0 * f64::from(i)).collect();
+        let rates = (0..40).map(|i| 1e-7 * f64::from(i * i).sin()).collect();
+        let warming_k = (0..40).map(|i| 293.0 + 0.1 * f64::from(i)).collect();
+        let record = Record::new("noise", times_s, warming_k, rates).unwrap();
+        let model = model(Vec::new());
+        let chamber = Chamber::new(&model, &[&record]).unwrap();
+        let medians = Numbers::medians(&chamber.observed[0].series);
+        let least = |quantity| Parameter::of_quantity(quantity, Some(0), &medians).lower.exp();
+        let noise = chamber.noise_floor_rad_per_s(0);
+        assert!((least(Quantity::DriftSize) / (0.5 * noise) - 1.0).abs() < 1e-12);
+        assert!((least(Quantity::DriftTime) / 100.0 - 1.0).abs() < 1e-12);
     }
 }

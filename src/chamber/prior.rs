@@ -83,12 +83,15 @@ pub(crate) const PRIORS: [Prior; 23] = [
         ..line(Quantity::WanderShare, 0.15, 0.8, "flicker of gyros lies under the white noise of a row of seconds")
     },
     line(Quantity::WanderTime, 1500.0, 1.2, "flicker is nearly even over the decades that a record sees"),
-    relative(
-        Quantity::DriftSize,
-        1.0,
-        1.2,
-        "of the size of the noise: smaller is flicker, larger would be seen by eye",
-    ),
+    Prior {
+        least: 0.5,
+        ..relative(
+            Quantity::DriftSize,
+            1.0,
+            1.2,
+            "of the size of the noise: up to half of it is a gyro's flicker, larger would be seen by eye",
+        )
+    },
     Prior {
         least: 100.0,
         ..line(

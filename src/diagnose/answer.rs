@@ -2,7 +2,7 @@
 //!
 //! *Adequate*: the declared model holds the mass. *Missing*: one set holds 95 % of it. *Indistinguishable*: the smallest
 //! family that reaches 95 %, all of it. *Unexplained*: sets with wander, a cycle or an estimate beyond what is physical
-//! hold half, or the coil is wound or connected otherwise.
+//! hold half, or the coil is wound or connected otherwise: sets that say so hold 95 %, or half beside none of effects.
 
 use super::describe::{ScoredExplanation, contenders, findings, ladder, names, unexplained};
 use super::joint::{Explanation, Found, Member, Question, on_the_way};
@@ -28,22 +28,11 @@ pub(super) fn answer(
     let question = &Question { chamber: timed, ..asked.clone() };
     let declared = found.declared().ok_or(DiagnoseError::Unsolvable)?;
     let outside: f64 = found.explanations.iter().filter(|e| e.is_outside()).map(|e| e.probability).sum();
-    let rewound = |e: &Explanation| e.members.iter().any(|m| matches!(m, Member::Winding(_)));
-    let wound: f64 = found.explanations.iter().filter(|e| rewound(e) && !e.is_outside()).map(|e| e.probability).sum();
     let family = family(found);
     let top = family.first().copied().unwrap_or(declared);
-    let (verdict, named) = if outside >= HALF {
-        (Verdict::Unexplained, declared)
-    } else if wound >= HALF {
-        (Verdict::Unexplained, top)
-    } else if top.members.is_empty() {
-        (Verdict::Adequate, top)
-    } else if family.len() > 1 && distinct(question, &family) > 1 {
-        (Verdict::Indistinguishable, top)
-    } else if top.members.iter().all(|m| matches!(m, Member::Step { .. })) {
-        (Verdict::Unexplained, top)
-    } else {
-        (Verdict::Missing, top)
+    let (verdict, named) = match outside >= HALF {
+        true => (Verdict::Unexplained, declared),
+        false => verdict(question, found, &family, top),
     };
     let likeliest =
         if outside >= HALF { found.explanations.iter().find(|e| e.is_outside()).unwrap_or(top) } else { top };
@@ -87,14 +76,45 @@ pub(super) fn answer(
     })
 }
 
+/// The verdict where no half of the mass is with something unknown, and the set that is named.
+fn verdict<'e>(
+    question: &Question,
+    found: &Found,
+    family: &[&'e Explanation],
+    top: &'e Explanation,
+) -> (Verdict, &'e Explanation) {
+    let rewound = |e: &Explanation| e.members.iter().any(|m| matches!(m, Member::Winding(_)));
+    let wound: f64 = found.explanations.iter().filter(|e| rewound(e) && !e.is_outside()).map(|e| e.probability).sum();
+    if wound >= HALF {
+        // Where effects may explain the records none the less, the likeliest of them is named, and the winding beside them.
+        let is_certain = wound >= CERTAIN * known(found).map(|e| e.probability).sum::<f64>();
+        let by_effects = family.iter().find(|e| !rewound(e) && !e.effects(question).is_empty());
+        match by_effects {
+            Some(effects) if !is_certain => (Verdict::Indistinguishable, *effects),
+            _ => (Verdict::Unexplained, top),
+        }
+    } else if top.members.is_empty() {
+        (Verdict::Adequate, top)
+    } else if family.len() > 1 && distinct(question, family) > 1 {
+        (Verdict::Indistinguishable, top)
+    } else if top.members.iter().all(|m| matches!(m, Member::Step { .. })) {
+        (Verdict::Unexplained, top)
+    } else {
+        (Verdict::Missing, top)
+    }
+}
+
+/// Sets without anything unknown.
+fn known(found: &Found) -> impl Iterator<Item = &Explanation> {
+    found.explanations.iter().filter(|e| !e.is_outside() || e.members.is_empty())
+}
+
 /// The smallest family of sets without anything unknown that holds 95 % of what such sets hold.
 fn family(found: &Found) -> Vec<&Explanation> {
-    let known: Vec<&Explanation> =
-        found.explanations.iter().filter(|e| !e.is_outside() || e.members.is_empty()).collect();
-    let total: f64 = known.iter().map(|e| e.probability).sum();
+    let total: f64 = known(found).map(|e| e.probability).sum();
     let mut sum = 0.0;
     let mut family = Vec::new();
-    for explanation in known {
+    for explanation in known(found) {
         if sum >= CERTAIN * total && !family.is_empty() {
             break;
         }

@@ -129,29 +129,49 @@ fn alike(question: &Question, found: &Found, sets: &[Set], listed: &[f64]) -> Ve
     near.into_iter().zip(shares).collect()
 }
 
-/// The best of sets in their order, if it is better than everything listed by at least so much and the held-out records confirm it.
+/// The likeliest of sets in their order, if they are better than everything listed by at least so much and the held-out records confirm it.
 fn concluded(tools: &Tools, sets: Vec<Set>, listed: &[f64], least: f64) -> Result<Option<Discovered>, ChamberError> {
-    let question = tools.question;
-    let Some(best) = sets.first().cloned() else { return Ok(None) };
-    let confirmed = question.held_out.is_empty() || best.held_out_gain.is_none_or(|gain| gain > 0.0);
+    let confirmed = |s: &Set| tools.question.held_out.is_empty() || s.held_out_gain.is_none_or(|gain| gain > 0.0);
     let best_listed = listed.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if best.terms.is_empty() || best.total() < best_listed + least || !confirmed {
+    let Some(foremost) = sets.first().filter(|s| !s.terms.is_empty() && confirmed(s)) else { return Ok(None) };
+    let top = foremost.total();
+    if top < best_listed + least {
         return Ok(None);
     }
     let mut near: Vec<Set> = Vec::new();
-    for set in sets.into_iter().filter(|s| !s.terms.is_empty() && s.total() > best.total() - NEAR) {
+    for set in sets.into_iter().filter(|s| !s.terms.is_empty() && s.total() > top - NEAR) {
         if !near.iter().any(|other| other.says_the_same(&set)) {
             near.push(set);
         }
     }
-    let listed: f64 = listed.iter().map(|total| (total - best.total()).exp()).sum();
-    let sum: f64 = near.iter().map(|s| (s.total() - best.total()).exp()).sum::<f64>() + listed;
-    let probability = 1.0 / sum;
-    let alternatives =
-        near.into_iter().skip(1).map(|s| ((s.total() - best.total()).exp() / sum, s)).map(|(p, s)| (s, p)).collect();
+    let mut shares = shares(near, listed, &confirmed);
+    let (best, probability) = shares.remove(0);
+    let alternatives = shares.into_iter().filter(|(_, share)| *share > 0.0).collect();
     let (refined, errors) = refined(tools, &best);
     let steps = steps(tools, &best)?;
     Ok(Some(Discovered { best, refined, errors, probability, alternatives, steps }))
+}
+
+/// Sets and what they hold of the posterior mass beside what is listed, most first: a set that is hardly better than a confirmed one within it
+/// gives its mass to that one.
+fn shares(near: Vec<Set>, listed: &[f64], confirmed: &dyn Fn(&Set) -> bool) -> Vec<(Set, f64)> {
+    let top = near.iter().map(Set::total).fold(f64::NEG_INFINITY, f64::max);
+    let mass = |total: f64| (total - top).exp();
+    let sum: f64 = near.iter().map(|s| mass(s.total())).sum::<f64>() + listed.iter().map(|t| mass(*t)).sum::<f64>();
+    let mut shares: Vec<f64> = near.iter().map(|s| mass(s.total()) / sum).collect();
+    let mut places: Vec<usize> = (0..near.len()).collect();
+    places.sort_by_key(|&i| std::cmp::Reverse(near[i].len()));
+    for &large in &places {
+        let is_as_good =
+            |s: &Set| near[large].goes_beyond(s) && s.total() > near[large].total() - BEATS && confirmed(s);
+        let within = places.iter().copied().filter(|&small| is_as_good(&near[small]));
+        if let Some(small) = within.max_by(|&a, &b| near[a].total().total_cmp(&near[b].total())) {
+            shares[small] += std::mem::take(&mut shares[large]);
+        }
+    }
+    let mut all: Vec<(Set, f64)> = near.into_iter().zip(shares).collect();
+    all.sort_by(|a, b| b.1.total_cmp(&a.1));
+    all
 }
 
 /// A set with fewer of its terms, from none on, and the set itself, each with the held-out records' days by it, frozen.

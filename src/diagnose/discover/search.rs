@@ -63,6 +63,13 @@ impl Set {
             && self.terms.iter().all(|t| other.terms.iter().any(|u| u.is_sister_of(t)))
     }
 
+    /// Whether it has all that another has, and more.
+    pub(super) fn goes_beyond(&self, other: &Self) -> bool {
+        self.len() > other.len()
+            && other.explanation.members.iter().all(|m| self.explanation.members.contains(m))
+            && other.terms.iter().all(|t| self.terms.iter().any(|own| own.is_sister_of(t)))
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.explanation.members.len() + self.terms.len()
     }

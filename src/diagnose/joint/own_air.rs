@@ -13,7 +13,7 @@
 use rayon::prelude::*;
 
 use super::explanation::with;
-use super::{Explanation, Member, Outcome, Question, Winding};
+use super::{Explanation, Member, Outcome, Question, Winding, is_seen};
 use crate::chamber::{Chamber, Effort, Films, OwnAir};
 
 /// Sets that are looked at with kinks of their own after each score test: more are behind by what no kinks make up for.
@@ -57,6 +57,10 @@ pub(super) fn best_by_own_air<'a>(question: &Question<'a>, declared: &Explanatio
 fn by_path<'a>(question: &Question<'a>, declared: &Explanation, place: usize) -> Outcome<Option<InOwnAir<'a>>> {
     let member = Member::Effect(place);
     let Some((assumed, free)) = with(question, &[], &declared.fit, member, None) else { return Ok(None) };
+    // What readings do not see leads to no other air.
+    if !is_seen(&assumed.model, &declared.fit.assumed.model) {
+        return Ok(None);
+    }
     let records: Vec<_> = (0..question.chamber.records()).map(|r| question.chamber.record(r)).collect();
     let whole = Chamber::new(question.model, &records)?.switched_like(question.chamber, Films::Same);
     let own = whole.with_own_airs(question.chamber, &assumed, &free, &question.fitted)?;
