@@ -32,19 +32,10 @@ impl<'a> Chamber<'a> {
         }
         let whole: Vec<Series> = self.observed.iter().map(|o| o.series.clone()).collect();
         let curved = self.fit_anew(assumed, free, records)?;
-        let of_other = |other: usize| -> Result<(usize, Series, Numbers), ChamberError> {
-            let mut chamber = self.clone();
-            let day = chamber.fit(&curved.assumed, &[], &[other], Some(&curved), Effort::SHORT)?;
-            let day = chamber.take_airs(day, &[other], &whole)?;
-            Ok((other, chamber.observed.swap_remove(other).series, day.numbers[other]))
-        };
-        let others: Vec<usize> = (0..self.records()).filter(|r| !records.contains(r)).collect();
-        let days: Result<Vec<_>, ChamberError> = others.into_par_iter().map(of_other).collect();
-        let fit = self.take_airs(curved.clone(), records, &whole)?;
-        for (other, series, day) in days? {
-            self.observed[other].series = series;
-            self.observed[other].day = Some(day);
-        }
+        let look = |chamber: &mut Self, day: Fit, other: usize| chamber.take_airs(day, &[other], &whole);
+        let days = self.days_of_others(&curved, records, &look)?;
+        let fit = self.take_airs(curved, records, &whole)?;
+        self.take_days(days);
         let fit = self.fit(assumed, free, records, Some(&fit), Effort::QUICK)?;
         let prices = self.prices_of_kinks(like);
         Ok((self, fit, prices))

@@ -2,7 +2,7 @@
 
 use super::film::drive;
 use super::fit::Fit;
-use super::layout::{Layout, Numbers, OutputGains, Parts};
+use super::layout::{Layout, Numbers, OutputGains, Parts, RecordKind};
 use super::learned::Learned;
 use super::parameter::Place;
 use super::prior::{PRIORS, Quantity};
@@ -145,7 +145,7 @@ impl Causal {
         outputs.resize(reduced.outputs, 0.0);
         let gains = OutputGains { outputs, air: air_gain };
         let parts = Parts { reduced: &reduced, gains: &gains, skin_s, shows, lag_s, drift: false, cycle: false };
-        let layout = Layout::with(&parts, false, false, false);
+        let layout = Layout::with(&parts, &RecordKind::default());
         let mut numbers = surroundings.numbers;
         // Only the gyro's own states hang on these.
         [Quantity::RateNoise, Quantity::WanderShare, Quantity::WanderTime]

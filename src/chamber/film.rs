@@ -114,7 +114,7 @@ mod tests {
 
     use super::super::dense::tests::model;
     use super::super::kinks::tests::kinked;
-    use super::super::layout::{OutputGains, Parts};
+    use super::super::layout::{OutputGains, Parts, RecordKind};
     use super::super::shows::Shows;
     use super::super::system::driven_by_air;
     use super::*;
@@ -140,7 +140,7 @@ mod tests {
             drift: false,
             cycle: false,
         };
-        let layout = Layout::with(&parts, false, false, false);
+        let layout = Layout::with(&parts, &RecordKind::default());
         let row = drive(&layout, &one, 60.0 / 25.0);
         // What is as warm as the air stays so.
         let levels: f64 = row[..one.modes()].iter().sum::<f64>() + row[layout.trend];

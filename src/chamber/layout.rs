@@ -83,13 +83,24 @@ pub(super) struct Layout {
     pub(crate) size: usize,
 }
 
+/// What of a record asks for states of its own.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct RecordKind {
+    /// Windows of its rates overlap.
+    pub(super) overlaps: bool,
+    /// Its readings are means.
+    pub(super) averaged: bool,
+    /// Its air takes time to take on another slope.
+    pub(super) controlled: bool,
+}
+
 impl Layout {
     pub(crate) fn new(parts: &Parts, series: &Series) -> Self {
-        Self::with(parts, series.overlaps, series.averaged > 1, series.controlled)
+        let (overlaps, averaged, controlled) = (series.overlaps, series.averaged > 1, series.controlled);
+        Self::with(parts, &RecordKind { overlaps, averaged, controlled })
     }
 
-    /// `overlaps`: rates' windows do; `averaged`: readings are means; `controlled`: the air takes time to take on another slope.
-    pub(crate) fn with(parts: &Parts, overlaps: bool, averaged: bool, controlled: bool) -> Self {
+    pub(crate) fn with(parts: &Parts, record: &RecordKind) -> Self {
         let mut size = 0;
         let mut take = |count: usize| {
             size += count;
@@ -99,15 +110,15 @@ impl Layout {
         let _ = modes;
         let skin = parts.skin_s.map(|_| take(1));
         let trend = take(2);
-        let control = controlled.then(|| take(2));
+        let control = record.controlled.then(|| take(2));
         let (turbulence, ripple, driver) = (take(1), take(2), take(2));
         let lag = (parts.lag_s > 0.0).then(|| take(1));
         let wander = take(1);
         let drift = parts.drift.then(|| take(1));
         let cycle = parts.cycle.then(|| take(2));
         let (offset, window) = (take(1), take(1));
-        let windows = [window, if overlaps { take(1) } else { window }];
-        let reading = averaged.then(|| take(1));
+        let windows = [window, if record.overlaps { take(1) } else { window }];
+        let reading = record.averaged.then(|| take(1));
         let modes = parts.reduced.modes();
         Self {
             modes,

@@ -35,8 +35,9 @@ pub(crate) enum Quantity {
     CyclePeriod,
     /// Deviation of the air's slope where a record begins \[K/s\]; what pack and sensor lag behind it follows.
     StartSlope,
-    /// One over the angular frequency \[s\] and the damping ratio with which a controlled chamber's air follows its set point; only where it does.
+    /// One over the angular frequency with which a controlled chamber's air follows its set point \[s\]; only where it does.
     ControlTime,
+    /// The damping ratio with which it does.
     ControlDamping,
     /// Time in which the air of a stage approaches its set point, its slope dying away \[s\]; only where the air does.
     ApproachTime,
@@ -53,7 +54,7 @@ pub(crate) struct Prior {
     /// Of the natural logarithm.
     pub(crate) deviation: f64,
     pub(crate) relative: bool,
-    /// What is smaller, or larger, is not this any more.
+    /// What is smaller, or larger, is not this any more; multiples of the noise where it is one.
     pub(crate) least: f64,
     pub(crate) most: f64,
     pub(crate) reason: &'static str,
@@ -232,7 +233,7 @@ mod tests {
         for (place, prior) in PRIORS.iter().enumerate() {
             assert!(std::ptr::eq(prior.quantity.prior(), &PRIORS[place]) || *prior.quantity.prior() == *prior);
             assert_eq!(PRIORS.iter().filter(|p| p.quantity == prior.quantity).count(), 1);
-            assert!(prior.least < prior.median && prior.median < prior.most || prior.relative);
+            assert!(prior.least < prior.median && prior.median < prior.most);
             assert!(prior.median > 0.0 && prior.deviation > 0.0 && prior.reason.len() > 10);
         }
         assert!((SWITCHED_LOG - 0.02_f64.ln()).abs() < 1e-3);

@@ -30,6 +30,13 @@ const BESIDE_S: f64 = 250.0;
 /// A record with more kinks than one in so many rows has no kinks but a curve.
 const FEWEST_ROWS_A_KINK: usize = 30;
 
+/// A record that is not fitted, and what its day was.
+pub(super) struct OtherDay {
+    record: usize,
+    series: Series,
+    numbers: Numbers,
+}
+
 impl<'a> Chamber<'a> {
     /// The chamber without what the model says are gross errors and with the kinks of each record's air, and the fit of
     /// the assumption to `records`; the others are looked through with what was found for the first.
@@ -75,26 +82,41 @@ impl<'a> Chamber<'a> {
         let curved = self.between_steps(curved, records)?;
         let whole = self.observed.iter().map(|o| o.series.clone()).collect::<Vec<_>>();
         let curved = self.without_gross_errors(curved, records)?;
-        let others: Vec<usize> = (0..self.records()).filter(|r| !records.contains(r)).collect();
         let own = || -> Result<(Self, Fit), ChamberError> {
             let mut chamber = self.clone();
             let fit = chamber.take_airs(curved.clone(), records, &whole)?;
             Ok((chamber, fit))
         };
-        let of_other = |&other: &usize| -> Result<(Series, Numbers), ChamberError> {
-            let mut chamber = self.clone();
-            let day = chamber.fit(&curved.assumed, &[], &[other], Some(&curved), Effort::SHORT)?;
-            let day = chamber.looked_through(day, &[other])?;
-            Ok((chamber.observed.swap_remove(other).series, day.numbers[other]))
-        };
-        let (own, days) = rayon::join(own, || others.par_iter().map(of_other).collect::<Result<Vec<_>, _>>());
+        let look = |chamber: &mut Self, day: Fit, other: usize| chamber.looked_through(day, &[other]);
+        let (own, days) = rayon::join(own, || self.days_of_others(&curved, records, &look));
         let (mut chamber, fit) = own?;
-        for (&other, (series, day)) in others.iter().zip(days?) {
-            chamber.observed[other].series = series;
-            chamber.observed[other].day = Some(day);
-        }
+        chamber.take_days(days?);
         let fit = chamber.fit(&fit.assumed.clone(), &fit.free.clone(), records, Some(&fit), Effort::FULL)?;
         Ok((chamber, fit))
+    }
+
+    /// Records that are not fitted, each as `look` finds it from a day by a fit to the others.
+    pub(super) fn days_of_others(
+        &self,
+        fit: &Fit,
+        records: &[usize],
+        look: &(dyn Fn(&mut Self, Fit, usize) -> Result<Fit, ChamberError> + Sync),
+    ) -> Result<Vec<OtherDay>, ChamberError> {
+        let others: Vec<usize> = (0..self.records()).filter(|r| !records.contains(r)).collect();
+        let of = |record: usize| {
+            let mut chamber = self.clone();
+            let day = chamber.fit(&fit.assumed, &[], &[record], Some(fit), Effort::SHORT)?;
+            let day = look(&mut chamber, day, record)?;
+            Ok(OtherDay { record, series: chamber.observed.swap_remove(record).series, numbers: day.numbers[record] })
+        };
+        others.into_par_iter().map(of).collect()
+    }
+
+    pub(super) fn take_days(&mut self, days: Vec<OtherDay>) {
+        for day in days {
+            let observed = &mut self.observed[day.record];
+            (observed.series, observed.day) = (day.series, Some(day.numbers));
+        }
     }
 
     /// Records without gross errors, each with its air as it is likeliest.

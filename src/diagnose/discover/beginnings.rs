@@ -27,11 +27,11 @@ impl Tools<'_, '_> {
             // A wander takes up a slow term before a term is tried.
             let may_replace = self.may_replace(&umbrella(), listed) || self.may_replace(&self.plain(declared), listed);
             if may_replace {
-                sets = self.beneath(umbrella(), declared, best_listed, progress);
+                sets = self.beneath(umbrella(), declared, best_listed, &|share| progress(0.4 * share));
             }
             let replaces = |s: &Set| s.explanation.members.is_empty() && s.total() > best_listed + BEATS;
             if !sets.iter().any(|s| !s.terms.is_empty() && replaces(s)) {
-                let beside = self.search(self.plain(listed), MOST_TERMS, &|share| progress(0.4 * share));
+                let beside = self.search(self.plain(listed), MOST_TERMS, &|share| progress(0.4 + 0.4 * share));
                 let gains = |s: &Set| !s.terms.is_empty() && s.total() > listed.total();
                 let promises = may_replace || listed.members.len() > 1 || beside.iter().any(gains);
                 let without = self.searched_without_shadows(found, best_listed);
@@ -44,7 +44,7 @@ impl Tools<'_, '_> {
             }
         } else {
             sets = self.searched_without_shadows(found, best_listed);
-            sets.extend(self.beneath(umbrella(), declared, best_listed, progress));
+            sets.extend(self.beneath(umbrella(), declared, best_listed, &|share| progress(0.8 * share)));
         }
         let best_yet = sets.iter().map(Set::total).fold(f64::NEG_INFINITY, f64::max);
         if let Some(listed) = listed.filter(|e| !is_beside_listed && e.total() + BEATS > best_yet) {
@@ -55,6 +55,7 @@ impl Tools<'_, '_> {
         Some(sets)
     }
 
+    /// What is searched without what may stand in a formula's place; empty where nothing of it comes near.
     fn searched_without_shadows(&self, found: &Found, best_listed: f64) -> Vec<Set> {
         let begun = self.without_shadows(found, best_listed);
         begun.map(|set| self.search(set, MOST_TERMS, &|_| ())).unwrap_or_default()

@@ -24,7 +24,7 @@ mod shadows;
 use std::sync::{Arc, OnceLock};
 
 use crate::chamber::{Chamber, ChamberError, Effort, Fit};
-use crate::diagnose::joint::{Explanation, Found, Member, Question};
+use crate::diagnose::joint::{Explanation, Found, Member, Question, give_to_smaller};
 
 pub(crate) use grammar::Allowed;
 pub(crate) use proposal::{FormulaProposal, NO_WINDING, ProposedTerm, Shown, TermParameter};
@@ -159,16 +159,11 @@ fn shares(near: Vec<Set>, listed: &[f64], confirmed: &dyn Fn(&Set) -> bool) -> V
     let mass = |total: f64| (total - top).exp();
     let sum: f64 = near.iter().map(|s| mass(s.total())).sum::<f64>() + listed.iter().map(|t| mass(*t)).sum::<f64>();
     let mut shares: Vec<f64> = near.iter().map(|s| mass(s.total()) / sum).collect();
-    let mut places: Vec<usize> = (0..near.len()).collect();
-    places.sort_by_key(|&i| std::cmp::Reverse(near[i].len()));
-    for &large in &places {
-        let is_as_good =
-            |s: &Set| near[large].goes_beyond(s) && s.total() > near[large].total() - BEATS && confirmed(s);
-        let within = places.iter().copied().filter(|&small| is_as_good(&near[small]));
-        if let Some(small) = within.max_by(|&a, &b| near[a].total().total_cmp(&near[b].total())) {
-            shares[small] += std::mem::take(&mut shares[large]);
-        }
-    }
+    let totals: Vec<f64> = near.iter().map(Set::total).collect();
+    let sizes: Vec<usize> = near.iter().map(Set::len).collect();
+    give_to_smaller(&mut shares, &totals, &sizes, |small, large| {
+        near[large].holds(&near[small]) && totals[small] > totals[large] - BEATS && confirmed(&near[small])
+    });
     let mut all: Vec<(Set, f64)> = near.into_iter().zip(shares).collect();
     all.sort_by(|a, b| b.1.total_cmp(&a.1));
     all

@@ -63,10 +63,9 @@ impl Set {
             && self.terms.iter().all(|t| other.terms.iter().any(|u| u.is_sister_of(t)))
     }
 
-    /// Whether it has all that another has, and more.
-    pub(super) fn goes_beyond(&self, other: &Self) -> bool {
-        self.len() > other.len()
-            && other.explanation.members.iter().all(|m| self.explanation.members.contains(m))
+    /// Whether it has all that another has.
+    pub(super) fn holds(&self, other: &Self) -> bool {
+        other.explanation.members.iter().all(|m| self.explanation.members.contains(m))
             && other.terms.iter().all(|t| self.terms.iter().any(|own| own.is_sister_of(t)))
     }
 
@@ -400,7 +399,7 @@ impl Tools<'_, '_> {
         progress: &(dyn Fn(f64) + Sync),
     ) -> Vec<Set> {
         let wanders = umbrella.explanation.is_outside();
-        let mut sets = self.search(umbrella, MOST_TERMS, &|share| progress(0.4 + 0.4 * share));
+        let mut sets = self.search(umbrella, MOST_TERMS, &|share| progress(share));
         let is_better = |s: &Set| !s.terms.is_empty() && s.total() >= best_listed + BEATS;
         if wanders && !sets.iter().any(is_better) {
             sets.extend(self.search(self.plain(declared), MOST_TERMS, &|_| ()));

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::adjust::adjust;
 use super::explanation::{fitted, without};
 use super::odds::{CERTAIN, WINDOW};
+use super::parsimony::give_to_smaller;
 use super::readings::take_off;
 use super::{Explanation, Member, Outcome, Question, Winding};
 use crate::chamber::{Effort, Fit};
@@ -105,33 +106,21 @@ pub(super) fn judge(
     let errors: Vec<Option<[f64; 2]>> = explanations.par_iter().map(|e| errors(question, e).unwrap_or(None)).collect();
     // From the largest set on: its mass goes to the best set within it that is as good, that lacks no news, or that predicts
     // rates better.
-    let mut places: Vec<usize> = (0..explanations.len()).collect();
-    places.sort_by_key(|&i| std::cmp::Reverse(explanations[i].members.len()));
-    for &large in &places {
-        let within = places
-            .iter()
-            .copied()
-            .filter(|&small| {
-                let (a, b) = (&explanations[small], &explanations[large]);
-                let no_news = || {
-                    let mut more = b.members.iter().filter(|m| !a.members.contains(m));
-                    more.all(|m| b.is_no_news(question.model.effects.len(), *m))
-                };
-                let worsens = || {
-                    let mut more = b.members.iter().filter(|m| !a.members.contains(m));
-                    more.all(|m| matches!(m, Member::Effect(_) | Member::Refitted(_)))
-                        && errors[small].zip(errors[large]).is_some_and(|(a, b)| is_worse(b, a))
-                };
-                a.members.len() < b.members.len()
-                    && a.members.iter().all(|m| b.members.contains(m))
-                    && (a.total() > b.total() - CERTAIN.log || no_news() || worsens())
-            })
-            .max_by(|&a, &b| explanations[a].total().total_cmp(&explanations[b].total()));
-        if let Some(small) = within {
-            explanations[small].probability += explanations[large].probability;
-            explanations[large].probability = 0.0;
-        }
-    }
+    let totals: Vec<f64> = explanations.iter().map(Explanation::total).collect();
+    let sizes: Vec<usize> = explanations.iter().map(|e| e.members.len()).collect();
+    let mut masses: Vec<f64> = explanations.iter().map(|e| e.probability).collect();
+    give_to_smaller(&mut masses, &totals, &sizes, |small, large| {
+        let (a, b) = (&explanations[small], &explanations[large]);
+        let more = || b.members.iter().filter(|m| !a.members.contains(m));
+        let no_news = || more().all(|m| b.is_no_news(question.model.effects.len(), *m));
+        let worsens = || {
+            more().all(|m| matches!(m, Member::Effect(_) | Member::Refitted(_)))
+                && errors[small].zip(errors[large]).is_some_and(|(a, b)| is_worse(b, a))
+        };
+        a.members.iter().all(|m| b.members.contains(m))
+            && (a.total() > b.total() - CERTAIN.log || no_news() || worsens())
+    });
+    explanations.iter_mut().zip(masses).for_each(|(e, mass)| e.probability = mass);
     explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(b.total().total_cmp(&a.total())));
     Ok(())
 }

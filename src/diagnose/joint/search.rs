@@ -78,16 +78,17 @@ pub(crate) fn ranked(question: &Question, null: Fit, progress: &(dyn Fn(f64) + S
     let mut cache = Cache::new();
     cache.insert(declared.key(), declared.clone());
     let (_, best, found) =
-        ranked_from(question, declared.clone(), cache.clone(), &|share| progress(0.2 + 0.6 * share))?;
+        ranked_from(question, declared.clone(), cache.clone(), &|share| progress(0.2 + 0.4 * share))?;
     let other = best_by_own_air(question, &declared).filter(|own| own.merit > declared.merit - WINDOW);
-    progress(0.8);
     let Some(other) = other else { return Ok(found) };
+    progress(0.6);
     let there = Question { chamber: &other.chamber, ..question.clone() };
     let mut cache = carried(&there, &[], cache);
     let price = other.explanation.merit - other.merit;
     keep(&mut cache, other.explanation.clone());
     let path = other.explanation.members.clone();
-    let (best_there, worth, found_there) = ranked_from(&there, other.explanation, cache, &|_| ())?;
+    let (best_there, worth, found_there) =
+        ranked_from(&there, other.explanation, cache, &|share| progress(0.6 + 0.4 * share))?;
     // Without the other path in the end it has only gone astray.
     let is_by_it = path.iter().all(|m| best_there.members.contains(m));
     Ok(if is_by_it && worth - price > best { Found { is_elsewhere: true, ..found_there } } else { found })
