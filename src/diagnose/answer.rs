@@ -4,6 +4,8 @@
 //! family that reaches 95 %, all of it. *Unexplained*: sets with wander, a cycle or an estimate beyond what is physical
 //! hold half, or the coil is wound or connected otherwise: sets that say so hold 95 %, or half beside none of effects.
 
+use std::collections::BTreeSet;
+
 use super::describe::{ScoredExplanation, contenders, findings, ladder, names, unexplained};
 use super::joint::{Explanation, Found, Member, Question, on_the_way};
 use super::standing::CERTAIN;
@@ -126,10 +128,7 @@ fn family(found: &Found) -> Vec<&Explanation> {
 
 /// How many sets of effects a family holds, whatever parameters are free in them.
 fn distinct(question: &Question, family: &[&Explanation]) -> usize {
-    let mut seen: Vec<Vec<String>> = family.iter().map(|e| names(question, e)).collect();
-    seen.iter_mut().for_each(|s| s.sort());
-    seen.sort();
-    seen.dedup();
+    let seen: BTreeSet<Vec<String>> = family.iter().map(|e| sorted(names(question, e))).collect();
     seen.len()
 }
 
@@ -137,7 +136,7 @@ pub(super) fn posterior(question: &Question, found: &Found) -> Vec<Share> {
     let mut shares: Vec<Share> = Vec::new();
     for explanation in found.explanations.iter().filter(|e| e.probability > 1e-6) {
         let effects = names(question, explanation);
-        match shares.iter_mut().find(|s| s.effects == effects) {
+        match shares.iter_mut().find(|s| sorted(s.effects.clone()) == sorted(effects.clone())) {
             Some(share) => share.probability += explanation.probability,
             None => shares.push(Share {
                 effects,
@@ -149,6 +148,12 @@ pub(super) fn posterior(question: &Question, found: &Found) -> Vec<Share> {
         }
     }
     shares
+}
+
+/// A set's names, whatever order they joined it in.
+fn sorted(mut names: Vec<String>) -> Vec<String> {
+    names.sort();
+    names
 }
 
 /// Declared numbers that were fitted anew.

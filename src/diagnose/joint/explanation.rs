@@ -58,7 +58,7 @@ impl Explanation {
                 }
                 Member::Effect(_) => EFFECT.log,
                 Member::Refitted(_) => REFITTED.log,
-                Member::Winding(w) => windings[*w].log_prior(),
+                Member::Winding(w) => windings[*w].log_prior,
                 Member::Step { record, .. } => STEP.log - (question.chamber.times_s(*record).len() as f64).ln(),
                 Member::Drift | Member::Cycle => OUTSIDE.log,
             })

@@ -9,8 +9,10 @@
 //! Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773; Madigan and Raftery, ibid. 89 (1994) 1535 (Occam's window).
 
 mod adjust;
+mod back;
 mod beside;
 mod explanation;
+mod forward;
 mod judge;
 mod odds;
 mod own_air;
@@ -18,6 +20,7 @@ mod parsimony;
 mod readings;
 mod screen;
 mod search;
+mod tries;
 mod winding;
 
 use std::sync::Arc;
@@ -26,6 +29,7 @@ use crate::chamber::{Chamber, ChamberError, Effort, Fit, Free};
 use crate::diagnose::candidate::Candidate;
 use crate::pattern::Pattern;
 
+pub(crate) use back::refit_without;
 pub(crate) use beside::beside;
 pub(crate) use explanation::{Explanation, Member};
 pub(in crate::diagnose) use explanation::{fitted, with, without};
@@ -33,7 +37,7 @@ pub(in crate::diagnose) use odds::EFFECT;
 pub(in crate::diagnose) use parsimony::give_to_smaller;
 pub(in crate::diagnose) use readings::{Readings, changes_readings, is_seen};
 pub(in crate::diagnose) use screen::{Proposal, TestedStart, proposals_along, tested_starts};
-pub(crate) use search::{again, fit_one, judged, ranked, refit_without, search_if_it_promises};
+pub(crate) use search::{again, fit_one, judged, ranked, search_if_it_promises};
 pub(crate) use winding::Winding;
 
 /// What is asked of the search.

@@ -17,8 +17,11 @@ const fn odds(name: &'static str, log: f64, reason: &'static str) -> Odds {
 pub(in crate::diagnose) const EFFECT: Odds =
     odds("effect", -3.0, "one effect of the catalogue is missing in one coil of twenty");
 pub(super) const REFITTED: Odds = odds("refitted", -2.3, "a number of a model file is wrong in one of ten");
-pub(super) const WINDING: Odds =
-    odds("winding", -3.9, "one coil in fifty is wound, or connected, as another classic or the other way round");
+pub(super) const WINDING: Odds = odds(
+    "winding",
+    -3.9,
+    "one coil in fifty is connected the other way round, or wound as another classic, whichever it is: half of these each",
+);
 pub(super) const EXCHANGE: Odds =
     odds("exchange", -4.6, "one coil in a hundred has two of its layers exchanged, whichever they are");
 pub(super) const OUTSIDE: Odds =

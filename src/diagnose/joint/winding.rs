@@ -20,18 +20,10 @@ pub(crate) struct Winding {
     pub(crate) reversed: bool,
     /// The two layers that changed places, counted from 0 innermost.
     pub(crate) exchanged: Option<(usize, usize)>,
+    /// What is held likely of it before any record is read.
+    pub(crate) log_prior: f64,
     /// Rise of the log posterior in a short fit with it; until then what the score test promises.
     pub(crate) promised: f64,
-}
-
-impl Winding {
-    /// What is held likely of it before any record is read.
-    pub(super) fn log_prior(&self) -> f64 {
-        match self.exchanged {
-            Some(pair) => EXCHANGE.log + share_of_exchanges(pair, self.pattern.layers()).ln(),
-            None => WINDING.log,
-        }
-    }
 }
 
 /// The share of all exchanges that is of this pair of layers: who loses count is off by one more often than by ten, so a pair is taken to
@@ -65,10 +57,11 @@ pub(super) fn promising(question: &Question, fit: &Fit) -> Outcome<Vec<Winding>>
     };
     let own = gains(&fit.assumed.pattern)?;
     let mut all = Vec::new();
-    let mut look = |pattern: Pattern, classic, reversed, exchanged| -> Outcome<()> {
+    let mut look = |pattern: Pattern, pair| -> Outcome<()> {
         if pattern != fit.assumed.pattern && !all.iter().any(|w: &Winding| w.pattern == pattern) {
             let promised = scores.gain_of(&(gains(&pattern)? - &own));
-            all.push(Winding { pattern, classic, reversed, exchanged, promised });
+            let log_prior = EXCHANGE.log + share_of_exchanges(pair, layers).ln();
+            all.push(Winding { pattern, classic: None, reversed: false, exchanged: Some(pair), log_prior, promised });
         }
         Ok(())
     };
@@ -77,35 +70,41 @@ pub(super) fn promising(question: &Question, fit: &Fit) -> Outcome<Vec<Winding>>
             let mut segments = question.pattern.segments().to_vec();
             segments.swap(a, b);
             if let Ok(pattern) = Pattern::new(segments) {
-                look(pattern, None, false, Some((a, b)))?;
+                look(pattern, (a, b))?;
             }
         }
     }
     all.retain(|w| w.promised > WORTH_A_LOOK);
     all.sort_by(|a, b| b.promised.total_cmp(&a.promised));
     all.truncate(EXCHANGES_LOOKED_AT);
-    all.extend(classics(question, fit));
+    all.extend(classics(question.pattern, &fit.assumed.pattern));
     Ok(most_likely(question, fit, all))
 }
 
-/// Other classics, and the declared winding connected the other way round.
-fn classics(question: &Question, fit: &Fit) -> Vec<Winding> {
-    let layers = question.pattern.layers();
+/// Other classics, and the declared winding connected the other way round: this as likely as all of those together, which are alike.
+fn classics(declared: &Pattern, assumed: &Pattern) -> Vec<Winding> {
+    let layers = declared.layers();
     let known = Classic::ALL.into_iter().filter_map(|c| Some((c.pattern(layers).ok()?, Some(c.key()))));
     let mut all: Vec<Winding> = Vec::new();
-    for (pattern, classic) in known.chain([(question.pattern.clone(), None)]) {
+    for (pattern, classic) in known.chain([(declared.clone(), None)]) {
         for (pattern, reversed) in [(pattern.clone(), false), (pattern.reversed(), true)] {
-            if pattern != fit.assumed.pattern && !all.iter().any(|w| w.pattern == pattern) {
-                all.push(Winding { pattern, classic, reversed, exchanged: None, promised: f64::NEG_INFINITY });
+            if pattern != *assumed && !all.iter().any(|w| w.pattern == pattern) {
+                let (log_prior, promised) = (WINDING.log, f64::NEG_INFINITY);
+                all.push(Winding { pattern, classic, reversed, exchanged: None, log_prior, promised });
             }
         }
+    }
+    let reversed = declared.reversed();
+    let others = all.iter().filter(|w| w.pattern != reversed).count() as f64;
+    for winding in &mut all {
+        winding.log_prior -= if winding.pattern == reversed { 2.0_f64.ln() } else { (2.0 * others).ln() };
     }
     all
 }
 
 fn most_likely(question: &Question, fit: &Fit, mut all: Vec<Winding>) -> Vec<Winding> {
     promise_beside(question, fit, &mut all);
-    let worth = |w: &Winding| w.promised + w.log_prior();
+    let worth = |w: &Winding| w.promised + w.log_prior;
     all.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
     all.truncate(TRIED);
     all
@@ -137,5 +136,18 @@ mod tests {
         assert!((sum - 1.0).abs() < 1e-12, "{sum}");
         let ratio = share_of_exchanges((31, 32), layers) / share_of_exchanges((3, 13), layers);
         assert!((ratio - 10.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn other_windings_share_what_is_held_likely_of_them_and_the_declared_one_reversed_has_half() {
+        for declared in [Classic::Qua, Classic::Oct, Classic::Zyl] {
+            let declared = declared.pattern(16).unwrap();
+            let all = classics(&declared, &declared);
+            let sum: f64 = all.iter().map(|w| w.log_prior.exp()).sum();
+            assert!((sum / WINDING.log.exp() - 1.0).abs() < 1e-12, "{sum}");
+            let reversed = all.iter().find(|w| w.pattern == declared.reversed()).unwrap();
+            assert!((reversed.log_prior - (WINDING.log - 2.0_f64.ln())).abs() < 1e-12);
+            assert!(all.len() > 4 && all.iter().all(|w| w.log_prior <= reversed.log_prior));
+        }
     }
 }

@@ -1,0 +1,172 @@
+//! Forward and back from a set: score test, fits of what promises most, the best as long as it is better, and what it does without.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::back::{complete, look_back, refit_without_last};
+use super::explanation::fitted;
+use super::odds::{CERTAIN, WINDING};
+use super::own_air::{InOwnAir, best_by_own_kinks};
+use super::screen::{foremost, looked_at};
+use super::tries::{TRIED, calmed, discrete, tried};
+use super::winding::{promise_beside, promising};
+use super::{Explanation, Member, Outcome, Question, Winding};
+use crate::chamber::{Chamber, Effort};
+
+/// An effect that gains so much may stand for another winding: what that costs beforehand, and what makes it certain.
+const MAY_BE_WOUND: f64 = CERTAIN.log - WINDING.log;
+/// A set must be better by so much to go on from: what is better by less gives its mass to the smaller one.
+const WORTH_A_STEP: f64 = CERTAIN.log;
+
+/// Sets that were fitted, by their members.
+pub(super) type Cache = BTreeMap<Vec<Member>, Explanation>;
+
+pub(super) fn keep(cache: &mut Cache, explanation: Explanation) {
+    let key = explanation.key();
+    if cache.get(&key).is_none_or(|known| explanation.merit > known.merit) {
+        cache.insert(key, explanation);
+    }
+}
+
+/// Best first.
+pub(super) fn in_order(a: &Explanation, b: &Explanation) -> std::cmp::Ordering {
+    b.merit.total_cmp(&a.merit).then_with(|| a.key().cmp(&b.key()))
+}
+
+/// Whether a search may go on in a chamber with the kinks that a set would have placed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kinks {
+    Own,
+    /// The chamber was looked through by the best set already.
+    Given,
+}
+
+/// A search under way, all of its fits in one chamber.
+pub(super) struct Path<'a> {
+    pub(super) chamber: Chamber<'a>,
+    pub(super) best: Explanation,
+    pub(super) cache: Cache,
+    pub(super) windings: Vec<Winding>,
+    /// What the first score test promised of each candidate; None before it.
+    pub(super) promised: Option<Vec<(usize, f64)>>,
+    /// What the kinks of its chamber cost more than those of the chamber that was asked about.
+    pub(super) price: f64,
+    /// Whether its chamber is another than that.
+    pub(super) is_elsewhere: bool,
+}
+
+impl<'a> Path<'a> {
+    /// From a set, with others that were fitted in the same chamber.
+    pub(super) fn new(question: &Question<'a>, best: Explanation, cache: Cache) -> Self {
+        let chamber = question.chamber.clone();
+        Self { chamber, best, cache, windings: Vec::new(), promised: None, price: 0.0, is_elsewhere: false }
+    }
+
+    /// On to larger sets as long as they are better, and back; at last what may stand in the place of each member.
+    ///
+    /// # Errors
+    /// Of the best set, that it cannot be solved.
+    pub(super) fn go_on(&mut self, question: &Question, kinks: Kinks, progress: &(dyn Fn(f64) + Sync)) -> Outcome<()> {
+        for stage in self.best.members.len().min(question.depth)..question.depth {
+            let found = self.beside(question)?;
+            progress((stage + 1) as f64 / question.depth as f64);
+            if !self.take(question, found, kinks) {
+                break;
+            }
+        }
+        let here = Question { chamber: &self.chamber, ..question.clone() };
+        complete(&here, &self.windings, &self.best, &mut self.cache);
+        // What other records may yet prefer, as a step further or in another winding's place, is as complete.
+        let (size, is_wound) = (self.best.members.len(), self.best.has_winding());
+        let is_other = |e: &&Explanation| {
+            let goes_on = e.members.len() > size || is_wound;
+            goes_on && !e.has_winding() && !e.is_outside() && e.merit > self.best.merit - WORTH_A_STEP
+        };
+        if let Some(other) = self.cache.values().filter(is_other).min_by(|a, b| in_order(a, b)).cloned() {
+            complete(&here, &self.windings, &other, &mut self.cache);
+        }
+        Ok(())
+    }
+
+    /// The sets with one member more, best first.
+    fn beside(&mut self, question: &Question) -> Outcome<Vec<Explanation>> {
+        let here = Question { chamber: &self.chamber, ..question.clone() };
+        let best = &self.best;
+        let mut proposals = looked_at(&here, best)?;
+        if self.promised.is_none() {
+            // Where nothing promises what would make another winding certain, nothing is wound otherwise.
+            if best.is_outside() || proposals.iter().any(|p| p.gain > MAY_BE_WOUND) {
+                self.windings = promising(&here, &best.fit)?;
+            }
+            self.promised = Some(foremost(&proposals));
+        } else if !best.has_winding() {
+            // Beside what has been found since, another winding is worth something else.
+            promise_beside(&here, &best.fit, &mut self.windings);
+        }
+        proposals.extend(discrete(&here, &self.windings, best));
+        Ok(tried(&here, &self.windings, best, proposals))
+    }
+
+    /// The best of what was found, where it is better than the best so far; whether there may be more.
+    fn take(&mut self, question: &Question, found: Vec<Explanation>, kinks: Kinks) -> bool {
+        let foremost = found.iter().find(|e| !e.is_beyond_physical()).cloned();
+        let own = match kinks {
+            Kinks::Own => {
+                let here = Question { chamber: &self.chamber, ..question.clone() };
+                best_by_own_kinks(&self.chamber, &here, &self.windings, &found)
+            }
+            Kinks::Given => None,
+        };
+        found.into_iter().for_each(|explanation| keep(&mut self.cache, explanation));
+        let least = foremost.as_ref().map_or(self.base(), |f| f.merit.max(self.base())) + WORTH_A_STEP;
+        let next = match (own.filter(|own| own.merit > least), foremost) {
+            (Some(own), _) => self.moved(question, own),
+            (None, Some(next)) => next,
+            (None, None) => return false,
+        };
+        let here = Question { chamber: &self.chamber, ..question.clone() };
+        let next = calmed(&here, &self.windings, next);
+        keep(&mut self.cache, next.clone());
+        // What was fitted with the larger set may be a better chamber for the smaller one.
+        if let Some(again) = refit_without_last(&here, &self.windings, &next) {
+            keep(&mut self.cache, again);
+        }
+        if next.merit < self.base() + WORTH_A_STEP {
+            return false;
+        }
+        self.best = look_back(&here, &self.windings, next, &mut self.cache);
+        !self.best.members.iter().any(|m| m.is_outside())
+    }
+
+    /// What the best set is worth by the best fit of it.
+    fn base(&self) -> f64 {
+        self.cache.get(&self.best.key()).map_or(self.best.merit, |b| b.merit)
+    }
+
+    /// To the chamber with a set's own kinks; what was found so far is fitted again there.
+    fn moved(&mut self, question: &Question, own: InOwnAir<'a>) -> Explanation {
+        self.price += own.explanation.merit - own.merit;
+        self.chamber = own.chamber;
+        self.is_elsewhere = true;
+        let here = Question { chamber: &self.chamber, ..question.clone() };
+        self.cache = carried(&here, &self.windings, std::mem::take(&mut self.cache));
+        own.explanation
+    }
+}
+
+/// What was found in one chamber in another: the declared model and the best.
+pub(super) fn carried(question: &Question, windings: &[Winding], cache: Cache) -> Cache {
+    let mut all: Vec<Explanation> = cache.into_values().collect();
+    all.sort_by(in_order);
+    let mut kept = 0;
+    all.retain(|e| {
+        kept += 1;
+        e.members.is_empty() || kept <= TRIED
+    });
+    let there = all.into_par_iter().filter_map(|e| {
+        let begin = (e.fit.assumed.clone(), e.fit.free.clone());
+        fitted(question, windings, e.members, &begin, &e.fit, Effort::QUICK)
+    });
+    there.map(|e| (e.key(), e)).collect()
+}
