@@ -50,6 +50,8 @@ pub(super) struct Path<'a> {
     pub(super) windings: Vec<Winding>,
     /// What the first score test promised of each candidate; None before it.
     pub(super) promised: Option<Vec<(usize, f64)>>,
+    /// The most that the last score test promised.
+    pub(super) left: f64,
     /// What the kinks of its chamber cost more than those of the chamber that was asked about.
     pub(super) price: f64,
     /// Whether its chamber is another than that.
@@ -60,7 +62,7 @@ impl<'a> Path<'a> {
     /// From a set, with others that were fitted in the same chamber.
     pub(super) fn new(question: &Question<'a>, best: Explanation, cache: Cache) -> Self {
         let chamber = question.chamber.clone();
-        Self { chamber, best, cache, windings: Vec::new(), promised: None, price: 0.0, is_elsewhere: false }
+        Self { chamber, best, cache, windings: Vec::new(), promised: None, left: 0.0, price: 0.0, is_elsewhere: false }
     }
 
     /// On to larger sets as long as they are better, and back; at last what may stand in the place of each member.
@@ -77,15 +79,6 @@ impl<'a> Path<'a> {
         }
         let here = Question { chamber: &self.chamber, ..question.clone() };
         complete(&here, &self.windings, &self.best, &mut self.cache);
-        // What other records may yet prefer, as a step further or in another winding's place, is as complete.
-        let (size, is_wound) = (self.best.members.len(), self.best.has_winding());
-        let is_other = |e: &&Explanation| {
-            let goes_on = e.members.len() > size || is_wound;
-            goes_on && !e.has_winding() && !e.is_outside() && e.merit > self.best.merit - WORTH_A_STEP
-        };
-        if let Some(other) = self.cache.values().filter(is_other).min_by(|a, b| in_order(a, b)).cloned() {
-            complete(&here, &self.windings, &other, &mut self.cache);
-        }
         Ok(())
     }
 
@@ -94,6 +87,7 @@ impl<'a> Path<'a> {
         let here = Question { chamber: &self.chamber, ..question.clone() };
         let best = &self.best;
         let mut proposals = looked_at(&here, best)?;
+        self.left = proposals.iter().map(|p| p.gain).fold(0.0, f64::max);
         if self.promised.is_none() {
             // Where nothing promises what would make another winding certain, nothing is wound otherwise.
             if best.is_outside() || proposals.iter().any(|p| p.gain > MAY_BE_WOUND) {

@@ -2,10 +2,11 @@
 
 use rayon::prelude::*;
 
+use super::back::complete;
 use super::explanation::{fitted, with};
 use super::forward::{Cache, Kinks, Path, carried, in_order, keep};
 use super::judge::{Care, judge};
-use super::odds::WINDOW;
+use super::odds::{CERTAIN, WINDOW};
 use super::own_air::best_by_own_air;
 use super::screen::{Proposal, proposals};
 use super::tries::calmed;
@@ -80,20 +81,37 @@ fn ranked_from(
 ) -> Outcome<(Explanation, f64, Found)> {
     let mut path = Path::new(question, best, cache);
     path.go_on(question, Kinks::Own, progress)?;
-    let Path { chamber, best, cache, windings, promised, price, is_elsewhere } = path;
-    let mut explanations: Vec<Explanation> = cache.into_values().collect();
-    judge(&Question { chamber: &chamber, ..question.clone() }, &windings, &mut explanations, Care::AsRanked)?;
+    let Path { chamber, best, mut cache, windings, promised, left, price, is_elsewhere } = path;
+    let here = Question { chamber: &chamber, ..question.clone() };
+    let mut explanations: Vec<Explanation> = cache.values().cloned().collect();
+    judge(&here, &windings, &mut explanations, Care::AsRanked)?;
+    // What held-out records prefer, and what may stand for another winding, is as complete as what the search ended with.
+    let preferred = preferred(&explanations, &best);
+    if !preferred.is_empty() {
+        preferred.iter().for_each(|set| complete(&here, &windings, set, &mut cache));
+        explanations = cache.into_values().collect();
+        judge(&here, &windings, &mut explanations, Care::AsRanked)?;
+    }
     let worth = best.merit - price;
-    Ok((best, worth, Found { explanations, promised: promised.unwrap_or_default(), windings, is_elsewhere }))
+    Ok((best, worth, Found { explanations, promised: promised.unwrap_or_default(), left, windings, is_elsewhere }))
+}
+
+/// Of judged sets, the likeliest if it goes further than the best of the search, and, if that is wound otherwise, the likeliest that is not.
+fn preferred(judged: &[Explanation], best: &Explanation) -> Vec<Explanation> {
+    let Some(first) = judged.first() else { return Vec::new() };
+    let plain = judged.iter().find(|e| !e.has_winding() && e.members.len() > 1 && !e.is_outside());
+    let further = (first.members.len() > best.members.len()).then_some(first);
+    let plain = plain.filter(|e| first.has_winding() && e.key() != best.key() && e.total() > first.total() - WINDOW);
+    further.into_iter().chain(plain).cloned().collect()
 }
 
 /// What was found, judged again in a chamber that is looked through with the best of it ([`crate::chamber::Chamber::with_timed_shocks_by`]):
-/// what that chamber's kinks and gross errors hid is looked for beside the best once more, where the score test promises enough.
+/// what the old one's kinks and gross errors hid is looked for beside the best once more, where the score test promises more than it did.
 ///
 /// # Errors
 /// A declared model that cannot be solved for these records.
 pub(crate) fn again(question: &Question, found: Found) -> Outcome<Found> {
-    let Found { explanations, promised, windings, .. } = found;
+    let Found { explanations, promised, left, windings, .. } = found;
     let there = explanations.into_par_iter().filter_map(|e| {
         let begin = (e.fit.assumed.clone(), e.fit.free.clone());
         fitted(question, &windings, e.members, &begin, &e.fit, Effort::FULL)
@@ -105,7 +123,7 @@ pub(crate) fn again(question: &Question, found: Found) -> Outcome<Found> {
     let best = cache.values().filter(|e| !e.is_beyond_physical()).min_by(|a, b| in_order(a, b)).cloned();
     let (mut windings, mut cache) = (windings, cache);
     if let Some(best) = best.filter(|best| best.members.len() < question.depth && !best.is_outside())
-        && most_promised(question, &best)? > PROMISING
+        && most_promised(question, &best)? > PROMISING.max(left + CERTAIN.log)
     {
         let mut path = Path { windings, promised: Some(promised.clone()), ..Path::new(question, best, cache) };
         path.go_on(question, Kinks::Given, &|_| ())?;
@@ -113,7 +131,7 @@ pub(crate) fn again(question: &Question, found: Found) -> Outcome<Found> {
     }
     let mut explanations: Vec<Explanation> = cache.into_values().collect();
     judge(question, &windings, &mut explanations, Care::InFull)?;
-    Ok(Found { explanations, promised, windings, is_elsewhere: false })
+    Ok(Found { explanations, promised, left, windings, is_elsewhere: false })
 }
 
 fn most_promised(question: &Question, best: &Explanation) -> Outcome<f64> {
