@@ -153,10 +153,11 @@ impl Chamber<'_> {
         known: Option<&KnownDerivatives>,
     ) -> Result<Ascent<'c>, ChamberError> {
         let &Beginning { assumed, numbers, parameters, records, courses } = begin;
+        let first = records.first().copied().unwrap_or(0);
         let coordinates: Vec<f64> = parameters
             .iter()
             .map(|p| {
-                let read = p.read(assumed, numbers);
+                let read = p.read(assumed, numbers, first);
                 if read.is_finite() { read.clamp(p.lower, p.upper) } else { p.mean }
             })
             .collect();

@@ -121,7 +121,7 @@ impl Chamber<'_> {
             self.parameters(&from.assumed, &from.free, &[record])?.into_iter().filter(is_coil).collect();
         let start = DVector::from_iterator(
             parameters.len(),
-            parameters.iter().map(|p| p.read(&from.assumed, &numbers).clamp(p.lower, p.upper)),
+            parameters.iter().map(|p| p.read(&from.assumed, &numbers, record).clamp(p.lower, p.upper)),
         );
         let held = |at: &DVector<f64>| match hold {
             Some(hold) if hold.information.nrows() == at.len() => {

@@ -215,10 +215,10 @@ impl Parameter {
         matches!(self.place, Place::Quantity { quantity, .. } if quantity != Quantity::Film)
     }
 
-    /// Reads it from what is assumed.
-    pub(super) fn read(&self, assumed: &Assumption, numbers: &[Numbers]) -> f64 {
+    /// Reads it from what is assumed; what records share is as the `first` that is fitted has it.
+    pub(super) fn read(&self, assumed: &Assumption, numbers: &[Numbers], first: usize) -> f64 {
         let value = match self.place {
-            Place::Quantity { quantity, record } => numbers[record.unwrap_or(0)].get(quantity),
+            Place::Quantity { quantity, record } => numbers[record.unwrap_or(first)].get(quantity),
             Place::Effect { effect, parameter } => assumed.model.effects[effect].values()[parameter],
             Place::Input { input } => assumed.inputs[input].amplitude,
         };
