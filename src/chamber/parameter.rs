@@ -260,6 +260,7 @@ mod tests {
     use super::super::dense::tests::model;
     use super::*;
     use crate::effect::find;
+    use crate::pattern::classic::Classic;
     use crate::record::Record;
 
     #[test]
@@ -268,6 +269,22 @@ mod tests {
         let stated = Some(StatedNumber { value: 12.4, within: 0.25 });
         let parameter = Parameter::of_effect(&fitted, &Free { effect: 0, parameter: 0, stated, deviation: None });
         assert_eq!((parameter.mean, parameter.deviation), (12.4f64.ln(), 0.25));
+    }
+
+    #[test]
+    fn what_records_share_is_read_from_the_first_that_is_fitted() {
+        let times_s: Vec<f64> = (1..=40).map(|i| 10.0 * f64::from(i)).collect();
+        let warming_k: Vec<f64> = (0..40).map(|i| 293.0 + 0.1 * f64::from(i)).collect();
+        let record = Record::new("day", times_s, warming_k, vec![0.0; 40]).unwrap();
+        let model = model(Vec::new());
+        let chamber = Chamber::new(&model, &[&record, &record]).unwrap();
+        let medians = Numbers::medians(&chamber.observed[0].series);
+        let mut numbers = [medians; 2];
+        numbers[1].set(Quantity::Film, 71.0);
+        let assumed = super::super::Assumption::new(model.clone(), Classic::Qua.pattern(8).unwrap());
+        let film = Parameter::of_quantity(Quantity::Film, None, &medians);
+        assert!((film.read(&assumed, &numbers, 0) - medians.get(Quantity::Film).ln()).abs() < 1e-12);
+        assert!((film.read(&assumed, &numbers, 1) - 71.0_f64.ln()).abs() < 1e-12);
     }
 
     #[test]

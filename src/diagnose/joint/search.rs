@@ -161,3 +161,33 @@ pub(crate) fn fit_one(question: &Question, base: &Fit) -> Option<Explanation> {
     let best = fits.into_iter().max_by(|a, b| a.merit.total_cmp(&b.merit))?;
     Some(calmed(question, &[], best))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chamber::Assumption;
+    use crate::diagnose::experiment::fixtures::{model, pattern};
+
+    fn judged(members: Vec<Member>, merit: f64, held_out: f64) -> Explanation {
+        let fit = Fit::to_nothing(Assumption::new(model(Vec::new()), pattern()), Vec::new(), 1e-7);
+        let held_out = Some(held_out);
+        Explanation { members, fit, merit, held_out, in_readings: 0.0, understated: 0.0, probability: 0.0 }
+    }
+
+    #[test]
+    fn what_held_out_records_prefer_is_asked_further_and_effects_in_the_place_of_a_winding() {
+        let (one, wound) = (Member::Effect(0), Member::Winding(0));
+        let best = judged(vec![one], 100.0, 50.0);
+        let keys = |list: Vec<Explanation>| list.iter().map(Explanation::key).collect::<Vec<_>>();
+        // What the search ended with needs no more.
+        assert!(preferred(std::slice::from_ref(&best), &best).is_empty());
+        let further = judged(vec![one, Member::Effect(1)], 101.0, 58.0);
+        assert_eq!(keys(preferred(&[further.clone(), best.clone()], &best)), [further.key()]);
+        // In the place of another winding, too, unless it is far behind.
+        let rewound = judged(vec![one, wound], 102.0, 60.0);
+        let list = [rewound.clone(), further.clone(), best.clone()];
+        assert_eq!(keys(preferred(&list, &best)), [rewound.key(), further.key()]);
+        let far = judged(vec![one, Member::Effect(1)], 80.0, 55.0);
+        assert_eq!(keys(preferred(&[rewound.clone(), far, best.clone()], &best)), [rewound.key()]);
+    }
+}
