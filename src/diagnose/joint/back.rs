@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
+use super::cache::{Cache, keep};
 use super::explanation::{fitted, with, without};
-use super::forward::{Cache, keep};
 use super::screen::proposals;
 use super::tries::choose;
 use super::{Explanation, Member, Question, Winding};

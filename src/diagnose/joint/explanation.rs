@@ -229,6 +229,11 @@ fn step(question: &Question, record: usize, row: usize) -> Input {
     }
 }
 
+/// Best first.
+pub(super) fn in_order(a: &Explanation, b: &Explanation) -> std::cmp::Ordering {
+    b.merit.total_cmp(&a.merit).then_with(|| a.key().cmp(&b.key()))
+}
+
 /// Fits a set.
 pub(in crate::diagnose) fn fitted(
     question: &Question,

@@ -1,38 +1,19 @@
 //! Forward and back from a set: score test, fits of what promises most, the best as long as it is better, and what it does without.
 
-use std::collections::BTreeMap;
-
-use rayon::prelude::*;
-
 use super::back::{complete, look_back, refit_without_last};
-use super::explanation::fitted;
+use super::cache::{Cache, carried, keep};
 use super::odds::{CERTAIN, WINDING};
 use super::own_air::{InOwnAir, best_by_own_kinks};
 use super::screen::{foremost, looked_at};
-use super::tries::{TRIED, calmed, discrete, tried};
+use super::tries::{calmed, discrete, tried};
 use super::winding::{promise_beside, promising};
-use super::{Explanation, Member, Outcome, Question, Winding};
-use crate::chamber::{Chamber, Effort};
+use super::{Explanation, Outcome, Question, Winding};
+use crate::chamber::Chamber;
 
 /// An effect that gains so much may stand for another winding: what that costs beforehand, and what makes it certain.
 const MAY_BE_WOUND: f64 = CERTAIN.log - WINDING.log;
 /// A set must be better by so much to go on from: what is better by less gives its mass to the smaller one.
 const WORTH_A_STEP: f64 = CERTAIN.log;
-
-/// Sets that were fitted, by their members.
-pub(super) type Cache = BTreeMap<Vec<Member>, Explanation>;
-
-pub(super) fn keep(cache: &mut Cache, explanation: Explanation) {
-    let key = explanation.key();
-    if cache.get(&key).is_none_or(|known| explanation.merit > known.merit) {
-        cache.insert(key, explanation);
-    }
-}
-
-/// Best first.
-pub(super) fn in_order(a: &Explanation, b: &Explanation) -> std::cmp::Ordering {
-    b.merit.total_cmp(&a.merit).then_with(|| a.key().cmp(&b.key()))
-}
 
 /// Whether a search may go on in a chamber with the kinks that a set would have placed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -147,20 +128,4 @@ impl<'a> Path<'a> {
         self.cache = carried(&here, &self.windings, std::mem::take(&mut self.cache));
         own.explanation
     }
-}
-
-/// What was found in one chamber in another: the declared model and the best.
-pub(super) fn carried(question: &Question, windings: &[Winding], cache: Cache) -> Cache {
-    let mut all: Vec<Explanation> = cache.into_values().collect();
-    all.sort_by(in_order);
-    let mut kept = 0;
-    all.retain(|e| {
-        kept += 1;
-        e.members.is_empty() || kept <= TRIED
-    });
-    let there = all.into_par_iter().filter_map(|e| {
-        let begin = (e.fit.assumed.clone(), e.fit.free.clone());
-        fitted(question, windings, e.members, &begin, &e.fit, Effort::QUICK)
-    });
-    there.map(|e| (e.key(), e)).collect()
 }

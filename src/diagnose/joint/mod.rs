@@ -11,6 +11,7 @@
 mod adjust;
 mod back;
 mod beside;
+mod cache;
 mod explanation;
 mod forward;
 mod judge;

@@ -3,8 +3,9 @@
 use rayon::prelude::*;
 
 use super::back::complete;
-use super::explanation::{fitted, with};
-use super::forward::{Cache, Kinks, Path, carried, in_order, keep};
+use super::cache::{Cache, carried, keep};
+use super::explanation::{fitted, in_order, with};
+use super::forward::{Kinks, Path};
 use super::judge::{Care, judge};
 use super::odds::{CERTAIN, WINDOW};
 use super::own_air::best_by_own_air;

@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::explanation::{fitted, with};
-use super::forward::in_order;
+use super::explanation::{fitted, in_order, with};
 use super::screen::Proposal;
 use super::{Explanation, Member, Question, Winding};
 use crate::chamber::{Assumption, Effort, Fit, Free, Quantity};
