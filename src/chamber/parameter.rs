@@ -275,7 +275,8 @@ mod tests {
     fn what_records_share_is_read_from_the_first_that_is_fitted() {
         let times_s: Vec<f64> = (1..=40).map(|i| 10.0 * f64::from(i)).collect();
         let warming_k: Vec<f64> = (0..40).map(|i| 293.0 + 0.1 * f64::from(i)).collect();
-        let record = Record::new("day", times_s, warming_k, vec![0.0; 40]).unwrap();
+        let rates = (0..40).map(|i| 1e-7 * f64::from(i * i).sin()).collect();
+        let record = Record::new("day", times_s, warming_k, rates).unwrap();
         let model = model(Vec::new());
         let chamber = Chamber::new(&model, &[&record, &record]).unwrap();
         let medians = Numbers::medians(&chamber.observed[0].series);
