@@ -256,8 +256,8 @@ pub(super) fn write(
 
 #[cfg(test)]
 mod tests {
-    use super::super::Chamber;
     use super::super::dense::tests::model;
+    use super::super::{Chamber, Effort};
     use super::*;
     use crate::effect::find;
     use crate::pattern::classic::Classic;
@@ -272,20 +272,21 @@ mod tests {
     }
 
     #[test]
-    fn what_records_share_is_read_from_the_first_that_is_fitted() {
+    fn a_fit_to_one_record_begins_with_that_records_film() {
         let times_s: Vec<f64> = (1..=40).map(|i| 10.0 * f64::from(i)).collect();
         let warming_k: Vec<f64> = (0..40).map(|i| 293.0 + 0.1 * f64::from(i)).collect();
         let rates = (0..40).map(|i| 1e-7 * f64::from(i * i).sin()).collect();
         let record = Record::new("day", times_s, warming_k, rates).unwrap();
         let model = model(Vec::new());
         let chamber = Chamber::new(&model, &[&record, &record]).unwrap();
-        let medians = Numbers::medians(&chamber.observed[0].series);
-        let mut numbers = [medians; 2];
-        numbers[1].set(Quantity::Film, 71.0);
-        let assumed = super::super::Assumption::new(model.clone(), Classic::Qua.pattern(8).unwrap());
-        let film = Parameter::of_quantity(Quantity::Film, None, &medians);
-        assert!((film.read(&assumed, &numbers, 0) - medians.get(Quantity::Film).ln()).abs() < 1e-12);
-        assert!((film.read(&assumed, &numbers, 1) - 71.0_f64.ln()).abs() < 1e-12);
+        let assumed = Assumption::new(model.clone(), Classic::Qua.pattern(8).unwrap());
+        // Where a fit ends that takes no step is where it began.
+        let still = Effort { iterations: 0, ..Effort::SHORT };
+        let mut day = chamber.fit(&assumed, &[], &[1], None, still).unwrap();
+        day.numbers[1].set(Quantity::Film, 71.0);
+        assert!(day.number(Quantity::Film, 0) < 50.0);
+        let again = chamber.fit(&assumed, &[], &[1], Some(&day), still).unwrap();
+        assert!((again.number(Quantity::Film, 1) / 71.0 - 1.0).abs() < 1e-12);
     }
 
     #[test]

@@ -136,7 +136,8 @@ pub(super) fn posterior(question: &Question, found: &Found) -> Vec<Share> {
     let mut shares: Vec<Share> = Vec::new();
     for explanation in found.explanations.iter().filter(|e| e.probability > 1e-6) {
         let effects = names(question, explanation);
-        match shares.iter_mut().find(|s| sorted(s.effects.clone()) == sorted(effects.clone())) {
+        let named = sorted(effects.clone());
+        match shares.iter_mut().find(|s| sorted(s.effects.clone()) == named) {
             Some(share) => share.probability += explanation.probability,
             None => shares.push(Share {
                 effects,

@@ -3,14 +3,11 @@
 use rayon::prelude::*;
 
 use super::cache::{Cache, keep};
-use super::explanation::{fitted, with, without};
+use super::explanation::{Begin, fitted, with, without};
 use super::screen::proposals;
 use super::tries::choose;
 use super::{Explanation, Member, Question, Winding};
-use crate::chamber::{Assumption, Effort, Free};
-
-/// Where a fit begins: what is assumed, and what of its effects is free.
-type Begin = (Assumption, Vec<Free>);
+use crate::chamber::Effort;
 
 /// The set before its last member, beginning with the chamber that was found with it.
 pub(super) fn refit_without_last(question: &Question, windings: &[Winding], next: &Explanation) -> Option<Explanation> {

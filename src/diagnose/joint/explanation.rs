@@ -144,6 +144,9 @@ impl Explanation {
     }
 }
 
+/// Where a fit begins: what is assumed, and what of its effects is free.
+pub(in crate::diagnose) type Begin = (Assumption, Vec<Free>);
+
 /// What an explanation with one more member assumes, its values as given for an effect.
 pub(in crate::diagnose) fn with(
     question: &Question,
@@ -151,7 +154,7 @@ pub(in crate::diagnose) fn with(
     from: &Fit,
     member: Member,
     values: Option<Vec<f64>>,
-) -> Option<(Assumption, Vec<Free>)> {
+) -> Option<Begin> {
     let (mut assumed, mut free) = (from.assumed.clone(), from.free.clone());
     match member {
         Member::Effect(place) => {
@@ -187,7 +190,7 @@ pub(in crate::diagnose) fn with(
 }
 
 /// The assumption of an explanation without one of its members.
-pub(in crate::diagnose) fn without(question: &Question, from: &Explanation, place: usize) -> (Assumption, Vec<Free>) {
+pub(in crate::diagnose) fn without(question: &Question, from: &Explanation, place: usize) -> Begin {
     let (mut assumed, mut free) = (from.fit.assumed.clone(), from.fit.free.clone());
     let declared = question.model.effects.len();
     match from.members[place] {
@@ -239,7 +242,7 @@ pub(in crate::diagnose) fn fitted(
     question: &Question,
     windings: &[Winding],
     members: Vec<Member>,
-    (assumed, free): &(Assumption, Vec<Free>),
+    (assumed, free): &Begin,
     from: &Fit,
     effort: Effort,
 ) -> Option<Explanation> {

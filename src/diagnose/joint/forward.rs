@@ -10,7 +10,7 @@ use super::winding::{promise_beside, promising};
 use super::{Explanation, Outcome, Question, Winding};
 use crate::chamber::Chamber;
 
-/// An effect that gains so much may stand for another winding: what that costs beforehand, and what makes it certain.
+/// An effect that gains so much may stand for another winding: what that costs beforehand, whichever it is, and what makes it certain.
 const MAY_BE_WOUND: f64 = CERTAIN.log - WINDING.log;
 /// A set must be better by so much to go on from: what is better by less gives its mass to the smaller one.
 const WORTH_A_STEP: f64 = CERTAIN.log;
@@ -24,14 +24,14 @@ pub(super) enum Kinks {
 }
 
 /// A search under way, all of its fits in one chamber.
-pub(super) struct Path<'a> {
+pub(super) struct Search<'a> {
     pub(super) chamber: Chamber<'a>,
     pub(super) best: Explanation,
     pub(super) cache: Cache,
     pub(super) windings: Vec<Winding>,
     /// What the first score test promised of each candidate; None before it.
     pub(super) promised: Option<Vec<(usize, f64)>>,
-    /// The most that the last score test promised.
+    /// The most that the last score test promised, at or above what is left beside the best.
     pub(super) left: f64,
     /// What the kinks of its chamber cost more than those of the chamber that was asked about.
     pub(super) price: f64,
@@ -39,7 +39,7 @@ pub(super) struct Path<'a> {
     pub(super) is_elsewhere: bool,
 }
 
-impl<'a> Path<'a> {
+impl<'a> Search<'a> {
     /// From a set, with others that were fitted in the same chamber.
     pub(super) fn new(question: &Question<'a>, best: Explanation, cache: Cache) -> Self {
         let chamber = question.chamber.clone();

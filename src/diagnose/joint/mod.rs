@@ -80,7 +80,7 @@ pub(crate) struct Found {
     pub(crate) explanations: Vec<Explanation>,
     /// Of each candidate the gain in log likelihood that the score test promised, largest first, with the effect there.
     pub(crate) promised: Vec<(usize, f64)>,
-    /// The most that the score test promised beside the best at last.
+    /// The most that the search's last score test promised.
     pub(super) left: f64,
     pub(crate) windings: Vec<Winding>,
     /// Whether its fits are of another chamber than that which was asked about.

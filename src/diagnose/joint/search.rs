@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::back::complete;
 use super::cache::{Cache, carried, keep};
 use super::explanation::{fitted, in_order, with};
-use super::forward::{Kinks, Path};
+use super::forward::{Kinks, Search};
 use super::judge::{Care, judge};
 use super::odds::{CERTAIN, WINDOW};
 use super::own_air::best_by_own_air;
@@ -73,16 +73,16 @@ pub(crate) fn ranked(question: &Question, null: Fit, progress: &(dyn Fn(f64) + S
     Ok(if is_by_it && worth - price > best { Found { is_elsewhere: true, ..found_there } } else { found })
 }
 
-/// A path's whole course, ranked.
+/// A search from a set: the best that it ended with, what that is worth less what the kinks of its own air cost, and all that was found, ranked.
 fn ranked_from(
     question: &Question,
     best: Explanation,
     cache: Cache,
     progress: &(dyn Fn(f64) + Sync),
 ) -> Outcome<(Explanation, f64, Found)> {
-    let mut path = Path::new(question, best, cache);
-    path.go_on(question, Kinks::Own, progress)?;
-    let Path { chamber, best, mut cache, windings, promised, left, price, is_elsewhere } = path;
+    let mut search = Search::new(question, best, cache);
+    search.go_on(question, Kinks::Own, progress)?;
+    let Search { chamber, best, mut cache, windings, promised, left, price, is_elsewhere } = search;
     let here = Question { chamber: &chamber, ..question.clone() };
     let mut explanations: Vec<Explanation> = cache.values().cloned().collect();
     judge(&here, &windings, &mut explanations, Care::AsRanked)?;
@@ -112,23 +112,22 @@ fn preferred(judged: &[Explanation], best: &Explanation) -> Vec<Explanation> {
 /// # Errors
 /// A declared model that cannot be solved for these records.
 pub(crate) fn again(question: &Question, found: Found) -> Outcome<Found> {
-    let Found { explanations, promised, left, windings, .. } = found;
+    let Found { explanations, promised, left, mut windings, .. } = found;
     let there = explanations.into_par_iter().filter_map(|e| {
         let begin = (e.fit.assumed.clone(), e.fit.free.clone());
         fitted(question, &windings, e.members, &begin, &e.fit, Effort::FULL)
     });
-    let cache: Cache = there.map(|e| (e.key(), e)).collect();
+    let mut cache: Cache = there.map(|e| (e.key(), e)).collect();
     if !cache.contains_key(&Vec::new()) {
         return Err(ChamberError::Unsolvable);
     }
     let best = cache.values().filter(|e| !e.is_beyond_physical()).min_by(|a, b| in_order(a, b)).cloned();
-    let (mut windings, mut cache) = (windings, cache);
     if let Some(best) = best.filter(|best| best.members.len() < question.depth && !best.is_outside())
         && most_promised(question, &best)? > PROMISING.max(left + CERTAIN.log)
     {
-        let mut path = Path { windings, promised: Some(promised.clone()), ..Path::new(question, best, cache) };
-        path.go_on(question, Kinks::Given, &|_| ())?;
-        (windings, cache) = (path.windings, path.cache);
+        let mut search = Search { windings, promised: Some(promised.clone()), ..Search::new(question, best, cache) };
+        search.go_on(question, Kinks::Given, &|_| ())?;
+        (windings, cache) = (search.windings, search.cache);
     }
     let mut explanations: Vec<Explanation> = cache.into_values().collect();
     judge(question, &windings, &mut explanations, Care::InFull)?;

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::explanation::{fitted, in_order, with};
+use super::explanation::{Begin, fitted, in_order, with};
 use super::screen::Proposal;
 use super::{Explanation, Member, Question, Winding};
-use crate::chamber::{Assumption, Effort, Fit, Free, Quantity};
+use crate::chamber::{Effort, Fit, Quantity};
 
 /// Members that are fitted after each score test, as far as they promise this much …
 pub(super) const TRIED: usize = 8;
@@ -21,9 +21,6 @@ const MAY_WIN: f64 = 1.0 / 3.0;
 /// Periods of a cycle and times of an offset step, as shares of the record.
 const CYCLES: [f64; 3] = [0.06, 0.15, 0.4];
 const STEPS: usize = 60;
-
-/// Where a fit begins: what is assumed, and what of its effects is free.
-type Begin = (Assumption, Vec<Free>);
 
 /// What promises most beside a set, fitted, best first; where none of it is plain, also what says that something else is there.
 pub(super) fn tried(
