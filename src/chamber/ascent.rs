@@ -58,6 +58,8 @@ impl Effort {
     pub(crate) const FULL: Self = Self { iterations: 25, tolerance: 0.1, rounds: 2 };
     /// To half a unit: enough to rank sets.
     pub(crate) const QUICK: Self = Self { iterations: 10, tolerance: 0.7, rounds: 1 };
+    /// No step: where a fit begins, as a fit.
+    pub(crate) const NONE: Self = Self { iterations: 0, tolerance: 0.0, rounds: 1 };
     /// Enough to rank starts.
     pub(crate) const SHORT: Self = Self { iterations: 1, tolerance: 3.0, rounds: 1 };
     /// Whether what is fitted so far is only compared.
@@ -70,6 +72,8 @@ impl Effort {
 #[derive(Debug, Clone)]
 pub(super) struct KnownDerivatives {
     parameters: Vec<Parameter>,
+    /// What each parameter is of: effects and inputs have other places in other assumptions.
+    owners: Vec<Option<String>>,
     records: Vec<usize>,
     /// Of each record, in the order of `records`.
     derivatives: Vec<Derivatives>,
@@ -77,20 +81,23 @@ pub(super) struct KnownDerivatives {
 }
 
 impl KnownDerivatives {
-    fn new(
-        parameters: &[Parameter],
-        records: &[usize],
-        derivatives: Vec<Derivatives>,
-        innovations: &[Vec<Innovation>],
-    ) -> Self {
-        let variances = innovations.iter().map(|own| own.iter().map(|i| i.variance).collect()).collect();
-        Self { parameters: parameters.to_vec(), records: records.to_vec(), derivatives, variances }
+    fn new(parameters: &[Parameter], records: &[usize], derivatives: Vec<Derivatives>, at: &Ascent) -> Self {
+        let variances = at.innovations.iter().map(|own| own.iter().map(|i| i.variance).collect()).collect();
+        let owners = parameters.iter().map(|p| p.place.owner(&at.point.assumed)).collect();
+        Self { parameters: parameters.to_vec(), owners, records: records.to_vec(), derivatives, variances }
     }
 
     /// The innovations' derivative by a parameter in one record, taken along to where innovations are `base`; None where it was not
     /// taken, or where other measurements were.
-    fn column(&self, parameter: &Parameter, record: usize, base: &[Innovation]) -> Option<DerivativeColumn> {
-        let own = self.parameters.iter().position(|p| p.place == parameter.place && p.scale == parameter.scale)?;
+    fn column(
+        &self,
+        parameter: &Parameter,
+        owner: Option<&str>,
+        record: usize,
+        base: &[Innovation],
+    ) -> Option<DerivativeColumn> {
+        let is_same = |p: &Parameter| p.place.is_same_of_owner(parameter.place) && p.scale == parameter.scale;
+        let own = self.parameters.iter().zip(&self.owners).position(|(p, o)| is_same(p) && o.as_deref() == owner)?;
         let place = self.records.iter().position(|r| *r == record)?;
         let (derivatives, variances) = (&self.derivatives[place], &self.variances[place]);
         let column = derivatives.parameters.iter().position(|p| *p == own)?;
@@ -196,7 +203,7 @@ impl Chamber<'_> {
             }
         }
         let information = information_of(&derivatives, &state, parameters);
-        let known_derivatives = Some(KnownDerivatives::new(parameters, records, derivatives, &state.innovations));
+        let known_derivatives = Some(KnownDerivatives::new(parameters, records, derivatives, &state));
         Ok(Ascent { information, known_derivatives, ..state })
     }
 
@@ -208,7 +215,9 @@ impl Chamber<'_> {
         records: &[usize],
         known: Option<&KnownDerivatives>,
     ) -> Result<(Vec<Derivatives>, bool), ChamberError> {
-        let column = |p: usize, i: usize| known?.column(&parameters[p], records[i], &state.innovations[i]);
+        let owners: Vec<Option<String>> = parameters.iter().map(|p| p.place.owner(&state.point.assumed)).collect();
+        let column =
+            |p: usize, i: usize| known?.column(&parameters[p], owners[p].as_deref(), records[i], &state.innovations[i]);
         let of_records = |p: usize| -> Option<Vec<(usize, DerivativeColumn)>> {
             let own = (0..records.len()).filter(|&i| parameters[p].concerns(records[i]));
             own.map(|i| Some((i, column(p, i)?))).collect()

@@ -395,8 +395,7 @@ pub(super) mod tests {
         };
         let assumed = Assumption { inputs: vec![input], ..Assumption::new(model, dip()) };
         let free = [Free { effect: 0, parameter: 0, stated: None, deviation: None }];
-        let fit =
-            chamber.fit(&assumed, &free, &[0], None, Effort { iterations: 0, tolerance: 0.0, rounds: 1 }).unwrap();
+        let fit = chamber.fit(&assumed, &free, &[0], None, Effort::NONE).unwrap();
         let point = chamber.model_point(fit.assumed.clone(), fit.numbers.clone(), &[0], &fit.courses).unwrap();
         let base = vec![chamber.innovations(&point, 0).unwrap()];
         let found = chamber.derivatives(&point, &fit.parameters, &fit.coordinates, &[0], &base).unwrap();

@@ -24,6 +24,29 @@ pub(crate) enum Place {
     },
 }
 
+impl Place {
+    /// The effect or the input that it is of, by a name that is the same in every assumption; None: a quantity.
+    pub(super) fn owner(self, assumed: &Assumption) -> Option<String> {
+        match self {
+            Self::Quantity { .. } => None,
+            Self::Effect { effect, .. } => {
+                let effect = &assumed.model.effects[effect];
+                Some(format!("{} {:?} {:?}", effect.kind(), effect.choices(), effect.layer()))
+            }
+            Self::Input { input } => Some(assumed.inputs[input].name.clone()),
+        }
+    }
+
+    /// Whether both say the same of their owners.
+    pub(super) fn is_same_of_owner(self, other: Self) -> bool {
+        match (self, other) {
+            (Self::Effect { parameter, .. }, Self::Effect { parameter: of_other, .. }) => parameter == of_other,
+            (Self::Input { .. }, Self::Input { .. }) => true,
+            _ => self == other,
+        }
+    }
+}
+
 /// Which effect's parameters a fit moves, and how firmly what the model states holds them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Free {
@@ -257,10 +280,11 @@ pub(super) fn write(
 #[cfg(test)]
 mod tests {
     use super::super::dense::tests::model;
-    use super::super::{Chamber, Effort};
+    use super::super::{Chamber, Effort, Fit};
     use super::*;
     use crate::effect::find;
     use crate::pattern::classic::Classic;
+    use crate::rate::CoilModel;
     use crate::record::Record;
 
     #[test]
@@ -280,13 +304,39 @@ mod tests {
         let model = model(Vec::new());
         let chamber = Chamber::new(&model, &[&record, &record]).unwrap();
         let assumed = Assumption::new(model.clone(), Classic::Qua.pattern(8).unwrap());
-        // Where a fit ends that takes no step is where it began.
-        let still = Effort { iterations: 0, ..Effort::SHORT };
-        let mut day = chamber.fit(&assumed, &[], &[1], None, still).unwrap();
+        let mut day = chamber.fit(&assumed, &[], &[1], None, Effort::NONE).unwrap();
         day.numbers[1].set(Quantity::Film, 71.0);
         assert!(day.number(Quantity::Film, 0) < 50.0);
-        let again = chamber.fit(&assumed, &[], &[1], Some(&day), still).unwrap();
+        let again = chamber.fit(&assumed, &[], &[1], Some(&day), Effort::NONE).unwrap();
         assert!((again.number(Quantity::Film, 1) / 71.0 - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn derivatives_of_an_effect_serve_no_other_that_has_its_place_since() {
+        let times_s: Vec<f64> = (1..=40).map(|i| 10.0 * f64::from(i)).collect();
+        let warming_k: Vec<f64> = (0..40).map(|i| 293.0 + 0.1 * f64::from(i)).collect();
+        let rates = (0..40).map(|i| 1e-7 * f64::from(i * i).sin()).collect();
+        let record = Record::new("day", times_s, warming_k, rates).unwrap();
+        let model = model(Vec::new());
+        let chamber = Chamber::new(&model, &[&record]).unwrap();
+        let with = |effects: &[DeclaredEffect]| {
+            let model = CoilModel { effects: effects.to_vec(), ..model.clone() };
+            let free = (0..effects.len()).map(|effect| Free { effect, parameter: 0, stated: None, deviation: None });
+            (Assumption::new(model, Classic::Qua.pattern(8).unwrap()), free.collect::<Vec<_>>())
+        };
+        let declared =
+            |kind: &str, values: &[f64]| DeclaredEffect::new(find(kind).unwrap(), values.to_vec(), vec![]).unwrap();
+        let [first, second] = [declared("strain_mismatch", &[0.001]), declared("bias_temperature", &[1e-9, 0.0])];
+        let (both, free) = with(&[first, second.clone()]);
+        let both = chamber.fit(&both, &free, &[0], None, Effort::NONE).unwrap();
+        let (alone, free) = with(&[second]);
+        let errors = |from: Option<&Fit>| {
+            let fit = chamber.fit(&alone, &free, &[0], from, Effort::NONE).unwrap();
+            let of_effect = fit.parameters.iter().position(|p| matches!(p.place, Place::Effect { .. }));
+            fit.standard_errors[of_effect.unwrap()]
+        };
+        let (carried, fresh) = (errors(Some(&both)), errors(None));
+        assert!((carried / fresh - 1.0).abs() < 0.05, "{carried} {fresh}");
     }
 
     #[test]

@@ -330,7 +330,7 @@ impl<'a> Chamber<'a> {
         free: &[super::Free],
         records: &[usize],
     ) -> Result<Fit, ChamberError> {
-        let mut base = self.fit(assumed, free, records, None, Effort { iterations: 0, tolerance: 0.0, rounds: 1 })?;
+        let mut base = self.fit(assumed, free, records, None, Effort::NONE)?;
         base.courses = vec![None; self.records()];
         let begin_at = |starts: Vec<Fit>| {
             let fit = |start: Fit| self.fit(assumed, free, records, Some(&start), Effort::QUICK);

@@ -38,7 +38,7 @@ fn day(model: &CoilModel, swing_k: f64, seed: u64) -> Record {
 }
 
 /// The same without the thermometer at the bore.
-fn bare_day(model: &CoilModel, swing_k: f64, seed: u64) -> Record {
+pub(in crate::diagnose) fn bare_day(model: &CoilModel, swing_k: f64, seed: u64) -> Record {
     let day = day(model, swing_k, seed);
     let columns = [day.times_s(), day.temperature_k(), day.rate_rad_per_s()].map(<[f64]>::to_vec);
     let [times_s, temperature_k, rates] = columns;

@@ -3,18 +3,23 @@
 use rayon::prelude::*;
 
 use super::cache::{Cache, keep};
-use super::explanation::{Begin, fitted, with, without};
+use super::explanation::{fitted, in_order, with, without};
 use super::screen::proposals;
-use super::tries::choose;
+use super::tries::{TRIED, choose};
 use super::{Explanation, Member, Question, Winding};
 use crate::chamber::Effort;
 
-/// The set before its last member, beginning with the chamber that was found with it.
-pub(super) fn refit_without_last(question: &Question, windings: &[Winding], next: &Explanation) -> Option<Explanation> {
-    let place = next.members.len().checked_sub(1)?;
-    let mut members = next.members.clone();
+/// A set without one of its members, beginning with the chamber that was found with it.
+pub(super) fn rest(
+    question: &Question,
+    windings: &[Winding],
+    from: &Explanation,
+    place: usize,
+    effort: Effort,
+) -> Option<Explanation> {
+    let mut members = from.members.clone();
     members.remove(place);
-    fitted(question, windings, members, &without(question, next, place), &next.fit, Effort::QUICK)
+    fitted(question, windings, members, &without(question, from, place), &from.fit, effort)
 }
 
 /// The rest of a set, fitted again without one member.
@@ -45,12 +50,10 @@ pub(super) fn look_back(
         let smaller: Vec<Explanation> = (0..best.members.len())
             .into_par_iter()
             .filter_map(|place| {
-                let mut members = best.members.clone();
-                members.remove(place);
-                let mut key = members.clone();
+                let mut key = best.members.clone();
+                key.remove(place);
                 key.sort_unstable();
-                let again =
-                    fitted(question, windings, members, &without(question, &best, place), &best.fit, Effort::QUICK);
+                let again = rest(question, windings, &best, place, Effort::QUICK);
                 again.into_iter().chain(cache.get(&key).cloned()).max_by(|a, b| a.merit.total_cmp(&b.merit))
             })
             .collect();
@@ -66,53 +69,122 @@ pub(super) fn look_back(
 
 /// The best set once more with the parameters that have defaults, and with each member exchanged for what promises most.
 pub(super) fn complete(question: &Question, windings: &[Winding], best: &Explanation, cache: &mut Cache) {
-    let mut begins: Vec<(Vec<Member>, Begin)> = Vec::new();
-    for (place, member) in best.members.iter().enumerate() {
-        let Member::Effect(own) = member else { continue };
-        let rest = without(question, best, place);
-        let mut rest_fit = best.fit.clone();
-        (rest_fit.assumed, rest_fit.free) = (rest.0.clone(), rest.1.clone());
-        for (other, candidate) in question.candidates.iter().enumerate() {
-            let own_candidate = &question.candidates[*own];
-            if candidate.is_fuller_than(own_candidate) || candidate.is_next_to(own_candidate) {
-                let values = if candidate.is_of_layer() {
-                    None
-                } else {
-                    best.effects(question).iter().find(|e| e.0 == *own).map(|e| e.1.values().to_vec())
-                };
-                let mut members = best.members.clone();
-                members.remove(place);
-                members.push(Member::Effect(other));
-                if let Some(begin) = with(question, windings, &rest_fit, Member::Effect(other), values) {
-                    begins.push((members, begin));
-                }
-            }
-        }
-        if best.members.len() > 1 {
-            let mut members = best.members.clone();
-            members.remove(place);
-            let Ok(rest_fit) = question.chamber.fit(&rest.0, &rest.1, &question.fitted, Some(&best.fit), Effort::FULL)
-            else {
-                continue;
-            };
-            let rest = Explanation::new(question, windings, members.clone(), rest_fit);
-            let Ok(proposals) = proposals(question, &rest) else { continue };
-            for proposal in choose(proposals) {
-                let mut members = members.clone();
-                members.push(proposal.member);
-                let mut key = members.clone();
-                key.sort_unstable();
-                if !cache.contains_key(&key)
-                    && let Some(begin) = with(question, windings, &rest.fit, proposal.member, proposal.values)
-                {
-                    begins.push((members, begin));
-                }
-            }
-        }
-    }
-    let found: Vec<Explanation> = begins
-        .into_par_iter()
-        .filter_map(|(members, begin)| fitted(question, windings, members, &begin, &best.fit, Effort::QUICK))
-        .collect();
+    let places = 0..best.members.len();
+    let found = places.into_par_iter().flat_map(|place| with_others(question, windings, best, place, cache));
+    let found: Vec<Explanation> = found.collect();
     found.into_iter().for_each(|explanation| keep(cache, explanation));
+}
+
+/// A set with others in the place of an effect, fitted.
+fn with_others(
+    question: &Question,
+    windings: &[Winding],
+    best: &Explanation,
+    place: usize,
+    known: &Cache,
+) -> Vec<Explanation> {
+    let Member::Effect(own) = best.members[place] else { return Vec::new() };
+    let mut short = next_of_kin(question, windings, best, place, own);
+    if best.members.len() > 1 {
+        // Where the rest stays as it is, what is like the member promises as much; where it is fitted by itself, what moves it too.
+        let rests = [Effort::NONE, Effort::QUICK].into_par_iter();
+        let rests = rests.filter_map(|effort| rest(question, windings, best, place, effort));
+        let rests: Vec<Explanation> = rests.collect();
+        let alone = rests.iter().map(|rest| rest.merit).fold(f64::NEG_INFINITY, f64::max);
+        let beside = rests.par_iter().flat_map(|rest| beside_rest(question, windings, rest, known));
+        short.extend(beside.filter(|other| other.merit > alone).collect::<Vec<_>>());
+    }
+    let mut foremost = Cache::new();
+    short.into_iter().for_each(|explanation| keep(&mut foremost, explanation));
+    let mut foremost: Vec<Explanation> = foremost.into_values().collect();
+    foremost.sort_by(in_order);
+    foremost.truncate(TRIED);
+    let further = foremost.into_par_iter().filter_map(|short| {
+        fitted(question, windings, short.members.clone(), &short.begin(), &short.fit, Effort::QUICK)
+    });
+    further.collect()
+}
+
+/// What differs from an effect by free parameters, or by one layer, in its place, after a short fit.
+fn next_of_kin(
+    question: &Question,
+    windings: &[Winding],
+    best: &Explanation,
+    place: usize,
+    own: usize,
+) -> Vec<Explanation> {
+    let mut rest = best.fit.clone();
+    (rest.assumed, rest.free) = without(question, best, place);
+    let (own, values) = (&question.candidates[own], best.effects(question).into_iter().find(|e| e.0 == own));
+    let values = values.map(|e| e.1.values().to_vec());
+    let kin = question.candidates.par_iter().enumerate().filter(|(_, c)| c.is_fuller_than(own) || c.is_next_to(own));
+    let short = kin.filter_map(|(other, candidate)| {
+        let member = Member::Effect(other);
+        let values = values.clone().filter(|_| !candidate.is_of_layer());
+        let begin = with(question, windings, &rest, member, values)?;
+        let mut members = best.members.clone();
+        members.remove(place);
+        members.push(member);
+        fitted(question, windings, members, &begin, &best.fit, Effort::SHORT)
+    });
+    short.collect()
+}
+
+/// What promises most beside a rest, and no fit is known of, after a short fit.
+fn beside_rest(question: &Question, windings: &[Winding], rest: &Explanation, known: &Cache) -> Vec<Explanation> {
+    let chosen = choose(proposals(question, rest).unwrap_or_default());
+    let fits = chosen.into_par_iter().filter_map(|p| {
+        let mut members = rest.members.clone();
+        members.push(p.member);
+        let mut key = members.clone();
+        key.sort_unstable();
+        if known.contains_key(&key) {
+            return None;
+        }
+        let begin = with(question, windings, &rest.fit, p.member, p.values)?;
+        fitted(question, windings, members, &begin, &rest.fit, Effort::SHORT)
+    });
+    fits.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chamber::{Assumption, Chamber};
+    use crate::diagnose::candidate::candidates;
+    use crate::diagnose::experiment::fixtures::{effect, model, pattern};
+    use crate::diagnose::tests::bare_day;
+
+    #[test]
+    fn in_its_place_a_member_promises_what_it_is_worth_and_beside_a_rest_that_makes_up_for_it_less() {
+        let hidden = [effect("midpoint_offset", &[0.1]), effect("glass_transition", &[-0.0013, 302.8, 4.6])];
+        let record = bare_day(&model(hidden.to_vec()), 20.0, 3);
+        let (declared, pattern) = (model(Vec::new()), pattern());
+        let assumed = Assumption::new(declared.clone(), pattern.clone());
+        let (chamber, null) = Chamber::new(&declared, &[&record]).unwrap().with_shocks(&assumed, &[0]).unwrap();
+        let candidates = candidates(&declared, &[&record]);
+        let question = Question {
+            chamber: &chamber,
+            model: &declared,
+            pattern: &pattern,
+            candidates: &candidates,
+            fitted: vec![0],
+            held_out: Vec::new(),
+            depth: 2,
+        };
+        let place = |kind: &str| Member::Effect(candidates.iter().position(|c| c.kind() == kind).unwrap());
+        let [own, other] = ["midpoint_offset", "glass_transition"].map(place);
+        let one = with(&question, &[], &null, own, Some(hidden[0].values().to_vec())).unwrap();
+        let one = fitted(&question, &[], vec![own], &one, &null, Effort::SHORT).unwrap();
+        let both = with(&question, &[], &one.fit, other, Some(hidden[1].values().to_vec())).unwrap();
+        let best = fitted(&question, &[], vec![own, other], &both, &null, Effort::FULL).unwrap();
+        let promised = |effort| {
+            let rest = rest(&question, &[], &best, 0, effort).unwrap();
+            let of_own = proposals(&question, &rest).unwrap().into_iter().filter(|p| p.member == own);
+            (rest.merit, of_own.map(|p| p.gain).fold(0.0, f64::max))
+        };
+        let (in_place, (alone, beside)) = (promised(Effort::NONE).1, promised(Effort::QUICK));
+        let worth = best.merit - alone;
+        assert!(in_place > 0.8 * worth && beside < 0.5 * worth, "{in_place} {beside} {worth}");
+    }
 }

@@ -29,7 +29,7 @@ pub(super) fn carried(question: &Question, windings: &[Winding], cache: Cache) -
         e.members.is_empty() || kept <= TRIED
     });
     let there = all.into_par_iter().filter_map(|e| {
-        let begin = (e.fit.assumed.clone(), e.fit.free.clone());
+        let begin = e.begin();
         fitted(question, windings, e.members, &begin, &e.fit, Effort::QUICK)
     });
     there.map(|e| (e.key(), e)).collect()

@@ -73,6 +73,11 @@ impl Explanation {
         explanation
     }
 
+    /// Where it ended, to begin there.
+    pub(super) fn begin(&self) -> Begin {
+        (self.fit.assumed.clone(), self.fit.free.clone())
+    }
+
     pub(super) fn has_winding(&self) -> bool {
         self.members.iter().any(|m| matches!(m, Member::Winding(_)))
     }

@@ -1,6 +1,6 @@
 //! Forward and back from a set: score test, fits of what promises most, the best as long as it is better, and what it does without.
 
-use super::back::{complete, look_back, refit_without_last};
+use super::back::{complete, look_back, rest};
 use super::cache::{Cache, carried, keep};
 use super::odds::{CERTAIN, WINDING};
 use super::own_air::{InOwnAir, best_by_own_kinks};
@@ -8,7 +8,7 @@ use super::screen::{foremost, looked_at};
 use super::tries::{calmed, discrete, tried};
 use super::winding::{promise_beside, promising};
 use super::{Explanation, Outcome, Question, Winding};
-use crate::chamber::Chamber;
+use crate::chamber::{Chamber, Effort};
 
 /// An effect that gains so much may stand for another winding: what that costs beforehand, whichever it is, and what makes it certain.
 const MAY_BE_WOUND: f64 = CERTAIN.log - WINDING.log;
@@ -104,9 +104,9 @@ impl<'a> Search<'a> {
         let next = calmed(&here, &self.windings, next);
         keep(&mut self.cache, next.clone());
         // What was fitted with the larger set may be a better chamber for the smaller one.
-        if let Some(again) = refit_without_last(&here, &self.windings, &next) {
-            keep(&mut self.cache, again);
-        }
+        let last = next.members.len().checked_sub(1);
+        let again = last.and_then(|last| rest(&here, &self.windings, &next, last, Effort::QUICK));
+        again.into_iter().for_each(|again| keep(&mut self.cache, again));
         if next.merit < self.base() + WORTH_A_STEP {
             return false;
         }

@@ -3,7 +3,8 @@
 use rayon::prelude::*;
 
 use super::adjust::adjust;
-use super::explanation::{fitted, without};
+use super::back::rest;
+use super::explanation::fitted;
 use super::odds::{CERTAIN, WINDOW};
 use super::parsimony::give_to_smaller;
 use super::readings::take_off;
@@ -49,11 +50,7 @@ pub(super) fn judge(
         .flat_map(|e| (0..e.members.len()).map(move |place| (e, place)))
         .collect::<Vec<_>>()
         .into_par_iter()
-        .filter_map(|(large, place)| {
-            let mut members = large.members.clone();
-            members.remove(place);
-            fitted(question, windings, members, &without(question, large, place), &large.fit, Effort::QUICK)
-        })
+        .filter_map(|(large, place)| rest(question, windings, large, place, Effort::QUICK))
         .collect();
     for small in again {
         match explanations.iter_mut().find(|e| e.key() == small.key()) {
@@ -71,7 +68,7 @@ pub(super) fn judge(
     });
     let judged = |e: &mut Explanation| {
         // What was only ranked is fitted in full before it is judged.
-        let begin = (e.fit.assumed.clone(), e.fit.free.clone());
+        let begin = e.begin();
         if care == Care::InFull
             && !e.fit.is_full()
             && let Some(again) = fitted(question, windings, e.members.clone(), &begin, &e.fit, Effort::FULL)

@@ -114,7 +114,7 @@ fn preferred(judged: &[Explanation], best: &Explanation) -> Vec<Explanation> {
 pub(crate) fn again(question: &Question, found: Found) -> Outcome<Found> {
     let Found { explanations, promised, left, mut windings, .. } = found;
     let there = explanations.into_par_iter().filter_map(|e| {
-        let begin = (e.fit.assumed.clone(), e.fit.free.clone());
+        let begin = e.begin();
         fitted(question, &windings, e.members, &begin, &e.fit, Effort::FULL)
     });
     let mut cache: Cache = there.map(|e| (e.key(), e)).collect();

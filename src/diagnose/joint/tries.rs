@@ -158,15 +158,14 @@ fn from_the_best(
         fitted(question, windings, members, begin, from, Effort::SHORT)
     });
     let best = short.max_by(|a, b| a.merit.total_cmp(&b.merit))?;
-    let begin = (best.fit.assumed.clone(), best.fit.free.clone());
-    fitted(question, windings, members.to_vec(), &begin, &best.fit, Effort::QUICK)
+    fitted(question, windings, members.to_vec(), &best.begin(), &best.fit, Effort::QUICK)
 }
 
 /// A set once more from a gyro that does not wander: with less missing there may be a better maximum there.
 pub(super) fn calmed(question: &Question, windings: &[Winding], known: Explanation) -> Explanation {
     let mut start = known.fit.clone();
     start.calm(&question.fitted);
-    let begin = (known.fit.assumed.clone(), known.fit.free.clone());
+    let begin = known.begin();
     let further = [&known.fit, &start]
         .into_par_iter()
         .filter_map(|from| fitted(question, windings, known.members.clone(), &begin, from, Effort::FULL));
