@@ -287,6 +287,14 @@ mod tests {
     use crate::rate::CoilModel;
     use crate::record::Record;
 
+    /// Forty rows of 10 s that warm by 0.6 K a minute, with a rate that is noise.
+    fn warming() -> Record {
+        let times_s: Vec<f64> = (1..=40).map(|i| 10.0 * f64::from(i)).collect();
+        let temperature_k = (0..40).map(|i| 293.0 + 0.1 * f64::from(i)).collect();
+        let rates = (0..40).map(|i| 1e-7 * f64::from(i * i).sin()).collect();
+        Record::new("warming", times_s, temperature_k, rates).unwrap()
+    }
+
     #[test]
     fn what_a_model_states_is_the_prior_whatever_a_fit_has_made_of_it() {
         let fitted = DeclaredEffect::new(find("surface_film").unwrap(), vec![17.4], vec![]).unwrap();
@@ -297,10 +305,7 @@ mod tests {
 
     #[test]
     fn a_fit_to_one_record_begins_with_that_records_film() {
-        let times_s: Vec<f64> = (1..=40).map(|i| 10.0 * f64::from(i)).collect();
-        let warming_k: Vec<f64> = (0..40).map(|i| 293.0 + 0.1 * f64::from(i)).collect();
-        let rates = (0..40).map(|i| 1e-7 * f64::from(i * i).sin()).collect();
-        let record = Record::new("day", times_s, warming_k, rates).unwrap();
+        let record = warming();
         let model = model(Vec::new());
         let chamber = Chamber::new(&model, &[&record, &record]).unwrap();
         let assumed = Assumption::new(model.clone(), Classic::Qua.pattern(8).unwrap());
@@ -313,10 +318,7 @@ mod tests {
 
     #[test]
     fn derivatives_of_an_effect_serve_no_other_that_has_its_place_since() {
-        let times_s: Vec<f64> = (1..=40).map(|i| 10.0 * f64::from(i)).collect();
-        let warming_k: Vec<f64> = (0..40).map(|i| 293.0 + 0.1 * f64::from(i)).collect();
-        let rates = (0..40).map(|i| 1e-7 * f64::from(i * i).sin()).collect();
-        let record = Record::new("day", times_s, warming_k, rates).unwrap();
+        let record = warming();
         let model = model(Vec::new());
         let chamber = Chamber::new(&model, &[&record]).unwrap();
         let with = |effects: &[DeclaredEffect]| {
@@ -341,10 +343,7 @@ mod tests {
 
     #[test]
     fn a_drift_is_half_the_noise_or_more_and_a_time_of_it_is_no_multiple_of_the_noise() {
-        let times_s: Vec<f64> = (1..=40).map(|i| 10.0 * f64::from(i)).collect();
-        let rates = (0..40).map(|i| 1e-7 * f64::from(i * i).sin()).collect();
-        let warming_k = (0..40).map(|i| 293.0 + 0.1 * f64::from(i)).collect();
-        let record = Record::new("noise", times_s, warming_k, rates).unwrap();
+        let record = warming();
         let model = model(Vec::new());
         let chamber = Chamber::new(&model, &[&record]).unwrap();
         let medians = Numbers::medians(&chamber.observed[0].series);

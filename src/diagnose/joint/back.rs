@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::cache::{Cache, keep};
-use super::explanation::{fitted, in_order, with, without};
+use super::explanation::{fitted, in_order, key, with, without};
 use super::screen::proposals;
 use super::tries::{TRIED, choose};
 use super::{Explanation, Member, Question, Winding};
@@ -50,11 +50,10 @@ pub(super) fn look_back(
         let smaller: Vec<Explanation> = (0..best.members.len())
             .into_par_iter()
             .filter_map(|place| {
-                let mut key = best.members.clone();
-                key.remove(place);
-                key.sort_unstable();
+                let mut members = best.members.clone();
+                members.remove(place);
                 let again = rest(question, windings, &best, place, Effort::QUICK);
-                again.into_iter().chain(cache.get(&key).cloned()).max_by(|a, b| a.merit.total_cmp(&b.merit))
+                again.into_iter().chain(cache.get(&key(members)).cloned()).max_by(|a, b| a.merit.total_cmp(&b.merit))
             })
             .collect();
         smaller.iter().for_each(|s| keep(cache, s.clone()));
@@ -136,9 +135,7 @@ fn beside_rest(question: &Question, windings: &[Winding], rest: &Explanation, kn
     let fits = chosen.into_par_iter().filter_map(|p| {
         let mut members = rest.members.clone();
         members.push(p.member);
-        let mut key = members.clone();
-        key.sort_unstable();
-        if known.contains_key(&key) {
+        if known.contains_key(&key(members.clone())) {
             return None;
         }
         let begin = with(question, windings, &rest.fit, p.member, p.values)?;

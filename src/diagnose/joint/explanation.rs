@@ -84,9 +84,7 @@ impl Explanation {
 
     /// The members in an order of their own.
     pub(crate) fn key(&self) -> Vec<Member> {
-        let mut key = self.members.clone();
-        key.sort_unstable();
-        key
+        key(self.members.clone())
     }
 
     pub(crate) fn total(&self) -> f64 {
@@ -235,6 +233,12 @@ fn step(question: &Question, record: usize, row: usize) -> Input {
         deviation: 10.0 * chamber.noise_floor_rad_per_s(record),
         follows: Vec::new(),
     }
+}
+
+/// Members in an order of their own, whichever they joined in.
+pub(super) fn key(mut members: Vec<Member>) -> Vec<Member> {
+    members.sort_unstable();
+    members
 }
 
 /// Best first.
