@@ -102,7 +102,43 @@ impl Chamber<'_> {
         let (worth, series, numbers) = best;
         let bends = series.rows.iter().any(|row| row.bend > 0.0);
         let controlled = if bends { self.controlled(fit, r, worth)? } else { None };
-        Ok(controlled.unwrap_or((series, numbers)))
+        match controlled {
+            Some(controlled) => Ok(controlled),
+            None if series.approaches => self.delayed(fit, r, series, numbers),
+            None => Ok((series, numbers)),
+        }
+    }
+
+    /// A record in air that approaches set points, with a delay if that is worth more. What a delay does within a row or two is seen with
+    /// kinks at their times only.
+    fn delayed(
+        &self,
+        fit: &Fit,
+        r: usize,
+        series: Series,
+        numbers: Numbers,
+    ) -> Result<(Series, Numbers), ChamberError> {
+        let mut at_once = self.clone();
+        at_once.observed[r].series = series;
+        let mut delayed = at_once.clone();
+        delayed.observed[r].series.delays = true;
+        let timed = |chamber: &Self| {
+            let mut chamber = chamber.clone();
+            let mut there = fit.clone();
+            there.numbers[r] = numbers;
+            there = chamber.fit(&fit.assumed, &[], &[r], Some(&there), Effort::QUICK)?;
+            chamber.time_kinks(&there, r)?;
+            let there = chamber.fit(&fit.assumed, &[], &[r], Some(&there), Effort::QUICK)?;
+            Ok::<_, ChamberError>((there.posterior(), there.numbers[r]))
+        };
+        let (own, other) = rayon::join(|| timed(&at_once), || timed(&delayed));
+        let ((own, _), (other, found)) = (own?, other?);
+        // One number more, which might have been anything.
+        let price = 0.5 * (delayed.observed[r].series.times_s.len() as f64).ln();
+        if other > own + price {
+            return Ok((delayed.observed.swap_remove(r).series, found));
+        }
+        Ok((at_once.observed.swap_remove(r).series, numbers))
     }
 
     /// A record in the air of a controlled chamber, if that is worth more.

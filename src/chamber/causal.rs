@@ -152,7 +152,7 @@ impl Causal {
             .into_iter()
             .for_each(|q| numbers.set(q, 1.0));
         // Which set point a stream's air approaches nobody knows.
-        let (f, noise, _) = dynamics(&parts, &layout, &numbers, f64::INFINITY, 1.0);
+        let (f, noise, _) = dynamics(&parts, &layout, &numbers, 1.0);
         let drive = drive(&layout, &reduced, 1.0);
         let (all, n) = (layout.size, layout.own());
         let level = |row: &[f64]| row[..n].to_vec();

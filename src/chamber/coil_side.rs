@@ -359,6 +359,9 @@ pub(super) fn quantities(assumed: &Assumption, observed: &Observed) -> Result<Ve
     }
     if observed.series.approaches {
         all.push(Quantity::ApproachTime);
+        if observed.series.delays {
+            all.push(Quantity::OnsetTime);
+        }
     }
     if !observed.series.film_switches_s.is_empty() {
         all.push(Quantity::FilmRatio);

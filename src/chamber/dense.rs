@@ -209,15 +209,17 @@ pub(super) mod tests {
         }
     }
 
-    /// In air that bends by itself, and in air that follows a set point.
+    /// In air that bends by itself, in air that follows a set point, and in air that approaches one, at once or with a delay.
     fn check_on(assumed: &Assumption, record: &Record, averaged: bool) {
-        check_in(assumed, record, averaged, false);
-        check_in(assumed, record, averaged, true);
+        check_in(assumed, record, averaged, |_| {});
+        check_in(assumed, record, averaged, |series| series.controlled = true);
+        check_in(assumed, record, averaged, |series| series.approaches = true);
+        check_in(assumed, record, averaged, |series| (series.approaches, series.delays) = (true, true));
     }
 
-    fn check_in(assumed: &Assumption, record: &Record, averaged: bool, controlled: bool) {
+    fn check_in(assumed: &Assumption, record: &Record, averaged: bool, air: impl Fn(&mut Series)) {
         let (mut series, mean_k) = observed(&assumed.model, record);
-        series.controlled = controlled;
+        air(&mut series);
         series.rows[9].kink = 1e-6;
         let between = 0.7 * series.times_s[14] + 0.3 * series.times_s[13];
         let series = series.with_kinks(&[Bend { time_s: between, slope_change_k_per_s: 2e-3 }]);

@@ -11,6 +11,8 @@ use rayon::prelude::*;
 use super::ascent::Effort;
 use super::filter::{self, Move};
 use super::fit::Fit;
+use super::layout::Numbers;
+use super::prior::Quantity;
 use super::series::{SHORT_ROW_S, Series, TimeStep};
 use super::system::decoupled_system;
 use super::{Assumption, Chamber, ChamberError};
@@ -30,6 +32,8 @@ const STRIDES_ROWS: [[f64; 2]; 2] = [[0.5, 0.15], [0.15, 0.05]];
 /// while any kink moves by this share of a row.
 const MOST_TURNS: usize = 4;
 const MOVED_ROWS: f64 = 0.02;
+/// Strides in the logarithm of the time of an onset.
+const ONSET_STRIDES: [f64; 2] = [0.4, 0.15];
 /// A share of a step that counts as none.
 const NO_SHARE: f64 = 1e-3;
 
@@ -113,15 +117,16 @@ impl Chamber<'_> {
         }
         let mut base = self.observed[record].series.clone();
         base.straighten();
-        let numbers = self.numbers_for(fit, record);
+        let mut numbers = self.numbers_for(fit, record);
         let (side, values) = self.side_and_values(fit, record, &numbers)?;
-        let likelihood = |kinks: &[Bend]| {
+        let likelihood_by = |numbers: &Numbers, kinks: &[Bend]| {
             let series = base.with_kinks(kinks);
-            let system = decoupled_system(&side.parts(&fit.assumed), &numbers, &series);
+            let system = decoupled_system(&side.parts(&fit.assumed), numbers, &series);
             filter::forward(&system, &series.rows, &values, false).log_likelihood
         };
         let row_s = base.shortest_s();
         for strides in strides_rows {
+            let likelihood = |kinks: &[Bend]| likelihood_by(&numbers, kinks);
             let (others, here) = (kinks.clone(), likelihood(&kinks));
             kinks.par_iter_mut().enumerate().for_each(|(place, kink)| {
                 let at = |time_s: f64| {
@@ -134,6 +139,9 @@ impl Chamber<'_> {
             // What another kink nearby does as well is none.
             while let Some(place) = worthless(&kinks, &likelihood, (base.times_s.len() as f64).ln()) {
                 kinks.remove(place);
+            }
+            if base.delays {
+                set_in(&mut kinks, &mut numbers, likelihood_by);
             }
             self.observed[record].series = base.with_kinks(&kinks);
             let slopes = self.slopes(fit, record)?;
@@ -182,6 +190,28 @@ impl Chamber<'_> {
         }
         bends
     }
+}
+
+/// Gives kinks and the time in which the air takes on each one's slope what is likeliest of both: a kink that is seen sooner and sets in more
+/// slowly differs little from one that does neither.
+fn set_in(kinks: &mut [Bend], numbers: &mut Numbers, likelihood: impl Fn(&Numbers, &[Bend]) -> f64) {
+    let onset = Quantity::OnsetTime;
+    let (prior, before_s) = (onset.prior(), numbers.get(onset));
+    let with = |log_s: f64| -> (Numbers, Vec<Bend>) {
+        let mut other = *numbers;
+        other.set(onset, log_s.exp());
+        let sooner = |kink: &Bend| Bend { time_s: kink.time_s - (log_s.exp() - before_s), ..*kink };
+        (other, kinks.iter().map(sooner).collect())
+    };
+    let at = |log_s: f64| {
+        let (numbers, kinks) = with(log_s);
+        likelihood(&numbers, &kinks) - 0.5 * ((log_s - prior.median.ln()) / prior.deviation).powi(2)
+    };
+    let start = before_s.ln();
+    let best = highest(at, start, at(start), &ONSET_STRIDES);
+    let (found, sooner) = with(best);
+    kinks.copy_from_slice(&sooner);
+    *numbers = found;
 }
 
 /// The kink that changes in some rows add up to: their centre and their sum.

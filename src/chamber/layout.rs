@@ -67,6 +67,10 @@ pub(super) struct Layout {
     pub(crate) trend: usize,
     /// Where the air follows a set point: the slope's own rate, and next the set point's slope.
     pub(super) control: Option<usize>,
+    /// Whether the air approaches a set point, its slope dying away.
+    pub(super) approaches: bool,
+    /// Where it does so with a delay: the slope that the stage asks for, which the air's takes on.
+    pub(super) onset: Option<usize>,
     pub(crate) turbulence: usize,
     pub(crate) ripple: usize,
     /// What drives the ripple.
@@ -92,12 +96,16 @@ pub(super) struct RecordKind {
     pub(super) averaged: bool,
     /// Its air takes time to take on another slope.
     pub(super) controlled: bool,
+    /// … or that slope dies away, at once or taken on with a delay.
+    pub(super) approaches: bool,
+    pub(super) delays: bool,
 }
 
 impl Layout {
     pub(crate) fn new(parts: &Parts, series: &Series) -> Self {
-        let (overlaps, averaged, controlled) = (series.overlaps, series.averaged > 1, series.controlled);
-        Self::with(parts, &RecordKind { overlaps, averaged, controlled })
+        let (overlaps, averaged) = (series.overlaps, series.averaged > 1);
+        let (controlled, approaches, delays) = (series.controlled, series.approaches, series.delays);
+        Self::with(parts, &RecordKind { overlaps, averaged, controlled, approaches, delays })
     }
 
     pub(crate) fn with(parts: &Parts, record: &RecordKind) -> Self {
@@ -111,6 +119,7 @@ impl Layout {
         let skin = parts.skin_s.map(|_| take(1));
         let trend = take(2);
         let control = record.controlled.then(|| take(2));
+        let onset = (record.approaches && record.delays).then(|| take(1));
         let (turbulence, ripple, driver) = (take(1), take(2), take(2));
         let lag = (parts.lag_s > 0.0).then(|| take(1));
         let wander = take(1);
@@ -125,6 +134,8 @@ impl Layout {
             skin,
             trend,
             control,
+            approaches: record.approaches,
+            onset,
             turbulence,
             ripple,
             driver,
@@ -137,6 +148,11 @@ impl Layout {
             reading,
             size,
         }
+    }
+
+    /// The slope that kinks change: the air's own, or what it takes on.
+    pub(super) fn kinked_slope(&self) -> usize {
+        self.onset.unwrap_or(self.trend + 1)
     }
 
     /// How many states come before the gyro's own.

@@ -46,6 +46,7 @@ impl Chamber<'_> {
     pub(crate) fn adopt(&mut self, stretch: &Chamber, found: &Fit) -> Result<Fit, ChamberError> {
         let mut fit = found.of_record(found.records[0]);
         self.observed[0].series.approaches = stretch.observed[0].series.approaches;
+        self.observed[0].series.delays = stretch.observed[0].series.delays;
         self.observed[0].series.controlled = stretch.observed[0].series.controlled;
         let smooth = |chamber: &Self, fit: &mut Fit| {
             let (assumed, numbers) = (fit.assumed.clone(), fit.numbers.clone());

@@ -41,6 +41,8 @@ pub(crate) enum Quantity {
     ControlDamping,
     /// Time in which the air of a stage approaches its set point, its slope dying away \[s\]; only where the air does.
     ApproachTime,
+    /// Time in which the air of a stage takes on the slope that a step asks for \[s\]; only where it does so with a delay.
+    OnsetTime,
     /// The film while it is switched over the usual one; only where it is.
     FilmRatio,
 }
@@ -61,7 +63,7 @@ pub(crate) struct Prior {
 }
 
 /// Every prior of the chamber.
-pub(crate) const PRIORS: [Prior; 23] = [
+pub(crate) const PRIORS: [Prior; 24] = [
     line(Quantity::Film, 25.0, 0.8, "free to moderately forced convection in a chamber: 8 … 80 W/(m²K)"),
     line(Quantity::ReadingNoise, 0.005, 1.0, "platinum sensors and their bridges read to a few millikelvin"),
     line(Quantity::InnerNoise, 0.005, 1.0, "as the sensor"),
@@ -120,6 +122,10 @@ pub(crate) const PRIORS: [Prior; 23] = [
         ..line(Quantity::ControlDamping, 0.7, 0.4, "controllers are tuned to overshoot a little")
     },
     line(Quantity::ApproachTime, 90.0, 0.8, "thermoelectric stages settle within half a minute to several minutes"),
+    Prior {
+        least: 0.5,
+        ..line(Quantity::OnsetTime, 4.0, 1.0, "plates between a thermoelectric element and the air, seconds")
+    },
     line(Quantity::FilmRatio, 1.0, 0.7, "a fan makes twice or thrice of still air's film, or stops doing so"),
 ];
 
@@ -157,12 +163,13 @@ impl Quantity {
             Self::ControlTime => "control_s",
             Self::ControlDamping => "control_damping",
             Self::ApproachTime => "approach_s",
+            Self::OnsetTime => "approach_onset_s",
             Self::FilmRatio => "switched_film_over_usual",
         }
     }
 
     /// What the air of one day is.
-    pub(super) const AIR: [Self; 12] = [
+    pub(super) const AIR: [Self; 13] = [
         Self::RestNoise,
         Self::BendNoise,
         Self::TurbulenceSize,
@@ -174,6 +181,7 @@ impl Quantity {
         Self::ControlTime,
         Self::ControlDamping,
         Self::ApproachTime,
+        Self::OnsetTime,
         Self::FilmRatio,
     ];
 
@@ -191,7 +199,10 @@ impl Quantity {
     /// what all records share is learned by itself.
     pub(crate) fn is_learned(self) -> bool {
         !self.is_shared()
-            && !matches!(self, Self::ControlTime | Self::ControlDamping | Self::ApproachTime | Self::FilmRatio)
+            && !matches!(
+                self,
+                Self::ControlTime | Self::ControlDamping | Self::ApproachTime | Self::OnsetTime | Self::FilmRatio
+            )
     }
 
     /// Whether it is one number for all records.

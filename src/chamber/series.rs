@@ -38,6 +38,8 @@ pub(super) struct Series {
     pub(super) controlled: bool,
     /// Whether its air approaches a set point, as that of a stage does behind a step: its slope dies away.
     pub(super) approaches: bool,
+    /// … and takes on the slope that a step asks for with a delay.
+    pub(super) delays: bool,
     /// When the film between air and pack changes to another one and back, ascending [s].
     pub(super) film_switches_s: Vec<f64>,
     /// Values in one row.
@@ -115,7 +117,6 @@ impl Series {
         for error in &gross {
             columns[if error.column == "rate" { RATE } else { 0 }][error.row] = f64::NAN;
         }
-        let spikes = gross.len();
         let times_s = record.times_s();
         let interval_s = record.interval_s();
         let duration_s = times_s[times_s.len() - 1] - times_s[0];
@@ -149,10 +150,11 @@ impl Series {
             steps: Vec::new(),
             shapes: Vec::new(),
             spans: blocks.iter().map(|b| b.span).collect(),
-            spikes,
+            spikes: gross.len(),
             kinks: 0,
             controlled: false,
             approaches: false,
+            delays: false,
             film_switches_s: Vec::new(),
             averaged,
             resolution_k,
@@ -193,11 +195,6 @@ impl Series {
         self.values[measurement][row] = f64::NAN;
         self.rows[row].measured[measurement] = None;
         self.spikes += 1;
-    }
-
-    /// The time in which its air approaches set points \[s\]; infinite where it does not.
-    pub(super) fn approach_s(&self, where_it_does_s: f64) -> f64 {
-        if self.approaches { where_it_does_s } else { f64::INFINITY }
     }
 
     /// Values as another series of the same rows has them: what it leaves out, and what a coarse sensor's readings say by it.

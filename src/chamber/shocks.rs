@@ -402,15 +402,17 @@ mod tests {
     use crate::numeric::piecewise::PiecewiseLinear;
     use crate::pattern::classic::Classic;
 
-    /// Air that approaches each of its set points with a time, from instants that are no rows'; in straight lines of two seconds.
-    fn staged(approach_s: f64) -> PiecewiseLinear {
+    /// Air that approaches each of its set points with a time, from instants that are no rows', and takes another one to begin with; in
+    /// straight lines of two seconds.
+    fn staged(approach_s: f64, onset_s: f64) -> PiecewiseLinear {
         let steps = [(904.3, 311.0), (1707.7, 302.0), (2612.9, 318.0), (3571.4, 289.0), (4703.6, 296.0)];
         let times_s: Vec<f64> = (0..=3000).map(|i| 2.0 * f64::from(i)).collect();
         let air = |t: f64| {
             let mut before = 293.0;
             let mut air = 293.0;
             for (at_s, aim) in steps.into_iter().filter(|(at_s, _)| *at_s < t) {
-                air += (aim - before) * (1.0 - (-(t - at_s) / approach_s).exp());
+                let left = |lag_s: f64| lag_s * (-(t - at_s) / lag_s.max(1e-9)).exp();
+                air += (aim - before) * (1.0 - (left(approach_s) - left(onset_s)) / (approach_s - onset_s));
                 before = aim;
             }
             air
@@ -424,29 +426,34 @@ mod tests {
     fn a_stages_air_is_told_by_the_time_of_its_approach_and_nothing_in_it_is_a_gross_error() {
         let (bare, pattern) = (model(Vec::new()), Classic::Zyl.pattern(8).unwrap());
         let declared = Assumption::new(bare.clone(), pattern.clone());
-        for approach_s in [40.0, 220.0] {
-            let record = in_air(&bare, &pattern, &staged(approach_s));
+        for (approach_s, onset_s) in [(40.0, 0.0), (220.0, 0.0), (60.0, 8.0)] {
+            let record = in_air(&bare, &pattern, &staged(approach_s, onset_s));
             let (_, fit) = Chamber::new(&bare, &[&record]).unwrap().with_shocks(&declared, &[0]).unwrap();
             // Looked through again by numbers of air whose kinks are known, a chamber that does not know them leaves nothing out.
             let chamber = Chamber::new(&bare, &[&record]).unwrap().with_timed_shocks_by(fit, &[0]).unwrap();
             let fit = chamber.fit_anew(&declared, &[], &[0]).unwrap();
             let series = &chamber.observed[0].series;
             let (found_s, film) = (fit.number(Quantity::ApproachTime, 0), fit.number(Quantity::Film, 0));
+            let found_onset_s = if series.delays { fit.number(Quantity::OnsetTime, 0) } else { 0.0 };
             println!(
-                "{approach_s} s: {found_s:.1} s, film {film:.2}, {} kinks, {} left out",
+                "{approach_s} s behind {onset_s} s: {found_s:.1} s behind {found_onset_s:.2} s, film {film:.2}, {} kinks, {} left out",
                 series.kinks, series.spikes
             );
             assert!(series.approaches);
+            assert!(series.delays || onset_s == 0.0);
             assert_eq!(series.spikes, 0);
             // An approach as long as the pack takes to follow may as well be the pack's: no worse than where the truth leads.
             let mut truth = fit.clone();
             truth.numbers[0].set(Quantity::ApproachTime, approach_s);
+            truth.numbers[0].set(Quantity::OnsetTime, onset_s.max(1.0));
             truth.numbers[0].set(Quantity::Film, 25.0);
             let truth = chamber.fit(&declared, &[], &[0], Some(&truth), Effort::FULL).unwrap();
             let less = truth.posterior() - fit.posterior();
             assert!(less < 0.5, "{less}");
             if approach_s < 100.0 {
-                assert!((found_s / approach_s - 1.0).abs() < 0.03, "{found_s}");
+                // Both times together are told better than either, and lines of two seconds set in with a delay of their own.
+                let together = (found_s + found_onset_s) / (approach_s + onset_s);
+                assert!((together - 1.0).abs() < 0.06, "{found_s} and {found_onset_s}");
                 assert!((film / 25.0 - 1.0).abs() < 0.03, "{film}");
             }
         }

@@ -35,6 +35,7 @@ pub(super) fn start(
     let mut ramp = vec![0.0; n];
     ramp[layout.trend + 1] = 1.0;
     layout.control.into_iter().for_each(|i| ramp[i + 1] = 1.0);
+    layout.onset.into_iter().for_each(|i| ramp[i] = 1.0);
     let skin_s = parts.skin_s.unwrap_or(0.0);
     parts.reduced.decay_per_s.iter().enumerate().for_each(|(i, l)| ramp[i] = -1.0 / l - skin_s);
     layout.skin.into_iter().for_each(|i| ramp[i] = -skin_s);
@@ -55,6 +56,7 @@ pub(super) fn start(
         one(i, slope / numbers.get(Quantity::ControlTime));
         one(i + 1, slope);
     }
+    layout.onset.into_iter().for_each(|i| one(i, slope));
     (0..layout.modes).for_each(|i| one(i, START_APART_MODES * apart));
     one(layout.turbulence, numbers.get(Quantity::TurbulenceSize));
     one(layout.wander, numbers.get(Quantity::WanderShare) * numbers.get(Quantity::RateNoise));

@@ -4,6 +4,7 @@
 //! dx_i = λ_i (a − x_i) dt                     modes of the pack behind the film; a = u + f + o, the air
 //! du = s dt,   ds = √q dW                     trend; q between the noise at rest and that where readings bend
 //! ds = −s/τ_a dt + √q dW                      … of a stage, which approaches its set point
+//! ds = (r − s)/τ_o dt,   dr = −r/τ_a dt + √q dW                 … of one that begins to do so with a delay
 //! ds = b dt,   db = (ω²(v − s) − 2 ζ ω b) dt,   dv = √q dW      … of a controlled chamber, whose air follows a set point
 //! df = −f/τ_f dt + σ_f √(2/τ_f) dW            turbulence
 //! d(o, p) = R (o, p) dt + γ (d, e) dt,   d(d, e) = R (d, e) dt + 2 σ_o √γ dW,   R = (−γ, ω; −ω, −γ)        ripple
@@ -17,7 +18,7 @@
 //! |---|---|---|
 //! | x_i, λ_i, c | modes, their decays and the rate per kelvin a second of each | K, 1/s, rad |
 //! | τ, W, b | sensor's lag, the rate's window, offset | s, s, rad/s |
-//! | τ_a | time in which the air of a stage approaches its set point | s |
+//! | τ_a, τ_o, r | time in which the air of a stage approaches its set point, and that in which its slope becomes what the step asks for | s, s, K/s |
 //! | v, ω, ζ | slope of a controlled chamber's set point; angular frequency and damping ratio of what follows it | K/s, 1/s, |
 //!
 //! The ripple's size and phase are what a compressor makes of its load, and as smooth: driven by noise itself the oscillator
@@ -76,9 +77,9 @@ struct Behind {
 }
 
 impl Behind {
-    fn new(parts: &Parts, layout: &Layout, numbers: &Numbers, approach_s: f64, film_ratio: f64) -> Self {
+    fn new(parts: &Parts, layout: &Layout, numbers: &Numbers, film_ratio: f64) -> Self {
         let drive = drive(layout, parts.reduced, film_ratio);
-        let (dynamics, noise, trend_noise) = dynamics(parts, layout, numbers, approach_s, film_ratio);
+        let (dynamics, noise, trend_noise) = dynamics(parts, layout, numbers, film_ratio);
         let (response, places) = (response(parts, layout, &drive), places(parts, layout, &drive));
         Self { dynamics, noises: [diagonal(&noise), diagonal(&trend_noise)], response, places }
     }
@@ -113,9 +114,8 @@ enum Coordinates {
 fn in_coordinates(parts: &Parts, numbers: &Numbers, series: &Series, coordinates: Coordinates) -> System {
     let layout = Layout::new(parts, series);
     let n = layout.size;
-    let approach_s = series.approach_s(numbers.get(Quantity::ApproachTime));
     let behind = series.films().iter().map(|film| numbers.film_ratio(*film));
-    let mut behind: Vec<Behind> = behind.map(|ratio| Behind::new(parts, &layout, numbers, approach_s, ratio)).collect();
+    let mut behind: Vec<Behind> = behind.map(|ratio| Behind::new(parts, &layout, numbers, ratio)).collect();
     let (mut mean, mut covariance) = start(parts, &layout, &behind[0].dynamics, numbers, series);
     if coordinates == Coordinates::Decoupled {
         let decoupling = Decoupling::new(&behind[0].dynamics, &layout);
@@ -157,7 +157,7 @@ fn in_coordinates(parts: &Parts, numbers: &Numbers, series: &Series, coordinates
         size: n,
         steps,
         trend: (numbers.get(Quantity::RestNoise), numbers.get(Quantity::BendNoise)),
-        slope: layout.trend + 1,
+        slope: layout.kinked_slope(),
         rows: Sparse::new(&rows, n),
         variances: [
             square(Quantity::ReadingNoise),
@@ -250,7 +250,6 @@ pub(super) fn dynamics(
     parts: &Parts,
     layout: &Layout,
     numbers: &Numbers,
-    approach_s: f64,
     film_ratio: f64,
 ) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let n = layout.size;
@@ -266,8 +265,7 @@ pub(super) fn dynamics(
         f[skin * n + skin] = -decay_per_s;
         layout.air().into_iter().for_each(|j| f[skin * n + j] = decay_per_s);
     }
-    f[layout.trend * n + layout.trend + 1] = 1.0;
-    f[(layout.trend + 1) * n + layout.trend + 1] = -1.0 / approach_s;
+    let trend = trend(layout, numbers, &mut f);
     let mut relax = |i: usize, size: f64, time_s: f64| {
         f[i * n + i] = -1.0 / time_s;
         g[i] = 2.0 * size * size / time_s;
@@ -298,19 +296,35 @@ pub(super) fn dynamics(
         }
         f[lag * n + lag] -= 1.0 / parts.lag_s;
     }
+    (f, g, trend)
+}
+
+/// The air's level and slope in F, and what drives them per unit of the density of the trend's noise.
+fn trend(layout: &Layout, numbers: &Numbers, f: &mut [f64]) -> Vec<f64> {
+    let n = layout.size;
+    f[layout.trend * n + layout.trend + 1] = 1.0;
+    if layout.approaches {
+        let dying = layout.kinked_slope();
+        f[dying * n + dying] = -1.0 / numbers.get(Quantity::ApproachTime);
+    }
+    if let Some(onset) = layout.onset {
+        let (slope, rate_per_s) = (layout.trend + 1, 1.0 / numbers.get(Quantity::OnsetTime));
+        f[slope * n + slope] = -rate_per_s;
+        f[slope * n + onset] = rate_per_s;
+    }
     let mut trend = vec![0.0; n];
     match layout.control {
         Some(control) => {
-            let (slope, frequency_per_s) = (layout.trend + 1, 1.0 / get(Quantity::ControlTime));
+            let (slope, frequency_per_s) = (layout.trend + 1, 1.0 / numbers.get(Quantity::ControlTime));
             f[slope * n + control] = 1.0;
-            f[control * n + control] = -2.0 * get(Quantity::ControlDamping) * frequency_per_s;
+            f[control * n + control] = -2.0 * numbers.get(Quantity::ControlDamping) * frequency_per_s;
             f[control * n + slope] = -frequency_per_s * frequency_per_s;
             f[control * n + control + 1] = frequency_per_s * frequency_per_s;
             trend[control + 1] = 1.0;
         }
-        None => trend[layout.trend + 1] = 1.0,
+        None => trend[layout.kinked_slope()] = 1.0,
     }
-    (f, g, trend)
+    trend
 }
 
 fn rotate(f: &mut [f64], n: usize, place: usize, period_s: f64) {
