@@ -1,9 +1,9 @@
-"""Draws trial cases under laboratory conditions: `python laboratory_cases.py DIR KIND SEED [COUNT]`, KIND one of lab, other, beyond, fan.
+"""Draws trial cases under laboratory conditions: `python laboratory_cases.py DIR KIND SEED [COUNT]`, KIND one of lab, other, beyond, fan, controls.
 
 One folder a case: coil.toml, calibration.csv, validation.csv, test.csv (a third record of another kind); truth.json and README.md
 beside them. `lab`: listed effects, alone and together, and controls, in chambers of several kinds with coarse sensors, gaps, spikes
 and flicker. `other`: outdoor days, thermoelectric stages, starts in a ramp, wrong declared numbers, other windings, reversed coils,
-offset steps, random walk, slow and irregular rows, a fan that is switched. `beyond`: effects that no catalogue lists. `fan`: more of the fan.
+offset steps, random walk, slow and irregular rows, a fan that is switched. `beyond`: effects that no catalogue lists. `fan`: more of the fan. `controls`: nothing is hidden, in every kind of chamber.
 """
 import json, os, sys, tomllib
 import numpy as np
@@ -196,6 +196,20 @@ def other(rng):
     return out
 
 
+def controls(rng):
+    """Nothing is hidden: half of them in closed chambers, half where a chamber, a logger or a gyro does otherwise."""
+    sixty = lambda: dict(step_s=60.0, rate_mean_s=60.0, resolution_k=float(rng.choice([0.01, 0.0625, 0.1])), noise_k=0.01)
+    out = []
+    for i in range(200):
+        columns = [c for c in ("supply_v", "laser_ma") if rng.random() < 0.3]
+        chamber = str(rng.choice(["controlled"] * 3 + ["thermostat"])) if i % 2 else str(rng.choice(["stage", "stage", "mid_ramp", "outdoors", "controlled"]))
+        logger = sixty() if chamber == "outdoors" else drawn_logger(rng)
+        if i % 10 == 8:
+            logger |= dict(jitter=float(rng.choice([0.2, 0.45])))
+        out.append(with_effects(rng, f"control-{i:03d}", chamber, [], columns=columns, logger=logger, gyro=drawn_gyro(rng, logger, flicker=0.5 if i % 4 == 3 else None)))
+    return out
+
+
 def fan(rng):
     """A fan is switched, and the film with it: sensors on the pack, sensors in the air behind a film that the model declares."""
     out = []
@@ -321,7 +335,7 @@ def write(root, kind, seed, cases):
 def main():
     root, kind, seed = sys.argv[1], sys.argv[2], int(sys.argv[3])
     rng = np.random.default_rng(seed)
-    cases = dict(lab=lab, other=other, beyond=beyond, fan=fan)[kind](rng)
+    cases = dict(lab=lab, other=other, beyond=beyond, fan=fan, controls=controls)[kind](rng)
     write(root, kind, seed, cases[:int(sys.argv[4])] if len(sys.argv) > 4 else cases)
 
 
