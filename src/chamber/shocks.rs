@@ -451,6 +451,7 @@ mod tests {
             let less = truth.posterior() - fit.posterior();
             assert!(less < 0.5, "{less}");
             if approach_s < 100.0 {
+                assert!(onset_s > 0.0 || (found_s / approach_s - 1.0).abs() < 0.03, "{found_s}");
                 // Both times together are told better than either, and lines of two seconds set in with a delay of their own.
                 let together = (found_s + found_onset_s) / (approach_s + onset_s);
                 assert!((together - 1.0).abs() < 0.06, "{found_s} and {found_onset_s}");
