@@ -3,11 +3,13 @@
 //! What makes the worst rate small makes the guaranteed worst rate small as well, but an annealer that begins anew
 //! under each objective ends in another valley each time. So every search first asks, briefly, for what all objectives
 //! find, with the look-ahead of the proof where the class has one, and judges it by its own. These short searches have a
-//! seed of their own, the same for every command and seed, so that what one of them comes upon no other misses.
+//! seed of their own, the same for every command and seed, so that what one of them comes upon no other misses. In classes of
+//! permutations a search's end, bounds and stretches of the fibre from the best that is known, is a draw from very many minima: it
+//! too is made in common, and again only by a search that has come upon something better.
 
 use super::anneal::rounds::{FoundPattern, Plan, Rounds, Rules};
 use super::cost::objective::Objective;
-use super::evaluator::{EQUALLY_GOOD, Evaluator, FEWEST_LAYERS, JudgeError, name_of};
+use super::evaluator::{EQUALLY_GOOD, Evaluator, FEWEST_LAYERS, JudgeError, Judged, name_of};
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 
@@ -27,6 +29,9 @@ const MOVES_OVER_BUILT_COILS: u64 = 1 << 16;
 
 /// Patterns of a short search that are shared.
 const SHARED: usize = 8;
+
+/// Captive runs up to which classes are searched one by one.
+pub(crate) const MOST_CAPTIVE: u8 = 2;
 
 /// Patterns from which a search is refined at its end.
 const REFINED: usize = 4;
@@ -60,24 +65,73 @@ impl<'a> Evaluator<'a> {
         for objective in SEARCHED.into_iter().filter(|o| has_bound || *o != Objective::GuaranteedRate) {
             shared.extend(self.under(objective).short(class, plan, goes_on)?);
         }
-        let is_wider = !matches!(class, WindabilityClass::Standard | WindabilityClass::Captive(0 | 1));
-        if is_wider {
-            // With one captive run the least is often found sooner than with any, and it is one of any.
-            let own = Some(self.objective)
-                .filter(|o| !matches!(o, Objective::WorstRate | Objective::P95 | Objective::WorstPhase));
+        let narrower = narrower_than(class);
+        // With few captive runs the least is often found sooner than with any, and it is one of any.
+        let own = Some(self.objective)
+            .filter(|o| !matches!(o, Objective::WorstRate | Objective::P95 | Objective::WorstPhase));
+        for &class in &narrower {
             for objective in [Some(Objective::WorstRate), own].into_iter().flatten() {
-                shared.extend(self.under(objective).short(WindabilityClass::Captive(1), plan, goes_on)?);
+                shared.extend(self.under(objective).short(class, plan, goes_on)?);
             }
         }
         if self.objective == Objective::P95 {
-            let narrower = is_wider.then_some(WindabilityClass::Captive(1));
-            for class in narrower.into_iter().chain([class]) {
+            for &class in narrower.first().into_iter().chain([&class]) {
                 shared.extend(self.over_built_coils(class, plan, &shared, goes_on)?);
             }
+        }
+        if goes_on() {
+            shared.extend(self.improved_of(class, &shared)?);
         }
         let mut seen = std::collections::BTreeSet::new();
         shared.retain(|pattern| seen.insert(pattern.segments().to_vec()));
         Ok(shared)
+    }
+
+    /// What bounds make of the best of given patterns under the objective of the search itself.
+    fn improved_of(&self, class: WindabilityClass, patterns: &[Pattern]) -> Result<Option<Pattern>, JudgeError> {
+        if self.goal().is_none() {
+            return Ok(None);
+        }
+        let mut judged = self.judge_all_of(class, patterns)?;
+        judged.sort_by(|a, b| a.objective_rad_per_s.total_cmp(&b.objective_rad_per_s));
+        let found = |judged: &Judged| FoundPattern {
+            cost: judged.objective_rad_per_s,
+            segments: judged.pattern.segments().to_vec(),
+        };
+        let found: Vec<FoundPattern> = judged.iter().map(found).collect();
+        let Some(best) = judged.into_iter().next() else { return Ok(None) };
+        Ok(Some(self.improved(class, best, &found, None)?.0.pattern))
+    }
+
+    /// Those of the class, by the reference.
+    fn judge_all_of(&self, class: WindabilityClass, patterns: &[Pattern]) -> Result<Vec<Judged>, JudgeError> {
+        let admitted = patterns.iter().filter(|pattern| class.admits(pattern));
+        let named: Vec<(String, Pattern)> = admitted.map(|pattern| (name_of(pattern), pattern.clone())).collect();
+        self.judge_all(&named)
+    }
+
+    /// What bounds make of the best that was found. What all searches have in common has been improved for all of them: if each
+    /// went on from it in a way of its own, each would end on the least of other patterns.
+    ///
+    /// # Errors
+    /// As [`Evaluator::improved`].
+    pub(crate) fn improved_beyond(
+        &self,
+        shared: &[Pattern],
+        class: WindabilityClass,
+        best: Judged,
+        found: &[FoundPattern],
+        good_enough_rad_per_s: Option<f64>,
+    ) -> Result<Judged, JudgeError> {
+        if self.goal().is_none() {
+            return Ok(best);
+        }
+        let common = self.judge_all_of(class, shared)?;
+        let least_common = common.iter().map(|judged| judged.objective_rad_per_s).fold(f64::INFINITY, f64::min);
+        if least_common <= best.objective_rad_per_s * (1.0 + EQUALLY_GOOD) {
+            return Ok(best);
+        }
+        Ok(self.improved(class, best, found, good_enough_rad_per_s)?.0)
     }
 
     /// What a search by P95 that is the same for every seed finds, and what descents from there come to.
@@ -116,9 +170,7 @@ impl<'a> Evaluator<'a> {
             return Ok(Vec::new());
         }
         let shared = self.companions(class, &Plan::usual(layers, COMMON_SEED), goes_on)?;
-        let admitted = shared.into_iter().filter(|pattern| class.admits(pattern));
-        let named: Vec<(String, Pattern)> = admitted.map(|pattern| (name_of(&pattern), pattern)).collect();
-        let mut judged = self.judge_all(&named)?;
+        let mut judged = self.judge_all_of(class, &shared)?;
         judged.sort_by(|a, b| a.objective_rad_per_s.total_cmp(&b.objective_rad_per_s));
         Ok(judged.into_iter().take(BEGUN_WITH).map(|judged| judged.pattern).collect())
     }
@@ -221,6 +273,17 @@ impl<'a> Evaluator<'a> {
         let admitted = patterns.iter().filter(|pattern| class.admits(pattern));
         admitted.map(|pattern| search.judged(pattern.segments())).collect()
     }
+}
+
+/// The classes within a class of permutations that are searched besides, the narrowest first: those that a front shows on their
+/// own ([`MOST_CAPTIVE`]).
+fn narrower_than(class: WindabilityClass) -> Vec<WindabilityClass> {
+    let most = match class {
+        WindabilityClass::Standard => 0,
+        WindabilityClass::Captive(runs) => runs.saturating_sub(1).min(MOST_CAPTIVE.into()),
+        WindabilityClass::Any => MOST_CAPTIVE.into(),
+    };
+    (1..=most).map(WindabilityClass::Captive).collect()
 }
 
 /// Best first, no two alike.

@@ -73,7 +73,7 @@ pub fn run(request: &Request, observer: &mut dyn Observer) -> Result<Option<Answ
     let is_unhurried = matches!(ended, Ended::Rule(_)) && !is_good_enough(&best);
     let best = match concluded {
         Some(concluded) => concluded,
-        None if is_unhurried => evaluator.improved(class, best, &found, target)?.0,
+        None if is_unhurried => evaluator.improved_beyond(&shared, class, best, &found, target)?,
         None => best,
     };
     let found_by = found_by(&best, &annealed, &baselines, search.state(), &shared);

@@ -13,6 +13,7 @@ use crate::search::anneal::quantile::QuantileCost;
 use crate::search::anneal::rounds::{
     DEFAULT_RESTARTS_PER_ROUND, FoundPattern, Optimisation, Plan, Rounds, Rules, default_moves_per_restart,
 };
+use crate::search::companions::MOST_CAPTIVE;
 use crate::search::compile::Whose;
 use crate::search::cost::guaranteed::UnitStep;
 use crate::search::cost::objective::Objective;
@@ -25,7 +26,7 @@ use crate::search::pareto::{ParetoPoint, front, is_knee};
 use super::{Observer, TaskError};
 
 /// The most captive reels that are tried one by one, and rounds of restarts a class.
-pub(crate) const DEFAULT_MOST_CAPTIVE: u8 = 2;
+pub(crate) const DEFAULT_MOST_CAPTIVE: u8 = MOST_CAPTIVE;
 pub(crate) const DEFAULT_ROUNDS: u64 = 3;
 
 /// What is to be weighed.
@@ -207,7 +208,7 @@ fn candidates(
     let mut patterns = patterns(&search.state().found);
     let found = evaluator.gathered(search.as_ref(), class, &shared, false, &|| true);
     if let Some(best) = evaluator.best(class, &found, &[])? {
-        patterns.push(evaluator.improved(class, best, &found, None)?.0.pattern);
+        patterns.push(evaluator.improved_beyond(&shared, class, best, &found, None)?.pattern);
     }
     patterns.extend(shared);
     Ok(observer.goes_on().then_some(patterns))
