@@ -127,23 +127,6 @@ fn under_every_objective_the_answer_is_the_best_of_all_permutations_and_of_those
 }
 
 #[test]
-#[ignore = "long: --include-ignored"]
-fn seeds_end_on_the_same_pattern_in_a_class_whose_minima_are_many() {
-    let (profiles, tolerance) = (spec(1), spread());
-    let model = model(14, LayerLength::Actual, &["surface_film"]);
-    for objective in [Objective::WorstRate, Objective::Pointing] {
-        let found = [1, 2, 3].map(|seed| {
-            let request = request(&model, &profiles, &tolerance, objective);
-            let plan = Plan { seed, ..request.plan.clone() };
-            let request = Request { class: WindabilityClass::Any, plan, recommend: false, ..request };
-            run(&request, &mut Unobserved).unwrap().unwrap().best.objective_rad_per_s
-        });
-        let (least, most) = found.iter().fold((f64::INFINITY, 0.0_f64), |(l, m), &f| (l.min(f), m.max(f)));
-        assert!(most <= least * 1.01, "{objective:?}: {found:?}");
-    }
-}
-
-#[test]
 fn with_cutting_planes_what_was_sampled_says_what_is_guaranteed_and_is_as_small_as_a_search_for_that_finds() {
     let (profiles, tolerance) = (spec(1), spread());
     let model = model(8, LayerLength::Actual, &["surface_film"]);
