@@ -194,7 +194,7 @@ impl<'a> Evaluator<'a> {
         self.short_with(moves, class, plan, goes_on)
     }
 
-    /// The same by any objective, and by the search's own also with longer restarts.
+    /// The same by any objective, and by the search's own, where that is a largest rate, also with longer restarts.
     fn found_in_common(
         &self,
         objective: Objective,
@@ -207,7 +207,10 @@ impl<'a> Evaluator<'a> {
         let usual = under.short_moves_per_restart(self.model.coil.layers());
         // Whoever asks for fewer moves has fewer.
         let is_unlimited = plan.moves_per_restart >= usual;
-        if objective == self.objective && class != WindabilityClass::Standard && is_unlimited {
+        // By rms and pointing error many moves at once do what longer restarts would.
+        let is_of_largest_rate = matches!(objective, Objective::WorstRate | Objective::GuaranteedRate);
+        let is_own = objective == self.objective && class != WindabilityClass::Standard;
+        if is_own && is_of_largest_rate && is_unlimited {
             found.extend(under.short_with(LONGER * usual, class, plan, goes_on)?);
         }
         Ok(found)
