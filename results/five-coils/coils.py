@@ -40,6 +40,8 @@ C = {
  'f28': dict(name='f28', d=165, n=28, m=72, di=95, p=170, ax=172, ll='actual', k=0.38, c=1.8e6, loc='outer_layer', effects='', seg=6, dur=4500),
  'c48': dict(name='c48', d=135, n=48, m=70, di=110, p=137, ax=140, ll='actual', k=0.35, c=1.7e6, loc='ambient', effects=film(300), seg=5, dur=4000),
 }
+C['g18'] = dict(name='g18', pattern='sym', d=165, n=18, m=75, di=85, p=169, ax=171, ll='actual', k=0.31, c=1.85e6, loc='ambient', effects=film(60), seg=5, dur=4500)
+C['g22'] = dict(name='g22', pattern='sym', d=200, n=22, m=50, di=70, p=205, ax=207, ll='actual', k=0.36, c=1.8e6, loc='ambient', effects=film(18), seg=4, dur=6000)
 def model(name, seed, out, **kw):
     t = BASE.format(**{'pattern': 'qua', **C[name], **kw}).replace('SEED', str(seed))
     open(out, 'w').write(t)
