@@ -100,8 +100,7 @@ impl<'a> Evaluator<'a> {
         if self.goal().is_none() {
             return Ok(None);
         }
-        let mut judged = self.judge_all_of(class, patterns)?;
-        judged.sort_by(|a, b| a.objective_rad_per_s.total_cmp(&b.objective_rad_per_s));
+        let judged = self.of_class_in_order(class, patterns)?;
         let found = |judged: &Judged| FoundPattern {
             cost: judged.objective_rad_per_s,
             segments: judged.pattern.segments().to_vec(),
@@ -111,11 +110,13 @@ impl<'a> Evaluator<'a> {
         Ok(Some(self.improved(class, best, &found, None)?.0.pattern))
     }
 
-    /// Those of the class, by the reference.
-    fn judge_all_of(&self, class: WindabilityClass, patterns: &[Pattern]) -> Result<Vec<Judged>, JudgeError> {
+    /// Those of the class as the reference judges them, best first.
+    fn of_class_in_order(&self, class: WindabilityClass, patterns: &[Pattern]) -> Result<Vec<Judged>, JudgeError> {
         let admitted = patterns.iter().filter(|pattern| class.admits(pattern));
         let named: Vec<(String, Pattern)> = admitted.map(|pattern| (name_of(pattern), pattern.clone())).collect();
-        self.judge_all(&named)
+        let mut judged = self.judge_all(&named)?;
+        judged.sort_by(|a, b| a.objective_rad_per_s.total_cmp(&b.objective_rad_per_s));
+        Ok(judged)
     }
 
     /// What bounds make of the best that was found. What all searches have in common has been improved for all of them: if each
@@ -134,9 +135,10 @@ impl<'a> Evaluator<'a> {
         if self.goal().is_none() {
             return Ok(best);
         }
-        let common = self.judge_all_of(class, shared)?;
-        let least_common = common.iter().map(|judged| judged.objective_rad_per_s).fold(f64::INFINITY, f64::min);
-        if least_common <= best.objective_rad_per_s * (1.0 + EQUALLY_GOOD) {
+        let common = self.of_class_in_order(class, shared)?;
+        let is_as_good =
+            |common: &Judged| common.objective_rad_per_s <= best.objective_rad_per_s * (1.0 + EQUALLY_GOOD);
+        if common.first().is_some_and(is_as_good) {
             return Ok(best);
         }
         Ok(self.improved(class, best, found, good_enough_rad_per_s)?.0)
@@ -178,8 +180,7 @@ impl<'a> Evaluator<'a> {
             return Ok(Vec::new());
         }
         let shared = self.companions(class, &Plan::usual(layers, COMMON_SEED), goes_on)?;
-        let mut judged = self.judge_all_of(class, &shared)?;
-        judged.sort_by(|a, b| a.objective_rad_per_s.total_cmp(&b.objective_rad_per_s));
+        let judged = self.of_class_in_order(class, &shared)?;
         Ok(judged.into_iter().take(BEGUN_WITH).map(|judged| judged.pattern).collect())
     }
 
