@@ -23,7 +23,7 @@ use crate::thermal::{HeatPath, check};
 /// The coil's side of a model: what does not depend on chamber and noise.
 #[derive(Debug)]
 pub(super) struct CoilSide {
-    path: HeatPath,
+    pub(super) path: HeatPath,
     film_w_per_m2_k: f64,
     modes: usize,
     pub(crate) reduced: Arc<Reduced>,

@@ -79,12 +79,12 @@ impl<'a> Chamber<'a> {
     /// By a fit whose air bends wherever readings do: to one that is straight but for its kinks, what does not know them yet is full of
     /// gross errors.
     fn with_shocks_about(mut self, curved: Fit, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
-        let curved = self.between_steps(curved, records)?;
         let whole = self.observed.iter().map(|o| o.series.clone()).collect::<Vec<_>>();
         let curved = self.without_gross_errors(curved, records)?;
         let own = || -> Result<(Self, Fit), ChamberError> {
             let mut chamber = self.clone();
             let fit = chamber.take_airs(curved.clone(), records, &whole)?;
+            let fit = chamber.between_steps(fit, records)?;
             Ok((chamber, fit))
         };
         let look = |chamber: &mut Self, day: Fit, other: usize| chamber.looked_through(day, &[other]);
@@ -121,10 +121,10 @@ impl<'a> Chamber<'a> {
 
     /// Records without gross errors, each with its air as it is likeliest.
     pub(super) fn looked_through(&mut self, fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
-        let fit = self.between_steps(fit, records)?;
         let whole = self.observed.iter().map(|o| o.series.clone()).collect::<Vec<_>>();
         let curved = self.without_gross_errors(fit, records)?;
-        self.take_airs(curved, records, &whole)
+        let fit = self.take_airs(curved, records, &whole)?;
+        self.between_steps(fit, records)
     }
 
     /// A fit to records without what it says are gross errors.
@@ -250,14 +250,19 @@ impl<'a> Chamber<'a> {
             return Ok(None);
         }
         let (mut chamber, mut fit) = (self.clone(), fit.clone());
-        for &r in &straight {
+        let is_timed = |r: usize| self.observed[r].series.approaches;
+        for &r in straight.iter().filter(|&&r| !is_timed(r)) {
             chamber.observed[r].series.straighten();
         }
         // By numbers that were fitted to others, and by those that were fitted to these.
         for effort in [Effort::SHORT, effort] {
             for &r in &straight {
                 let own = Fit { numbers: self.completed(&fit, &[r]), ..fit.clone() };
-                chamber.pass_for_kinks(&own, r)?;
+                if is_timed(r) {
+                    chamber.observed[r].series.kinks = chamber.time_kinks(&own, r)?.len();
+                } else {
+                    chamber.pass_for_kinks(&own, r)?;
+                }
             }
             fit = chamber.fit(&fit.assumed.clone(), &fit.free.clone(), &fit.records.clone(), Some(&fit), effort)?;
         }
@@ -363,7 +368,7 @@ impl<'a> Chamber<'a> {
         Ok(rippled.filter(|fit| fit.posterior() > still.posterior()).unwrap_or(still))
     }
 
-    /// As [`Chamber::fit`] from several chambers that differ in their ripple; the best goes on.
+    /// As [`Chamber::fit`] from several chambers that differ in their ripple, and in the order of a stage's lag and the pack's; the best goes on.
     ///
     /// # Errors
     /// As [`Chamber::fit`].
@@ -374,7 +379,11 @@ impl<'a> Chamber<'a> {
         records: &[usize],
     ) -> Result<Fit, ChamberError> {
         let best = self.best_start(assumed, free, records)?;
-        self.fit(&best.assumed.clone(), free, records, Some(&best), Effort::FULL)
+        let fit = self.fit(&best.assumed.clone(), free, records, Some(&best), Effort::FULL)?;
+        let Some(&staged) = records.iter().find(|&&r| self.observed[r].series.approaches) else { return Ok(fit) };
+        let Some(other) = self.in_other_order(&fit, &fit, staged)? else { return Ok(fit) };
+        let other = self.fit(&other.assumed.clone(), free, records, Some(&other), Effort::FULL)?;
+        Ok(if other.posterior() > fit.posterior() { other } else { fit })
     }
 }
 
@@ -397,71 +406,9 @@ fn peaks(values: &[f64], reach: usize) -> impl Iterator<Item = usize> {
 #[cfg(test)]
 mod tests {
     use super::super::dense::tests::{effect, model};
-    use super::super::kinks::tests::{KINKS_S, in_air, kinked};
+    use super::super::kinks::tests::{KINKS_S, kinked};
     use super::*;
-    use crate::numeric::piecewise::PiecewiseLinear;
     use crate::pattern::classic::Classic;
-
-    /// Air that approaches each of its set points with a time, from instants that are no rows', and takes another one to begin with; in
-    /// straight lines of two seconds.
-    fn staged(approach_s: f64, onset_s: f64) -> PiecewiseLinear {
-        let steps = [(904.3, 311.0), (1707.7, 302.0), (2612.9, 318.0), (3571.4, 289.0), (4703.6, 296.0)];
-        let times_s: Vec<f64> = (0..=3000).map(|i| 2.0 * f64::from(i)).collect();
-        let air = |t: f64| {
-            let mut before = 293.0;
-            let mut air = 293.0;
-            for (at_s, aim) in steps.into_iter().filter(|(at_s, _)| *at_s < t) {
-                let left = |lag_s: f64| lag_s * (-(t - at_s) / lag_s.max(1e-9)).exp();
-                air += (aim - before) * (1.0 - (left(approach_s) - left(onset_s)) / (approach_s - onset_s));
-                before = aim;
-            }
-            air
-        };
-        let values = times_s.iter().map(|t| air(*t)).collect();
-        PiecewiseLinear::new(times_s, values).unwrap()
-    }
-
-    #[test]
-    #[ignore = "long: --include-ignored"]
-    fn a_stages_air_is_told_by_the_time_of_its_approach_and_nothing_in_it_is_a_gross_error() {
-        let (bare, pattern) = (model(Vec::new()), Classic::Zyl.pattern(8).unwrap());
-        let declared = Assumption::new(bare.clone(), pattern.clone());
-        for (approach_s, onset_s) in [(40.0, 0.0), (220.0, 0.0), (60.0, 8.0)] {
-            let record = in_air(&bare, &pattern, &staged(approach_s, onset_s));
-            let (_, fit) = Chamber::new(&bare, &[&record]).unwrap().with_shocks(&declared, &[0]).unwrap();
-            // Looked through again by numbers of air whose kinks are known, a chamber that does not know them leaves nothing out.
-            let chamber = Chamber::new(&bare, &[&record]).unwrap().with_timed_shocks_by(fit, &[0]).unwrap();
-            let fit = chamber.fit_anew(&declared, &[], &[0]).unwrap();
-            let series = &chamber.observed[0].series;
-            let (found_s, film) = (fit.number(Quantity::ApproachTime, 0), fit.number(Quantity::Film, 0));
-            let found_onset_s = if series.delays { fit.number(Quantity::OnsetTime, 0) } else { 0.0 };
-            println!(
-                "{approach_s} s behind {onset_s} s: {found_s:.1} s behind {found_onset_s:.2} s, film {film:.2}, {} kinks, {} left out",
-                series.kinks, series.spikes
-            );
-            assert!(series.approaches);
-            assert!(series.delays || onset_s == 0.0);
-            assert_eq!(series.spikes, 0);
-            // An approach as long as the pack takes to follow may as well be the pack's: no worse than where the truth leads.
-            let mut truth = fit.clone();
-            truth.numbers[0].set(Quantity::ApproachTime, approach_s);
-            truth.numbers[0].set(Quantity::OnsetTime, onset_s.max(1.0));
-            truth.numbers[0].set(Quantity::Film, 25.0);
-            let truth = chamber.fit(&declared, &[], &[0], Some(&truth), Effort::FULL).unwrap();
-            let less = truth.posterior() - fit.posterior();
-            assert!(less < 0.5, "{less}");
-            if approach_s < 100.0 {
-                assert!(onset_s > 0.0 || (found_s / approach_s - 1.0).abs() < 0.03, "{found_s}");
-                // Both times together are told better than either, and lines of two seconds set in with a delay of their own.
-                let together = (found_s + found_onset_s) / (approach_s + onset_s);
-                assert!((together - 1.0).abs() < 0.06, "{found_s} and {found_onset_s}");
-                assert!((film / 25.0 - 1.0).abs() < 0.03, "{film}");
-            }
-        }
-        let ramps = kinked(&bare, &pattern);
-        let (chamber, _) = Chamber::new(&bare, &[&ramps]).unwrap().with_shocks(&declared, &[0]).unwrap();
-        assert!(!chamber.observed[0].series.approaches);
-    }
 
     #[test]
     fn a_coil_on_a_spool_needs_fewer_kinks_by_its_own_model_than_by_another() {
