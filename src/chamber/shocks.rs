@@ -254,15 +254,14 @@ impl<'a> Chamber<'a> {
         for &r in straight.iter().filter(|&&r| !is_timed(r)) {
             chamber.observed[r].series.straighten();
         }
+        let own = |fit: &Fit, r: usize| Fit { numbers: self.completed(fit, &[r]), ..fit.clone() };
+        for &r in straight.iter().filter(|&&r| is_timed(r)) {
+            chamber.observed[r].series.kinks = chamber.time_kinks(&own(&fit, r), r)?.len();
+        }
         // By numbers that were fitted to others, and by those that were fitted to these.
         for effort in [Effort::SHORT, effort] {
-            for &r in &straight {
-                let own = Fit { numbers: self.completed(&fit, &[r]), ..fit.clone() };
-                if is_timed(r) {
-                    chamber.observed[r].series.kinks = chamber.time_kinks(&own, r)?.len();
-                } else {
-                    chamber.pass_for_kinks(&own, r)?;
-                }
+            for &r in straight.iter().filter(|&&r| !is_timed(r)) {
+                chamber.pass_for_kinks(&own(&fit, r), r)?;
             }
             fit = chamber.fit(&fit.assumed.clone(), &fit.free.clone(), &fit.records.clone(), Some(&fit), effort)?;
         }
