@@ -51,23 +51,18 @@ impl<'a> Chamber<'a> {
 struct Timed<'a> {
     chamber: Chamber<'a>,
     fit: Fit,
-    kinks: usize,
-    /// Of one kink, in log prior.
-    price: f64,
+    /// Log posterior less what its kinks cost, which might have been in any row.
+    worth: f64,
 }
 
 impl Timed<'_> {
-    fn worth(&self) -> f64 {
-        self.fit.posterior() - self.price * self.kinks as f64
-    }
-
     /// Times and numbers once more, from these kinks or from those that readings have by this fit: by numbers of another air they were too many,
     /// or elsewhere.
     fn again(self, r: usize) -> Result<Self, ChamberError> {
         let mut anew = self.chamber.clone();
         anew.place_kinks_anew(&self.fit, r)?;
         let (these, anew) = rayon::join(|| self.chamber.clone().timed(&self.fit, r), || anew.timed(&self.fit, r));
-        let better = |one: Self, other: Self| if other.worth() > one.worth() { other } else { one };
+        let better = |one: Self, other: Self| if other.worth > one.worth { other } else { one };
         Ok(better(better(self, these?), anew?))
     }
 }
@@ -152,12 +147,13 @@ impl<'a> Chamber<'a> {
         };
         let (again, other) = rayon::join(|| usual.again(r), in_other_order);
         let again = again?;
-        let at_once = other?.filter(|other| other.worth() > again.worth()).unwrap_or(again);
+        let at_once = other?.filter(|other| other.worth > again.worth).unwrap_or(again);
         let mut delayed = at_once.chamber.clone();
         delayed.observed[r].series.delays = true;
         let delayed = delayed.timed(&at_once.fit, r)?;
         // One number more, which might have been anything.
-        let is_delayed = delayed.worth() > at_once.worth() + 0.5 * at_once.price;
+        let price = 0.5 * (self.times_s(r).len() as f64).ln();
+        let is_delayed = delayed.worth > at_once.worth + price;
         let Timed { mut chamber, fit: there, .. } = if is_delayed { delayed } else { at_once };
         Ok((chamber.observed.swap_remove(r).series, there.numbers[r]))
     }
@@ -169,7 +165,8 @@ impl<'a> Chamber<'a> {
         series.kinks = kinks;
         let price = (series.times_s.len() as f64).ln();
         let fit = self.fit(&from.assumed, &[], &[r], Some(from), Effort::QUICK)?;
-        Ok(Timed { chamber: self, fit, kinks, price })
+        let worth = fit.posterior() - price * kinks as f64;
+        Ok(Timed { chamber: self, fit, worth })
     }
 
     /// Places the kinks of a record's readings anew, in air that bends as it did.

@@ -250,6 +250,7 @@ impl<'a> Chamber<'a> {
             return Ok(None);
         }
         let (mut chamber, mut fit) = (self.clone(), fit.clone());
+        // A stage's kinks are at their times already (`airs::staged`): they move to those that this fit has them at.
         let is_timed = |r: usize| self.observed[r].series.approaches;
         for &r in straight.iter().filter(|&&r| !is_timed(r)) {
             chamber.observed[r].series.straighten();
