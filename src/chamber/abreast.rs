@@ -217,7 +217,7 @@ impl<'a, A: Arithmetic, const N: usize> AbreastPass<'a, A, N> {
                         self.mean[state] = self.kept.dot(self.arithmetic, kept, &self.mean);
                     }
                 }
-                Move::Kink => {}
+                Move::Kink(_) => {}
             }
         }
     }
@@ -226,7 +226,8 @@ impl<'a, A: Arithmetic, const N: usize> AbreastPass<'a, A, N> {
     #[inline(always)]
     fn predict<const B: usize, const C: usize>(&mut self, row: &Row) {
         if !row.is_kinked_within() {
-            self.kink(row);
+            let slope = self.systems[0].slope;
+            self.covariance[slope][slope].iter_mut().for_each(|own| *own += row.kink);
         }
         for &movement in &row.moves {
             match movement {
@@ -235,16 +236,22 @@ impl<'a, A: Arithmetic, const N: usize> AbreastPass<'a, A, N> {
                     self.step::<B, C>(step);
                 }
                 Move::Keep(slot) => self.keep_window::<B>(slot),
-                Move::Kink => self.kink(row),
+                Move::Kink(place) => self.kink(place, row.kink),
             }
         }
     }
 
     #[inline(always)]
-    fn kink(&mut self, row: &Row) {
-        let slope = self.systems[0].slope;
-        for l in 0..LANES {
-            self.covariance[slope][slope][l] += row.kink;
+    fn kink(&mut self, place: u16, variance: f64) {
+        let n = self.systems[0].size;
+        let change = |i: usize| each(self.systems, |s| s.kinks[place as usize][i]);
+        let changes: [Lanes; N] = std::array::from_fn(|i| if i < n { change(i) } else { [0.0; LANES] });
+        for i in 0..n {
+            for j in 0..n {
+                for l in 0..LANES {
+                    self.covariance[i][j][l] += variance * changes[i][l] * changes[j][l];
+                }
+            }
         }
     }
 

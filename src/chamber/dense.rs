@@ -114,7 +114,10 @@ pub(super) mod tests {
             for movement in &row.moves {
                 match movement {
                     Move::Step(index) => step(*index, &mut map, &mut noise),
-                    Move::Kink => noise[(system.slope, system.slope)] += row.kink,
+                    Move::Kink(place) => {
+                        let change = DVector::from_row_slice(&system.kinks[*place as usize]);
+                        noise += row.kink * &change * change.transpose();
+                    }
                     Move::Keep(slot) => {
                         let mut keep = DMatrix::identity(n, n);
                         for &(state, place) in &system.keeps[*slot as usize] {

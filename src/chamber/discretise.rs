@@ -5,9 +5,8 @@
 //! Φ(2h) = Φ(h)²,   Q(2h) = Q(h) + Φ(h) Q(h) Φ(h)ᵀ,   both by their Taylor series at h = Δ/2^k
 //! ```
 //!
-//! Van Loan's one exponential of a doubled matrix overflows where a mode is stiff; doubling does not. A record whose rows differ,
-//! or whose air has kinks within them, has steps of a hundred lengths, which need not be doubled from nothing: a step is the next shorter
-//! one and a little more.
+//! Van Loan's one exponential of a doubled matrix overflows where a mode is stiff; doubling does not. A record whose rows differ
+//! has steps of a hundred lengths, which need not be doubled from nothing: a step is the next shorter one and a little more.
 //!
 //! ```text
 //! Φ(a + δ) = Φ(δ) Φ(a),   Q(a + δ) = Q(δ) + Φ(δ) Q(a) Φ(δ)ᵀ
@@ -57,6 +56,91 @@ impl Pass for Discretise<'_> {
     fn run(self, arithmetic: impl Arithmetic) -> Self::Output {
         dispatch!(self.n, discretise_of(arithmetic, &self))
     }
+}
+
+/// What a state that changes by one makes of all states so long after: a column of Φ for each of the times, in their order.
+///
+/// # Shapes
+/// `system` row-major n × n \[1/s\]; one entry of the answer a time, of n.
+pub(super) fn changes_after(system: &[f64], n: usize, state: usize, times_s: &[f64]) -> Vec<Vec<f64>> {
+    dispatched(ChangesAfter { system, n, state, times_s })
+}
+
+struct ChangesAfter<'a> {
+    system: &'a [f64],
+    n: usize,
+    state: usize,
+    times_s: &'a [f64],
+}
+
+impl Pass for ChangesAfter<'_> {
+    type Output = Vec<Vec<f64>>;
+
+    #[inline(always)]
+    fn run(self, arithmetic: impl Arithmetic) -> Self::Output {
+        dispatch!(self.n, changes_after_of(arithmetic, &self))
+    }
+}
+
+/// Each by those doubled Φ that its time is made up of, and by the series for what is left.
+#[inline(always)]
+fn changes_after_of<const N: usize>(arithmetic: impl Arithmetic, of: &ChangesAfter) -> Vec<Vec<f64>> {
+    let n = of.n;
+    if of.times_s.is_empty() {
+        return Vec::new();
+    }
+    let longest_s = of.times_s.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    let unit_s = series_unit_s(of.system, n, longest_s);
+    let f = Sparse::new(of.system, n);
+    let mut doubled: Vec<(f64, Sparse)> = Vec::new();
+    let (mut length_s, mut phi) = (unit_s, transition_of::<N>(arithmetic, &f, unit_s));
+    while length_s < longest_s {
+        let sparse = Sparse::of_square(&phi, n);
+        phi = sparse.times_square(arithmetic, &phi);
+        doubled.push((length_s, sparse));
+        length_s *= 2.0;
+    }
+    let column = |&time_s: &f64| {
+        let (mut change, mut left_s) = ([0.0; N], time_s);
+        change[of.state] = 1.0;
+        for (length_s, phi) in doubled.iter().rev() {
+            if *length_s <= left_s {
+                left_s -= length_s;
+                change = phi.times(arithmetic, &change);
+            }
+        }
+        let mut term = change;
+        for order in 1..=TERMS {
+            term = f.times(arithmetic, &term).map(|v| v * left_s / order as f64);
+            (0..N).for_each(|i| change[i] += term[i]);
+        }
+        change[..n].to_vec()
+    };
+    of.times_s.iter().map(column).collect()
+}
+
+/// Φ over a time for which the series serves.
+#[inline(always)]
+fn transition_of<const N: usize>(arithmetic: impl Arithmetic, f: &Sparse, time_s: f64) -> Square<N> {
+    let mut sum = [[0.0; N]; N];
+    (0..f.rows()).for_each(|i| sum[i][i] = 1.0);
+    let mut term = sum;
+    for order in 1..=TERMS {
+        term = f.times_square(arithmetic, &term);
+        for i in 0..N {
+            for j in 0..N {
+                term[i][j] *= time_s / order as f64;
+                sum[i][j] += term[i][j];
+            }
+        }
+    }
+    sum
+}
+
+/// The longest time for which the series serves, at most this one.
+fn series_unit_s(system: &[f64], n: usize, longest_s: f64) -> f64 {
+    let norm = system.chunks_exact(n).map(|row| row.iter().map(|v| v.abs()).sum::<f64>()).fold(0.0, f64::max);
+    if norm.is_finite() { longest_s.min(LARGEST_NORM / norm) } else { longest_s }
 }
 
 /// Φ and the two Q over one length of time.
@@ -111,10 +195,8 @@ impl<const N: usize> Over<N> {
 #[inline(always)]
 fn discretise_of<const N: usize>(arithmetic: impl Arithmetic, of: &Discretise) -> Vec<Discrete> {
     let n = of.n;
-    let norm = of.system.chunks_exact(n).map(|row| row.iter().map(|v| v.abs()).sum::<f64>()).fold(0.0, f64::max);
     let longest_s = of.steps_s.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    // The longest time for which the series serves.
-    let unit_s = if norm.is_finite() { longest_s.min(LARGEST_NORM / norm) } else { longest_s };
+    let unit_s = series_unit_s(of.system, n, longest_s);
     let series = series_of::<N>(arithmetic, of, unit_s);
     let mut order: Vec<usize> = (0..of.steps_s.len()).collect();
     order.sort_by(|a, b| of.steps_s[*a].total_cmp(&of.steps_s[*b]));
@@ -184,6 +266,19 @@ fn series_of<const N: usize>(arithmetic: impl Arithmetic, of: &Discretise, unit_
 mod tests {
     use super::*;
     use crate::chamber::system::diagonal;
+
+    #[test]
+    fn a_change_of_one_state_is_carried_on_as_the_whole_system_is() {
+        let f = [[-2.5, 0.0, 0.0, 2.5], [0.0, -0.01, 0.05, 0.3], [0.0, -0.05, -0.01, 0.0], [0.0, 0.0, 0.0, -0.002]];
+        let (f, none) = (f.concat(), [0.0; 16]);
+        let times_s = [9.8, 0.0, 0.02, 60.0, 3.7];
+        for state in 0..4 {
+            for (time_s, found) in times_s.iter().zip(changes_after(&f, 4, state, &times_s)) {
+                let whole = &discretise(&f, [&none, &none], 4, &[*time_s])[0].transition;
+                assert!((0..4).all(|i| (found[i] - whole[4 * i + state]).abs() < 1e-12), "{state}, {time_s}: {found:?}");
+            }
+        }
+    }
 
     #[test]
     fn a_stiff_mode_behind_a_random_walk_is_the_closed_form() {

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! e = v/S − K·r,  D = 1/S + Kᵀ N K,  r ← h e + r,  N ← h hᵀ D + N − h (N K)ᵀ − (N K) hᵀ,  N ← Φᵀ N Φ       backwards
-//! e/D is a measurement less what all others make of it, e/√D its standardised value; r_s/√N_ss likewise says whether the slope changed here
+//! e/D is a measurement less what all others make of it, e/√D its standardised value; u·r/√(uᵀNu) likewise says whether the slope changed here, u: what comes of that
 //! ```
 //!
 //! # Source
@@ -83,17 +83,17 @@ fn doubts_of<const N: usize>(arithmetic: impl Arithmetic, system: &System, rows:
                 }
             }
         }
-        let kink = |r: &[f64; N], spread: &Square<N>| {
-            let own = spread[system.slope][system.slope];
-            if own > 0.0 { (r[system.slope] / own.sqrt(), r[system.slope] / own) } else { (0.0, 0.0) }
-        };
+        let kink = |along: f64, own: f64| if own > 0.0 { (along / own.sqrt(), along / own) } else { (0.0, 0.0) };
         for &movement in row.moves.iter().rev() {
             retreat(arithmetic, system, movement, &mut r);
             match movement {
                 Move::Step(step) => spread = system.steps[step as usize].phi_turned.surround(arithmetic, &spread),
                 Move::Keep(slot) => forget_window(system, slot, &mut spread),
-                Move::Kink => {
-                    let here = kink(&r, &spread);
+                Move::Kink(place) => {
+                    let change: [f64; N] = wide(&system.kinks[place as usize]);
+                    let dot = |line: &[f64; N]| line.iter().zip(&change).map(|(a, u)| a * u).sum::<f64>();
+                    let own = spread.iter().zip(&change).map(|(line, u)| u * dot(line)).sum();
+                    let here = kink(dot(&r), own);
                     if here.0.abs() > found.kinks[k].0.abs() {
                         found.kinks[k] = here;
                     }
@@ -101,7 +101,7 @@ fn doubts_of<const N: usize>(arithmetic: impl Arithmetic, system: &System, rows:
             }
         }
         if !row.is_kinked_within() {
-            found.kinks[k] = kink(&r, &spread);
+            found.kinks[k] = kink(r[system.slope], spread[system.slope][system.slope]);
         }
     }
     found

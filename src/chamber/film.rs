@@ -55,30 +55,40 @@ impl Series {
         let mut with = self.clone();
         with.film_switches_s = times_s.to_vec();
         // Only those of the films that it has.
-        (with.steps, with.shapes) = (Vec::new(), Vec::new());
+        (with.steps, with.after_kinks, with.shapes) = (Vec::new(), Vec::new(), Vec::new());
         let mut film = Film::Usual;
         let mut left = times_s.iter().copied().peekable();
         for k in 0..with.rows.len() {
             let mut at_s = if k > 0 { with.times_s[k - 1] } else { f64::NEG_INFINITY };
             let mut moves = Vec::new();
-            for movement in std::mem::take(&mut with.rows[k].moves) {
+            let mut before = std::mem::take(&mut with.rows[k].moves).into_iter().peekable();
+            while let Some(movement) = before.next() {
                 let Move::Step(step) = movement else {
                     moves.push(behind(movement, film));
                     continue;
                 };
                 let length_s = self.steps[step as usize].length_s;
                 let end_s = at_s + length_s;
+                let mut kinks_s = Vec::new();
+                while let Some(&Move::Kink(place)) = before.peek() {
+                    kinks_s.push(end_s - self.after_kink_s(place));
+                    before.next();
+                }
+                let (mut pieces, mut begun_s) = (Vec::new(), at_s);
                 while let Some(switch_s) = left.next_if(|&t| t < end_s - NO_SHARE * length_s) {
-                    if switch_s > at_s + NO_SHARE * length_s {
-                        let before = with.step_of(TimeStep { length_s: switch_s - at_s, film });
-                        moves.push(Move::Step(before));
-                        at_s = switch_s;
+                    if switch_s > begun_s + NO_SHARE * length_s {
+                        pieces.push((switch_s, film));
+                        begun_s = switch_s;
                     }
                     film = film.other();
                 }
-                let rest = with.step_of(TimeStep { length_s: end_s - at_s, film });
-                moves.push(Move::Step(rest));
-                at_s = end_s;
+                pieces.push((end_s, film));
+                for (to_s, film) in pieces {
+                    moves.push(Move::Step(with.step_of(TimeStep { length_s: to_s - at_s, film })));
+                    let own_s = kinks_s.extract_if(.., |kink_s| *kink_s < to_s || to_s >= end_s);
+                    moves.extend(own_s.map(|kink_s| with.kink_before(TimeStep { length_s: to_s - kink_s, film })));
+                    at_s = to_s;
+                }
             }
             // A switch at the row itself is behind its steps.
             while left.next_if(|&t| t <= with.times_s[k]).is_some() {

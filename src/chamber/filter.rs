@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! predict  x ← Φ x,  P ← Φ P Φᵀ + Q_0 + q Q_1                 q: the trend's noise at this row
-//!          where the air has a kink, first P_ss ← P_ss + κ²    κ: how large it seems; s: the trend's slope
+//!          where the air has a kink, P ← P + κ² u uᵀ           κ: how large it seems; u = Φ(t) e_s, t after it; s: the trend's slope
 //! keep     z ← c·x                                             where a rate's window begins
 //! take in  v = y − h·x,  S = h P hᵀ + R,  x ← x + P h v/S,  P ← P − P h hᵀ P/S
 //! smooth   r ← h v/S + (I − K h)ᵀ r,  r ← Φᵀ r,  x̂ = x + P r
@@ -16,6 +16,8 @@
 
 // Loops over an index that the compiler knows the end of: iterators stay calls in functions as large as these.
 #![allow(clippy::needless_range_loop)]
+
+use std::sync::Arc;
 
 use super::arithmetic::{Arithmetic, Pass, dispatched};
 pub(super) use super::row::{AMBIENT, MEASURED, Move, RATE, Row};
@@ -40,11 +42,15 @@ pub(super) struct Step {
 #[derive(Debug, Clone)]
 pub(super) struct System {
     pub(crate) size: usize,
-    pub(crate) steps: Vec<Step>,
+    pub(crate) steps: Arc<[Step]>,
     /// Slope noise of the air's trend at rest and where readings bend [K²/s³].
     pub(crate) trend: (f64, f64),
     /// The state that is the trend's slope.
     pub(crate) slope: usize,
+    /// What a slope that changes by one within a step makes of the states by the step's end.
+    pub(crate) kinks: Vec<Vec<f64>>,
+    /// F behind each film, row-major n × n.
+    pub(crate) dynamics: Vec<Vec<f64>>,
     /// Rows of the thermometers and of the rate, each for the shares of a window: see [`Row::window`].
     pub(crate) rows: Sparse,
     pub(crate) variances: [f64; MEASURED],
@@ -194,13 +200,14 @@ struct StepNoise<const N: usize> {
 
 impl<const N: usize> StepNoise<N> {
     #[inline(always)]
-    fn at(&mut self, steps: &[Noise<N>], step: u16, density: f64) -> &Square<N> {
+    fn at(&mut self, system: &System, step: u16, density: f64) -> &Square<N> {
         if self.of != Some((step, density)) {
             self.of = Some((step, density));
-            let own = &steps[step as usize];
-            for i in 0..N {
-                for j in 0..N {
-                    self.noise[i][j] = own.noise[i][j] + density * own.trend_noise[i][j];
+            let (own, n) = (&system.steps[step as usize], system.size);
+            let lines = own.noise.chunks_exact(n).zip(own.trend_noise.chunks_exact(n));
+            for (line, (noise, trend_noise)) in self.noise.iter_mut().zip(lines) {
+                for j in 0..n {
+                    line[j] = noise[j] + density * trend_noise[j];
                 }
             }
         }
@@ -208,10 +215,15 @@ impl<const N: usize> StepNoise<N> {
     }
 }
 
-/// A step with its noises as wide as the compiler knows.
-struct Noise<const N: usize> {
-    noise: Square<N>,
-    trend_noise: Square<N>,
+/// P ← P + κ² u uᵀ.
+#[inline(always)]
+fn add_kink<const N: usize>(arithmetic: impl Arithmetic, change: &[f64], variance: f64, covariance: &mut Square<N>) {
+    let change: [f64; N] = wide(change);
+    for i in 0..N {
+        for j in 0..N {
+            covariance[i][j] = arithmetic.add_product(variance * change[i], change[j], covariance[i][j]);
+        }
+    }
 }
 
 #[inline(always)]
@@ -243,7 +255,7 @@ fn advance<const N: usize>(arithmetic: impl Arithmetic, system: &System, row: &R
                     mean[state] = system.kept.dot(arithmetic, kept, mean);
                 }
             }
-            Move::Kink => {}
+            Move::Kink(_) => {}
         }
     }
 }
@@ -259,7 +271,7 @@ pub(super) fn retreat<const N: usize>(arithmetic: impl Arithmetic, system: &Syst
                 system.kept.add_to(kept, weight, r);
             }
         }
-        Move::Kink => {}
+        Move::Kink(_) => {}
     }
 }
 
@@ -276,11 +288,6 @@ fn forward_of<const N: usize>(
     keep: bool,
 ) -> Trace {
     let n = system.size;
-    let steps: Vec<Noise<N>> = system
-        .steps
-        .iter()
-        .map(|s| Noise { noise: wide_square(&s.noise, n), trend_noise: wide_square(&s.trend_noise, n) })
-        .collect();
     let mut added = StepNoise { of: None, noise: [[0.0; N]; N] };
     let mut mean: [f64; N] = wide(&system.mean);
     let mut covariance: Square<N> = wide_square(&system.covariance, n);
@@ -310,10 +317,10 @@ fn forward_of<const N: usize>(
                 match movement {
                     Move::Step(step) => {
                         let phi = &system.steps[step as usize].phi;
-                        predict(arithmetic, phi, added.at(&steps, step, density), &mut covariance, &mut room);
+                        predict(arithmetic, phi, added.at(system, step, density), &mut covariance, &mut room);
                     }
                     Move::Keep(slot) => keep_window(arithmetic, system, slot, &mut covariance),
-                    Move::Kink => covariance[system.slope][system.slope] += row.kink,
+                    Move::Kink(place) => add_kink(arithmetic, &system.kinks[place as usize], row.kink, &mut covariance),
                 }
             }
             if keep {

@@ -9,11 +9,12 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::ascent::Effort;
-use super::filter::{self, Move};
+use super::elsewhere::Elsewhere;
+use super::filter::{self, Move, System, Values};
 use super::fit::Fit;
 use super::layout::Numbers;
 use super::prior::Quantity;
-use super::series::{SHORT_ROW_S, Series, TimeStep};
+use super::series::{SHORT_ROW_S, Series, TimeStep, place_of_step};
 use super::system::decoupled_system;
 use super::{Assumption, Chamber, ChamberError};
 
@@ -28,14 +29,14 @@ pub(crate) struct Bend {
 const REACH_ROWS: usize = 5;
 /// Strides in rows by which kinks are moved: each list one after another, all kinks anew with the next.
 const STRIDES_ROWS: [[f64; 2]; 2] = [[0.5, 0.15], [0.15, 0.05]];
+/// Strides that one parabola may move a kink by.
+const MOST_STRIDES: f64 = 2.0;
 /// Numbers that were fitted with kinks at wrong times move them less than they should: fits and kinks take turns, at most so often,
 /// while any kink moves by this share of a row.
 const MOST_TURNS: usize = 4;
 const MOVED_ROWS: f64 = 0.02;
 /// Strides in the logarithm of the time of an onset.
 const ONSET_STRIDES: [f64; 2] = [0.4, 0.15];
-/// A share of a step that counts as none.
-const NO_SHARE: f64 = 1e-3;
 
 impl Chamber<'_> {
     /// As [`Chamber::with_shocks`] for the first record, with its kinks, and its film's switches, at the times that readings and rates have
@@ -119,28 +120,16 @@ impl Chamber<'_> {
         base.straighten();
         let mut numbers = self.numbers_for(fit, record);
         let (side, values) = self.side_and_values(fit, record, &numbers)?;
-        let likelihood_by = |numbers: &Numbers, kinks: &[Bend]| {
-            let series = base.with_kinks(kinks);
-            let system = decoupled_system(&side.parts(&fit.assumed), numbers, &series);
-            filter::forward(&system, &series.rows, &values, false).log_likelihood
-        };
-        let row_s = base.shortest_s();
+        let plain = |numbers: &Numbers| decoupled_system(&side.parts(&fit.assumed), numbers, &base);
         for strides in strides_rows {
-            let likelihood = |kinks: &[Bend]| likelihood_by(&numbers, kinks);
-            let (others, here) = (kinks.clone(), likelihood(&kinks));
-            kinks.par_iter_mut().enumerate().for_each(|(place, kink)| {
-                let at = |time_s: f64| {
-                    let mut all = others.clone();
-                    all[place].time_s = time_s;
-                    likelihood(&all)
-                };
-                kink.time_s = highest(at, kink.time_s, here, &strides.map(|rows| rows * row_s));
-            });
-            // What another kink nearby does as well is none.
-            while let Some(place) = worthless(&kinks, &likelihood, (base.times_s.len() as f64).ln()) {
-                kinks.remove(place);
-            }
+            let strides_s = strides.map(|rows| rows * base.shortest_s());
+            let likelihood = KinkLikelihood { base: &base, straight: plain(&numbers), values: &values };
+            likelihood.climb(&mut kinks, &strides_s);
+            likelihood.take_out_worthless(&mut kinks);
             if base.delays {
+                let likelihood_by = |numbers: &Numbers, kinks: &[Bend]| {
+                    KinkLikelihood { base: &base, straight: plain(numbers), values: &values }.of(kinks)
+                };
                 set_in(&mut kinks, &mut numbers, likelihood_by);
             }
             self.observed[record].series = base.with_kinks(&kinks);
@@ -223,17 +212,67 @@ fn centre(times_s: &[f64], slopes: &[f64], rows: Range<usize>) -> Bend {
     Bend { time_s, slope_change_k_per_s: changes.iter().sum() }
 }
 
-/// The kink without which the likelihood falls least, if that is by less than its price.
-fn worthless(kinks: &[Bend], likelihood: &(impl Fn(&[Bend]) -> f64 + Sync), price: f64) -> Option<usize> {
-    let here = likelihood(kinks);
-    let without = |place: usize| {
-        let mut others = kinks.to_vec();
-        others.remove(place);
-        here - likelihood(&others)
-    };
-    let costs: Vec<f64> = (0..kinks.len()).into_par_iter().map(without).collect();
-    let (place, cost) = costs.into_iter().enumerate().min_by(|a, b| a.1.total_cmp(&b.1))?;
-    (cost < price).then_some(place)
+/// The likelihood of a record whose air is straight but for kinks.
+struct KinkLikelihood<'a> {
+    base: &'a Series,
+    /// Without any kink.
+    straight: System,
+    values: &'a Values,
+}
+
+impl KinkLikelihood<'_> {
+    fn with(&self, kinks: &[Bend]) -> (Series, System) {
+        let series = self.base.with_kinks(kinks);
+        let system = System { kinks: self.straight.kinks_of(&series), ..self.straight.clone() };
+        (series, system)
+    }
+
+    fn of(&self, kinks: &[Bend]) -> f64 {
+        let (series, system) = self.with(kinks);
+        filter::forward(&system, &series.rows, self.values, false).log_likelihood
+    }
+
+    /// Moves each kink, the others where they are, to the maximum along time.
+    fn climb(&self, kinks: &mut [Bend], strides_s: &[f64]) {
+        let others = kinks.to_vec();
+        let reach_s = MOST_STRIDES * strides_s.iter().sum::<f64>();
+        let (series, system) = self.with(&others);
+        let stretches = others.iter().map(|kink| self.base.rows_about(kink.time_s, reach_s)).collect();
+        let elsewhere = Elsewhere::new(&system, &series.rows, self.values, stretches);
+        kinks.par_iter_mut().enumerate().for_each(|(place, kink)| {
+            let at = |time_s: f64| {
+                let mut all = others.clone();
+                all[place].time_s = time_s;
+                let series = self.base.with_kinks(&all);
+                elsewhere.log_likelihood(place, &series.rows, self.straight.kinks_of(&series))
+            };
+            kink.time_s = highest(at, kink.time_s, at(kink.time_s), strides_s);
+        });
+    }
+
+    /// Takes out, one by one, the kink without which the likelihood falls least, while that is by less than its price: what another one nearby
+    /// does as well is none.
+    fn take_out_worthless(&self, kinks: &mut Vec<Bend>) {
+        let price = (self.base.times_s.len() as f64).ln();
+        while !kinks.is_empty() {
+            let (series, system) = self.with(kinks);
+            let stretches = kinks.iter().map(|kink| self.base.rows_about(kink.time_s, 0.0)).collect();
+            let elsewhere = Elsewhere::new(&system, &series.rows, self.values, stretches);
+            let cost = |place: usize| {
+                let mut others = kinks.clone();
+                others.remove(place);
+                let without = self.base.with_kinks(&others);
+                let here = elsewhere.log_likelihood(place, &series.rows, system.kinks.clone());
+                here - elsewhere.log_likelihood(place, &without.rows, self.straight.kinks_of(&without))
+            };
+            let costs: Vec<f64> = (0..kinks.len()).into_par_iter().map(cost).collect();
+            let least = costs.into_iter().enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+            match least {
+                Some((place, cost)) if cost < price => kinks.remove(place),
+                _ => break,
+            };
+        }
+    }
 }
 
 /// The time of the highest likelihood near a time: by parabolas through three, ever closer.
@@ -242,7 +281,7 @@ pub(super) fn highest(at: impl Fn(f64) -> f64, start_s: f64, value: f64, strides
     for &stride_s in strides_s {
         let (before, after) = (at(best_s - stride_s), at(best_s + stride_s));
         let curvature = before - 2.0 * best + after;
-        let top = if curvature < 0.0 { (0.5 * (before - after) / curvature).clamp(-2.0, 2.0) } else { 0.0 };
+        let top = if curvature < 0.0 { (0.5 * (before - after) / curvature).clamp(-MOST_STRIDES, MOST_STRIDES) } else { 0.0 };
         let middle_s = best_s;
         for (time_s, value) in [
             (middle_s - stride_s, before),
@@ -285,6 +324,11 @@ impl Series {
         self.times_s.partition_point(|t| *t <= time_s).clamp(1, self.rows.len() - 1)
     }
 
+    /// The rows that a time may lie in, give or take, and the one before them.
+    fn rows_about(&self, time_s: f64, reach_s: f64) -> Range<usize> {
+        self.row_of(time_s - reach_s) - 1..self.row_of(time_s + reach_s) + 1
+    }
+
     /// The time of a row's kink: the middle of where it may be.
     fn kink_s(&self, row: usize) -> f64 {
         let mut at_s = self.times_s[row.max(1) - 1];
@@ -296,8 +340,8 @@ impl Series {
             match movement {
                 Move::Step(step) => at_s += self.steps[*step as usize].length_s,
                 Move::Keep(_) => {}
-                Move::Kink => {
-                    sum_s += at_s;
+                Move::Kink(place) => {
+                    sum_s += at_s - self.after_kink_s(*place);
                     count += 1.0;
                 }
             }
@@ -309,9 +353,9 @@ impl Series {
     pub(super) fn straighten(&mut self) {
         for row in &mut self.rows {
             row.kink = 0.0;
-            row.moves.retain(|m| *m != Move::Kink);
+            row.moves.retain(|m| !matches!(m, Move::Kink(_)));
         }
-        self.kinks = 0;
+        (self.kinks, self.after_kinks) = (0, Vec::new());
     }
 
     /// Lets rows have a kink of this size, wherever it is in them: in a row that is long beside what the coil's outer layers
@@ -319,27 +363,35 @@ impl Series {
     pub(super) fn kink_within(&mut self, rows: Range<usize>, size_k_per_s: f64) {
         for k in rows {
             self.rows[k].kink += size_k_per_s * size_k_per_s;
-            if self.rows[k].moves.contains(&Move::Kink) {
+            if self.rows[k].is_kinked_within() {
                 continue;
             }
             let mut moves = Vec::new();
-            for movement in std::mem::take(&mut self.rows[k].moves) {
-                let Move::Step(step) = movement else {
-                    moves.push(movement);
-                    continue;
-                };
+            for movement in self.rows[k].moves.clone() {
+                moves.push(movement);
+                let Move::Step(step) = movement else { continue };
                 let whole = self.steps[step as usize];
                 let parts = (whole.length_s / SHORT_ROW_S).ceil().max(1.0);
-                let length_s = whole.length_s / parts;
-                let part = if parts > 1.0 { self.step_of(TimeStep { length_s, ..whole }) } else { step };
-                (0..parts as usize).for_each(|_| moves.extend([Move::Kink, Move::Step(part)]));
+                for part in 0..parts as usize {
+                    let length_s = whole.length_s * (1.0 - part as f64 / parts);
+                    moves.push(self.kink_before(TimeStep { length_s, ..whole }));
+                }
             }
             // One place alone is where the steps begin.
-            if moves.iter().filter(|m| **m == Move::Kink).count() == 1 {
-                moves.retain(|m| *m != Move::Kink);
+            if moves.iter().filter(|m| matches!(m, Move::Kink(_))).count() > 1 {
+                self.rows[k].moves = moves;
             }
-            self.rows[k].moves = moves;
         }
+    }
+
+    /// From one of the kinks to the end of the step that it is within \[s\].
+    pub(super) fn after_kink_s(&self, place: u16) -> f64 {
+        self.after_kinks[place as usize].length_s
+    }
+
+    /// A kink so long before the end of a step.
+    pub(super) fn kink_before(&mut self, end: TimeStep) -> Move {
+        Move::Kink(place_of_step(&mut self.after_kinks, end))
     }
 
     /// Kinks at these times; of rows that have none so far.
@@ -349,31 +401,22 @@ impl Series {
             let row = with.row_of(kink.time_s);
             let mut left_s = kink.time_s - with.times_s[row - 1];
             with.rows[row].kink += kink.slope_change_k_per_s.powi(2);
-            let mut moves = Vec::new();
-            let mut placed = left_s <= 0.0 || with.rows[row].is_kinked_within();
-            for &movement in &with.rows[row].moves {
-                let Move::Step(step) = movement else {
-                    moves.push(movement);
-                    continue;
-                };
-                let whole = with.steps[step as usize];
-                let step_s = whole.length_s;
-                let share = left_s / step_s;
-                if placed || share >= 1.0 - NO_SHARE {
-                    moves.push(movement);
-                } else if share <= NO_SHARE {
-                    moves.extend([Move::Kink, movement]);
-                    placed = true;
-                } else {
-                    let first = with.steps.len() as u16;
-                    with.steps.extend([left_s, step_s - left_s].map(|length_s| TimeStep { length_s, ..whole }));
-                    moves.extend([Move::Step(first), Move::Kink, Move::Step(first + 1)]);
-                    placed = true;
-                }
-                left_s -= step_s;
+            if left_s <= 0.0 || with.rows[row].is_kinked_within() {
+                continue;
             }
-            if !placed {
-                moves.push(Move::Kink);
+            let is_step = |m: &Move| matches!(m, Move::Step(_));
+            let last = with.rows[row].moves.iter().rposition(is_step);
+            let mut moves = with.rows[row].moves.clone();
+            for (place, movement) in with.rows[row].moves.clone().into_iter().enumerate() {
+                let Move::Step(step) = movement else { continue };
+                let whole = with.steps[step as usize];
+                let after_s = whole.length_s - left_s;
+                if after_s > 0.0 || Some(place) == last {
+                    let kink = with.kink_before(TimeStep { length_s: after_s.max(0.0), ..whole });
+                    moves.insert(place + 1, kink);
+                    break;
+                }
+                left_s = -after_s;
             }
             with.rows[row].moves = moves;
         }
@@ -438,6 +481,48 @@ pub(super) mod tests {
                 found.iter().min_by(|a, b| (a.time_s - time_s).abs().total_cmp(&(b.time_s - time_s).abs())).unwrap();
             assert!((near.time_s - time_s).abs() < 1.0, "{time_s}: {near:?}");
             assert!((near.slope_change_k_per_s / change - 1.0).abs() < 0.1, "{time_s}: {near:?} of {change}");
+        }
+    }
+
+    #[test]
+    fn where_a_kink_moves_or_goes_all_other_rows_say_what_they_would_in_a_pass_over_the_whole_record() {
+        let (model, pattern) = (model(Vec::new()), Classic::Zyl.pattern(8).unwrap());
+        let record = kinked(&model, &pattern);
+        let chamber = Chamber::new(&model, &[&record]).unwrap();
+        let assumed = Assumption::new(model, pattern);
+        let fit = chamber.fit(&assumed, &[], &[0], None, Effort::NONE).unwrap();
+        let mut numbers = chamber.numbers_for(&fit, 0);
+        numbers.set(Quantity::FilmRatio, 2.0);
+        let (side, values) = chamber.side_and_values(&fit, 0, &numbers).unwrap();
+        let whole = &chamber.observed[0].series;
+        // The last one in the rows at the end, behind which there are none.
+        let end_s = whole.start_s + whole.duration_s - 4.0;
+        let bend = |time_s: f64| Bend { time_s, slope_change_k_per_s: 0.02 };
+        let kinks: Vec<Bend> = KINKS_S.into_iter().chain([end_s]).map(bend).collect();
+        for base in [whole.clone(), whole.with_film_switches(&[1500.0, 2875.0])] {
+            let straight = decoupled_system(&side.parts(&assumed), &numbers, &base);
+            let likelihood = KinkLikelihood { base: &base, straight, values: &values };
+            let (series, system) = likelihood.with(&kinks);
+            let stretches = kinks.iter().map(|kink| base.rows_about(kink.time_s, 13.0)).collect();
+            let elsewhere = Elsewhere::new(&system, &series.rows, &values, stretches);
+            let beside = |place: usize, kinks: &[Bend]| {
+                let series = base.with_kinks(kinks);
+                elsewhere.log_likelihood(place, &series.rows, likelihood.straight.kinks_of(&series))
+            };
+            for place in 0..kinks.len() {
+                let moved = [-13.0, -3.7, 2.0, 13.0].map(|later_s| {
+                    let mut moved = kinks.clone();
+                    moved[place].time_s += later_s;
+                    moved
+                });
+                let mut fewer = kinks.clone();
+                fewer.remove(place);
+                for others in moved.iter().chain([&fewer]) {
+                    let (found, exact) =
+                        (beside(place, others) - beside(place, &kinks), likelihood.of(others) - likelihood.of(&kinks));
+                    assert!((found - exact).abs() < 1e-6, "{place}: {found} for {exact}");
+                }
+            }
         }
     }
 }

@@ -42,6 +42,7 @@ mod dense;
 mod derivative;
 mod discretise;
 mod doubts;
+mod elsewhere;
 mod film;
 mod film_step;
 mod filter;

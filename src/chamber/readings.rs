@@ -239,7 +239,7 @@ pub(super) fn backward(system: &System, rows: &[Row], trace: &Trace, mut visit: 
                     let half = turned(&phi.times_matrix(&information, n), n);
                     information = phi.times_matrix(&half, n);
                 }
-                Move::Kink => {}
+                Move::Kink(_) => {}
                 Move::Keep(slot) => {
                     for &(state, kept) in system.keeps[slot as usize].iter().rev() {
                         let weight = std::mem::take(&mut r[state]);

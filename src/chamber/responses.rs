@@ -67,7 +67,7 @@ fn respond(
                         mean[state] = dot(&system.kept, kept, &mean);
                     }
                 }
-                Move::Kink => {}
+                Move::Kink(_) => {}
             }
         }
         let gains = trace.gains[trace.gains_of[k] as usize].gain.chunks_exact(n + 1);

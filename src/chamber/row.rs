@@ -16,8 +16,8 @@ pub(super) enum Move {
     Step(u16),
     /// A window begins, which this slot remembers.
     Keep(u8),
-    /// The air's slope has its kink here, and not where the row's steps begin.
-    Kink,
+    /// The air's slope had its kink within the step that has just passed: what one of [`super::filter::System::kinks`] says came of it.
+    Kink(u16),
 }
 
 /// What happens up to and at one row of a record.
@@ -27,7 +27,7 @@ pub(super) struct Row {
     pub(crate) moves: Vec<Move>,
     /// Of how much the readings bend here: 0 at rest to 1.
     pub(crate) bend: f64,
-    /// Variance of a kink of the air's slope where this row's steps begin, or at [`Move::Kink`] [K²/s²].
+    /// Variance of a kink of the air's slope where this row's steps begin, or at each [`Move::Kink`] [K²/s²].
     pub(crate) kink: f64,
     /// Rows of [`super::filter::System::rows`] to measure with; None where there is no value.
     pub(crate) measured: [Option<u16>; MEASURED],
@@ -41,7 +41,7 @@ pub(super) struct Row {
 impl Row {
     /// Whether its kink is between its steps, not where they begin.
     pub(crate) fn is_kinked_within(&self) -> bool {
-        self.kink > 0.0 && self.moves.contains(&Move::Kink)
+        self.kink > 0.0 && self.moves.iter().any(|m| matches!(m, Move::Kink(_)))
     }
 }
 

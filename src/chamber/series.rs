@@ -26,6 +26,8 @@ pub(super) struct Series {
     pub(crate) rows: Vec<Row>,
     /// Distinct steps of time.
     pub(super) steps: Vec<TimeStep>,
+    /// Times from kinks to the ends of the steps that they are within.
+    pub(super) after_kinks: Vec<TimeStep>,
     /// Distinct ways in which a row is measured.
     pub(crate) shapes: Vec<Shape>,
     /// Of each row, the first and last of the record's rows in it.
@@ -151,6 +153,7 @@ impl Series {
             shapes: Vec::new(),
             spans: blocks.iter().map(|b| b.span).collect(),
             spikes: gross.len(),
+            after_kinks: Vec::new(),
             kinks: 0,
             controlled: false,
             approaches: false,
@@ -219,11 +222,7 @@ impl Series {
 
     /// The step like this one, which may be a new one.
     pub(super) fn step_of(&mut self, step: TimeStep) -> u16 {
-        let is_same = |s: &TimeStep| (s.length_s - step.length_s).abs() < SAME_S && s.film == step.film;
-        self.steps.iter().position(is_same).unwrap_or_else(|| {
-            self.steps.push(step);
-            self.steps.len() - 1
-        }) as u16
+        place_of_step(&mut self.steps, step)
     }
 
     /// The usual time between rows [s].
@@ -315,6 +314,14 @@ impl Series {
 }
 
 /// The place of a shape, which may be a new one.
+pub(super) fn place_of_step(steps: &mut Vec<TimeStep>, step: TimeStep) -> u16 {
+    let is_same = |s: &TimeStep| (s.length_s - step.length_s).abs() < SAME_S && s.film == step.film;
+    steps.iter().position(is_same).unwrap_or_else(|| {
+        steps.push(step);
+        steps.len() - 1
+    }) as u16
+}
+
 pub(super) fn place_of(shapes: &mut Vec<Shape>, shape: Shape) -> usize {
     shapes.iter().position(|s| same(s, &shape)).unwrap_or_else(|| {
         shapes.push(shape);

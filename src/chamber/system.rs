@@ -27,8 +27,10 @@
 //! A half space, or a pack whose heat capacity is unknown, is driven by its outermost layer, which follows the air with the
 //! time that a film over the pack's capacity would have.
 
+use std::sync::Arc;
+
 use super::decoupled::Decoupling;
-use super::discretise::discretise;
+use super::discretise::{changes_after, discretise};
 use super::film::drive;
 use super::filter::{RATE, Step, System};
 use super::layout::{Layout, Numbers, Parts};
@@ -153,9 +155,11 @@ fn in_coordinates(parts: &Parts, numbers: &Numbers, series: &Series, coordinates
     }
     let square = |q: Quantity| numbers.get(q).powi(2);
     let grid = series.resolution_k.powi(2) / 12.0;
-    System {
+    let mut system = System {
         size: n,
         steps,
+        dynamics: behind.into_iter().map(|own| own.dynamics).collect(),
+        kinks: Vec::new(),
         trend: (numbers.get(Quantity::RestNoise), numbers.get(Quantity::BendNoise)),
         slope: layout.kinked_slope(),
         rows: Sparse::new(&rows, n),
@@ -170,11 +174,13 @@ fn in_coordinates(parts: &Parts, numbers: &Numbers, series: &Series, coordinates
         kept: Sparse::new(&kept, n),
         mean,
         covariance,
-    }
+    };
+    system.kinks = system.kinks_of(series);
+    system
 }
 
 /// All steps of a record, each behind its film.
-fn steps(behind: &[Behind], series: &Series) -> Vec<Step> {
+fn steps(behind: &[Behind], series: &Series) -> Arc<[Step]> {
     let mut steps: Vec<Option<Step>> = vec![None; series.steps.len()];
     for (film, behind) in series.films().iter().zip(behind) {
         let own: Vec<usize> = (0..steps.len()).filter(|&i| series.steps[i].film == *film).collect();
@@ -334,6 +340,18 @@ fn rotate(f: &mut [f64], n: usize, place: usize, period_s: f64) {
 }
 
 impl System {
+    /// What a kink makes of the states by the end of the step that it is within, for each of a record's.
+    pub(super) fn kinks_of(&self, series: &Series) -> Vec<Vec<f64>> {
+        let mut kinks: Vec<Vec<f64>> = vec![Vec::new(); series.after_kinks.len()];
+        for (film, dynamics) in series.films().iter().zip(&self.dynamics) {
+            let own: Vec<usize> = (0..kinks.len()).filter(|&i| series.after_kinks[i].film == *film).collect();
+            let times_s: Vec<f64> = own.iter().map(|&i| series.after_kinks[i].length_s).collect();
+            let found = changes_after(dynamics, self.size, self.slope, &times_s);
+            own.into_iter().zip(found).for_each(|(i, change)| kinks[i] = change);
+        }
+        kinks
+    }
+
     /// Takes the offset as known and the gyro as steady: what is left of a rate's variance is air and white noise.
     pub(crate) fn forget_offset(&mut self, parts: &Parts, series: &Series) {
         let layout = Layout::new(parts, series);
