@@ -62,8 +62,18 @@ impl Timed<'_> {
         let mut anew = self.chamber.clone();
         anew.place_kinks_anew(&self.fit, r)?;
         let (these, anew) = rayon::join(|| self.chamber.clone().timed(&self.fit, r), || anew.timed(&self.fit, r));
-        let better = |one: Self, other: Self| if other.worth > one.worth { other } else { one };
-        Ok(better(better(self, these?), anew?))
+        Ok(self.or_better(Some(these?)).or_better(Some(anew?)))
+    }
+
+    /// These steps in air that does not bend beside them, from these numbers on.
+    fn without_bends(&self, from: &Fit, r: usize) -> Result<Self, ChamberError> {
+        let mut chamber = self.chamber.clone();
+        chamber.observed[r].series.rows.iter_mut().for_each(|row| row.bend = 0.0);
+        chamber.timed(from, r)?.again(r)
+    }
+
+    fn or_better(self, other: Option<Self>) -> Self {
+        other.filter(|other| other.worth > self.worth).unwrap_or(self)
     }
 }
 
@@ -129,8 +139,8 @@ impl<'a> Chamber<'a> {
         }
     }
 
-    /// A record in air that approaches set points, as a stage's does: in that order of its own time and the pack's, and with a delay if that is
-    /// worth more. What either does within a row or two is seen with kinks at their times only.
+    /// A record in air that approaches set points, as a stage's does: in that order of its own time and the pack's, bending beside its kinks or
+    /// not, and with a delay if that is worth more. What each does within a row or two is seen with kinks at their times only.
     fn staged(&self, fit: &Fit, r: usize, series: Series, numbers: Numbers) -> Result<(Series, Numbers), ChamberError> {
         let mut usual = self.clone();
         usual.observed[r].series = series;
@@ -146,8 +156,14 @@ impl<'a> Chamber<'a> {
             other.timed(&turned, r)?.again(r).map(Some)
         };
         let (again, other) = rayon::join(|| usual.again(r), in_other_order);
-        let again = again?;
-        let at_once = other?.filter(|other| other.worth > again.worth).unwrap_or(again);
+        let found = again?.or_better(other?);
+        // What bends beside steps stood for steps at other times; it would still do so for those of the other order.
+        let turned = found.chamber.in_other_order(&found.fit, &found.fit, r)?;
+        let (straight, turned) = rayon::join(
+            || found.without_bends(&found.fit, r),
+            || turned.map(|turned| found.without_bends(&turned, r)).transpose(),
+        );
+        let at_once = found.or_better(Some(straight?)).or_better(turned?);
         let mut delayed = at_once.chamber.clone();
         delayed.observed[r].series.delays = true;
         let delayed = delayed.timed(&at_once.fit, r)?;

@@ -275,7 +275,10 @@ mod tests {
         for state in 0..4 {
             for (time_s, found) in times_s.iter().zip(changes_after(&f, 4, state, &times_s)) {
                 let whole = &discretise(&f, [&none, &none], 4, &[*time_s])[0].transition;
-                assert!((0..4).all(|i| (found[i] - whole[4 * i + state]).abs() < 1e-12), "{state}, {time_s}: {found:?}");
+                assert!(
+                    (0..4).all(|i| (found[i] - whole[4 * i + state]).abs() < 1e-12),
+                    "{state}, {time_s}: {found:?}"
+                );
             }
         }
     }

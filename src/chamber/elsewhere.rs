@@ -57,7 +57,8 @@ impl<'a> Elsewhere<'a> {
         }
         let (mean, covariance) = (self.mean(whole.start).to_vec(), self.covariance(whole.start).to_vec());
         let system = System { mean, covariance, kinks, ..self.system.clone() };
-        let values = Values { of: self.values.of.each_ref().map(|v| v.get(whole.clone()).unwrap_or_default().to_vec()) };
+        let values =
+            Values { of: self.values.of.each_ref().map(|v| v.get(whole.clone()).unwrap_or_default().to_vec()) };
         let there = filter::forward(&system, &own, &values, true);
         let (Some((r, information)), Some(last)) = (behind, there.gains.last()) else { return there.log_likelihood };
         let n = system.size;

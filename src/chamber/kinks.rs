@@ -28,7 +28,7 @@ pub(crate) struct Bend {
 /// Rows to each side of where readings have a kink in which it may be: a lagging sensor shows it late.
 const REACH_ROWS: usize = 5;
 /// Strides in rows by which kinks are moved: each list one after another, all kinks anew with the next.
-const STRIDES_ROWS: [[f64; 2]; 2] = [[0.5, 0.15], [0.15, 0.05]];
+const STRIDES_ROWS: [[f64; 2]; 3] = [[0.5, 0.15], [0.15, 0.05], [0.05, 0.015]];
 /// Strides that one parabola may move a kink by.
 const MOST_STRIDES: f64 = 2.0;
 /// Numbers that were fitted with kinks at wrong times move them less than they should: fits and kinks take turns, at most so often,
@@ -281,7 +281,8 @@ pub(super) fn highest(at: impl Fn(f64) -> f64, start_s: f64, value: f64, strides
     for &stride_s in strides_s {
         let (before, after) = (at(best_s - stride_s), at(best_s + stride_s));
         let curvature = before - 2.0 * best + after;
-        let top = if curvature < 0.0 { (0.5 * (before - after) / curvature).clamp(-MOST_STRIDES, MOST_STRIDES) } else { 0.0 };
+        let top =
+            if curvature < 0.0 { (0.5 * (before - after) / curvature).clamp(-MOST_STRIDES, MOST_STRIDES) } else { 0.0 };
         let middle_s = best_s;
         for (time_s, value) in [
             (middle_s - stride_s, before),
