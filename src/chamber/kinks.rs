@@ -65,7 +65,7 @@ impl Chamber<'_> {
         let mut fit = self.fit(assumed, &[], &[0], Some(&fit), Effort::FULL)?;
         for _ in 1..MOST_TURNS {
             let before: Vec<f64> = kinks.iter().map(|kink| kink.time_s).collect();
-            kinks = self.move_kinks(&fit, 0, kinks, &STRIDES_ROWS[1..])?;
+            kinks = self.move_kinks(&fit, 0, kinks, &STRIDES_ROWS[1..])?.0;
             let enough_s = MOVED_ROWS * self.observed[0].series.shortest_s();
             let stays = |(kink, before_s): (&Bend, &f64)| (kink.time_s - before_s).abs() < enough_s;
             if kinks.len() == before.len() && kinks.iter().zip(&before).all(stays) {
@@ -93,28 +93,40 @@ impl Chamber<'_> {
         Ok(self)
     }
 
-    /// Moves a record's kinks, each somewhere within a few rows so far, to the times that readings and rates have them at.
+    /// Moves a record's kinks, each somewhere within a few rows so far or where it was found to be by another fit, to the times that readings
+    /// and rates have them at.
     ///
     /// # Errors
     /// A model that cannot be solved.
     pub(crate) fn time_kinks(&mut self, fit: &Fit, record: usize) -> Result<Vec<Bend>, ChamberError> {
+        let timed = self.observed[record].series.timed_kinks();
         let windows = self.observed[record].series.widen_kinks();
         let slopes = self.slopes(fit, record)?;
         let times_s = &self.observed[record].series.times_s;
-        let kinks = windows.into_iter().map(|window| centre(times_s, &slopes, window)).collect();
-        self.move_kinks(fit, record, kinks, &STRIDES_ROWS)
+        let centres = windows.into_iter().map(|window| centre(times_s, &slopes, window)).collect();
+        let Some(timed) = timed else { return Ok(self.move_kinks(fit, record, centres, &STRIDES_ROWS)?.0) };
+        // Within a few rows of where they were the centre may be that of another maximum, a better one or a worse.
+        let mut here = self.clone();
+        let (kinks, worth) = here.move_kinks(fit, record, timed, &STRIDES_ROWS)?;
+        let (others, other_worth) = self.move_kinks(fit, record, centres, &STRIDES_ROWS)?;
+        if other_worth > worth {
+            return Ok(others);
+        }
+        self.observed[record].series = here.observed.swap_remove(record).series;
+        Ok(kinks)
     }
 
-    /// Moves kinks, about where they are so far, to the likelihood's maximum; takes out those that are none.
+    /// Moves kinks, about where they are so far, to the likelihood's maximum; takes out those that are none. With them comes the log likelihood
+    /// less what they cost.
     fn move_kinks(
         &mut self,
         fit: &Fit,
         record: usize,
         mut kinks: Vec<Bend>,
         strides_rows: &[[f64; 2]],
-    ) -> Result<Vec<Bend>, ChamberError> {
+    ) -> Result<(Vec<Bend>, f64), ChamberError> {
         if kinks.is_empty() {
-            return Ok(kinks);
+            return Ok((kinks, f64::NEG_INFINITY));
         }
         let mut base = self.observed[record].series.clone();
         base.straighten();
@@ -140,7 +152,9 @@ impl Chamber<'_> {
             }
         }
         self.observed[record].series = base.with_kinks(&kinks);
-        Ok(kinks)
+        let likelihood = KinkLikelihood { base: &base, straight: plain(&numbers), values: &values };
+        let worth = likelihood.of(&kinks) - likelihood.price() * kinks.len() as f64;
+        Ok((kinks, worth))
     }
 
     /// The air's slope at each row by all measurements \[K/s\].
@@ -232,6 +246,11 @@ impl KinkLikelihood<'_> {
         filter::forward(&system, &series.rows, self.values, false).log_likelihood
     }
 
+    /// Of a kink, which might have been at any row.
+    fn price(&self) -> f64 {
+        (self.base.times_s.len() as f64).ln()
+    }
+
     /// Moves each kink, the others where they are, to the maximum along time.
     fn climb(&self, kinks: &mut [Bend], strides_s: &[f64]) {
         let others = kinks.to_vec();
@@ -253,7 +272,7 @@ impl KinkLikelihood<'_> {
     /// Takes out, one by one, the kink without which the likelihood falls least, while that is by less than its price: what another one nearby
     /// does as well is none.
     fn take_out_worthless(&self, kinks: &mut Vec<Bend>) {
-        let price = (self.base.times_s.len() as f64).ln();
+        let price = self.price();
         while !kinks.is_empty() {
             let (series, system) = self.with(kinks);
             let stretches = kinks.iter().map(|kink| self.base.rows_about(kink.time_s, 0.0)).collect();
@@ -298,8 +317,8 @@ pub(super) fn highest(at: impl Fn(f64) -> f64, start_s: f64, value: f64, strides
 }
 
 impl Series {
-    /// Lets each kink be anywhere within reach of where it was found and nearer than any other; the rows of each.
-    fn widen_kinks(&mut self) -> Vec<Range<usize>> {
+    /// The rows of each kink, and its variance.
+    fn rows_of_kinks(&self) -> Vec<(Range<usize>, f64)> {
         let mut found: Vec<(Range<usize>, f64)> = Vec::new();
         for (k, row) in self.rows.iter().enumerate().skip(1).filter(|(_, row)| row.kink > 0.0) {
             match found.last_mut() {
@@ -307,6 +326,23 @@ impl Series {
                 _ => found.push((k..k + 1, row.kink)),
             }
         }
+        found
+    }
+
+    /// Kinks that are at their times; None where one may be in several rows.
+    fn timed_kinks(&self) -> Option<Vec<Bend>> {
+        let found = self.rows_of_kinks();
+        let bend = |(rows, size): (Range<usize>, f64)| Bend {
+            time_s: self.kink_s(rows.start),
+            slope_change_k_per_s: size.sqrt(),
+        };
+        let is_timed = !found.is_empty() && found.iter().all(|(rows, _)| rows.len() == 1);
+        is_timed.then(|| found.into_iter().map(bend).collect())
+    }
+
+    /// Lets each kink be anywhere within reach of where it was found and nearer than any other; the rows of each.
+    fn widen_kinks(&mut self) -> Vec<Range<usize>> {
+        let found = self.rows_of_kinks();
         let middles: Vec<usize> = found.iter().map(|(rows, _)| usize::midpoint(rows.start, rows.end - 1)).collect();
         let windows = middles.iter().enumerate().map(|(place, &middle)| {
             let from = if place > 0 { usize::midpoint(middles[place - 1], middle) + 1 } else { 1 };
