@@ -9,6 +9,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::ascent::Effort;
+use super::doubts::doubts;
 use super::elsewhere::Elsewhere;
 use super::filter::{self, Move, System, Values};
 use super::fit::Fit;
@@ -144,12 +145,7 @@ impl Chamber<'_> {
                 };
                 set_in(&mut kinks, &mut numbers, likelihood_by);
             }
-            self.observed[record].series = base.with_kinks(&kinks);
-            let slopes = self.slopes(fit, record)?;
-            for kink in &mut kinks {
-                let row = base.row_of(kink.time_s);
-                kink.slope_change_k_per_s = slopes[row] - slopes[row - 1];
-            }
+            KinkLikelihood { base: &base, straight: plain(&numbers), values: &values }.size(&mut kinks);
         }
         self.observed[record].series = base.with_kinks(&kinks);
         let likelihood = KinkLikelihood { base: &base, straight: plain(&numbers), values: &values };
@@ -267,6 +263,14 @@ impl KinkLikelihood<'_> {
             };
             kink.time_s = highest(at, kink.time_s, at(kink.time_s), strides_s);
         });
+    }
+
+    /// Gives each kink the size that all measurements say it has.
+    fn size(&self, kinks: &mut [Bend]) {
+        let (series, system) = self.with(kinks);
+        let trace = filter::forward(&system, &series.rows, self.values, true);
+        let doubts = doubts(&system, &series.rows, &trace);
+        kinks.iter_mut().for_each(|kink| kink.slope_change_k_per_s = doubts.kinks[self.base.row_of(kink.time_s)].1);
     }
 
     /// Takes out, one by one, the kink without which the likelihood falls least, while that is by less than its price: what another one nearby
