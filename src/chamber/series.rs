@@ -139,15 +139,12 @@ impl Series {
             };
             (0..times_s.len()).map(whole).collect()
         };
+        let channels = record.channel_means(rate_mean_s);
         let mut series = Self {
             times_s: blocks.iter().map(|b| b.time_s).collect(),
             values: std::array::from_fn(|m| blocks.iter().map(|b| b.values[m]).collect()),
             reference_k,
-            columns: record
-                .channel_means(rate_mean_s)
-                .iter()
-                .map(|c| blocks.iter().map(|b| b.mean(c)).collect())
-                .collect(),
+            columns: channels.iter().map(|c| blocks.iter().map(|b| b.mean(c)).collect()).collect(),
             rows: Vec::new(),
             steps: Vec::new(),
             shapes: Vec::new(),

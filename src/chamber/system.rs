@@ -126,22 +126,6 @@ fn in_coordinates(parts: &Parts, numbers: &Numbers, series: &Series, coordinates
         decoupling.take_covariance(&mut covariance);
     }
     let steps = steps(&behind, series);
-    let mut rows = Vec::new();
-    for shape in &series.shapes {
-        let Behind { dynamics, response, places, .. } = &behind[shape.film as usize];
-        for place in places {
-            let share = |row: &[f64]| row.iter().map(|v| v * shape.end_share).collect::<Vec<f64>>();
-            let mut row = share(place);
-            // Only the sensor's readings are interpolated; those of other thermometers are taken at the window's end.
-            if let (Some(reading), true) = (layout.reading, std::ptr::eq(place, &raw const places[0])) {
-                row[reading] = 1.0 - shape.end_share;
-            } else {
-                row.clone_from(place);
-            }
-            rows.extend(row);
-        }
-        rows.extend(rate_row(&layout, dynamics, response, shape));
-    }
     // Of each film the slots of windows, and what they keep.
     let (mut keeps, mut kept): (Vec<Vec<(usize, usize)>>, Vec<f64>) = (Vec::new(), Vec::new());
     for Behind { response, places, .. } in &behind {
@@ -158,11 +142,10 @@ fn in_coordinates(parts: &Parts, numbers: &Numbers, series: &Series, coordinates
     let mut system = System {
         size: n,
         steps,
-        dynamics: behind.into_iter().map(|own| own.dynamics).collect(),
         kinks: Vec::new(),
         trend: (numbers.get(Quantity::RestNoise), numbers.get(Quantity::BendNoise)),
         slope: layout.kinked_slope(),
-        rows: Sparse::new(&rows, n),
+        rows: Sparse::new(&rows(&behind, &layout, series), n),
         variances: [
             square(Quantity::ReadingNoise),
             square(Quantity::InnerNoise),
@@ -174,9 +157,34 @@ fn in_coordinates(parts: &Parts, numbers: &Numbers, series: &Series, coordinates
         kept: Sparse::new(&kept, n),
         mean,
         covariance,
+        dynamics: behind.into_iter().map(|own| own.dynamics).collect(),
     };
     system.kinks = system.kinks_of(series);
     system
+}
+
+/// What each way of measuring a row measures.
+///
+/// # Shapes
+/// Row-major, a row a measurement, n columns.
+fn rows(behind: &[Behind], layout: &Layout, series: &Series) -> Vec<f64> {
+    let mut rows = Vec::new();
+    for shape in &series.shapes {
+        let Behind { dynamics, response, places, .. } = &behind[shape.film as usize];
+        for place in places {
+            let share = |row: &[f64]| row.iter().map(|v| v * shape.end_share).collect::<Vec<f64>>();
+            let mut row = share(place);
+            // Only the sensor's readings are interpolated; those of other thermometers are taken at the window's end.
+            if let (Some(reading), true) = (layout.reading, std::ptr::eq(place, &raw const places[0])) {
+                row[reading] = 1.0 - shape.end_share;
+            } else {
+                row.clone_from(place);
+            }
+            rows.extend(row);
+        }
+        rows.extend(rate_row(layout, dynamics, response, shape));
+    }
+    rows
 }
 
 /// All steps of a record, each behind its film.
