@@ -235,7 +235,7 @@ impl CoilSide {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use statrs::distribution::{ContinuousCDF, Normal};
@@ -297,7 +297,7 @@ mod tests {
 
     /// Air that approaches each of its set points with a time, from instants that are no rows', and takes another one to begin with; in
     /// straight lines of two seconds.
-    fn staged(approach_s: f64, onset_s: f64) -> PiecewiseLinear {
+    pub(in crate::chamber) fn staged(approach_s: f64, onset_s: f64) -> PiecewiseLinear {
         let steps = [(904.3, 311.0), (1707.7, 302.0), (2612.9, 318.0), (3571.4, 289.0), (4703.6, 296.0)];
         let times_s: Vec<f64> = (0..=3000).map(|i| 2.0 * f64::from(i)).collect();
         let air = |t: f64| {

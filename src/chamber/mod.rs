@@ -51,6 +51,7 @@ mod fitted;
 mod foreseen;
 mod gain;
 mod grid;
+mod kinked_rows;
 mod kinks;
 mod known;
 mod layout;
