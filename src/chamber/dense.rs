@@ -9,7 +9,7 @@ pub(super) mod tests {
     use crate::chamber::coil_side::{CoilSide, Observed, smoothed};
     use crate::chamber::doubts::doubts;
     use crate::chamber::filter::{self, Move, System};
-    use crate::chamber::kinks::Bend;
+    use crate::chamber::kinked_rows::Bend;
     use crate::chamber::layout::{Numbers, Parts};
     use crate::chamber::prior::Quantity;
     use crate::chamber::series::{Origin, Series};

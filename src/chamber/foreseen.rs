@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::coil_side::{CoilSide, smoothed};
 use super::filter::Innovation;
 use super::fit::Fit;
-use super::kinks::Bend;
+use super::kinked_rows::Bend;
 use super::layout::Numbers;
 use super::parameter::{Parameter, Place, write};
 use super::prior::Quantity;

@@ -3,8 +3,14 @@
 use std::ops::Range;
 
 use super::filter::Move;
-use super::kinks::Bend;
 use super::series::{SHORT_ROW_S, Series, TimeStep, place_of_step};
+
+/// A change of the air's slope that stands out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Bend {
+    pub(crate) time_s: f64,
+    pub(crate) slope_change_k_per_s: f64,
+}
 
 /// Rows to each side of where readings have a kink in which it may be: a lagging sensor shows it late.
 const REACH_ROWS: usize = 5;

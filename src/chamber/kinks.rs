@@ -13,18 +13,12 @@ use super::doubts::doubts;
 use super::elsewhere::Elsewhere;
 use super::filter::{self, System, Values};
 use super::fit::Fit;
+use super::kinked_rows::Bend;
 use super::layout::Numbers;
 use super::prior::Quantity;
 use super::series::Series;
 use super::system::decoupled_system;
 use super::{Assumption, Chamber, ChamberError};
-
-/// A change of the air's slope that stands out.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Bend {
-    pub(crate) time_s: f64,
-    pub(crate) slope_change_k_per_s: f64,
-}
 
 /// Strides in rows by which kinks are moved: each list one after another, all kinks anew with the next.
 const STRIDES_ROWS: [[f64; 2]; 3] = [[0.5, 0.15], [0.15, 0.05], [0.05, 0.015]];

@@ -11,7 +11,7 @@
 use super::coil_side::{CoilSide, run_kept};
 use super::filter::{self, Innovation, MEASURED, Move, RATE, Row, System, Trace, Values};
 use super::fit::Fit;
-use super::kinks::Bend;
+use super::kinked_rows::Bend;
 use super::known::Reference;
 use super::layout::{Layout, Numbers};
 use super::prior::Quantity;

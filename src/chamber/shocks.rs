@@ -11,7 +11,7 @@ use super::coil_side::{BLIND_RAD2_PER_S2, CoilSide, run_kept};
 use super::doubts::doubts;
 use super::filter::{self, RATE};
 use super::fit::Fit;
-use super::kinks::Bend;
+use super::kinked_rows::Bend;
 use super::layout::Numbers;
 use super::prior::{GROSS_FACTOR, GROSS_SHARE, KINKS_PER_ROW, Quantity};
 use super::series::Series;
