@@ -310,7 +310,7 @@ impl Series {
     }
 }
 
-/// The place of a shape, which may be a new one.
+/// The place of a step, which may be a new one.
 pub(super) fn place_of_step(steps: &mut Vec<TimeStep>, step: TimeStep) -> u16 {
     let is_same = |s: &TimeStep| (s.length_s - step.length_s).abs() < SAME_S && s.film == step.film;
     steps.iter().position(is_same).unwrap_or_else(|| {
@@ -319,6 +319,7 @@ pub(super) fn place_of_step(steps: &mut Vec<TimeStep>, step: TimeStep) -> u16 {
     }) as u16
 }
 
+/// The place of a shape, which may be a new one.
 pub(super) fn place_of(shapes: &mut Vec<Shape>, shape: Shape) -> usize {
     shapes.iter().position(|s| same(s, &shape)).unwrap_or_else(|| {
         shapes.push(shape);
