@@ -68,7 +68,7 @@ impl Timed<'_> {
     /// These steps in air that does not bend beside them, from these numbers on.
     fn without_bends(&self, from: &Fit, r: usize) -> Result<Self, ChamberError> {
         let mut chamber = self.chamber.clone();
-        chamber.observed[r].series.rows.iter_mut().for_each(|row| row.bend = 0.0);
+        chamber.observed[r].series.take_out_bends();
         chamber.timed(from, r)?.again(r)
     }
 
@@ -117,7 +117,7 @@ impl<'a> Chamber<'a> {
         let kinked = |(chamber, from, bends): (&Self, &Fit, bool)| {
             let mut chamber = chamber.clone();
             if !bends {
-                chamber.observed[r].series.rows.iter_mut().for_each(|row| row.bend = 0.0);
+                chamber.observed[r].series.take_out_bends();
             }
             let Ok(Some((kinked, worth))) = chamber.kinked(from, r) else { return Ok(None) };
             Ok(Some((worth, chamber.observed.swap_remove(r).series, kinked.numbers[r])))

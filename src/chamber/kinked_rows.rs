@@ -85,6 +85,11 @@ impl Series {
         sum_s / count
     }
 
+    /// Lets the air bend nowhere but at kinks.
+    pub(super) fn take_out_bends(&mut self) {
+        self.rows.iter_mut().for_each(|row| row.bend = 0.0);
+    }
+
     /// Takes all kinks out, and the places within rows where they may be.
     pub(super) fn straighten(&mut self) {
         for row in &mut self.rows {

@@ -125,22 +125,21 @@ impl Chamber<'_> {
         base.straighten();
         let mut numbers = self.numbers_for(fit, record);
         let (side, values) = self.side_and_values(fit, record, &numbers)?;
-        let plain = |numbers: &Numbers| decoupled_system(&side.parts(&fit.assumed), numbers, &base);
+        let likelihood_by = |numbers: &Numbers| {
+            let straight = decoupled_system(&side.parts(&fit.assumed), numbers, &base);
+            KinkLikelihood { base: &base, straight, values: &values }
+        };
+        let mut likelihood = likelihood_by(&numbers);
         for strides in strides_rows {
-            let strides_s = strides.map(|rows| rows * base.shortest_s());
-            let likelihood = KinkLikelihood { base: &base, straight: plain(&numbers), values: &values };
-            likelihood.climb(&mut kinks, &strides_s);
+            likelihood.climb(&mut kinks, &strides.map(|rows| rows * base.shortest_s()));
             likelihood.take_out_worthless(&mut kinks);
             if base.delays {
-                let likelihood_by = |numbers: &Numbers, kinks: &[Bend]| {
-                    KinkLikelihood { base: &base, straight: plain(numbers), values: &values }.of(kinks)
-                };
-                set_in(&mut kinks, &mut numbers, likelihood_by);
+                set_in(&mut kinks, &mut numbers, |numbers, kinks| likelihood_by(numbers).of(kinks));
+                likelihood = likelihood_by(&numbers);
             }
-            KinkLikelihood { base: &base, straight: plain(&numbers), values: &values }.size(&mut kinks);
+            likelihood.size(&mut kinks);
         }
         self.observed[record].series = base.with_kinks(&kinks);
-        let likelihood = KinkLikelihood { base: &base, straight: plain(&numbers), values: &values };
         let worth = likelihood.of(&kinks) - likelihood.price() * kinks.len() as f64;
         Ok((kinks, worth))
     }
@@ -429,7 +428,7 @@ pub(super) mod tests {
         let mut chamber = Chamber::new(&model, &[&record]).unwrap();
         let series = &mut chamber.observed[0].series;
         series.approaches = true;
-        series.rows.iter_mut().for_each(|row| row.bend = 0.0);
+        series.take_out_bends();
         let assumed = Assumption { drift: true, ..Assumption::new(model, pattern) };
         let mut fit = chamber.fit(&assumed, &[], &[0], None, Effort::NONE).unwrap();
         fit.numbers[0].set(Quantity::Film, 25.0);

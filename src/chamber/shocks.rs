@@ -222,7 +222,7 @@ impl<'a> Chamber<'a> {
         let before = self.observed[record].series.clone();
         let rows = before.rows.len();
         if !bends {
-            self.observed[record].series.rows.iter_mut().for_each(|row| row.bend = 0.0);
+            self.observed[record].series.take_out_bends();
         }
         let mut count = 0;
         for _ in 0..KINK_ROUNDS * KINK_PASSES {
@@ -293,7 +293,7 @@ impl<'a> Chamber<'a> {
     /// Straight but for these bends.
     pub(super) fn bend_at(&mut self, bends: &[Bend], record: usize) {
         let series = &mut self.observed[record].series;
-        series.rows.iter_mut().for_each(|row| row.bend = 0.0);
+        series.take_out_bends();
         let row = |bend: &Bend| series.times_s.partition_point(|t| *t <= bend.time_s);
         let kinks: Vec<(usize, f64)> = bends.iter().map(|bend| (row(bend), bend.slope_change_k_per_s)).collect();
         self.spread_kinks(&kinks, record);
@@ -419,7 +419,7 @@ mod tests {
         let mut chamber = Chamber::new(&bare, &[&record]).unwrap();
         let base = chamber.best_start(&declared, &[], &[0]).unwrap();
         // By itself the record would rather have its air bend than be straight by a model that is not its own.
-        chamber.observed[0].series.rows.iter_mut().for_each(|row| row.bend = 0.0);
+        chamber.observed[0].series.take_out_bends();
         chamber.pass_for_kinks(&base, 0).unwrap();
         let base = chamber.fit(&declared, &[], &[0], Some(&base), Effort::QUICK).unwrap();
         let own = Assumption::new(spool, pattern);
