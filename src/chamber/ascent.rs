@@ -270,7 +270,7 @@ fn score_of(derivatives: &[Derivatives], state: &Ascent, parameters: &[Parameter
     let mut score = DVector::zeros(parameters.len());
     derivatives.iter().zip(&state.innovations).for_each(|(own, base)| own.add_score_to(base, &mut score));
     for (i, p) in parameters.iter().enumerate() {
-        score[i] -= (state.coordinates[i] - p.mean) * p.deviation.powi(-2);
+        score[i] += p.prior_slope(state.coordinates[i]).0;
     }
     score
 }
@@ -280,7 +280,7 @@ fn information_of(derivatives: &[Derivatives], state: &Ascent, parameters: &[Par
     let mut information = DMatrix::zeros(parameters.len(), parameters.len());
     derivatives.iter().zip(&state.innovations).for_each(|(own, base)| own.add_information_to(base, &mut information));
     for (i, p) in parameters.iter().enumerate() {
-        information[(i, i)] += p.deviation.powi(-2);
+        information[(i, i)] += p.prior_slope(state.coordinates[i]).1;
     }
     information
 }

@@ -108,13 +108,13 @@ impl Fit {
     /// effect holds likely of its size does not decide between two that do the same.
     ///
     /// ```text
-    /// ln E = ln L + ln p(chamber) − ½ Σ_e z_e² + (c/2) ln 2π − ½ ln |I_cc| − (e/2) ln n
+    /// ln E = ln L + ln p(chamber) − Σ_e c_e + (c/2) ln 2π − ½ ln |I_cc| − (e/2) ln n
     /// ```
     ///
-    /// z: distance from an effect's prior in its deviations; c, e: numbers of the chamber and of effects; n: `rows`.
+    /// c_e: what an effect's prior falls by from its mean ([`Parameter::cost`]); c, e: numbers of the chamber and of effects; n: `rows`.
     pub(crate) fn merit(&self, rows: usize) -> f64 {
         let effects = self.parameters.iter().zip(&self.coordinates).filter(|(p, _)| !p.is_of_chamber());
-        let cost = |p: &Parameter, x: f64| 0.5 * ((x - p.mean) / p.deviation).powi(2) + 0.5 * (rows as f64).ln();
+        let cost = |p: &Parameter, x: f64| p.cost(x) + 0.5 * (rows as f64).ln();
         self.merit_of_chamber() - effects.map(|(p, &x)| cost(p, x)).sum::<f64>()
     }
 

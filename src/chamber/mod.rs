@@ -104,6 +104,8 @@ pub(crate) use known::Reference;
 pub(crate) use learned::{Estimate, Learned};
 pub(crate) use long::MOST_ROWS_FITTED;
 pub(crate) use noise::{Noise, Remedy};
+#[cfg(test)]
+pub(crate) use parameter::Tails;
 pub(crate) use parameter::{Free, Parameter, Place, Scale, StatedNumber, is_factor};
 pub(crate) use prior::{BREAK_K2_PER_S2, BREAKS_PER_S, PRIORS, Quantity};
 pub(crate) use readings::Told;

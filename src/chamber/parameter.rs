@@ -84,11 +84,26 @@ pub(crate) enum Scale {
     Linear,
 }
 
+/// How a prior falls off.
+///
+/// ```text
+/// Normal:  −ln p(z) = ½ z² + ½ ln 2π            Cauchy:  −ln p(z) = ln(1 + ½ z²) + ½ ln 2π²        z = (x − mean)/deviation
+/// ```
+///
+/// Both are as curved about the mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Tails {
+    Normal,
+    /// Of a size of which not even the order is known: five deviations away is nine times less likely than one.
+    Cauchy,
+}
+
 /// One coordinate of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Parameter {
     pub(crate) place: Place,
     pub(crate) scale: Scale,
+    pub(crate) tails: Tails,
     /// Of the prior, in the coordinate.
     pub(crate) mean: f64,
     pub(crate) deviation: f64,
@@ -106,7 +121,7 @@ pub(crate) struct Parameter {
 /// | a temperature in °C | normal about its start, 30 K | the range of a chamber |
 /// | per unit of a logged column | normal about 0, what would make all that the rate does | the unit is whatever was logged |
 /// | positive or zero | half of a normal of a hundredth of its bound | zero unless something is there |
-/// | anything else | normal about 0, four starts | its start is what matters in practice |
+/// | anything else | about 0, four starts, with the tails of Cauchy's density | its start is what matters in practice, and no bound |
 const FACTOR_DEVIATION: f64 = 0.3;
 const ORDER_DEVIATION: f64 = 1.0;
 const TEMPERATURE_DEVIATION_K: f64 = 30.0;
@@ -128,6 +143,7 @@ impl Parameter {
         Self {
             place,
             scale: Scale::Logarithm,
+            tails: Tails::Normal,
             mean,
             deviation: prior.deviation,
             lower: (mean - 12.0).max(unit + prior.least.ln()),
@@ -137,7 +153,8 @@ impl Parameter {
 
     pub(super) fn of_input(input: usize, deviation: f64) -> Self {
         let (lower, upper) = (f64::NEG_INFINITY, f64::INFINITY);
-        Self { place: Place::Input { input }, scale: Scale::Linear, mean: 0.0, deviation, lower, upper }
+        let place = Place::Input { input };
+        Self { place, scale: Scale::Linear, tails: Tails::Normal, mean: 0.0, deviation, lower, upper }
     }
 
     pub(super) fn of_effect(effect: &DeclaredEffect, free: &Free) -> Self {
@@ -146,11 +163,12 @@ impl Parameter {
         let value = effect.values()[free.parameter];
         let linear = |mean: f64, deviation: f64| {
             let (lower, upper) = (declared.lower, declared.upper);
-            Self { place, scale: Scale::Linear, mean, deviation, lower, upper }
+            Self { place, scale: Scale::Linear, tails: Tails::Normal, mean, deviation, lower, upper }
         };
+        let size = |deviation: f64| Self { tails: Tails::Cauchy, ..linear(0.0, deviation) };
         let logarithm = |mean: f64, deviation: f64| {
             let (lower, upper) = (declared.lower.ln(), declared.upper.ln());
-            Self { place, scale: Scale::Logarithm, mean, deviation, lower, upper }
+            Self { place, scale: Scale::Logarithm, tails: Tails::Normal, mean, deviation, lower, upper }
         };
         if let Some(StatedNumber { value, within }) = free.stated {
             return if declared.lower > 0.0 {
@@ -167,7 +185,7 @@ impl Parameter {
             return if declared.lower > 0.0 {
                 logarithm(value.ln(), ORDER_DEVIATION)
             } else {
-                linear(0.0, STARTS * value.abs().max(1e-6))
+                size(STARTS * value.abs().max(1e-6))
             };
         };
         let start = spec.unit.to_si(spec.start);
@@ -180,7 +198,7 @@ impl Parameter {
         } else if spec.lower == 0.0 {
             linear(0.0, SHARE_OF_BOUND * declared.upper)
         } else {
-            linear(0.0, STARTS * start.abs())
+            size(STARTS * start.abs())
         }
     }
 
@@ -198,10 +216,37 @@ impl Parameter {
         }
     }
 
+    /// By how much the prior is lower there than at its mean, in its natural logarithm.
+    pub(crate) fn cost(&self, coordinate: f64) -> f64 {
+        let half = 0.5 * self.distance(coordinate).powi(2);
+        match self.tails {
+            Tails::Normal => half,
+            Tails::Cauchy => half.ln_1p(),
+        }
+    }
+
     /// Natural logarithm of the prior's density.
     pub(super) fn log_prior(&self, coordinate: f64) -> f64 {
-        let apart = (coordinate - self.mean) / self.deviation;
-        -0.5 * apart * apart - self.deviation.ln() - 0.5 * std::f64::consts::TAU.ln()
+        let whole = match self.tails {
+            Tails::Normal => std::f64::consts::TAU.sqrt(),
+            Tails::Cauchy => std::f64::consts::SQRT_2 * std::f64::consts::PI,
+        };
+        -self.cost(coordinate) - (self.deviation * whole).ln()
+    }
+
+    /// Derivative of the prior's logarithm, and the precision of the normal that touches it there and is nowhere higher.
+    pub(super) fn prior_slope(&self, coordinate: f64) -> (f64, f64) {
+        let z = self.distance(coordinate);
+        let falls = match self.tails {
+            Tails::Normal => 1.0,
+            Tails::Cauchy => 1.0 / (1.0 + 0.5 * z * z),
+        };
+        (-z * falls / self.deviation, falls * self.deviation.powi(-2))
+    }
+
+    /// From the prior's mean, in its deviations.
+    pub(crate) fn distance(&self, coordinate: f64) -> f64 {
+        (coordinate - self.mean) / self.deviation
     }
 
     /// Step of a difference, in the coordinate.
@@ -301,6 +346,37 @@ mod tests {
         let stated = Some(StatedNumber { value: 12.4, within: 0.25 });
         let parameter = Parameter::of_effect(&fitted, &Free { effect: 0, parameter: 0, stated, deviation: None });
         assert_eq!((parameter.mean, parameter.deviation), (12.4f64.ln(), 0.25));
+    }
+
+    #[test]
+    fn priors_are_densities_whose_slopes_are_theirs_and_both_are_as_curved_at_their_means() {
+        let effect = |kind: &str, value: f64| {
+            let effect = DeclaredEffect::new(find(kind).unwrap(), vec![value], vec![]).unwrap();
+            Parameter::of_effect(&effect, &Free { effect: 0, parameter: 0, stated: None, deviation: None })
+        };
+        let (size, factor) = (effect("strain_mismatch", 0.002), effect("diffusivity", 1.1));
+        assert_eq!((size.tails, factor.tails), (Tails::Cauchy, Tails::Normal));
+        for parameter in [size, factor] {
+            let at = |z: f64| parameter.mean + z * parameter.deviation;
+            // z = tan u, so that the tails are within reach.
+            let steps = 20_000;
+            let width = std::f64::consts::PI / f64::from(steps);
+            let cell = |i: i32| {
+                let u = -0.5 * std::f64::consts::PI + (f64::from(i) + 0.5) * width;
+                parameter.log_prior(at(u.tan())).exp() * parameter.deviation / u.cos().powi(2) * width
+            };
+            let whole: f64 = (0..steps).map(cell).sum();
+            assert!((whole - 1.0).abs() < 1e-3, "{whole}");
+            for z in [-6.0, -1.0, 0.0, 0.3, 4.0] {
+                let by = 1e-4 * parameter.deviation;
+                let rise = parameter.log_prior(at(z) + by) - parameter.log_prior(at(z) - by);
+                let (slope, precision) = parameter.prior_slope(at(z));
+                assert!((rise / (2.0 * by) - slope).abs() < 1e-5 / parameter.deviation, "{z}");
+                assert!(precision > 0.0 && precision <= parameter.deviation.powi(-2) * (1.0 + 1e-12));
+            }
+            assert!((parameter.cost(at(0.1)) - 0.005).abs() < 2e-5);
+        }
+        assert!((size.cost(size.mean + 5.0 * size.deviation).exp() / 1.5 - 9.0).abs() < 1e-9);
     }
 
     #[test]

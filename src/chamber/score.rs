@@ -126,8 +126,8 @@ impl Chamber<'_> {
             add_cross(own, &trace.innovations, &responses, &mut cross);
         }
         for (i, p) in fit.parameters.iter().enumerate() {
-            let precision = p.deviation.powi(-2);
-            slope[i] -= (fit.coordinates[i] - p.mean) * precision;
+            let (prior_slope, precision) = p.prior_slope(fit.coordinates[i]);
+            slope[i] += prior_slope;
             own_information[(i, i)] += precision;
         }
         if let Some(factor) = own_information.cholesky() {
@@ -158,8 +158,8 @@ impl Chamber<'_> {
         let mut own = DMatrix::zeros(fitted, fitted);
         derivatives.iter().zip(&base).for_each(|(d, b)| d.add_to(b, &mut slope, &mut own));
         for (i, p) in fit.parameters.iter().enumerate() {
-            let precision = p.deviation.powi(-2);
-            slope[i] -= (fit.coordinates[i] - p.mean) * precision;
+            let (prior_slope, precision) = p.prior_slope(fit.coordinates[i]);
+            slope[i] += prior_slope;
             own[(i, i)] += precision;
         }
         let Some(factor) = own.cholesky() else { return Err(ChamberError::Unsolvable) };

@@ -154,8 +154,8 @@ impl<'a> Chamber<'a> {
             records.push(Prepared { record, innovations, derivatives, system, trace });
         }
         for (i, p) in parameters.iter().enumerate() {
-            let precision = p.deviation.powi(-2);
-            slope[i] -= (coordinates[i] - p.mean) * precision;
+            let (prior_slope, precision) = p.prior_slope(coordinates[i]);
+            slope[i] += prior_slope;
             information[(i, i)] += precision;
         }
         let factor = information.cholesky().ok_or(ChamberError::Unsolvable)?;

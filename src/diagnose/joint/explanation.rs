@@ -3,7 +3,7 @@
 use super::odds::{EFFECT, KNOWN_WITHIN, OUTSIDE, PHYSICAL, REFITTED, STATED_WITHIN, STEP};
 use super::{Question, Winding, rates};
 use crate::chamber::{Assumption, Effort, Fit, Free, Input, Parameter, Place, Scale, StatedNumber, is_factor};
-use crate::effect::DeclaredEffect;
+use crate::effect::{DeclaredEffect, Nature};
 
 /// One thing that a set assumes beside the declared model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -103,11 +103,13 @@ impl Explanation {
 
     pub(crate) fn is_beyond_physical(&self) -> bool {
         self.fit.parameters.iter().zip(&self.fit.coordinates).any(|(p, &x)| {
-            let Place::Effect { .. } = p.place else { return false };
+            let Place::Effect { effect, .. } = p.place else { return false };
             let at_bound = (p.scale == Scale::Logarithm && p.lower > f64::NEG_INFINITY && x - p.lower < 1e-3)
                 || p.upper - x < 1e-3 * p.deviation
                 || (p.scale == Scale::Linear && p.lower < 0.0 && x - p.lower < 1e-3 * p.deviation);
-            at_bound || (x - p.mean).abs() > PHYSICAL * p.deviation
+            // What only says what a rate follows has no size that would be unphysical.
+            let is_empirical = self.fit.assumed.model.effects[effect].spec().nature == Nature::Empirical;
+            at_bound || (!is_empirical && p.distance(x).abs() > PHYSICAL)
         })
     }
 
@@ -262,6 +264,7 @@ pub(in crate::diagnose) fn fitted(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chamber::Tails;
     use crate::diagnose::experiment::fixtures::{effect, model, pattern};
 
     /// With one effect of the catalogue, its first parameter as given.
@@ -271,7 +274,15 @@ mod tests {
         if let Some(value) = values.first() {
             let place = Place::Effect { effect: 0, parameter: 0 };
             let (lower, upper) = (f64::NEG_INFINITY, f64::INFINITY);
-            fit.parameters.push(Parameter { place, scale, mean: 0.0, deviation: 0.3, lower, upper });
+            fit.parameters.push(Parameter {
+                place,
+                scale,
+                tails: Tails::Normal,
+                mean: 0.0,
+                deviation: 0.1,
+                lower,
+                upper,
+            });
             fit.coordinates.push(if scale == Scale::Logarithm { value.ln() } else { *value });
         }
         let members = vec![Member::Effect(3)];
@@ -288,5 +299,11 @@ mod tests {
         // Nothing was declared of these.
         assert!(!no_news("midpoint_offset", &[0.001], Scale::Linear));
         assert!(!no_news("finite_pack", &[], Scale::Linear));
+    }
+
+    #[test]
+    fn a_mechanism_has_sizes_that_are_unphysical_and_what_only_follows_a_rate_has_none() {
+        let large = |kind: &str| explanation(kind, &[0.4], Scale::Linear).is_beyond_physical();
+        assert!(large("strain_mismatch") && !large("bias_gradient_rate"));
     }
 }

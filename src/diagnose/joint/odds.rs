@@ -36,7 +36,8 @@ pub(super) const STATED_WITHIN: f64 = 0.25;
 /// A declared number is never known better than this share of itself (methods for conductivity and for dn/dT state some per cent): to
 /// correct it by less is no news, however surely it is found.
 pub(super) const KNOWN_WITHIN: f64 = 0.01;
-/// An estimate so many deviations of its prior away is beyond what is physical: one in two thousand.
+/// An estimate so many deviations of its prior away is beyond what is physical: one in two thousand of a normal one; of a mechanism's size, 14 times
+/// where it is usually looked for.
 pub(super) const PHYSICAL: f64 = 3.5;
 /// Sets so much less likely than the best hold no more than e⁻²⁰ of the mass.
 pub(super) const WINDOW: f64 = 20.0;
