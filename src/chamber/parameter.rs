@@ -121,7 +121,7 @@ pub(crate) struct Parameter {
 /// | a temperature in °C | normal about its start, 30 K | the range of a chamber |
 /// | per unit of a logged column | normal about 0, what would make all that the rate does | the unit is whatever was logged |
 /// | positive or zero | half of a normal of a hundredth of its bound | zero unless something is there |
-/// | anything else | about 0, four starts, with the tails of Cauchy's density | its start is what matters in practice, and no bound |
+/// | anything else | about 0, four starts, with the tails of Cauchy's density | its start is what matters in practice; how far it may go is not known |
 const FACTOR_DEVIATION: f64 = 0.3;
 const ORDER_DEVIATION: f64 = 1.0;
 const TEMPERATURE_DEVIATION_K: f64 = 30.0;
