@@ -1,5 +1,7 @@
 //! What a fit moves: numbers of the chamber, parameters of effects, amplitudes of inputs; and where they are likely to be.
 
+use nalgebra::{DMatrix, DVector};
+
 use super::Assumption;
 use super::layout::Numbers;
 use super::prior::Quantity;
@@ -291,6 +293,23 @@ impl Parameter {
             Place::Input { input } => assumed.inputs[input].amplitude,
         };
         self.coordinate(value)
+    }
+}
+
+/// Adds what priors say of coordinates to the slope and the information of a log likelihood.
+///
+/// # Shapes
+/// One coordinate, slope and row a parameter.
+pub(super) fn add_priors(
+    parameters: &[Parameter],
+    coordinates: &[f64],
+    slope: &mut DVector<f64>,
+    information: &mut DMatrix<f64>,
+) {
+    for (i, (parameter, &coordinate)) in parameters.iter().zip(coordinates).enumerate() {
+        let (prior_slope, precision) = parameter.prior_slope(coordinate);
+        slope[i] += prior_slope;
+        information[(i, i)] += precision;
     }
 }
 

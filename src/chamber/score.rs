@@ -20,6 +20,7 @@ use super::coil_side::run_kept;
 use super::derivative::{DerivativeColumn, Derivatives};
 use super::filter::{RATE, Values, respond};
 use super::fit::Fit;
+use super::parameter::add_priors;
 use super::{Assumption, Chamber, ChamberError};
 
 /// A course that might add to the rate [rad/s at unit amplitude].
@@ -125,11 +126,7 @@ impl Chamber<'_> {
             own.add_to(&trace.innovations, &mut slope, &mut own_information);
             add_cross(own, &trace.innovations, &responses, &mut cross);
         }
-        for (i, p) in fit.parameters.iter().enumerate() {
-            let (prior_slope, precision) = p.prior_slope(fit.coordinates[i]);
-            slope[i] += prior_slope;
-            own_information[(i, i)] += precision;
-        }
+        add_priors(&fit.parameters, &fit.coordinates, &mut slope, &mut own_information);
         if let Some(factor) = own_information.cholesky() {
             // The innovations fall by V per unit of amplitude: their derivative is −V.
             let weights = factor.solve(&cross.transpose());
@@ -157,11 +154,7 @@ impl Chamber<'_> {
         let mut slope = DVector::zeros(fitted);
         let mut own = DMatrix::zeros(fitted, fitted);
         derivatives.iter().zip(&base).for_each(|(d, b)| d.add_to(b, &mut slope, &mut own));
-        for (i, p) in fit.parameters.iter().enumerate() {
-            let (prior_slope, precision) = p.prior_slope(fit.coordinates[i]);
-            slope[i] += prior_slope;
-            own[(i, i)] += precision;
-        }
+        add_priors(&fit.parameters, &fit.coordinates, &mut slope, &mut own);
         let Some(factor) = own.cholesky() else { return Err(ChamberError::Unsolvable) };
         let found = changed
             .par_iter()

@@ -18,7 +18,7 @@ use super::coil_side::run_kept;
 use super::derivative::Derivatives;
 use super::filter::{RATE, System, Trace, Values, respond};
 use super::fit::Fit;
-use super::parameter::{Parameter, Place};
+use super::parameter::{Parameter, Place, add_priors};
 use super::prior::Quantity;
 use super::{Assumption, Chamber, ChamberError, Column};
 
@@ -153,11 +153,7 @@ impl<'a> Chamber<'a> {
             }
             records.push(Prepared { record, innovations, derivatives, system, trace });
         }
-        for (i, p) in parameters.iter().enumerate() {
-            let (prior_slope, precision) = p.prior_slope(coordinates[i]);
-            slope[i] += prior_slope;
-            information[(i, i)] += precision;
-        }
+        add_priors(&parameters, &coordinates, &mut slope, &mut information);
         let factor = information.cholesky().ok_or(ChamberError::Unsolvable)?;
         Ok(Scorer { chamber: self, fit: fit.clone(), records, factor, slope })
     }
