@@ -49,9 +49,12 @@ impl Pass for Abreast<'_> {
     }
 }
 
-/// A number of each system; what is in no system is 1, which nothing divides by zero for.
+/// What is in no system, which nothing divides by zero for.
+const NO_SYSTEM: Lanes = [1.0; LANES];
+
+/// A number of each system.
 fn each<'a>(systems: &'a [System], number: impl Fn(&'a System) -> f64) -> Lanes {
-    std::array::from_fn(|lane| systems.get(lane).map_or(1.0, &number))
+    std::array::from_fn(|lane| systems.get(lane).map_or(NO_SYSTEM[lane], &number))
 }
 
 /// The entries of a matrix that are not zero in every system, row by row.
@@ -141,13 +144,24 @@ impl WideEntries {
 /// One step of time.
 struct WideStep {
     phi: WideEntries,
-    /// Row-major n × n.
-    noise: Vec<Lanes>,
-    trend_noise: Vec<Lanes>,
+    /// Everything but the trend's noise, and the trend's per unit of its density; in the order in which they are added.
+    noises: Vec<[Lanes; 2]>,
 }
 
-/// Systems of one structure, and what a pass over a record knows of each so far.
-struct AbreastPass<'a, A, const N: usize> {
+/// Two symmetric matrices row by row up to the diagonal, in blocks of C columns.
+fn in_blocks<const C: usize>(n: usize, noise: &[Lanes], trend_noise: &[Lanes]) -> Vec<[Lanes; 2]> {
+    let mut blocks = Vec::with_capacity(n * (n + 2 * C) / 2);
+    for i in 0..n {
+        for j in 0..(i / C + 1) * C {
+            let place = i * n + j;
+            blocks.push(if j < n { [noise[place], trend_noise[place]] } else { [[0.0; LANES]; 2] });
+        }
+    }
+    blocks
+}
+
+/// Systems of one structure, and what a pass over a record knows of each so far; C: columns of a covariance that are worked out at a time.
+struct AbreastPass<'a, A, const N: usize, const C: usize> {
     arithmetic: A,
     systems: &'a [System],
     steps: Vec<WideStep>,
@@ -157,23 +171,23 @@ struct AbreastPass<'a, A, const N: usize> {
     mean: [Lanes; N],
     covariance: Box<Covariances<N>>,
     room: Box<Covariances<N>>,
-    /// The noise of a step at a bend, in the order in which it is added; and of which it is.
-    noise: Vec<Lanes>,
-    noise_of: Option<(u16, f64)>,
     gains: [[Lanes; N]; MEASURED],
     variances: [Lanes; MEASURED],
 }
 
-impl<'a, A: Arithmetic, const N: usize> AbreastPass<'a, A, N> {
+impl<'a, A: Arithmetic, const N: usize, const C: usize> AbreastPass<'a, A, N, C> {
     fn new(arithmetic: A, systems: &'a [System]) -> Self {
         let n = systems[0].size;
         let wide = |matrix: &dyn Fn(&'a System) -> &'a [f64]| -> Vec<Lanes> {
-            (0..n * n).map(|i| each(systems, |s| matrix(s)[i])).collect()
+            let mut wide = vec![NO_SYSTEM; n * n];
+            for (lane, system) in systems.iter().enumerate() {
+                wide.iter_mut().zip(matrix(system)).for_each(|(lanes, value)| lanes[lane] = *value);
+            }
+            wide
         };
         let step = |i: usize| WideStep {
             phi: WideEntries::new(systems, |s| &s.steps[i].phi),
-            noise: wide(&|s| &s.steps[i].noise),
-            trend_noise: wide(&|s| &s.steps[i].trend_noise),
+            noises: in_blocks::<C>(n, &wide(&|s| &s.steps[i].noise), &wide(&|s| &s.steps[i].trend_noise)),
         };
         let mut mean = [[0.0; LANES]; N];
         let mut covariance = Box::new([[[0.0; LANES]; N]; N]);
@@ -192,8 +206,6 @@ impl<'a, A: Arithmetic, const N: usize> AbreastPass<'a, A, N> {
             mean,
             covariance,
             room: Box::new([[[0.0; LANES]; N]; N]),
-            noise: Vec::new(),
-            noise_of: None,
             gains: [[[0.0; LANES]; N]; MEASURED],
             variances: [[1.0; LANES]; MEASURED],
         }
@@ -224,17 +236,14 @@ impl<'a, A: Arithmetic, const N: usize> AbreastPass<'a, A, N> {
 
     /// The covariances up to a row.
     #[inline(always)]
-    fn predict<const B: usize, const C: usize>(&mut self, row: &Row) {
+    fn predict<const B: usize>(&mut self, row: &Row) {
         if !row.is_kinked_within() {
             let slope = self.systems[0].slope;
             self.covariance[slope][slope].iter_mut().for_each(|own| *own += row.kink);
         }
         for &movement in &row.moves {
             match movement {
-                Move::Step(step) => {
-                    self.add_up::<C>(step, row.bend);
-                    self.step::<B, C>(step);
-                }
+                Move::Step(step) => self.step::<B>(step, row.bend),
                 Move::Keep(slot) => self.keep_window::<B>(slot),
                 Move::Kink(place) => self.kink(place, row.kink),
             }
@@ -255,31 +264,13 @@ impl<'a, A: Arithmetic, const N: usize> AbreastPass<'a, A, N> {
         }
     }
 
-    /// The noise of a step, by how much the trend has.
-    fn add_up<const C: usize>(&mut self, step: u16, bend: f64) {
-        if self.noise_of == Some((step, bend)) {
-            return;
-        }
-        self.noise_of = Some((step, bend));
-        self.noise.clear();
-        let n = self.systems[0].size;
-        let density: Lanes = std::array::from_fn(|l| self.trend.0[l] + bend * (self.trend.1[l] - self.trend.0[l]));
-        let own = &self.steps[step as usize];
-        for i in 0..n {
-            for j in 0..i / C * C + C {
-                let place = i * n + j;
-                let noise = |l: usize| own.noise[place][l] + density[l] * own.trend_noise[place][l];
-                self.noise.push(if j < n { std::array::from_fn(noise) } else { [0.0; LANES] });
-            }
-        }
-    }
-
     /// P ← Φ P Φᵀ + Q, columns in blocks: first P Φᵀ, and of the second product what is left of the diagonal, where modes, whose rows have
     /// most entries, have fewest columns.
     #[inline(always)]
-    fn step<const B: usize, const C: usize>(&mut self, step: u16) {
+    fn step<const B: usize>(&mut self, step: u16, bend: f64) {
         let n = self.systems[0].size;
-        let phi = &self.steps[step as usize].phi;
+        let WideStep { phi, noises } = &self.steps[step as usize];
+        let density: Lanes = std::array::from_fn(|l| self.trend.0[l] + bend * (self.trend.1[l] - self.trend.0[l]));
         for i in 0..n {
             for from in (0..N).step_by(B) {
                 let sums = phi.sums::<N, B>(self.arithmetic, i, &self.covariance, from);
@@ -288,14 +279,15 @@ impl<'a, A: Arithmetic, const N: usize> AbreastPass<'a, A, N> {
                 }
             }
         }
-        let mut noise = self.noise.chunks_exact(C);
+        let mut noises = noises.chunks_exact(C);
         for i in 0..n {
             for from in (0..=i).step_by(C) {
                 let mut sums = phi.sums::<N, C>(self.arithmetic, i, &self.room, from);
-                let Some(added) = noise.next() else { break };
+                let Some(added) = noises.next() else { break };
                 for b in 0..C {
+                    let [noise, trend_noise] = &added[b];
                     for l in 0..LANES {
-                        sums[b][l] += added[b][l];
+                        sums[b][l] += noise[l] + density[l] * trend_noise[l];
                     }
                     self.covariance[i][from + b] = sums[b];
                     self.covariance[from + b][i] = sums[b];
@@ -374,7 +366,7 @@ fn pass<const N: usize, const B: usize, const C: usize>(
     asked: &Abreast,
 ) -> Vec<Vec<Innovation>> {
     let rows = asked.rows;
-    let mut pass = AbreastPass::<_, N>::new(arithmetic, asked.systems);
+    let mut pass = AbreastPass::<_, N, C>::new(arithmetic, asked.systems);
     let mut found: Vec<Vec<Innovation>> = asked.systems.iter().map(|_| Vec::with_capacity(2 * rows.len())).collect();
     let mut settled = 0;
     for (k, row) in rows.iter().enumerate() {
@@ -385,7 +377,7 @@ fn pass<const N: usize, const B: usize, const C: usize>(
         let frozen = settled >= SETTLED_ROWS;
         pass.advance(row);
         if !frozen {
-            pass.predict::<B, C>(row);
+            pass.predict::<B>(row);
         }
         let mut change: f64 = 0.0;
         for (m, index) in row.measured.iter().enumerate() {

@@ -3,6 +3,8 @@
 
 #[cfg(test)]
 pub(super) mod tests {
+    use std::sync::Arc;
+
     use nalgebra::{DMatrix, DVector};
 
     use crate::chamber::abreast;
@@ -14,7 +16,7 @@ pub(super) mod tests {
     use crate::chamber::prior::Quantity;
     use crate::chamber::series::{Origin, Series};
     use crate::chamber::solved::Solved;
-    use crate::chamber::system::{decoupled_system, system};
+    use crate::chamber::system::{decoupled_system, decoupled_system_beside, system};
     use crate::chamber::{Assumption, Chamber, Effort, Free, Input};
     use crate::coil::{Coil, CoilSpec, Fibre, LayerLength};
     use crate::effect::{DeclaredEffect, find};
@@ -72,9 +74,11 @@ pub(super) mod tests {
     }
 
     fn dense(system: &System, sparse: &crate::chamber::sparse::Sparse) -> DMatrix<f64> {
-        let n = system.size;
-        let one = DMatrix::<f64>::identity(n, n);
-        DMatrix::from_row_slice(sparse.rows(), n, &sparse.times_matrix(one.as_slice(), n))
+        let mut dense = DMatrix::zeros(sparse.rows(), system.size);
+        for row in 0..sparse.rows() {
+            sparse.row(row).iter().for_each(|&(column, value)| dense[(row, column)] = value);
+        }
+        dense
     }
 
     /// Mean and covariance of all measurements, and of each with the states at one row.
@@ -212,6 +216,25 @@ pub(super) mod tests {
         }
     }
 
+    /// One beside another takes its steps over where they follow from the same, and only there.
+    fn beside_another_is_by_itself(parts: &Parts, numbers: &Numbers, series: &Series) {
+        let known = decoupled_system(parts, numbers, series);
+        let shares = [
+            (Quantity::ReadingNoise, true),
+            (Quantity::BendNoise, true),
+            (Quantity::TurbulenceSize, false),
+            (Quantity::WanderTime, false),
+            (Quantity::RipplePeriod, false),
+        ];
+        for (quantity, shares) in shares {
+            let mut moved = *numbers;
+            moved.set(quantity, 1.1 * numbers.get(quantity));
+            let beside = decoupled_system_beside(&known, parts, &moved, series);
+            assert_eq!(Arc::ptr_eq(&known.steps, &beside.steps), shares, "{quantity:?}");
+            assert_eq!(format!("{beside:?}"), format!("{:?}", decoupled_system(parts, &moved, series)), "{quantity:?}");
+        }
+    }
+
     /// In air that bends by itself, in air that follows a set point, and in air that approaches one, at once or with a delay.
     fn check_on(assumed: &Assumption, record: &Record, averaged: bool) {
         check_in(assumed, record, averaged, |_| {});
@@ -243,6 +266,7 @@ pub(super) mod tests {
         let exact = -0.5 * (apart.dot(&solved) + determinant + apart.len() as f64 * std::f64::consts::TAU.ln());
         println!("{} measurements, log likelihood {} and {exact}", apart.len(), trace.log_likelihood);
         assert!((trace.log_likelihood - exact).abs() < 1e-8 * exact.abs());
+        beside_another_is_by_itself(&side.parts(assumed), &numbers, &seen.series);
         abreast_is_one_by_one(&side.parts(assumed), &numbers, &seen.series);
         let inverse = factor.inverse();
         let doubts = doubts(&system, &seen.series.rows, &trace);

@@ -24,6 +24,8 @@ use super::sparse::{MOST_STATES, Sparse, Square, dispatch, turned, wide_square};
 /// Terms of the series; what they leave out is below ½^13/13! = 2e-14.
 const TERMS: usize = 12;
 const LARGEST_NORM: f64 = 0.5;
+/// Lengths of time that differ by less are one \[s\]: instants of a record are told to about this.
+const SAME_S: f64 = 1e-9;
 /// Noises that are told apart.
 const NOISES: usize = 2;
 
@@ -144,6 +146,7 @@ fn series_unit_s(system: &[f64], n: usize, longest_s: f64) -> f64 {
 }
 
 /// Φ and the two Q over one length of time.
+#[derive(Clone)]
 struct Over<const N: usize> {
     transition: Square<N>,
     noises: [Square<N>; NOISES],
@@ -168,28 +171,33 @@ impl<const N: usize> Over<N> {
         }
     }
 
-    /// This time, and then another.
+    /// Carries it on by another time, whose Φ comes with it.
     #[inline(always)]
-    fn then(&self, arithmetic: impl Arithmetic, other: &Self, n: usize) -> Self {
-        let phi = Sparse::of_square(&other.transition, n);
-        let mut both = Self {
-            transition: phi.times_square(arithmetic, &self.transition),
-            noises: [phi.surround(arithmetic, &self.noises[0]), phi.surround(arithmetic, &self.noises[1])],
-        };
+    fn carry_on(&mut self, arithmetic: impl Arithmetic, by: &Self, phi: &Sparse) {
+        self.transition = phi.times_square(arithmetic, &self.transition);
         for k in 0..NOISES {
-            for i in 0..N {
-                for j in 0..N {
-                    both.noises[k][i][j] += other.noises[k][i][j];
-                }
+            let half = turned(&phi.times_square(arithmetic, &self.noises[k]));
+            for i in 0..phi.rows() {
+                self.noises[k][i] = phi.combine_onto(arithmetic, i, &half, &by.noises[k][i]);
             }
         }
-        both
     }
 
     fn discrete(&self, n: usize) -> Discrete {
-        let flat = |square: &Square<N>| square[..n].iter().flat_map(|row| row[..n].iter().copied()).collect();
+        let flat = |square: &Square<N>| {
+            let mut flat = Vec::with_capacity(n * n);
+            square[..n].iter().for_each(|row| flat.extend_from_slice(&row[..n]));
+            flat
+        };
         Discrete { transition: flat(&self.transition), noises: [flat(&self.noises[0]), flat(&self.noises[1])] }
     }
+}
+
+/// What a step is longer than the next shorter one, and its Φ.
+struct More<const N: usize> {
+    time_s: f64,
+    over: Over<N>,
+    phi: Sparse,
 }
 
 #[inline(always)]
@@ -201,17 +209,23 @@ fn discretise_of<const N: usize>(arithmetic: impl Arithmetic, of: &Discretise) -
     let mut order: Vec<usize> = (0..of.steps_s.len()).collect();
     order.sort_by(|a, b| of.steps_s[*a].total_cmp(&of.steps_s[*b]));
     let mut found: Vec<(usize, Discrete)> = Vec::with_capacity(order.len());
-    let mut known: Option<(f64, Over<N>)> = None;
+    let (mut known_s, mut known) = (0.0, Over::<N>::nothing(n));
+    let mut last: Option<More<N>> = None;
     for place in order {
-        let step_s = of.steps_s[place];
-        let more_s = step_s - known.as_ref().map_or(0.0, |k| k.0);
-        let more = over(arithmetic, &series, more_s / unit_s, n);
-        let whole = match &known {
-            Some((_, before)) => before.then(arithmetic, &more, n),
-            None => more,
+        // What is left out is made up for by the next.
+        let more_s = of.steps_s[place] - known_s;
+        let more = match last.take() {
+            Some(same) if (same.time_s - more_s).abs() < SAME_S => same,
+            _ => {
+                let over = over(arithmetic, &series, more_s / unit_s, n);
+                let phi = Sparse::of_square(&over.transition, n);
+                More { time_s: more_s, over, phi }
+            }
         };
-        found.push((place, whole.discrete(n)));
-        known = Some((step_s, whole));
+        known.carry_on(arithmetic, &more.over, &more.phi);
+        known_s += more.time_s;
+        found.push((place, known.discrete(n)));
+        last = Some(more);
     }
     found.sort_by_key(|f| f.0);
     found.into_iter().map(|f| f.1).collect()
@@ -229,7 +243,8 @@ fn over<const N: usize>(arithmetic: impl Arithmetic, series: &[Over<N>], units: 
         sum.add(term, power);
     }
     for _ in 0..doublings {
-        sum = sum.then(arithmetic, &sum, n);
+        let half = sum.clone();
+        sum.carry_on(arithmetic, &half, &Sparse::of_square(&half.transition, n));
     }
     sum
 }
@@ -302,7 +317,8 @@ mod tests {
         // A stiff mode, an oscillator that noise drives, and a random walk that both follow.
         let f = [[-2.5, 0.0, 0.0, 2.5], [0.0, -0.01, 0.05, 0.3], [0.0, -0.05, -0.01, 0.0], [0.0, 0.0, 0.0, -0.002]];
         let (f, rest, bend) = (f.concat(), diagonal(&[0.0, 0.0, 0.4, 0.0]), diagonal(&[0.0, 0.0, 0.0, 1.0]));
-        let steps_s = [10.0, 3.7, 9.8, 3.701, 60.0, 10.0, 0.02];
+        // Some longer than the next by the same, as far as instants are told.
+        let steps_s = [10.0, 3.7, 9.8, 3.701, 60.0, 10.0, 0.02, 10.1, 10.2, 10.3 + 4e-15, 10.4];
         let all = discretise(&f, [&rest, &bend], 4, &steps_s);
         for (step_s, found) in steps_s.iter().zip(&all) {
             let alone = &discretise(&f, [&rest, &bend], 4, &[*step_s])[0];

@@ -14,8 +14,8 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::backward::{Visited, backward};
 use super::filter::{self, MEASURED, Row, System, Trace, Values};
-use super::readings::backward;
 
 /// A record as it was, of which some rows will be changed.
 pub(super) struct Elsewhere<'a> {
@@ -38,9 +38,11 @@ impl<'a> Elsewhere<'a> {
         let trace = filter::forward(system, rows, values, true);
         let mut stretches: Vec<Stretch> = stretches.into_iter().map(|rows| Stretch { rows, behind: None }).collect();
         let n = system.size;
-        backward(system, rows, &trace, |k, r, information| {
-            for stretch in stretches.iter_mut().filter(|s| s.rows.end == k) {
-                stretch.behind = Some((DVector::from_column_slice(r), DMatrix::from_row_slice(n, n, information)));
+        backward(system, rows, &trace, &mut |visited| {
+            let Visited::Row { row, r, information } = visited else { return };
+            for stretch in stretches.iter_mut().filter(|s| s.rows.end == row) {
+                let lines = information.lines().flatten().copied();
+                stretch.behind = Some((DVector::from_column_slice(r), DMatrix::from_row_iterator(n, n, lines)));
             }
         });
         Self { system, values, trace, stretches }

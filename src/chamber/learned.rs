@@ -1,10 +1,10 @@
 //! What a fit says of film, offset and chamber, where the records determine it.
 
+use super::backward::{Visited, backward};
 use super::fit::Fit;
 use super::layout::Layout;
 use super::parameter::Place;
 use super::prior::{PRIORS, Quantity};
-use super::readings::backward;
 use super::{Chamber, ChamberError};
 
 /// A number with its standard error, both in SI.
@@ -73,20 +73,13 @@ impl Chamber<'_> {
         let place = Layout::new(&side.parts(&fit.assumed), series).offset();
         let n = system.size;
         let mut found = Estimate { value: f64::NAN, standard_error: f64::NAN };
-        backward(&system, &series.rows, &trace, |k, r, information| {
-            if k > 0 {
-                return;
-            }
+        backward(&system, &series.rows, &trace, &mut |visited| {
+            let Visited::Row { row: 0, r, information } = visited else { return };
             let covariance = &trace.gains[trace.gains_of[0] as usize].covariance;
             let own = &covariance[place * n..(place + 1) * n];
             let correction: f64 = own.iter().zip(r).map(|(p, r)| p * r).sum();
-            let known: f64 = information
-                .chunks_exact(n)
-                .zip(own)
-                .map(|(line, p)| p * line.iter().zip(own).map(|(i, q)| i * q).sum::<f64>())
-                .sum();
             found.value = trace.means[place] + correction;
-            found.standard_error = (own[place] - known).max(0.0).sqrt();
+            found.standard_error = (own[place] - information.of(own)).max(0.0).sqrt();
         });
         Ok(found)
     }

@@ -33,6 +33,7 @@ mod adjustment;
 mod airs;
 mod arithmetic;
 mod ascent;
+mod backward;
 mod causal;
 mod coil_side;
 mod course;

@@ -10,7 +10,7 @@ use super::known::Reference;
 use super::layout::Numbers;
 use super::parameter::{Parameter, write};
 use super::prior::Quantity;
-use super::system::decoupled_system;
+use super::system::{decoupled_system, decoupled_system_beside};
 use super::{Assumption, Chamber, ChamberError};
 
 /// All that a likelihood is computed from.
@@ -63,6 +63,7 @@ impl Chamber<'_> {
         parameter: &Parameter,
         coordinate: f64,
         record: usize,
+        unmoved: &System,
     ) -> Result<MovedRecord, ChamberError> {
         let mut numbers = point.numbers.clone();
         let mut assumed = point.assumed.clone();
@@ -72,14 +73,14 @@ impl Chamber<'_> {
         let series = &self.observed[record].series;
         if parameter.leaves_coil() {
             let Some(side) = &point.sides[record] else { return Err(ChamberError::Unsolvable) };
-            let system = decoupled_system(&side.parts(&point.assumed), &numbers[record], series);
+            let system = decoupled_system_beside(unmoved, &side.parts(&point.assumed), &numbers[record], series);
             return Ok(MovedRecord { system, values: None });
         }
         let mut there = self.model_point(assumed, numbers, &[record], point.courses)?;
         let (Some(side), values) = (&there.sides[record], there.values[record].take()) else {
             return Err(ChamberError::Unsolvable);
         };
-        let system = decoupled_system(&side.parts(&there.assumed), &there.numbers[record], series);
+        let system = decoupled_system_beside(unmoved, &side.parts(&there.assumed), &there.numbers[record], series);
         Ok(MovedRecord { system, values })
     }
 
@@ -99,12 +100,18 @@ impl Chamber<'_> {
             own.sort_by_key(|&p| parameters[p].leaves_coil());
             tasks.extend(own.chunks(abreast::LANES).map(|chunk| (i, chunk.to_vec())));
         }
+        let unmoved = |record: &usize| -> Result<System, ChamberError> {
+            let Some(side) = &point.sides[*record] else { return Err(ChamberError::Unsolvable) };
+            let series = &self.observed[*record].series;
+            Ok(decoupled_system(&side.parts(&point.assumed), &point.numbers[*record], series))
+        };
+        let unmoved = records.iter().map(unmoved).collect::<Result<Vec<System>, ChamberError>>()?;
         let columns: Vec<Result<Vec<DerivativeColumn>, ChamberError>> = tasks
             .par_iter()
             .map(|(i, own)| {
                 let moved: Result<Vec<(f64, MovedRecord)>, ChamberError> = own
                     .iter()
-                    .map(|&p| self.moved_a_step(point, &parameters[p], coordinates[p], records[*i]))
+                    .map(|&p| self.moved_a_step(point, &parameters[p], coordinates[p], records[*i], &unmoved[*i]))
                     .collect();
                 let (steps, moved): (Vec<f64>, Vec<MovedRecord>) = moved?.into_iter().unzip();
                 let there = self.innovations_abreast(point, moved, records[*i])?;
@@ -126,9 +133,10 @@ impl Chamber<'_> {
         parameter: &Parameter,
         coordinate: f64,
         record: usize,
+        unmoved: &System,
     ) -> Result<(f64, MovedRecord), ChamberError> {
         let step = if coordinate + parameter.step() > parameter.upper { -parameter.step() } else { parameter.step() };
-        let by = |step: f64| Ok((step, self.moved(point, parameter, coordinate + step, record)?));
+        let by = |step: f64| Ok((step, self.moved(point, parameter, coordinate + step, record, unmoved)?));
         by(step).or_else(|_| by(-step))
     }
 

@@ -1,15 +1,15 @@
 //! What the readings alone say of a record's layers, in a chamber whose numbers readings and rates have shown together.
 //!
 //! ```text
-//! r ← h v/S + (I − K h)ᵀ r,  N ← h hᵀ/S + (I − K h)ᵀ N (I − K h)         backwards over the readings
-//! Var(c·x | all readings) = c P cᵀ − c P N P cᵀ
+//! Var(c·x | all readings) = c P cᵀ − c P N P cᵀ         N: what the backward pass ([`super::backward`]) has of them at a row
 //! ```
 //!
 //! # Source
 //! de Jong, J. Am. Stat. Assoc. 84 (1989) 1085.
 
+use super::backward::{Visited, backward};
 use super::coil_side::{CoilSide, run_kept};
-use super::filter::{self, Innovation, MEASURED, Move, RATE, Row, System, Trace, Values};
+use super::filter::{self, Innovation, MEASURED, RATE, Row, System, Trace, Values};
 use super::fit::Fit;
 use super::kinked_rows::Bend;
 use super::known::Reference;
@@ -103,7 +103,8 @@ impl<'a> Chamber<'a> {
         let mut variance = vec![0.0; series.rows.len()];
         let mut along = vec![0.0; n];
         let mut row = vec![0.0; n];
-        backward(&system, &rows, &trace, |k, _, information| {
+        backward(&system, &rows, &trace, &mut |visited| {
+            let Visited::Row { row: k, information, .. } = visited else { return };
             let covariance = &trace.gains[trace.gains_of[k] as usize].covariance;
             row.iter_mut().for_each(|v| *v = 0.0);
             system.rows.add_to(series.shape_of(k) * MEASURED + RATE, 1.0, &mut row);
@@ -113,12 +114,7 @@ impl<'a> Chamber<'a> {
                 *a = line.iter().zip(&row).map(|(p, h)| p * h).sum();
             }
             let before: f64 = row.iter().zip(&along).map(|(h, a)| h * a).sum();
-            let known: f64 = information
-                .chunks_exact(n)
-                .zip(&along)
-                .map(|(line, a)| a * line.iter().zip(&along).map(|(i, b)| i * b).sum::<f64>())
-                .sum();
-            variance[k] = (before - known).max(0.0);
+            variance[k] = (before - information.of(&along)).max(0.0);
         });
         let states = filter::smooth(&system, &rows, &trace);
         let bends = self.bends(record, |k| states[k * n + layout.trend + 1]);
@@ -202,66 +198,4 @@ fn without_rates(series: &Series) -> Vec<Row> {
     let mut rows = series.rows.clone();
     rows.iter_mut().for_each(|row| row.measured[RATE] = None);
     rows
-}
-
-/// Walks back over the rows; at each, `visit` is told its place, r and N (row-major) with the row's own measurements.
-pub(super) fn backward(system: &System, rows: &[Row], trace: &Trace, mut visit: impl FnMut(usize, &[f64], &[f64])) {
-    let n = system.size;
-    let mut r = vec![0.0; n];
-    let mut information = vec![0.0; n * n];
-    let mut taken = trace.innovations.len();
-    let mut h = vec![0.0; n];
-    for (k, row) in rows.iter().enumerate().rev() {
-        let gains = &trace.gains[trace.gains_of[k] as usize];
-        let present: Vec<usize> = row.measured.iter().flatten().map(|&h| h as usize).collect();
-        for (place, &index) in present.iter().enumerate().rev() {
-            taken -= 1;
-            let innovation = trace.innovations[taken];
-            let gain = &gains.gain[place * (n + 1)..place * (n + 1) + n];
-            h.iter_mut().for_each(|v| *v = 0.0);
-            system.rows.add_to(index, 1.0, &mut h);
-            let along: f64 = gain.iter().zip(&r).map(|(g, r)| g * r).sum();
-            r.iter_mut().zip(&h).for_each(|(r, h)| *r += h * (innovation.value / innovation.variance - along));
-            let u: Vec<f64> = information.chunks_exact(n).map(|line| dot(line, gain)).collect();
-            let own = dot(&u, gain) + 1.0 / innovation.variance;
-            for i in 0..n {
-                for j in 0..n {
-                    information[i * n + j] += h[i] * h[j] * own - h[i] * u[j] - u[i] * h[j];
-                }
-            }
-        }
-        visit(k, &r, &information);
-        for &movement in row.moves.iter().rev() {
-            match movement {
-                Move::Step(step) => {
-                    let phi = &system.steps[step as usize].phi_turned;
-                    r = phi.times_matrix(&r, 1);
-                    let half = turned(&phi.times_matrix(&information, n), n);
-                    information = phi.times_matrix(&half, n);
-                }
-                Move::Kink(_) => {}
-                Move::Keep(slot) => {
-                    for &(state, kept) in system.keeps[slot as usize].iter().rev() {
-                        let weight = std::mem::take(&mut r[state]);
-                        system.kept.add_to(kept, weight, &mut r);
-                        for _ in 0..2 {
-                            for line in information.chunks_exact_mut(n) {
-                                let weight = std::mem::take(&mut line[state]);
-                                system.kept.add_to(kept, weight, line);
-                            }
-                            information = turned(&information, n);
-                        }
-                    }
-                }
-            }
-        }
-    }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn turned(matrix: &[f64], n: usize) -> Vec<f64> {
-    (0..n * n).map(|i| matrix[i % n * n + i / n]).collect()
 }

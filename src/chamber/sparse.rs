@@ -28,6 +28,9 @@ pub(super) const MOST_STATES: usize = 32;
 /// A square block of states; lanes beyond the model's states stay zero.
 pub(super) type Square<const N: usize> = [[f64; N]; N];
 
+/// Entries of a row that there is room for before any is written: behind a film that stays, a mode's row of Φ has three.
+const USUAL: usize = 4;
+
 /// The entries of a matrix that are not zero, row by row.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Sparse {
@@ -40,27 +43,43 @@ impl Sparse {
     /// # Shapes
     /// `matrix` row-major with `columns` columns.
     pub(crate) fn new(matrix: &[f64], columns: usize) -> Self {
-        Self::of_rows(matrix.chunks_exact(columns).map(|row| row.iter().copied()))
+        Self::of_rows(matrix.chunks_exact(columns), columns)
     }
 
-    fn of_rows(rows: impl Iterator<Item = impl Iterator<Item = f64>>) -> Self {
-        let mut sparse = Self { starts: vec![0], entries: Vec::new() };
+    fn of_rows<'a>(rows: impl Iterator<Item = &'a [f64]>, columns: usize) -> Self {
+        let mut sparse = Self { starts: Vec::with_capacity(columns + 1), entries: Vec::with_capacity(USUAL * columns) };
+        sparse.starts.push(0);
         for row in rows {
-            sparse.entries.extend(row.enumerate().filter(|(_, v)| *v != 0.0));
+            for (column, &value) in row.iter().enumerate() {
+                if value != 0.0 {
+                    sparse.entries.push((column, value));
+                }
+            }
             sparse.starts.push(sparse.entries.len());
         }
         sparse
     }
 
-    /// # Shapes
-    /// `matrix` row-major n × n.
-    pub(crate) fn transposed(matrix: &[f64], n: usize) -> Self {
-        Self::of_rows((0..n).map(|column| matrix.chunks_exact(n).map(move |row| row[column])))
+    /// Its rows as columns, of which there are so many.
+    pub(crate) fn transposed(&self, columns: usize) -> Self {
+        // Where the next entry of each column goes: behind all of those before it.
+        let mut ends = vec![0; columns + 1];
+        self.entries.iter().for_each(|(column, _)| ends[column + 1] += 1);
+        (0..columns).for_each(|column| ends[column + 1] += ends[column]);
+        let starts = ends.clone();
+        let mut entries = vec![(0, 0.0); self.entries.len()];
+        for row in 0..self.rows() {
+            for &(column, value) in self.row(row) {
+                entries[ends[column]] = (row, value);
+                ends[column] += 1;
+            }
+        }
+        Self { starts, entries }
     }
 
     /// Of what is zero beyond n × n.
     pub(crate) fn of_square<const N: usize>(square: &Square<N>, n: usize) -> Self {
-        Self::of_rows(square[..n].iter().map(|row| row[..n].iter().copied()))
+        Self::of_rows(square[..n].iter().map(|row| &row[..n]), n)
     }
 
     #[inline(always)]
@@ -125,17 +144,6 @@ impl Sparse {
             }
         }
         sum
-    }
-
-    /// M X for a row-major X of `columns` columns, without a width known to the compiler.
-    pub(crate) fn times_matrix(&self, x: &[f64], columns: usize) -> Vec<f64> {
-        let mut out = vec![0.0; self.rows() * columns];
-        for (row, line) in out.chunks_exact_mut(columns).enumerate() {
-            for &(k, v) in self.row(row) {
-                line.iter_mut().zip(&x[k * columns..(k + 1) * columns]).for_each(|(o, x)| *o += v * x);
-            }
-        }
-        out
     }
 
     /// M X.

@@ -69,11 +69,17 @@ pub(super) fn driven_by_air(path: &HeatPath, film_w_per_m2_k: f64) -> (HeatPath,
     (driven, None)
 }
 
+/// What the steps of a system follow from, behind one film; all row-major n × n.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Dynamics {
+    /// F, and what drives it, which is the same behind either film: G, and that of the trend's noise.
+    pub(super) of: Vec<f64>,
+    noises: [Vec<f64>; 2],
+}
+
 /// What of the system is another one behind another film.
 struct Behind {
-    /// F, row-major, and what drives it, which is the same behind either: G, and that of the trend's noise.
-    dynamics: Vec<f64>,
-    noises: [Vec<f64>; 2],
+    dynamics: Dynamics,
     response: Vec<f64>,
     places: [Vec<f64>; RATE],
 }
@@ -81,14 +87,15 @@ struct Behind {
 impl Behind {
     fn new(parts: &Parts, layout: &Layout, numbers: &Numbers, film_ratio: f64) -> Self {
         let drive = drive(layout, parts.reduced, film_ratio);
-        let (dynamics, noise, trend_noise) = dynamics(parts, layout, numbers, film_ratio);
+        let (of, noise, trend_noise) = dynamics(parts, layout, numbers, film_ratio);
+        let dynamics = Dynamics { of, noises: [diagonal(&noise), diagonal(&trend_noise)] };
         let (response, places) = (response(parts, layout, &drive), places(parts, layout, &drive));
-        Self { dynamics, noises: [diagonal(&noise), diagonal(&trend_noise)], response, places }
+        Self { dynamics, response, places }
     }
 
     fn decouple(&mut self, decoupling: &Decoupling) {
-        decoupling.take_dynamics(&mut self.dynamics);
-        self.noises.iter_mut().for_each(|noise| decoupling.take_covariance(noise));
+        decoupling.take_dynamics(&mut self.dynamics.of);
+        self.dynamics.noises.iter_mut().for_each(|noise| decoupling.take_covariance(noise));
         decoupling.take_rows(&mut self.response);
         self.places.iter_mut().for_each(|place| decoupling.take_rows(place));
     }
@@ -96,12 +103,17 @@ impl Behind {
 
 /// The system for one record.
 pub(super) fn system(parts: &Parts, numbers: &Numbers, series: &Series) -> System {
-    in_coordinates(parts, numbers, series, Coordinates::States)
+    in_coordinates(parts, numbers, series, Coordinates::States, None)
 }
 
 /// One with the same innovations, whose states are others: for forward passes only.
 pub(super) fn decoupled_system(parts: &Parts, numbers: &Numbers, series: &Series) -> System {
-    in_coordinates(parts, numbers, series, Coordinates::Decoupled)
+    in_coordinates(parts, numbers, series, Coordinates::Decoupled, None)
+}
+
+/// As [`decoupled_system`], beside one of the same series that is known: where nothing that steps follow from is another there, they are its.
+pub(super) fn decoupled_system_beside(known: &System, parts: &Parts, numbers: &Numbers, series: &Series) -> System {
+    in_coordinates(parts, numbers, series, Coordinates::Decoupled, Some(known))
 }
 
 /// What the states are.
@@ -113,19 +125,28 @@ enum Coordinates {
     Decoupled,
 }
 
-fn in_coordinates(parts: &Parts, numbers: &Numbers, series: &Series, coordinates: Coordinates) -> System {
+fn in_coordinates(
+    parts: &Parts,
+    numbers: &Numbers,
+    series: &Series,
+    coordinates: Coordinates,
+    beside: Option<&System>,
+) -> System {
     let layout = Layout::new(parts, series);
     let n = layout.size;
     let behind = series.films().iter().map(|film| numbers.film_ratio(*film));
     let mut behind: Vec<Behind> = behind.map(|ratio| Behind::new(parts, &layout, numbers, ratio)).collect();
-    let (mut mean, mut covariance) = start(parts, &layout, &behind[0].dynamics, numbers, series);
+    let (mut mean, mut covariance) = start(parts, &layout, &behind[0].dynamics.of, numbers, series);
     if coordinates == Coordinates::Decoupled {
-        let decoupling = Decoupling::new(&behind[0].dynamics, &layout);
+        let decoupling = Decoupling::new(&behind[0].dynamics.of, &layout);
         behind.iter_mut().for_each(|own| own.decouple(&decoupling));
         decoupling.take_columns(&mut mean, 1);
         decoupling.take_covariance(&mut covariance);
     }
-    let steps = steps(&behind, series);
+    let steps = match beside {
+        Some(known) if known.dynamics.iter().eq(behind.iter().map(|own| &own.dynamics)) => Arc::clone(&known.steps),
+        _ => steps(&behind, series),
+    };
     // Of each film the slots of windows, and what they keep.
     let (mut keeps, mut kept): (Vec<Vec<(usize, usize)>>, Vec<f64>) = (Vec::new(), Vec::new());
     for Behind { response, places, .. } in &behind {
@@ -170,7 +191,7 @@ fn in_coordinates(parts: &Parts, numbers: &Numbers, series: &Series, coordinates
 fn rows(behind: &[Behind], layout: &Layout, series: &Series) -> Vec<f64> {
     let mut rows = Vec::new();
     for shape in &series.shapes {
-        let Behind { dynamics, response, places, .. } = &behind[shape.film as usize];
+        let Behind { dynamics, response, places } = &behind[shape.film as usize];
         for place in places {
             let share = |row: &[f64]| row.iter().map(|v| v * shape.end_share).collect::<Vec<f64>>();
             let mut row = share(place);
@@ -182,7 +203,7 @@ fn rows(behind: &[Behind], layout: &Layout, series: &Series) -> Vec<f64> {
             }
             rows.extend(row);
         }
-        rows.extend(rate_row(layout, dynamics, response, shape));
+        rows.extend(rate_row(layout, &dynamics.of, response, shape));
     }
     rows
 }
@@ -193,11 +214,12 @@ fn steps(behind: &[Behind], series: &Series) -> Arc<[Step]> {
     for (film, behind) in series.films().iter().zip(behind) {
         let own: Vec<usize> = (0..steps.len()).filter(|&i| series.steps[i].film == *film).collect();
         let lengths_s: Vec<f64> = own.iter().map(|&i| series.steps[i].length_s).collect();
-        let [noise, trend_noise] = &behind.noises;
+        let Dynamics { of, noises: [noise, trend_noise] } = &behind.dynamics;
         let n = behind.response.len();
-        for (i, found) in own.into_iter().zip(discretise(&behind.dynamics, [noise, trend_noise], n, &lengths_s)) {
+        for (i, found) in own.into_iter().zip(discretise(of, [noise, trend_noise], n, &lengths_s)) {
             let [noise, trend_noise] = found.noises;
-            let (phi, phi_turned) = (Sparse::new(&found.transition, n), Sparse::transposed(&found.transition, n));
+            let phi = Sparse::new(&found.transition, n);
+            let phi_turned = phi.transposed(n);
             steps[i] = Some(Step { phi, phi_turned, noise, trend_noise });
         }
     }
@@ -354,7 +376,7 @@ impl System {
         for (film, dynamics) in series.films().iter().zip(&self.dynamics) {
             let own: Vec<usize> = (0..kinks.len()).filter(|&i| series.after_kinks[i].film == *film).collect();
             let times_s: Vec<f64> = own.iter().map(|&i| series.after_kinks[i].length_s).collect();
-            let found = changes_after(dynamics, self.size, self.slope, &times_s);
+            let found = changes_after(&dynamics.of, self.size, self.slope, &times_s);
             own.into_iter().zip(found).for_each(|(i, change)| kinks[i] = change);
         }
         kinks

@@ -87,10 +87,10 @@ fn verdict<'e>(
 ) -> (Verdict, &'e Explanation) {
     let rewound = |e: &Explanation| e.members.iter().any(|m| matches!(m, Member::Winding(_)));
     let wound: f64 = found.explanations.iter().filter(|e| rewound(e) && !e.is_outside()).map(|e| e.probability).sum();
+    // Where effects may explain the records none the less, the likeliest of them is named, and the winding beside them.
+    let by_effects = family.iter().find(|e| !rewound(e) && !e.effects(question).is_empty());
     if wound >= HALF {
-        // Where effects may explain the records none the less, the likeliest of them is named, and the winding beside them.
         let is_certain = wound >= CERTAIN * known(found).map(|e| e.probability).sum::<f64>();
-        let by_effects = family.iter().find(|e| !rewound(e) && !e.effects(question).is_empty());
         match by_effects {
             Some(effects) if !is_certain => (Verdict::Indistinguishable, *effects),
             _ => (Verdict::Unexplained, top),
@@ -98,7 +98,7 @@ fn verdict<'e>(
     } else if top.members.is_empty() {
         (Verdict::Adequate, top)
     } else if family.len() > 1 && distinct(question, family) > 1 {
-        (Verdict::Indistinguishable, top)
+        (Verdict::Indistinguishable, if rewound(top) { by_effects.copied().unwrap_or(top) } else { top })
     } else if top.members.iter().all(|m| matches!(m, Member::Step { .. })) {
         (Verdict::Unexplained, top)
     } else {
