@@ -29,6 +29,14 @@ const SAME_S: f64 = 1e-9;
 /// Noises that are told apart.
 const NOISES: usize = 2;
 
+/// What steps follow from, behind one film; all row-major n × n.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ContinuousDynamics {
+    /// F, and what drives it, which is the same behind either film: G, and that of the trend's noise.
+    pub(super) of: Vec<f64>,
+    pub(super) noises: [Vec<f64>; NOISES],
+}
+
 /// Φ and, for each of the noises, Q; all row-major n × n.
 #[derive(Debug, Clone)]
 pub(super) struct Discrete {

@@ -20,9 +20,9 @@
 use std::sync::Arc;
 
 use super::arithmetic::{Arithmetic, Pass, dispatched};
+use super::discretise::ContinuousDynamics;
 pub(super) use super::row::{AMBIENT, MEASURED, Move, RATE, Row};
 use super::sparse::{MOST_STATES, Sparse, Square, dispatch, turn, wide, wide_square};
-use super::system::Dynamics;
 
 /// Relative change of every S from row to row below which a row counts as settled, and how many of them freeze the gains:
 /// together they cost less than 0.2 of log likelihood on 1 500 rows (a test).
@@ -51,7 +51,7 @@ pub(super) struct System {
     /// What a slope that changes by one within a step makes of the states by the step's end.
     pub(crate) kinks: Vec<Vec<f64>>,
     /// Behind each film.
-    pub(crate) dynamics: Vec<Dynamics>,
+    pub(crate) dynamics: Vec<ContinuousDynamics>,
     /// Rows of the thermometers and of the rate, each for the shares of a window: see [`Row::window`].
     pub(crate) rows: Sparse,
     pub(crate) variances: [f64; MEASURED],

@@ -30,7 +30,7 @@
 use std::sync::Arc;
 
 use super::decoupled::Decoupling;
-use super::discretise::{changes_after, discretise};
+use super::discretise::{ContinuousDynamics, changes_after, discretise};
 use super::film::drive;
 use super::filter::{RATE, Step, System};
 use super::layout::{Layout, Numbers, Parts};
@@ -69,17 +69,9 @@ pub(super) fn driven_by_air(path: &HeatPath, film_w_per_m2_k: f64) -> (HeatPath,
     (driven, None)
 }
 
-/// What the steps of a system follow from, behind one film; all row-major n × n.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Dynamics {
-    /// F, and what drives it, which is the same behind either film: G, and that of the trend's noise.
-    pub(super) of: Vec<f64>,
-    noises: [Vec<f64>; 2],
-}
-
 /// What of the system is another one behind another film.
 struct Behind {
-    dynamics: Dynamics,
+    dynamics: ContinuousDynamics,
     response: Vec<f64>,
     places: [Vec<f64>; RATE],
 }
@@ -88,7 +80,7 @@ impl Behind {
     fn new(parts: &Parts, layout: &Layout, numbers: &Numbers, film_ratio: f64) -> Self {
         let drive = drive(layout, parts.reduced, film_ratio);
         let (of, noise, trend_noise) = dynamics(parts, layout, numbers, film_ratio);
-        let dynamics = Dynamics { of, noises: [diagonal(&noise), diagonal(&trend_noise)] };
+        let dynamics = ContinuousDynamics { of, noises: [diagonal(&noise), diagonal(&trend_noise)] };
         let (response, places) = (response(parts, layout, &drive), places(parts, layout, &drive));
         Self { dynamics, response, places }
     }
@@ -214,7 +206,7 @@ fn steps(behind: &[Behind], series: &Series) -> Arc<[Step]> {
     for (film, behind) in series.films().iter().zip(behind) {
         let own: Vec<usize> = (0..steps.len()).filter(|&i| series.steps[i].film == *film).collect();
         let lengths_s: Vec<f64> = own.iter().map(|&i| series.steps[i].length_s).collect();
-        let Dynamics { of, noises: [noise, trend_noise] } = &behind.dynamics;
+        let ContinuousDynamics { of, noises: [noise, trend_noise] } = &behind.dynamics;
         let n = behind.response.len();
         for (i, found) in own.into_iter().zip(discretise(of, [noise, trend_noise], n, &lengths_s)) {
             let [noise, trend_noise] = found.noises;
