@@ -24,8 +24,8 @@ use super::sparse::{MOST_STATES, Sparse, Square, dispatch, turned, wide_square};
 /// Terms of the series; what they leave out is below ½^13/13! = 2e-14.
 const TERMS: usize = 12;
 const LARGEST_NORM: f64 = 0.5;
-/// Lengths of time that differ by less are one \[s\]: instants of a record are told to about this.
-const SAME_S: f64 = 1e-9;
+/// Differences between lengths that differ by less are one \[s\]: rounding leaves less of them in records of up to a million seconds.
+const ROUNDING_S: f64 = 1e-9;
 /// Noises that are told apart.
 const NOISES: usize = 2;
 
@@ -223,7 +223,7 @@ fn discretise_of<const N: usize>(arithmetic: impl Arithmetic, of: &Discretise) -
         // What is left out is made up for by the next.
         let more_s = of.steps_s[place] - known_s;
         let more = match last.take() {
-            Some(same) if (same.time_s - more_s).abs() < SAME_S => same,
+            Some(same) if (same.time_s - more_s).abs() < ROUNDING_S => same,
             _ => {
                 let over = over(arithmetic, &series, more_s / unit_s, n);
                 let phi = Sparse::of_square(&over.transition, n);
