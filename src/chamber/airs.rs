@@ -16,12 +16,19 @@ const LEAST_FILM: f64 = 0.1;
 const MOST_FILM: f64 = 1e5;
 const FILM_HALVES: usize = 16;
 
-/// A chamber with another air, the fit there, and what the kinks that each record has more cost in log prior.
+/// Whether air may be taken for that of a controlled chamber.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Controllers {
+    MayBe,
+    None,
+}
+
+/// A chamber with another air, the fit there, and what each record's kinks and controller cost more in log prior.
 pub(crate) type OwnAir<'a> = (Chamber<'a>, Fit, Vec<f64>);
 
 impl<'a> Chamber<'a> {
     /// The records as they were taken in, less what a chamber of them leaves out, with the air that each is likeliest to have by what is assumed; the
-    /// fit there, and what the kinks that each has more than in that chamber cost in log prior.
+    /// fit there, and what the kinks and the controller that each has more than in that chamber cost in log prior.
     ///
     /// # Errors
     /// As [`Chamber::fit`].
@@ -31,9 +38,11 @@ impl<'a> Chamber<'a> {
         assumed: &Assumption,
         free: &[Free],
         records: &[usize],
+        controllers: Controllers,
     ) -> Result<OwnAir<'a>, ChamberError> {
         for (own, other) in self.observed.iter_mut().zip(&like.observed) {
             own.series.take_values_of(&other.series);
+            own.series.may_be_controlled = controllers == Controllers::MayBe;
         }
         let whole: Vec<Series> = self.observed.iter().map(|o| o.series.clone()).collect();
         let curved = self.fit_anew(assumed, free, records)?;
@@ -42,7 +51,7 @@ impl<'a> Chamber<'a> {
         let fit = self.take_airs(curved, records, &whole)?;
         self.take_days(days);
         let fit = self.fit(assumed, free, records, Some(&fit), Effort::QUICK)?;
-        let prices = self.prices_of_kinks(like);
+        let prices = self.prices_of_air(like);
         Ok((self, fit, prices))
     }
 }
@@ -131,7 +140,7 @@ impl<'a> Chamber<'a> {
         }
         let (worth, series, numbers) = best;
         let bends = series.rows.iter().any(|row| row.bend > 0.0);
-        let controlled = if bends { self.controlled(fit, r, worth)? } else { None };
+        let controlled = if bends && series.may_be_controlled { self.controlled(fit, r, worth)? } else { None };
         match controlled {
             Some(controlled) => Ok(controlled),
             None if series.approaches => self.staged(fit, r, series, numbers),
@@ -198,9 +207,7 @@ impl<'a> Chamber<'a> {
         let mut chamber = self.clone();
         chamber.observed[r].series.controlled = true;
         let there = chamber.fit(&fit.assumed, &[], &[r], Some(fit), Effort::QUICK)?;
-        // Its time and its damping ratio cost what a kink's place and height do.
-        let price = (chamber.observed[r].series.times_s.len() as f64).ln();
-        let is_better = there.posterior() > worth + price;
+        let is_better = there.posterior() > worth + chamber.observed[r].series.price_of_controller();
         Ok(is_better.then(|| (chamber.observed.swap_remove(r).series, there.numbers[r])))
     }
 
@@ -289,6 +296,16 @@ pub(super) mod tests {
             assert!((found_s * found / (control_s * damping)).ln().abs() < 0.35, "{found_s} {found}");
             assert!(damping > 0.5 || (found / damping).ln().abs() < 0.1, "{found}");
             assert!((film / 25.0).ln().abs() < 0.25, "{film}");
+            // Where no controller may be, it is air that bends by itself, which costs no time and no damping ratio, and is worth less.
+            let whole = Chamber::new(&bare, &[&record]).unwrap();
+            let (own, bending, prices) =
+                whole.with_own_airs(&chamber, &declared, &[], &[0], Controllers::None).unwrap();
+            let kinks = own.observed[0].series.kinks as f64 - chamber.observed[0].series.kinks as f64;
+            println!("without a controller {:.1} of {:.1}", bending.posterior() - prices[0], fit.posterior());
+            assert!(!own.observed[0].series.controlled);
+            let least = -(chamber.times_s(0).len() as f64).ln();
+            assert!(if kinks == 0.0 { (prices[0] - least).abs() < 1e-9 } else { prices[0] > least }, "{prices:?}");
+            assert!(bending.posterior() - prices[0] < fit.posterior());
         }
         let ramps = kinked(&bare, &pattern);
         let (chamber, _) = Chamber::new(&bare, &[&ramps]).unwrap().with_shocks(&declared, &[0]).unwrap();

@@ -93,7 +93,7 @@ use solved::Solved;
 use system::driven_by_air;
 
 pub(crate) use adjustment::DifferenceVariance;
-pub(crate) use airs::OwnAir;
+pub(crate) use airs::{Controllers, OwnAir};
 pub(crate) use ascent::Effort;
 pub(crate) use causal::{Causal, Surroundings};
 pub(crate) use filter::Innovation;
@@ -291,6 +291,11 @@ impl<'a> Chamber<'a> {
     /// Ends of the chamber's rows of one record.
     pub(crate) fn times_s(&self, record: usize) -> &[f64] {
         &self.observed[record].series.times_s
+    }
+
+    /// Whether a record's air is that of a controlled chamber.
+    pub(crate) fn is_controlled(&self, record: usize) -> bool {
+        self.observed[record].series.controlled
     }
 
     /// The first and last of a record's rows that are in one of the chamber's.

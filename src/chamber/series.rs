@@ -38,6 +38,8 @@ pub(super) struct Series {
     pub(super) kinks: usize,
     /// Whether its air takes time to take on another slope, as that of a controlled chamber does.
     pub(super) controlled: bool,
+    /// Whether it may be taken for that.
+    pub(super) may_be_controlled: bool,
     /// Whether its air approaches a set point, as that of a stage does behind a step: its slope dies away.
     pub(super) approaches: bool,
     /// … and takes on the slope that a step asks for with a delay.
@@ -153,6 +155,7 @@ impl Series {
             after_kinks: Vec::new(),
             kinks: 0,
             controlled: false,
+            may_be_controlled: true,
             approaches: false,
             delays: false,
             film_switches_s: Vec::new(),
@@ -204,6 +207,11 @@ impl Series {
         for (row, there) in self.rows.iter_mut().zip(&other.rows) {
             (row.measured, row.rounding) = (there.measured, there.rounding);
         }
+    }
+
+    /// What a controller costs in log prior: its time and its damping ratio cost what a kink's place and height do.
+    pub(super) fn price_of_controller(&self) -> f64 {
+        (self.times_s.len() as f64).ln()
     }
 
     /// Takes in again what was left out since.

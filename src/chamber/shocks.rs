@@ -266,14 +266,18 @@ impl<'a> Chamber<'a> {
             }
             fit = chamber.fit(&fit.assumed.clone(), &fit.free.clone(), &fit.records.clone(), Some(&fit), effort)?;
         }
-        let prices = chamber.prices_of_kinks(self);
+        let prices = chamber.prices_of_air(self);
         Ok(Some((chamber, fit, prices)))
     }
 
-    /// What the kinks that each record has more than in another chamber cost in log prior.
-    pub(super) fn prices_of_kinks(&self, other: &Self) -> Vec<f64> {
-        let kinks = |chamber: &Self, r: usize| chamber.observed[r].series.kinks as f64;
-        (0..self.records()).map(|r| (kinks(self, r) - kinks(other, r)) * -KINKS_PER_ROW.ln()).collect()
+    /// What the kinks and the controllers that each record has more than in another chamber cost in log prior.
+    pub(super) fn prices_of_air(&self, other: &Self) -> Vec<f64> {
+        let price = |chamber: &Self, r: usize| {
+            let series = &chamber.observed[r].series;
+            let controller = if series.controlled { series.price_of_controller() } else { 0.0 };
+            controller - KINKS_PER_ROW.ln() * series.kinks as f64
+        };
+        (0..self.records()).map(|r| price(self, r) - price(other, r)).collect()
     }
 
     /// Places kinks until no more are found with numbers as they are; how many.

@@ -1,6 +1,6 @@
 //! Reference: records of an independent simulator in which nothing is hidden (`tests/data/records-controls`): what the air did makes
 //! readings likelier with a lag of the sensor (26 in log likelihood), or with another pack, than without; the rates do not ask for it.
-//! Flicker is 0.3 and 0.5 of the white noise. Three pairs are of steps of a thermoelectric stage; one of them hides a stress gradient. One pair behind a coarse sensor and one of a stage hide a factor of dn/dT. Two further pairs have their sensor on a housing and on the spool (`tests/data/records-parts`). Tolerance: nothing is named, no formula is proposed, and nothing is called unexplained.
+//! Flicker is 0.3 and 0.5 of the white noise. Three pairs are of steps of a thermoelectric stage; one of them hides a stress gradient. One pair behind a coarse sensor and one of a stage hide a factor of dn/dT, one hides a lag and two effects. Two further pairs have their sensor on a housing and on the spool (`tests/data/records-parts`). Tolerance: nothing is named, no formula is proposed, and nothing is called unexplained.
 
 use std::path::Path;
 
@@ -66,6 +66,20 @@ fn a_winding_that_effects_may_stand_for_is_not_named_alone() {
         println!("{name}: {kinds:?}");
         assert!(kinds.contains(&"thermo_optic".to_owned()), "{kinds:?}");
     }
+}
+
+/// Without a lag the air is taken for a controlled chamber's, whose time stands for the lag: a reversed coil explained the rates, with certainty.
+#[test]
+#[ignore = "long: --include-ignored"]
+fn a_lag_that_a_controllers_time_stands_for_is_asked_for_in_air_without_a_controller() {
+    let found = diagnosed("records-controls/lag-or-controller");
+    let kinds: Vec<String> = found.effects.iter().map(|f| f.effect.kind()).collect();
+    assert_eq!(found.verdict, Verdict::Missing);
+    assert!(kinds.contains(&"sensor_lag".to_owned()) && kinds.contains(&"bias_gradient_rate".to_owned()), "{kinds:?}");
+    // 86.1 s was put in.
+    let lag = found.effects.iter().find(|f| f.effect.kind() == "sensor_lag").unwrap();
+    let (value, error) = (lag.parameters[0].value, lag.parameters[0].standard_error.unwrap());
+    assert!((value - 86.1).abs() < 2.0 * error && error < 15.0, "{value} {error}");
 }
 
 /// By a model without the fast modes the outermost layer's gain explained this better than what is there.

@@ -36,6 +36,7 @@ pub(crate) use explanation::{Explanation, Member};
 pub(in crate::diagnose) use explanation::{fitted, with, without};
 pub(in crate::diagnose) use odds::EFFECT;
 pub(in crate::diagnose) use parsimony::give_to_smaller;
+use readings::is_seen_alone;
 pub(in crate::diagnose) use readings::{Readings, changes_readings, is_seen};
 pub(in crate::diagnose) use screen::{Proposal, TestedStart, proposals_along, tested_starts};
 pub(crate) use search::{again, fit_one, judged, ranked, search_if_it_promises};

@@ -13,8 +13,9 @@
 use rayon::prelude::*;
 
 use super::explanation::with;
-use super::{Explanation, Member, Outcome, Question, Winding, is_seen};
-use crate::chamber::{Chamber, Effort, Films, OwnAir};
+use super::{Explanation, Member, Outcome, Question, Winding, is_seen, is_seen_alone};
+use crate::chamber::{Chamber, Controllers, Effort, Films, OwnAir};
+use crate::diagnose::candidate::Candidate;
 
 /// Sets that are looked at with kinks of their own after each score test: more are behind by what no kinks make up for.
 const LOOKED_AT: usize = 4;
@@ -45,25 +46,50 @@ pub(super) fn best_by_own_kinks<'a>(
 /// The best set of one effect that makes the heat path another one, as a pack that ends does of a half space, in the air that it would have seen.
 /// Where readings look like air of no kind by the declared path, such a set is far behind in the common chamber.
 pub(super) fn best_by_own_air<'a>(question: &Question<'a>, declared: &Explanation) -> Option<InOwnAir<'a>> {
-    let is_whole = |place: &usize| question.candidates[*place].free.is_empty();
-    let places: Vec<usize> = (0..question.candidates.len()).filter(is_whole).collect();
+    let is_whole = |candidate: &Candidate| candidate.free.is_empty();
+    best_of_one(question, declared, &is_whole, Controllers::MayBe)
+}
+
+/// The best set of one effect that only readings see, as a lag of the sensor, in air that no controller makes. A controller's time and a lag are two
+/// in a row, of which readings see little more than the sum: beside the one, no score test asks for the other.
+pub(super) fn best_without_controllers<'a>(question: &Question<'a>, declared: &Explanation) -> Option<InOwnAir<'a>> {
+    let is_of_sensor = |candidate: &Candidate| {
+        let with = question.model.with_effect(candidate.effect.clone());
+        is_seen(&with, question.model) && is_seen_alone(&with, question.model)
+    };
+    best_of_one(question, declared, &is_of_sensor, Controllers::None)
+}
+
+fn best_of_one<'a>(
+    question: &Question<'a>,
+    declared: &Explanation,
+    is_asked: &dyn Fn(&Candidate) -> bool,
+    controllers: Controllers,
+) -> Option<InOwnAir<'a>> {
+    let places: Vec<usize> = (0..question.candidates.len()).filter(|&p| is_asked(&question.candidates[p])).collect();
     let own = places.into_par_iter().filter_map(|place| {
         // A heat path that cannot be solved speaks against itself alone.
-        by_path(question, declared, place).unwrap_or_default()
+        by_effect(question, declared, place, controllers).unwrap_or_default()
     });
     best(own.collect())
 }
 
-fn by_path<'a>(question: &Question<'a>, declared: &Explanation, place: usize) -> Outcome<Option<InOwnAir<'a>>> {
+fn by_effect<'a>(
+    question: &Question<'a>,
+    declared: &Explanation,
+    place: usize,
+    controllers: Controllers,
+) -> Outcome<Option<InOwnAir<'a>>> {
     let member = Member::Effect(place);
     let Some((assumed, free)) = with(question, &[], &declared.fit, member, None) else { return Ok(None) };
     // What readings do not see leads to no other air.
     if !is_seen(&assumed.model, &declared.fit.assumed.model) {
         return Ok(None);
     }
-    let records: Vec<_> = (0..question.chamber.records()).map(|r| question.chamber.record(r)).collect();
-    let whole = Chamber::new(question.model, &records)?.switched_like(question.chamber, Films::Same);
-    let own = whole.with_own_airs(question.chamber, &assumed, &free, &question.fitted)?;
+    let chamber = question.chamber;
+    let records: Vec<_> = (0..chamber.records()).map(|r| chamber.record(r)).collect();
+    let whole = Chamber::new(question.model, &records)?.switched_like(chamber, Films::Same);
+    let own = whole.with_own_airs(chamber, &assumed, &free, &question.fitted, controllers)?;
     Ok(Some(in_own_air(question, &[], vec![member], own)))
 }
 

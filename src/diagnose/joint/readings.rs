@@ -113,6 +113,11 @@ pub(in crate::diagnose) fn is_seen(model: &CoilModel, without: &CoilModel) -> bo
     }
 }
 
+/// Whether only readings see what a model has more than another: the coil is heated as it was.
+pub(super) fn is_seen_alone(model: &CoilModel, without: &CoilModel) -> bool {
+    matches!((model.heat_path(), without.heat_path()), (Ok(a), Ok(b)) if a == b)
+}
+
 /// Whether readings would be others with a set's members.
 pub(in crate::diagnose) fn changes_readings(question: &Question, explanation: &Explanation) -> bool {
     explanation.members.iter().any(|member| match member {

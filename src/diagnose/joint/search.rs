@@ -8,7 +8,7 @@ use super::explanation::{fitted, in_order, with};
 use super::forward::{Kinks, Search};
 use super::judge::{Care, judge};
 use super::odds::{CERTAIN, WINDOW};
-use super::own_air::best_by_own_air;
+use super::own_air::{best_by_own_air, best_without_controllers};
 use super::screen::{Proposal, proposals};
 use super::tries::calmed;
 use super::{Explanation, Found, Member, Outcome, Question};
@@ -46,8 +46,8 @@ pub(crate) fn judged(question: &Question, mut found: Found) -> Outcome<Found> {
     Ok(found)
 }
 
-/// Searches sets of explanations, and ranks them: from the declared model, and from another heat path that its candidates give it, if one may be
-/// the coil's. What else is missing hangs on which it is.
+/// Searches sets of explanations, and ranks them: from the declared model, and in air of another kind that some candidate would have seen, if that
+/// may be the chamber's. What else is missing hangs on which it is.
 ///
 /// # Errors
 /// As [`search_if_it_promises`].
@@ -56,21 +56,26 @@ pub(crate) fn ranked(question: &Question, null: Fit, progress: &(dyn Fn(f64) + S
     let declared = Explanation::new(question, &[], Vec::new(), null);
     let mut cache = Cache::new();
     cache.insert(declared.key(), declared.clone());
-    let (_, best, found) =
+    let (best, mut most, mut found) =
         ranked_from(question, declared.clone(), cache.clone(), &|share| progress(0.2 + 0.4 * share))?;
-    let other = best_by_own_air(question, &declared).filter(|own| own.merit > declared.merit - WINDOW);
-    let Some(other) = other else { return Ok(found) };
+    let mut others = vec![best_by_own_air(question, &declared)];
+    // Another winding stands for much: before it is named, air without a controller is asked for.
+    if best.has_winding() && question.fitted.iter().any(|&r| question.chamber.is_controlled(r)) {
+        others.push(best_without_controllers(question, &declared));
+    }
     progress(0.6);
-    let there = Question { chamber: &other.chamber, ..question.clone() };
-    let mut cache = carried(&there, &[], cache);
-    let price = other.explanation.merit - other.merit;
-    keep(&mut cache, other.explanation.clone());
-    let path = other.explanation.members.clone();
-    let (best_there, worth, found_there) =
-        ranked_from(&there, other.explanation, cache, &|share| progress(0.6 + 0.4 * share))?;
-    // Without the other path in the end it has only gone astray.
-    let is_by_it = path.iter().all(|m| best_there.members.contains(m));
-    Ok(if is_by_it && worth - price > best { Found { is_elsewhere: true, ..found_there } } else { found })
+    for other in others.into_iter().flatten().filter(|own| own.merit > declared.merit - WINDOW) {
+        let there = Question { chamber: &other.chamber, ..question.clone() };
+        let mut cache = carried(&there, &[], cache.clone());
+        let price = other.explanation.merit - other.merit;
+        keep(&mut cache, other.explanation.clone());
+        let (_, worth, found_there) =
+            ranked_from(&there, other.explanation, cache, &|share| progress(0.6 + 0.4 * share))?;
+        if worth - price > most + PROMISING {
+            (most, found) = (worth - price, Found { is_elsewhere: true, ..found_there });
+        }
+    }
+    Ok(found)
 }
 
 /// A search from a set: the best that it ended with, what that is worth less what the kinks of its own air cost, and all that was found, ranked.
@@ -94,7 +99,8 @@ fn ranked_from(
         judge(&here, &windings, &mut explanations, Care::AsRanked)?;
     }
     let worth = best.merit - price;
-    Ok((best, worth, Found { explanations, promised: promised.unwrap_or_default(), left, windings, is_elsewhere }))
+    let found = Found { explanations, promised: promised.unwrap_or_default(), left, windings, is_elsewhere };
+    Ok((best, worth, found))
 }
 
 /// Of judged sets, the likeliest if it goes further than the best of the search, and, if that is wound otherwise, the likeliest that is not.
