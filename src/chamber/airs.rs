@@ -7,7 +7,7 @@ use super::ascent::Effort;
 use super::coil_side::CoilSide;
 use super::fit::Fit;
 use super::layout::Numbers;
-use super::prior::Quantity;
+use super::prior::{Quantity, price_of_controller};
 use super::series::Series;
 use super::{Assumption, Chamber, ChamberError, Free};
 
@@ -207,7 +207,7 @@ impl<'a> Chamber<'a> {
         let mut chamber = self.clone();
         chamber.observed[r].series.controlled = true;
         let there = chamber.fit(&fit.assumed, &[], &[r], Some(fit), Effort::QUICK)?;
-        let is_better = there.posterior() > worth + chamber.observed[r].series.price_of_controller();
+        let is_better = there.posterior() > worth + price_of_controller(self.times_s(r).len());
         Ok(is_better.then(|| (chamber.observed.swap_remove(r).series, there.numbers[r])))
     }
 

@@ -235,6 +235,11 @@ pub(super) const GROSS_FACTOR: f64 = 30.0;
 /// An air of straight lines turns some ten times in a record of 1500 rows.
 pub(super) const KINKS_PER_ROW: f64 = 1.0 / 150.0;
 
+/// What a controller costs a record of so many rows in log prior: its time and its damping ratio cost what a kink's place and height do.
+pub(super) fn price_of_controller(rows: usize) -> f64 {
+    (rows as f64).ln()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -36,9 +36,8 @@ pub(super) struct Series {
     pub(crate) spikes: usize,
     /// Kinks that were placed in its air.
     pub(super) kinks: usize,
-    /// Whether its air takes time to take on another slope, as that of a controlled chamber does.
+    /// Whether its air takes time to take on another slope, as that of a controlled chamber does, and whether it may be taken for that.
     pub(super) controlled: bool,
-    /// Whether it may be taken for that.
     pub(super) may_be_controlled: bool,
     /// Whether its air approaches a set point, as that of a stage does behind a step: its slope dies away.
     pub(super) approaches: bool,
@@ -121,8 +120,7 @@ impl Series {
         for error in &gross {
             columns[if error.column == "rate" { RATE } else { 0 }][error.row] = f64::NAN;
         }
-        let times_s = record.times_s();
-        let interval_s = record.interval_s();
+        let (times_s, interval_s) = (record.times_s(), record.interval_s());
         let duration_s = times_s[times_s.len() - 1] - times_s[0];
         let reference_k = columns[0].iter().copied().find(|v| v.is_finite()).unwrap_or(0.0);
         for column in &mut columns[..RATE] {
@@ -204,14 +202,8 @@ impl Series {
     pub(super) fn take_values_of(&mut self, other: &Self) {
         self.values.clone_from(&other.values);
         self.spikes = other.spikes;
-        for (row, there) in self.rows.iter_mut().zip(&other.rows) {
-            (row.measured, row.rounding) = (there.measured, there.rounding);
-        }
-    }
-
-    /// What a controller costs in log prior: its time and its damping ratio cost what a kink's place and height do.
-    pub(super) fn price_of_controller(&self) -> f64 {
-        (self.times_s.len() as f64).ln()
+        let rows = self.rows.iter_mut().zip(&other.rows);
+        rows.for_each(|(row, there)| (row.measured, row.rounding) = (there.measured, there.rounding));
     }
 
     /// Takes in again what was left out since.

@@ -13,7 +13,7 @@ use super::filter::{self, RATE};
 use super::fit::Fit;
 use super::kinked_rows::Bend;
 use super::layout::Numbers;
-use super::prior::{GROSS_FACTOR, GROSS_SHARE, KINKS_PER_ROW, Quantity};
+use super::prior::{GROSS_FACTOR, GROSS_SHARE, KINKS_PER_ROW, Quantity, price_of_controller};
 use super::series::Series;
 
 use super::system::system;
@@ -274,7 +274,7 @@ impl<'a> Chamber<'a> {
     pub(super) fn prices_of_air(&self, other: &Self) -> Vec<f64> {
         let price = |chamber: &Self, r: usize| {
             let series = &chamber.observed[r].series;
-            let controller = if series.controlled { series.price_of_controller() } else { 0.0 };
+            let controller = if series.controlled { price_of_controller(series.times_s.len()) } else { 0.0 };
             controller - KINKS_PER_ROW.ln() * series.kinks as f64
         };
         (0..self.records()).map(|r| price(self, r) - price(other, r)).collect()

@@ -68,10 +68,10 @@ fn a_winding_that_effects_may_stand_for_is_not_named_alone() {
     }
 }
 
-/// Without a lag the air is taken for a controlled chamber's, whose time stands for the lag: a reversed coil explained the rates, with certainty.
+/// A controller (83 s) and a lag of the sensor (86 s) are two in a row: by the one, a reversed coil explained the rates with certainty.
 #[test]
 #[ignore = "long: --include-ignored"]
-fn a_lag_that_a_controllers_time_stands_for_is_asked_for_in_air_without_a_controller() {
+fn a_lag_behind_a_controller_is_asked_for_in_air_without_one() {
     let found = diagnosed("records-controls/lag-or-controller");
     let kinds: Vec<String> = found.effects.iter().map(|f| f.effect.kind()).collect();
     assert_eq!(found.verdict, Verdict::Missing);
