@@ -53,11 +53,10 @@ pub(super) fn best_by_own_air<'a>(question: &Question<'a>, declared: &Explanatio
 /// The best set of one effect that only readings see, as a lag of the sensor, in air that no controller makes. A controller's time and a lag are two
 /// in a row, of which readings see little more than the sum: beside the one, no score test asks for the other.
 pub(super) fn best_without_controllers<'a>(question: &Question<'a>, declared: &Explanation) -> Option<InOwnAir<'a>> {
-    let is_of_sensor = |candidate: &Candidate| {
-        let with = question.model.with_effect(candidate.effect.clone());
-        is_seen(&with, question.model) && is_seen_alone(&with, question.model)
-    };
-    best_of_one(question, declared, &is_of_sensor, Controllers::None)
+    // Those that readings do not see either are left out below.
+    let leaves_heat_path =
+        |candidate: &Candidate| is_seen_alone(&question.model.with_effect(candidate.effect.clone()), question.model);
+    best_of_one(question, declared, &leaves_heat_path, Controllers::None)
 }
 
 fn best_of_one<'a>(
