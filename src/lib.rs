@@ -53,8 +53,9 @@
 // The heads of modules speak to those who read the source.
 #![allow(rustdoc::private_intra_doc_links)]
 
-// Floor 0: units, mathematics and text without domain words.
+// Floor 0: units, mathematics and text without domain words, and what runs on all processors.
 pub mod numeric;
+pub(crate) mod parallel;
 pub mod text;
 pub mod units;
 // Floor 1: what a coil, a pattern, a profile and a record are.

@@ -1,7 +1,7 @@
 //! What each record's air is likeliest to be: a curve, straight but for kinks, or both; whether it approaches set points, and whether it follows
 //! one as a controlled chamber does.
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::ascent::Effort;
 use super::coil_side::CoilSide;
@@ -70,7 +70,8 @@ impl Timed<'_> {
     fn again(self, r: usize) -> Result<Self, ChamberError> {
         let mut anew = self.chamber.clone();
         anew.place_kinks_anew(&self.fit, r)?;
-        let (these, anew) = rayon::join(|| self.chamber.clone().timed(&self.fit, r), || anew.timed(&self.fit, r));
+        let (these, anew) =
+            crate::parallel::join(|| self.chamber.clone().timed(&self.fit, r), || anew.timed(&self.fit, r));
         Ok(self.or_better(Some(these?)).or_better(Some(anew?)))
     }
 
@@ -92,7 +93,8 @@ impl<'a> Chamber<'a> {
     /// # Errors
     /// As [`Chamber::fit`].
     pub(super) fn take_airs(&mut self, mut fit: Fit, records: &[usize], whole: &[Series]) -> Result<Fit, ChamberError> {
-        let found: Result<Vec<_>, ChamberError> = records.par_iter().map(|&r| self.likeliest_air(&fit, r)).collect();
+        let found: Result<Vec<_>, ChamberError> =
+            records.iter().in_parallel().map(|&r| self.likeliest_air(&fit, r)).collect();
         // To a curve the rows behind a kink are gross errors.
         let mut again = Vec::new();
         for (&r, (series, numbers)) in records.iter().zip(found?) {
@@ -131,7 +133,7 @@ impl<'a> Chamber<'a> {
             let Ok(Some((kinked, worth))) = chamber.kinked(from, r) else { return Ok(None) };
             Ok(Some((worth, chamber.observed.swap_remove(r).series, kinked.numbers[r])))
         };
-        let found: Result<Vec<_>, ChamberError> = asked.into_par_iter().map(kinked).collect();
+        let found: Result<Vec<_>, ChamberError> = asked.in_parallel().map(kinked).collect();
         let mut best = (curved.posterior(), self.observed[r].series.clone(), curved.numbers[r]);
         for there in found?.into_iter().flatten() {
             if there.0 > best.0 {
@@ -164,11 +166,11 @@ impl<'a> Chamber<'a> {
             other.place_kinks_anew(&turned, r)?;
             other.timed(&turned, r)?.again(r).map(Some)
         };
-        let (again, other) = rayon::join(|| usual.again(r), in_other_order);
+        let (again, other) = crate::parallel::join(|| usual.again(r), in_other_order);
         let found = again?.or_better(other?);
         // What bends beside steps stood for steps at other times; it would still do so for those of the other order.
         let turned = found.chamber.in_other_order(&found.fit, &found.fit, r)?;
-        let (straight, turned) = rayon::join(
+        let (straight, turned) = crate::parallel::join(
             || found.without_bends(&found.fit, r),
             || turned.map(|turned| found.without_bends(&turned, r)).transpose(),
         );

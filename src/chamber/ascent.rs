@@ -21,8 +21,8 @@
 //! Conn, Gould, Toint, Trust-Region Methods (2000), chapters 6 and 7.7 (boxes); Nocedal and Wright, Numerical Optimization
 //! (2006), algorithm 16.3 (active sets of a convex quadratic programme).
 
+use crate::parallel::InParallel;
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::derivative::{DerivativeColumn, Derivatives};
 use super::filter::Innovation;
@@ -252,7 +252,8 @@ impl Chamber<'_> {
             return Err(ChamberError::Unsolvable);
         }
         let point = self.model_point(assumed, numbers, records, courses)?;
-        let innovations: Result<Vec<_>, _> = records.par_iter().map(|&r| self.innovations(&point, r)).collect();
+        let innovations: Result<Vec<_>, _> =
+            records.iter().in_parallel().map(|&r| self.innovations(&point, r)).collect();
         let innovations = innovations?;
         let log_likelihood: f64 = innovations.iter().map(|i| log_likelihood(i)).sum();
         let log_prior: f64 = parameters.iter().zip(&coordinates).map(|(p, &c)| p.log_prior(c)).sum();

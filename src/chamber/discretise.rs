@@ -20,6 +20,7 @@
 
 use super::arithmetic::{Arithmetic, Pass, dispatched};
 use super::sparse::{MOST_STATES, Sparse, Square, dispatch, turned, wide_square};
+use crate::numeric::order::sort_ascending;
 
 /// Terms of the series; what they leave out is below ½^13/13! = 2e-14.
 const TERMS: usize = 12;
@@ -215,7 +216,7 @@ fn discretise_of<const N: usize>(arithmetic: impl Arithmetic, of: &Discretise) -
     let unit_s = series_unit_s(of.system, n, longest_s);
     let series = series_of::<N>(arithmetic, of, unit_s);
     let mut order: Vec<usize> = (0..of.steps_s.len()).collect();
-    order.sort_by(|a, b| of.steps_s[*a].total_cmp(&of.steps_s[*b]));
+    sort_ascending(&mut order, |item| of.steps_s[*item]);
     let mut found: Vec<(usize, Discrete)> = Vec::with_capacity(order.len());
     let (mut known_s, mut known) = (0.0, Over::<N>::nothing(n));
     let mut last: Option<More<N>> = None;

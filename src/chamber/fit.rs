@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use crate::parallel::InParallel;
 use nalgebra::DMatrix;
-use rayon::prelude::*;
 
 use super::ascent::{AscentEnd, Beginning, Effort, KnownDerivatives};
 use super::coil_side::{CoilSide, quantities, smoothed};
@@ -158,7 +158,7 @@ impl Chamber<'_> {
             .map(Some)
         };
         let found: Vec<(usize, Result<Option<Reference>, ChamberError>)> =
-            records.par_iter().map(|&r| (r, of(r))).collect();
+            records.iter().in_parallel().map(|&r| (r, of(r))).collect();
         for (r, course) in found {
             courses[r] = course?.or(courses[r].take());
         }

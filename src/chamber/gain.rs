@@ -40,7 +40,7 @@ impl Chamber<'_> {
         let mut same_air = self.clone();
         let switches_s = other.film_switches_s(record);
         same_air.observed[record].series = same_air.observed[record].series.with_film_switches(switches_s);
-        let (here, there) = rayon::join(|| worth(self, fit, other), || worth(other, other_fit, self));
+        let (here, there) = crate::parallel::join(|| worth(self, fit, other), || worth(other, other_fit, self));
         Ok(here? - there?.max(worth(&same_air, fit, other)?))
     }
 

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::ascent::Effort;
 use super::doubts::doubts;
@@ -245,7 +245,7 @@ impl KinkLikelihood<'_> {
         let (series, system) = self.with(&others);
         let stretches = others.iter().map(|kink| self.base.rows_about(kink.time_s, reach_s)).collect();
         let elsewhere = Elsewhere::new(&system, &series.rows, self.values, stretches);
-        kinks.par_iter_mut().enumerate().for_each(|(place, kink)| {
+        kinks.iter_mut().enumerate().in_parallel().for_each(|(place, kink)| {
             let at = |time_s: f64| {
                 let mut all = others.clone();
                 all[place].time_s = time_s;
@@ -279,7 +279,7 @@ impl KinkLikelihood<'_> {
                 let here = elsewhere.log_likelihood(place, &series.rows, system.kinks.clone());
                 here - elsewhere.log_likelihood(place, &without.rows, self.straight.kinks_of(&without))
             };
-            let costs: Vec<f64> = (0..kinks.len()).into_par_iter().map(cost).collect();
+            let costs: Vec<f64> = (0..kinks.len()).in_parallel().map(cost).collect();
             let least = costs.into_iter().enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
             match least {
                 Some((place, cost)) if cost < price => kinks.remove(place),

@@ -1,6 +1,6 @@
 //! The innovations at one point of numbers and effects, and their derivatives there: all that a likelihood is computed from.
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::abreast;
 use super::coil_side::{CoilSide, run};
@@ -43,7 +43,7 @@ impl Chamber<'_> {
             let course = courses[r].as_ref().filter(|c| side.needs_reference() && c.outputs == side.reduced.outputs);
             side.values(&assumed, &self.observed[r], r, course).map(Some)
         };
-        let found: Result<Vec<_>, ChamberError> = records.par_iter().map(taken_off).collect();
+        let found: Result<Vec<_>, ChamberError> = records.iter().in_parallel().map(taken_off).collect();
         records.iter().zip(found?).for_each(|(&r, own)| values[r] = own);
         Ok(ModelPoint { assumed, numbers, sides, values, courses })
     }
@@ -107,7 +107,8 @@ impl Chamber<'_> {
         };
         let unmoved = records.iter().map(unmoved).collect::<Result<Vec<System>, ChamberError>>()?;
         let columns: Vec<Result<Vec<DerivativeColumn>, ChamberError>> = tasks
-            .par_iter()
+            .iter()
+            .in_parallel()
             .map(|(i, own)| {
                 let moved: Result<Vec<(f64, MovedRecord)>, ChamberError> = own
                     .iter()

@@ -9,6 +9,7 @@ use super::filter::RATE;
 use super::fit::Fit;
 use super::layout::{Numbers, Parts};
 use super::prior::Quantity;
+use crate::numeric::order::sort_ascending;
 
 use super::shows::Shows;
 use super::{Chamber, ChamberError, Place};
@@ -100,7 +101,7 @@ impl Chamber<'_> {
         for remedy in Remedy::ALL {
             remedies.push((remedy, air(self.unseen(fit, &numbers, record, Some(remedy))?.expected)));
         }
-        remedies.sort_by(|a, b| a.1.total_cmp(&b.1));
+        sort_ascending(&mut remedies, |item| item.1);
         Ok(Noise {
             white_rad_per_s: white,
             white_standard_error_rad_per_s: error,

@@ -1,8 +1,8 @@
 //! What many known inputs to the measurements make of the innovations: as [`super::filter::respond`], some at a time.
 
+use crate::parallel::InParallel;
 use nalgebra::DMatrix;
 use pulp::Arch;
-use rayon::prelude::*;
 
 use super::filter::{Move, Row, System, Trace, Values};
 use super::sparse::Sparse;
@@ -37,7 +37,7 @@ pub(super) fn responses(
         Arch::new().dispatch(|| respond(system, rows, trace, &inputs, (begins[0], &first), &mut out));
         out
     };
-    let columns: Vec<Vec<f64>> = begins.par_chunks(LANES).map(some).collect();
+    let columns: Vec<Vec<f64>> = begins.chunks(LANES).in_parallel().map(some).collect();
     DMatrix::from_vec(count, begins.len(), columns.concat())
 }
 

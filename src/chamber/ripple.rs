@@ -3,8 +3,9 @@
 //! A likelihood has a maximum for every period that an oscillator may lock on to, hundreds of units apart, and none leads to the
 //! next. The score of a ripple's variance where there is none says of all periods at once which are worth a fit.
 
+use crate::numeric::order::sort_descending;
+use crate::parallel::InParallel;
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::abreast;
 use super::derivative::DerivativeColumn;
@@ -59,7 +60,8 @@ impl Chamber<'_> {
         let series = &self.observed[record].series;
         let periods = periods_s(series.shortest_s());
         let columns: Vec<Result<Vec<DerivativeColumn>, ChamberError>> = periods
-            .par_chunks(abreast::LANES)
+            .chunks(abreast::LANES)
+            .in_parallel()
             .map(|periods| {
                 let with = |period_s: &f64| {
                     let mut numbers = point.numbers[record];
@@ -92,7 +94,7 @@ impl Chamber<'_> {
             all[i].gain > 0.0 && beside.iter().filter_map(|j| all.get(*j)).all(|other| other.gain <= all[i].gain)
         };
         let mut peaks: Vec<Ripple> = (0..all.len()).filter(|&i| is_peak(i)).map(|i| all[i]).collect();
-        peaks.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        sort_descending(&mut peaks, |item| item.gain);
         Ok(peaks)
     }
 }

@@ -13,8 +13,8 @@
 //! # Source
 //! Rao, Proc. Camb. Phil. Soc. 44 (1948) 50; Rosenberg, Ann. Econ. Soc. Meas. 2 (1973) 399 (columns through a filter).
 
+use crate::parallel::InParallel;
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::coil_side::run_kept;
 use super::derivative::{DerivativeColumn, Derivatives};
@@ -106,7 +106,8 @@ impl Chamber<'_> {
             let base = vec![trace.innovations.clone()];
             let derivatives = self.derivatives(&point, &fit.parameters, &fit.coordinates, &[record], &base)?;
             let responses: Vec<Vec<f64>> = columns
-                .par_iter()
+                .iter()
+                .in_parallel()
                 .map(|column| {
                     let mut inputs = Values { of: std::array::from_fn(|_| Vec::new()) };
                     inputs.of[RATE] = column.rate_rad_per_s.get(record).cloned().unwrap_or_default();
@@ -157,7 +158,8 @@ impl Chamber<'_> {
         add_priors(&fit.parameters, &fit.coordinates, &mut slope, &mut own);
         let Some(factor) = own.cholesky() else { return Err(ChamberError::Unsolvable) };
         let found = changed
-            .par_iter()
+            .iter()
+            .in_parallel()
             .map(|assumed| {
                 let mut score = 0.0;
                 let mut information = 0.0;

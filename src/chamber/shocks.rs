@@ -3,7 +3,7 @@
 //! Both are asked of the model itself, by what all other measurements make of each one ([`super::filter::doubts`]): a steep
 //! signal is no gross error to a model that has its slope, and a spike on it is none the less one.
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::airs::OwnAir;
 use super::ascent::Effort;
@@ -88,7 +88,7 @@ impl<'a> Chamber<'a> {
             Ok((chamber, fit))
         };
         let look = |chamber: &mut Self, day: Fit, other: usize| chamber.looked_through(day, &[other]);
-        let (own, days) = rayon::join(own, || self.days_of_others(&curved, records, &look));
+        let (own, days) = crate::parallel::join(own, || self.days_of_others(&curved, records, &look));
         let (mut chamber, fit) = own?;
         chamber.take_days(days?);
         let fit = chamber.fit(&fit.assumed.clone(), &fit.free.clone(), records, Some(&fit), Effort::FULL)?;
@@ -109,7 +109,7 @@ impl<'a> Chamber<'a> {
             let day = look(&mut chamber, day, record)?;
             Ok(OtherDay { record, series: chamber.observed.swap_remove(record).series, numbers: day.numbers[record] })
         };
-        others.into_par_iter().map(of).collect()
+        others.in_parallel().map(of).collect()
     }
 
     pub(super) fn take_days(&mut self, days: Vec<OtherDay>) {
@@ -343,7 +343,7 @@ impl<'a> Chamber<'a> {
         base.courses = vec![None; self.records()];
         let begin_at = |starts: Vec<Fit>| {
             let fit = |start: Fit| self.fit(assumed, free, records, Some(&start), Effort::QUICK);
-            let fits: Vec<Result<Fit, ChamberError>> = starts.into_par_iter().map(fit).collect();
+            let fits: Vec<Result<Fit, ChamberError>> = starts.in_parallel().map(fit).collect();
             fits.into_iter().flatten().reduce(|best, fit| if fit.posterior() > best.posterior() { fit } else { best })
         };
         let with_noise = |noise: &f64| {

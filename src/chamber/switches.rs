@@ -9,8 +9,9 @@
 //! Steps are looked for in an air and with a gyro as usual, because those that were fitted without a switch have taken in what it
 //! does. So they are proposals only: the likelihood of the whole model, everything fitted, says which are needed.
 
+use crate::numeric::order::sort_ascending;
+use crate::parallel::InParallel;
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::ascent::Effort;
 use super::coil_side::film_is_free;
@@ -92,7 +93,7 @@ impl Chamber<'_> {
     /// As [`Chamber::fit`].
     pub(crate) fn with_switched_film(&self, fit: &Fit) -> Result<Option<(Self, f64)>, ChamberError> {
         let of = |r: usize| self.switched(&self.usual_day(fit, r), r);
-        let found: Result<Vec<_>, _> = (0..self.records()).into_par_iter().map(of).collect();
+        let found: Result<Vec<_>, _> = (0..self.records()).in_parallel().map(of).collect();
         let found = found?;
         if found.iter().all(Option::is_none) {
             return Ok(None);
@@ -203,7 +204,7 @@ impl Chamber<'_> {
                 let worth = with.posterior() - there.film_price(&[record]);
                 Ok(Some((there.observed.swap_remove(record).series, with, worth)))
             };
-            let found: Result<Vec<_>, ChamberError> = proposed.into_par_iter().map(judged).collect();
+            let found: Result<Vec<_>, ChamberError> = proposed.in_parallel().map(judged).collect();
             let found = found?.into_iter().flatten().max_by(|a, b| a.2.total_cmp(&b.2));
             let Some((series, with, worth)) = found else { break };
             if best.as_ref().is_some_and(|best| worth < best.1 + LEAST_GAIN) {
@@ -273,15 +274,17 @@ impl Chamber<'_> {
             };
             let (others, here) = (times_s.clone(), likelihood(&times_s));
             let strides: Vec<f64> = strides.iter().map(|rows| rows * row_s).collect();
-            times_s.par_iter_mut().enumerate().filter(|(_, t)| **t > whole.start_s).for_each(|(place, time_s)| {
-                let at = |moved_s: f64| {
-                    let mut all = others.clone();
-                    all[place] = moved_s;
-                    all.sort_by(f64::total_cmp);
-                    likelihood(&all)
-                };
-                *time_s = highest(at, *time_s, here, &strides);
-            });
+            times_s.iter_mut().enumerate().filter(|(_, t)| **t > whole.start_s).in_parallel().for_each(
+                |(place, time_s)| {
+                    let at = |moved_s: f64| {
+                        let mut all = others.clone();
+                        all[place] = moved_s;
+                        all.sort_by(f64::total_cmp);
+                        likelihood(&all)
+                    };
+                    *time_s = highest(at, *time_s, here, &strides);
+                },
+            );
             times_s.sort_by(f64::total_cmp);
             while let Some(fewer) = without_needless(&times_s, &likelihood, price) {
                 times_s = fewer;
@@ -301,7 +304,7 @@ fn without_needless(times_s: &[f64], likelihood: &(impl Fn(&[f64]) -> f64 + Sync
         fewer.drain(from..to);
         (here - likelihood(&fewer) - price * (to - from) as f64, fewer)
     };
-    let all: Vec<(f64, Vec<f64>)> = spans.into_par_iter().map(without).collect();
+    let all: Vec<(f64, Vec<f64>)> = spans.in_parallel().map(without).collect();
     let (cost, fewer) = all.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
     (cost < 0.0).then_some(fewer)
 }
@@ -336,7 +339,7 @@ struct Step {
 
 /// Steps in order of time, those near each other as one.
 fn joined(mut steps: Vec<Step>, near_s: f64) -> Vec<Step> {
-    steps.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    sort_ascending(&mut steps, |item| item.time_s);
     let mut groups: Vec<Vec<Step>> = Vec::new();
     for step in steps {
         match groups.last_mut() {

@@ -6,6 +6,7 @@
 use super::regimes::{RecordPart, Regime};
 use super::{Comparison, Covariate};
 use crate::chamber::FilmSwitches;
+use crate::numeric::order::sort_descending;
 use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
 
 /// Whether a model is adequate for a record.
@@ -198,7 +199,7 @@ fn stands_out(part: &RecordPart) -> bool {
 fn concentrated(parts: &[RecordPart]) -> Vec<&RecordPart> {
     let holds_more = |p: &RecordPart| p.share_of_squared_error > CONCENTRATION * p.share_of_rows;
     let mut found: Vec<&RecordPart> = parts.iter().filter(|p| stands_out(p) && holds_more(p)).collect();
-    found.sort_by(|a, b| b.share_of_squared_error.total_cmp(&a.share_of_squared_error));
+    sort_descending(&mut found, |item| item.share_of_squared_error);
     found
 }
 
@@ -220,7 +221,7 @@ pub(super) fn judge(found: &Comparison, transient_s: f64) -> (Adequacy, Vec<Resi
     };
     let mut followed: Vec<(&Covariate, f64)> =
         found.correlations.iter().filter_map(|c| Some((&c.with, c.value?))).filter(|(_, v)| follows(*v)).collect();
-    followed.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+    sort_descending(&mut followed, |item| item.1.abs());
     for (quantity, correlation) in followed.into_iter().take(MOST_DEPENDENCES) {
         findings.push(ResidualFinding::Follows { quantity: quantity.clone(), correlation });
     }

@@ -20,6 +20,7 @@ use std::collections::VecDeque;
 use nalgebra::{DMatrix, DVector};
 
 use super::CompensateError;
+use crate::numeric::order::sort_ascending;
 use crate::numeric::statistics::line;
 use crate::record::Record;
 use crate::units::REFERENCE_TEMPERATURE_K;
@@ -110,7 +111,7 @@ impl Cumulated {
             record.temperature_k().iter().copied().zip(rates).collect::<Vec<(f64, f64)>>()
         };
         let mut rows: Vec<(f64, f64)> = records.iter().flat_map(rows_of).collect();
-        rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+        sort_ascending(&mut rows, |item| item.0);
         let mut sums = vec![Sums::default()];
         let mut all = Sums::default();
         for &(temperature_k, rate) in &rows {

@@ -28,6 +28,7 @@
 use nalgebra::DMatrix;
 
 use crate::chamber::Causal;
+use crate::numeric::order::sort_descending;
 
 /// A hypothesis so much less likely than the best is dropped (natural logarithm).
 pub(crate) const LEAST_LOG_WEIGHT: f64 = -10.0;
@@ -414,7 +415,7 @@ impl Filter {
             }
         }
         // Stable: of equals the one of the likelier parent comes first.
-        self.branches.sort_by(|a, b| b.0.total_cmp(&a.0));
+        sort_descending(&mut self.branches, |item| item.0);
         let best = self.branches[0].0;
         let mut kept = std::mem::take(&mut self.former);
         for &(log_weight, parent, age) in &self.branches {

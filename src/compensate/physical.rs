@@ -25,7 +25,7 @@
 
 mod beside;
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::CompensateError;
 use super::filter::{Dynamics, Filter, Tuning};
@@ -193,7 +193,7 @@ impl Physical {
         let Some(parts) = parts.filter(|parts| !parts.is_empty()) else { return };
         let least = |squares: &[f64]| squares.iter().copied().fold(f64::INFINITY, f64::min);
         let trials: Vec<(Surroundings, Vec<f64>, Vec<f64>)> = WANDER_HALF_DECADES
-            .into_par_iter()
+            .in_parallel()
             .map(|halves| {
                 let mut trial = self.clone();
                 trial.surroundings = self.surroundings.wandering(10f64.powf(-0.5 * f64::from(halves)));

@@ -1,6 +1,7 @@
 //! What stands beside a verdict: each effect with its size and its equals, the ladder, the candidates, what is left over.
 
-use rayon::prelude::*;
+use crate::numeric::order::{sort_ascending, sort_descending};
+use crate::parallel::InParallel;
 
 use super::joint::{Explanation, Found, Member, Question, refit_without};
 use super::plain::{Plain, ResidualShape};
@@ -19,7 +20,7 @@ pub(super) struct ScoredExplanation<'e> {
 impl<'e> ScoredExplanation<'e> {
     pub(crate) fn new(question: &Question, explanation: &'e Explanation) -> Result<Self, DiagnoseError> {
         let fits: Result<Vec<Fit>, _> =
-            question.held_out.par_iter().map(|&r| question.chamber.held_out(&explanation.fit, r)).collect();
+            question.held_out.iter().in_parallel().map(|&r| question.chamber.held_out(&explanation.fit, r)).collect();
         Ok(Self { explanation, held_out: fits? })
     }
 
@@ -77,7 +78,7 @@ pub(super) fn findings(
             confirmed_by: 2.0 * confirmed,
         })
     };
-    effects.par_iter().enumerate().map(|(place, (candidate, effect))| of(place, *candidate, effect)).collect()
+    effects.iter().enumerate().in_parallel().map(|(place, (candidate, effect))| of(place, *candidate, effect)).collect()
 }
 
 /// The only effect of a set.
@@ -236,7 +237,7 @@ pub(super) fn contenders(question: &Question, found: &Found, declared: &Explanat
             chi_square_less: 2.0 * gain,
         });
     }
-    all.sort_by(|a, b| a.bic.total_cmp(&b.bic));
+    sort_ascending(&mut all, |item| item.bic);
     all
 }
 
@@ -280,7 +281,7 @@ pub(super) fn unexplained(
         .filter(|(_, values)| values.len() == residuals.len())
         .filter_map(|(name, values)| Some((name, correlation(&values, &residuals)?)))
         .collect();
-    correlations.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+    sort_descending(&mut correlations, |item| item.1.abs());
     let record = question.fitted.first().copied().unwrap_or(0);
     let number = |q: Quantity| likeliest.fit.number(q, record);
     let gain = 2.0 * (likeliest.fit.log_likelihood - fit.log_likelihood);

@@ -100,7 +100,7 @@ fn with_shocks_where_needed<'a>(
     fitted: &[usize],
 ) -> Result<Option<(Chamber<'a>, Fit)>, ChamberError> {
     let shocked = |chamber: &Chamber<'a>| chamber.clone().with_shocks_by(fit.clone(), fitted);
-    let (with, without) = rayon::join(|| shocked(switched), || shocked(usual));
+    let (with, without) = crate::parallel::join(|| shocked(switched), || shocked(usual));
     let ((with, with_fit), (without, without_fit)) = (with?, without?);
     let changed: Vec<usize> =
         (0..with.records()).filter(|&r| with.film_switches_s(r) != without.film_switches_s(r)).collect();

@@ -6,6 +6,7 @@ pub mod expression;
 pub(crate) mod lobatto;
 pub(crate) mod maximise;
 pub(crate) mod noise;
+pub(crate) mod order;
 pub mod piecewise;
 pub(crate) mod pursuit;
 pub mod pyramid;

@@ -12,6 +12,7 @@
 //! Reflections: Householder, after Golub and Van Loan, Matrix Computations, section 8.3. Implicit QL with Wilkinson's
 //! shift: Bowdler, Martin, Reinsch, Wilkinson, Numer. Math. 11 (1968) 293 (`tql2`).
 
+use crate::numeric::order::sort_descending;
 use nalgebra::DMatrix;
 use pulp::Arch;
 
@@ -39,7 +40,7 @@ fn full(matrix: DMatrix<f64>, rows: &mut DMatrix<f64>) -> Result<Vec<f64>, NotCo
     // Reflections from the largest entries on, then rotations from the smallest: so small eigenvalues of a matrix whose scales
     // differ keep their own digits, and not only those that the largest one leaves.
     let mut order: Vec<usize> = (0..n).collect();
-    order.sort_by(|&a, &b| matrix[(b, b)].total_cmp(&matrix[(a, a)]));
+    sort_descending(&mut order, |item| matrix[(*item, *item)]);
     let sorted = DMatrix::from_fn(n, n, |i, j| matrix[(order[i], order[j])]);
     *rows = DMatrix::from_fn(rows.nrows(), n, |row, i| rows[(row, order[i])]);
     let (mut diagonal, mut off) = reduced(sorted, rows);

@@ -6,6 +6,7 @@ use super::page::{figure, page};
 use super::plot::{Axis, Chart, ChartSeries};
 use super::words;
 use crate::io::json::campaign::{CampaignJson, CellJson};
+use crate::numeric::order::sort_ascending;
 use crate::search::cost::objective::Objective;
 
 /// What costs less than this more than the best is equally good; the easier winding is then recommended.
@@ -142,7 +143,7 @@ fn chart(groups: &[Group], objective: &str) -> String {
         }
     }
     if coils.len() > MOST_COILS {
-        coils.sort_by(|a, b| a.1.total_cmp(&b.1));
+        sort_ascending(&mut coils, |item| item.1);
         coils.truncate(MOST_COILS);
     }
     let names = coils.iter().map(|((model, layers), _)| format!("{model}, {layers} layers"));

@@ -9,6 +9,7 @@ use super::outlook::OtherBoundary;
 use super::prospect::Outlook;
 use super::recommendation::Recommendation;
 use super::validation::Validation;
+use crate::numeric::order::sort_ascending;
 use crate::pattern::Pattern;
 use crate::profile::Profile;
 
@@ -137,7 +138,7 @@ impl Answer {
     pub(crate) fn others(&self) -> impl Iterator<Item = (String, Pattern)> {
         let recommended = self.recommendation.iter().map(|r| (r.name.clone(), r.pattern.clone()));
         let mut classics: Vec<&Judged> = self.baselines.iter().collect();
-        classics.sort_by(|a, b| a.objective_rad_per_s.total_cmp(&b.objective_rad_per_s));
+        sort_ascending(&mut classics, |item| item.objective_rad_per_s);
         let classics = classics.into_iter().map(|judged| (judged.name.clone(), judged.pattern.clone()));
         let found = self.state.found.iter().filter_map(|found| Pattern::new(found.segments.clone()).ok());
         recommended.chain(classics).chain(found.map(|pattern| (name_of(&pattern), pattern)))

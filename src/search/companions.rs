@@ -10,6 +10,7 @@
 use super::anneal::rounds::{FoundPattern, Plan, Rounds, Rules};
 use super::cost::objective::Objective;
 use super::evaluator::{EQUALLY_GOOD, Evaluator, FEWEST_LAYERS, JudgeError, Judged, name_of};
+use crate::numeric::order::sort_ascending;
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 
@@ -115,7 +116,7 @@ impl<'a> Evaluator<'a> {
         let admitted = patterns.iter().filter(|pattern| class.admits(pattern));
         let named: Vec<(String, Pattern)> = admitted.map(|pattern| (name_of(pattern), pattern.clone())).collect();
         let mut judged = self.judge_all(&named)?;
-        judged.sort_by(|a, b| a.objective_rad_per_s.total_cmp(&b.objective_rad_per_s));
+        sort_ascending(&mut judged, |item| item.objective_rad_per_s);
         Ok(judged)
     }
 

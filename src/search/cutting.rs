@@ -18,6 +18,7 @@ use super::cost::worst_case::SolvedProfiles;
 use super::evaluator::{Evaluator, JudgeError};
 use super::request::{Halt, Observer, Request, RunError};
 use super::validation::Draw;
+use crate::numeric::order::sort_ascending;
 use crate::pattern::Pattern;
 use crate::profile::{Profile, ProfileSpec};
 use crate::units::{deg_per_h_from_rad_per_s, percent_from_fraction};
@@ -161,7 +162,7 @@ fn joins(
     patterns.extend(evaluator.short(request.class, &request.plan, &|| true)?);
     let named: Vec<(String, Pattern)> = patterns.into_iter().map(|pattern| (String::new(), pattern)).collect();
     let mut judged = evaluator.judge_all(&named)?;
-    judged.sort_by(|a, b| a.objective_rad_per_s.total_cmp(&b.objective_rad_per_s));
+    sort_ascending(&mut judged, |item| item.objective_rad_per_s);
     let mut is_apart = false;
     for (place, judged) in judged.iter().take(PATTERNS.max(given.len())).enumerate() {
         let name = format!("worst-admissible-{}", spec.listed.len() - own + 1);

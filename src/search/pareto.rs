@@ -1,5 +1,6 @@
 //! The trade-off between a small error and an easy winding: what nothing else beats in every respect.
 
+use crate::numeric::order::sort_ascending;
 use crate::pattern::windability::{Windability, WindingGraph};
 use crate::search::evaluator::Judged;
 
@@ -70,7 +71,7 @@ pub(crate) fn front(points: &[ParetoPoint]) -> Vec<ParetoPoint> {
             kept.push(point.clone());
         }
     }
-    kept.sort_by(|a, b| a.judged.objective_rad_per_s.total_cmp(&b.judged.objective_rad_per_s));
+    sort_ascending(&mut kept, |item| item.judged.objective_rad_per_s);
     kept
 }
 

@@ -11,7 +11,7 @@
 //! # Source
 //! Berger, Statistical Decision Theory (1985), section 1.3 (expected loss under a posterior).
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::anneal::quantile::{QuantileCost, default_moves_per_restart};
 use super::anneal::rounds::{DEFAULT_RESTARTS_PER_ROUND, Optimisation, Plan, Rounds, Rules};
@@ -88,7 +88,7 @@ fn under_each(
     profiles: &ProfileSpec,
     patterns: &[Pattern],
 ) -> Result<Vec<Vec<f64>>, SearchError> {
-    models.par_iter().map(|model| worst_rates_rad_per_s(model, profiles, patterns)).collect()
+    models.iter().in_parallel().map(|model| worst_rates_rad_per_s(model, profiles, patterns)).collect()
 }
 
 /// What patterns promise over models that may be the true one; empty without models.

@@ -31,6 +31,7 @@ use super::prospect::{Outlook, Prospect, predicted_gain, prospects};
 use super::validation::{Unseen, UnseenPointing, Validation};
 use super::weighed_pointing::PointingFigures;
 use super::weighing::{TIE, Weighed, chosen, over_least};
+use crate::numeric::order::sort_ascending;
 use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
 use crate::pattern::windability::{Windability, WindabilityClass, WindingGraph};
@@ -131,7 +132,7 @@ impl Evaluator<'_> {
         }
         let mut prospects: Vec<(String, Prospect)> =
             weighed.iter().filter_map(|w| Some((w.judged.name.clone(), w.prospect?))).collect();
-        prospects.sort_by(|a, b| a.1.p95_rad_per_s.total_cmp(&b.1.p95_rad_per_s));
+        sort_ascending(&mut prospects, |item| item.1.p95_rad_per_s);
         let qua = context.baselines.iter().find(|b| b.name == Classic::Qua.key()).map(|b| &b.pattern);
         let old = context.former.map(|(_, pattern)| pattern).or(qua);
         let new = &recommended.judged.pattern;

@@ -1,7 +1,7 @@
 //! What patterns are weighed by where the pointing error is what is made small: on unseen profiles, over all profiles, over
 //! built coils and over models that may be the true one, all as the rate that makes it in one hour.
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::aside::Resolution;
 use super::cost::objective::Objective;
@@ -11,7 +11,7 @@ use super::cost::worst_case::{SearchError, SolvedProfiles};
 use super::evaluator::{Evaluator, JudgeError};
 use crate::numeric::statistics::quantile;
 use crate::pattern::Pattern;
-use crate::profile::ProfileSpec;
+use crate::profile::Profile;
 use crate::rate::CoilModel;
 
 /// Built coils at most: each has all profiles solved anew, where the guaranteed rate needs one step of the drive.
@@ -77,11 +77,13 @@ impl Evaluator<'_> {
     ) -> Result<Vec<PointingFigures>, JudgeError> {
         let ramp = EndlessRamp::new(self.model)?;
         let steepest = self.profiles.max_rate_k_per_s;
-        let built = self.built_pointing(patterns)?;
+        let drawn = self.profiles.profiles();
+        let built = self.built_pointing(&drawn, patterns)?;
         let likely = if uncertain.is_empty() {
             None
         } else {
-            Some(p95_over(uncertain.par_iter().map(|model| Ok(model.clone())), self.profiles, patterns)?)
+            let of = |model: &CoilModel| worst_pointing_under(model, &drawn, patterns);
+            Some(p95_over(uncertain.iter().in_parallel().map(of), patterns.len())?)
         };
         let of = |(i, pattern): (usize, &Pattern)| -> Result<PointingFigures, SearchError> {
             let guaranteed = ramp.as_ref().map(|ramp| ramp.guaranteed_rad(pattern, steepest)).transpose()?;
@@ -99,7 +101,7 @@ impl Evaluator<'_> {
     }
 
     /// The 95 % quantile of each pattern over built coils, and how many those are; none without spreads.
-    fn built_pointing(&self, patterns: &[Pattern]) -> Result<Option<(Vec<f64>, usize)>, JudgeError> {
+    fn built_pointing(&self, drawn: &[Profile], patterns: &[Pattern]) -> Result<Option<(Vec<f64>, usize)>, JudgeError> {
         let Some(declared) = self.tolerance else { return Ok(None) };
         let spec = ToleranceSpec { samples: declared.samples.clamp(2, MOST_BUILT), ..declared.clone() };
         let coils = match Coils::new(self.model, self.profiles, &spec) {
@@ -107,28 +109,28 @@ impl Evaluator<'_> {
             Err(ToleranceError::NoSpread) => return Ok(None),
             Err(error) => return Err(error.into()),
         };
-        Ok(Some((p95_over(coils.built(), self.profiles, patterns)?, spec.samples)))
+        let worst = coils.of_built(|model| worst_pointing_under(&model?, drawn, patterns));
+        Ok(Some((p95_over(worst, patterns.len())?, spec.samples)))
     }
+}
+
+/// Each pattern's worst pointing error over profiles, by one model.
+fn worst_pointing_under(model: &CoilModel, drawn: &[Profile], patterns: &[Pattern]) -> Result<Vec<f64>, SearchError> {
+    let solved = SolvedProfiles::new(model, drawn)?;
+    let of = |pattern: &Pattern| Ok(pointing_as_rate(model, &solved, pattern)?.rate_rad_per_s.abs());
+    patterns.iter().map(of).collect()
 }
 
 /// The 95 % quantile of each pattern's worst pointing error over models.
 fn p95_over(
-    models: impl IndexedParallelIterator<Item = Result<CoilModel, SearchError>>,
-    profiles: &ProfileSpec,
-    patterns: &[Pattern],
+    worst: impl IntoIterator<Item = Result<Vec<f64>, SearchError>>,
+    patterns: usize,
 ) -> Result<Vec<f64>, SearchError> {
-    let drawn = profiles.profiles();
-    let under = |model: Result<CoilModel, SearchError>| -> Result<Vec<f64>, SearchError> {
-        let model = model?;
-        let solved = SolvedProfiles::new(&model, &drawn)?;
-        let of = |pattern: &Pattern| Ok(pointing_as_rate(&model, &solved, pattern)?.rate_rad_per_s.abs());
-        patterns.iter().map(of).collect()
-    };
-    let worst: Vec<Vec<f64>> = models.map(under).collect::<Result<_, _>>()?;
+    let worst: Vec<Vec<f64>> = worst.into_iter().collect::<Result<_, _>>()?;
     let of = |p: usize| {
         let mut ascending: Vec<f64> = worst.iter().map(|model| model[p]).collect();
         ascending.sort_by(f64::total_cmp);
         quantile(&ascending, SHARE)
     };
-    Ok((0..patterns.len()).map(of).collect())
+    Ok((0..patterns).map(of).collect())
 }

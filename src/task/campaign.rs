@@ -6,6 +6,7 @@ use crate::io::json::campaign::{BlockJson, CampaignJson, CellDocument, CellJson,
 use crate::io::read::campaign_file::{CampaignCell, CampaignFile, CampaignKind, CellWork};
 use crate::io::write::campaign_cells::read_cell;
 use crate::io::write::campaign_tables;
+use crate::numeric::order::sort_descending;
 use crate::rate::CoilModel;
 
 use super::TaskError;
@@ -49,7 +50,7 @@ impl<'a> CampaignPart<'a> {
     pub fn dealt(campaign: &'a CampaignFile, cells: &'a [CampaignCell], index: usize, count: usize) -> Self {
         let costs: Vec<f64> = cells.iter().map(|cell| estimated_s(campaign, cell)).collect();
         let mut order: Vec<usize> = (0..cells.len()).collect();
-        order.sort_by(|&a, &b| costs[b].total_cmp(&costs[a]));
+        sort_descending(&mut order, |item| costs[*item]);
         let mut own: Vec<usize> = order
             .into_iter()
             .enumerate()

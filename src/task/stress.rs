@@ -1,6 +1,7 @@
 //! What a coil's materials do: strains and optical path layer by layer, and which potting and spool suit its winding.
 
-use rayon::prelude::*;
+use crate::numeric::order::sort_ascending;
+use crate::parallel::InParallel;
 
 use crate::io::json::stress::{
     FreeFibreJson, LayerStressJson, PatternStressJson, PottingChoiceJson, PottingJson, StressAtJson, StressJson,
@@ -146,7 +147,7 @@ pub(crate) fn potting(request: &PottingRequest, observer: &dyn Observer) -> Resu
         }
         choices.push(judged(file, &declared, materials, &patterns, &solved)?);
     }
-    choices.sort_by(|a, b| a.worst_rate_deg_per_h.total_cmp(&b.worst_rate_deg_per_h));
+    sort_ascending(&mut choices, |item| item.worst_rate_deg_per_h);
     Ok(PottingJson { model: file.model.name.clone(), choices })
 }
 
@@ -187,7 +188,8 @@ fn judged(
 ) -> Result<PottingChoiceJson, TaskError> {
     let model = file.model.with_materials(materials);
     let worst = patterns
-        .par_iter()
+        .iter()
+        .in_parallel()
         .map(|named| Ok((named, solved.worst_case(&model, &named.pattern)?)))
         .collect::<Result<Vec<_>, TaskError>>()?;
     let best = worst.iter().min_by(|a, b| a.1.rate_rad_per_s.abs().total_cmp(&b.1.rate_rad_per_s.abs()));

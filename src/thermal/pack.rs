@@ -34,6 +34,7 @@ use super::joined;
 use super::modal::Response;
 use super::network::{AxialElements, Network};
 use super::{BoreHeat, HeatPath, Location, ThermalError};
+use crate::numeric::order::sort_ascending;
 use crate::numeric::tridiagonal::diagonalise_full;
 
 /// The modal form of a pack's heat path.
@@ -165,7 +166,7 @@ impl Pack {
         if modes.iter().any(|mode| !(mode.decay_per_s > 0.0)) {
             return Err(ThermalError::Eigen);
         }
-        modes.sort_by(|a, b| a.decay_per_s.total_cmp(&b.decay_per_s));
+        sort_ascending(&mut modes, |item| item.decay_per_s);
 
         let has_ambient = network.to_ambient.iter().any(|g| *g != 0.0) || axial.has_moments();
         let steady_of = |input: fn(&Mode) -> f64| {

@@ -22,6 +22,7 @@
 //! Modal truncation with static residue, as in any text on structural dynamics; moments of what is truncated: Antoulas, Approximation of
 //! Large-Scale Dynamical Systems (2005), chapter 11; the exponentials as in `thermal::half_space_memory`.
 
+use crate::numeric::order::sort_descending;
 use nalgebra::{DMatrix, DVector};
 
 use super::half_space::HalfSpace;
@@ -83,7 +84,7 @@ impl Reduced {
         // What a mode takes away while the drive ramps; where a flange is heated the slowest modes need not matter most.
         let lag = |i: usize| joint.amplitude.column(i).iter().map(|a| a.abs()).sum::<f64>() / pack.decay_per_s[i];
         let mut all: Vec<usize> = (0..pack.modes()).collect();
-        all.sort_by(|&a, &b| lag(b).total_cmp(&lag(a)));
+        sort_descending(&mut all, |item| lag(*item));
         let (mut kept, fast) = match pack.modes() > modes {
             true => (all[..modes - 1].to_vec(), all[modes - 1..].to_vec()),
             false => (all, Vec::new()),

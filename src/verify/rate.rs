@@ -5,7 +5,7 @@
 //! grid where the pack is linear, and is extrapolated from two grids where its conductivity depends on temperature. The
 //! claim stands on a grid of its own and may be off by what that leaves: [`GRID_SHARES`] or [`STEPPED_SHARES`].
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::along::Along;
 use super::heat::{Heat, Moment, State};
@@ -161,7 +161,8 @@ fn worst_of_sums(heat: &Heat, optics: &Optics, profiles: &[Profile]) -> f64 {
     // What a user's formula does between two looks, nobody knows.
     let are_all_close = optics.has_formula();
     let few: Vec<Vec<f64>> = profiles
-        .par_iter()
+        .iter()
+        .in_parallel()
         .map(|profile| {
             let mut largest = Vec::new();
             let Some(mut along) = Along::new(heat, profile) else { return largest };
@@ -187,7 +188,7 @@ fn worst_of_sums(heat: &Heat, optics: &Optics, profiles: &[Profile]) -> f64 {
         }
         worst
     };
-    profiles.par_iter().zip(&few).map(worst_of).reduce(|| 0.0, f64::max)
+    profiles.iter().zip(&few).in_parallel().map(worst_of).fold(0.0, f64::max)
 }
 
 /// The largest |Ω| in one piece; `least` is what a peak must reach to be worth its top.
@@ -211,13 +212,14 @@ fn worst_of_steps(heat: &Heat, optics: &Optics, profiles: &[Profile]) -> f64 {
         states.iter().map(|state| (state.time_s, optics.rate_rad_per_s(state).abs())).collect()
     };
     let largest = |sizes: &[(f64, f64)]| sizes.iter().map(|(_, size)| *size).fold(0.0, f64::max);
-    let few: Vec<f64> = profiles.par_iter().map(|profile| largest(&sizes(heat.few_steps(profile)))).collect();
+    let few: Vec<f64> = profiles.iter().in_parallel().map(|profile| largest(&sizes(heat.few_steps(profile)))).collect();
     let seen = few.iter().copied().fold(0.0, f64::max);
     let is_worth = |few: f64| optics.has_formula() || few >= WORTH_STEPPING * seen;
     let close: Vec<Vec<(f64, f64)>> = profiles
-        .par_iter()
+        .iter()
         .zip(&few)
         .filter(|(_, few)| is_worth(**few))
+        .in_parallel()
         .map(|(profile, _)| sizes(heat.steps(profile)))
         .collect();
     let worst = close.iter().map(|sizes| largest(sizes)).fold(0.0, f64::max);

@@ -17,6 +17,7 @@ use source::{Source, Token, flatten, sources};
 /// Every module at the crate's root and its floor; a module that is not here has no place yet.
 const FLOORS: &[(&str, u8)] = &[
     ("units", 0),
+    ("parallel", 0),
     ("numeric", 0),
     ("text", 0),
     ("coil", 1),

@@ -10,7 +10,7 @@
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::grammar::Allowed;
 use super::search::{MOST_TERMS, Set, WITHIN_REACH};
@@ -35,8 +35,9 @@ pub(crate) fn anew<'a>(
     let least = found.explanations.iter().map(Explanation::total).fold(f64::NEG_INFINITY, f64::max) - WITHIN_REACH;
     let listed: Vec<Explanation> = found
         .explanations
-        .par_iter()
+        .iter()
         .filter(|e| e.members.is_empty() || e.total() > least)
+        .in_parallel()
         .filter_map(|e| refitted_from(&there, found, e, &e.fit))
         .collect();
     let Some(declared) = listed.iter().find(|e| e.members.is_empty()) else { return Ok(None) };
@@ -63,7 +64,7 @@ pub(crate) fn worth_beside(question: &Question, found: &Found, set: &Set) -> Vec
         let there = if is_asked { refitted_from(question, found, e, &set.explanation.fit) } else { None };
         there.map_or(e.total(), |there| there.total().max(e.total()))
     };
-    found.explanations.par_iter().map(worth).collect()
+    found.explanations.iter().in_parallel().map(worth).collect()
 }
 
 /// A listed set fitted again from another fit's chamber, with its held-out records.

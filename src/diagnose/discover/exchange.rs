@@ -1,7 +1,8 @@
 //! Members of a set exchanged for others: a search that goes forward takes what promises most first, which need not be what is best
 //! beside the terms that follow, and two that stand for one (a straight line and a mirrored bend for a bend) stay two.
 
-use rayon::prelude::*;
+use crate::numeric::order::sort_descending;
+use crate::parallel::InParallel;
 
 use super::NEAR;
 use super::grounds::Sought;
@@ -24,7 +25,7 @@ impl Tools<'_, '_> {
         for _ in 0..MOST_EXCHANGES {
             let Some(best) = sets.first().filter(|best| best.total() > best_listed - NEAR).cloned() else { return };
             sets.extend(self.exchanged(&best).into_iter().filter(|s| s.total().is_finite()));
-            sets.sort_by(|a, b| b.total().total_cmp(&a.total()));
+            sort_descending(sets, |item| item.total());
             if sets[0].says_the_same(&best) {
                 return;
             }
@@ -66,14 +67,14 @@ impl Tools<'_, '_> {
     fn with_others(&self, fewer: &Set, is_other: &dyn Fn(&Proposal) -> bool) -> Vec<Set> {
         let Ok(mut others) = self.listed_beside(fewer, Sought::Everything) else { return Vec::new() };
         others.retain(|p| p.gain > WORTH_LISTED && is_other(p));
-        others.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        sort_descending(&mut others, |item| item.gain);
         others.truncate(ALIKE);
-        others.par_iter().filter_map(|p| self.with_listed(fewer, p)).collect()
+        others.iter().in_parallel().filter_map(|p| self.with_listed(fewer, p)).collect()
     }
 
     /// Sets that came of an exchange, with their held-out records looked at.
     fn all_judged(&self, exchanged: &Set, sets: Vec<Set>) -> Vec<Set> {
-        sets.into_par_iter().map(|s| self.as_confirmed_as(exchanged, self.judged(self.consistent(s)))).collect()
+        sets.in_parallel().map(|s| self.as_confirmed_as(exchanged, self.judged(self.consistent(s)))).collect()
     }
 
     /// Other terms in the place of all of a set's, beside fewer of its listed effects.

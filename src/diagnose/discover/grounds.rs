@@ -12,7 +12,8 @@
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
+use crate::numeric::order::sort_descending;
+use crate::parallel::InParallel;
 
 use super::courses::Courses;
 use super::grammar::Term;
@@ -75,7 +76,8 @@ impl Grounds {
             })
             .collect();
         let courses = courses(question, fit, &days)?;
-        let moved: Vec<Moved> = fit.free.par_iter().filter_map(|free| Moved::new(question, fit, free)).collect();
+        let moved: Vec<Moved> =
+            fit.free.iter().in_parallel().filter_map(|free| Moved::new(question, fit, free)).collect();
         Ok(Self { model: fit.assumed.model.clone(), courses, moved })
     }
 
@@ -222,11 +224,11 @@ impl Tools<'_, '_> {
         };
         let Ok(mut listed) = self.listed_beside(foremost, Sought::WhatMoves) else { return Vec::new() };
         listed.retain(|p| p.gain > WORTH_LISTED);
-        listed.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        sort_descending(&mut listed, |item| item.gain);
         listed.truncate(PAIRED);
-        let found: Vec<Set> = listed.par_iter().filter_map(|p| self.with_listed(foremost, p)).collect();
+        let found: Vec<Set> = listed.iter().in_parallel().filter_map(|p| self.with_listed(foremost, p)).collect();
         let gains = found.into_iter().filter(|s| s.merit > foremost.merit);
-        gains.collect::<Vec<_>>().into_par_iter().map(|s| self.judged(self.consistent(s))).collect()
+        gains.collect::<Vec<_>>().in_parallel().map(|s| self.judged(self.consistent(s))).collect()
     }
 
     /// The score test of every listed effect beside a set, with what it makes of the variables of its terms.

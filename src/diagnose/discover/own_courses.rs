@@ -4,7 +4,8 @@
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
+use crate::numeric::order::sort_descending;
+use crate::parallel::InParallel;
 
 use super::NEAR;
 use super::grounds::{Grounds, SAME};
@@ -19,9 +20,9 @@ pub(super) fn with_own_courses(tools: &Tools, mut sets: Vec<Set>) -> Vec<Set> {
     let Some(least) = sets.first().map(|best| best.total() - NEAR) else { return sets };
     let near = sets.iter().take(MOST).take_while(|s| s.total() > least && !s.terms.is_empty()).count();
     let behind = sets.split_off(near);
-    let mut own: Vec<Set> = sets.into_par_iter().map(|set| again(tools, set)).collect();
+    let mut own: Vec<Set> = sets.in_parallel().map(|set| again(tools, set)).collect();
     own.extend(behind);
-    own.sort_by(|a, b| b.total().total_cmp(&a.total()));
+    sort_descending(&mut own, |item| item.total());
     own
 }
 

@@ -13,7 +13,7 @@
 use std::cmp::Ordering;
 use std::sync::Arc;
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::grammar::{Family, Term};
 use super::search::{MOST_TERMS, Set, Tools, WITHIN_REACH};
@@ -70,7 +70,7 @@ impl Tools<'_, '_> {
         let bare = self.judged(self.plain(declared));
         let Ok(regression) = self.question.chamber.regression(&declared.fit) else { return Vec::new() };
         let pairs = self.promising_pairs(&regression, &bare);
-        let sets = pairs.par_iter().filter_map(|pair| self.with_pair(&bare, pair));
+        let sets = pairs.iter().in_parallel().filter_map(|pair| self.with_pair(&bare, pair));
         let mut sets = self.foremost(sets.filter(|s| s.merit > bare.merit).collect());
         sets.retain(|s| s.total() > best_total - WITHIN_REACH);
         for set in &mut sets {
@@ -85,10 +85,17 @@ impl Tools<'_, '_> {
         // Of one layer's effects there are as many as layers, and each looks like its neighbours'.
         let listed = tested_starts(self.question, &bare.explanation, &|candidate, _| !candidate.is_of_layer());
         // What cannot be solved beside the fit promises nothing.
-        let listed: Vec<(&TestedStart, Scored)> =
-            listed.par_iter().flat_map(|s| regression.score_model(&s.assumed).map(|scored| (s, scored))).collect();
-        let mut pairs: Vec<Pair> =
-            self.families.par_iter().flat_map_iter(|f| self.pairs_with(regression, bare, &listed, f, rows)).collect();
+        let listed: Vec<(&TestedStart, Scored)> = listed
+            .iter()
+            .in_parallel()
+            .flat_map(|s| regression.score_model(&s.assumed).map(|scored| (s, scored)))
+            .collect();
+        let mut pairs: Vec<Pair> = self
+            .families
+            .iter()
+            .in_parallel()
+            .flat_map(|f| self.pairs_with(regression, bare, &listed, f, rows))
+            .collect();
         pairs.sort_by(Pair::order);
         let mut seen: Vec<(Member, String)> = Vec::new();
         pairs.retain(|pair| {

@@ -10,6 +10,7 @@ use crate::diagnose::joint::{Explanation, Found};
 use crate::diagnose::standing::CERTAIN;
 use crate::diagnose::{DiagnoseError, Diagnosis, Rung, Share, Verdict};
 use crate::effect::DeclaredEffect;
+use crate::numeric::order::sort_descending;
 use crate::numeric::statistics::rms;
 use crate::rate::CoilModel;
 
@@ -180,7 +181,7 @@ pub(in crate::diagnose) fn share_with(
     let shares =
         alike.iter().map(|(set, probability)| share(question, found, set, formula_in_numbers(set), *probability));
     diagnosis.posterior.extend(shares);
-    diagnosis.posterior.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    sort_descending(&mut diagnosis.posterior, |item| item.probability);
     if diagnosis.verdict == Verdict::Missing && named < CERTAIN {
         diagnosis.verdict = Verdict::Indistinguishable;
     }

@@ -13,7 +13,8 @@
 
 use std::sync::{Arc, OnceLock};
 
-use rayon::prelude::*;
+use crate::numeric::order::sort_descending;
+use crate::parallel::InParallel;
 
 use super::courses::Courses;
 use super::grammar::{Family, Term};
@@ -151,7 +152,7 @@ impl Tools<'_, '_> {
                 })
                 .fold(f64::NEG_INFINITY, f64::max)
         };
-        self.families.par_iter().map(of).reduce(|| f64::NEG_INFINITY, f64::max)
+        self.families.iter().in_parallel().map(of).fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// The best of each family at a set, refined; most worth first.
@@ -161,7 +162,8 @@ impl Tools<'_, '_> {
         let longest_s = courses.longest_s();
         let mut best: Vec<PromisingTerm> = self
             .families
-            .par_iter()
+            .iter()
+            .in_parallel()
             .filter_map(|family| {
                 let points = family.grid(longest_s).into_iter().map(|inner| Term { family: family.clone(), inner });
                 let scored = points.map(|term| {
@@ -177,7 +179,7 @@ impl Tools<'_, '_> {
         order(&mut best);
         best.truncate(REFINED);
         let mut refined: Vec<PromisingTerm> =
-            best.into_par_iter().map(|promise| self.refined(scorer, courses, promise, rows)).collect();
+            best.in_parallel().map(|promise| self.refined(scorer, courses, promise, rows)).collect();
         order(&mut refined);
         refined
     }
@@ -333,18 +335,18 @@ impl Tools<'_, '_> {
         let worthy = promises.iter().filter(|p| p.worth > 0.0 && p.gain > WORTH_BESIDE * first).take(ALIKE_TRIED);
         let tried = worthy.enumerate().filter(|(place, p)| *place < most || p.gain > first - NEAR);
         let tried: Vec<&PromisingTerm> = tried.map(|(_, p)| p).collect();
-        tried.par_iter().filter_map(|promise| self.with_term(set, promise)).collect()
+        tried.iter().in_parallel().filter_map(|promise| self.with_term(set, promise)).collect()
     }
 
     /// The foremost of sets in the order of their merits, and those that the fitted records hardly tell from it, with numbers and variables
     /// that follow their fits and the held-out records looked at.
     pub(crate) fn foremost(&self, mut sets: Vec<Set>) -> Vec<Set> {
-        sets.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+        sort_descending(&mut sets, |item| item.merit);
         let near = sets.first().map_or(f64::NEG_INFINITY, |best| best.merit - NEAR);
         let alike = sets.iter().take(ALIKE_TRIED).filter(|s| s.merit > near).count();
         sets.truncate(alike.max(HELD_OUT_TRIED));
-        let mut sets: Vec<Set> = sets.into_par_iter().map(|s| self.judged(self.consistent(s))).collect();
-        sets.sort_by(|a, b| b.total().total_cmp(&a.total()));
+        let mut sets: Vec<Set> = sets.in_parallel().map(|s| self.judged(self.consistent(s))).collect();
+        sort_descending(&mut sets, |item| item.total());
         sets
     }
 
@@ -366,11 +368,11 @@ impl Tools<'_, '_> {
         // No formula is left to be found; an effect that moves the variables of those that were may be.
         let sought = if is_anything { Sought::Everything } else { Sought::WhatMoves };
         let mut listed = self.listed_beside(set, sought).unwrap_or_default();
-        listed.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        sort_descending(&mut listed, |item| item.gain);
         listed.retain(|p| p.gain > WORTH_LISTED);
         listed.truncate(LISTED_TRIED);
         let mut next = if is_anything { self.with_terms(set, &regression, TRIED) } else { Vec::new() };
-        next.extend(listed.par_iter().filter_map(|p| self.with_listed(set, p)).collect::<Vec<_>>());
+        next.extend(listed.iter().in_parallel().filter_map(|p| self.with_listed(set, p)).collect::<Vec<_>>());
         self.foremost(next)
     }
 
@@ -435,7 +437,7 @@ impl Tools<'_, '_> {
             let Some(chosen) = chosen else { break };
             best = self.look_back(chosen, &mut all);
         }
-        all.sort_by(|a, b| b.total().total_cmp(&a.total()));
+        sort_descending(&mut all, |item| item.total());
         all
     }
 
@@ -443,9 +445,10 @@ impl Tools<'_, '_> {
     fn look_back(&self, mut best: Set, all: &mut Vec<Set>) -> Set {
         while best.len() > 1 {
             let places: Vec<usize> = (0..best.len()).collect();
-            let smaller: Vec<Set> = places.par_iter().filter_map(|&place| self.without(&best, place)).collect();
+            let smaller: Vec<Set> =
+                places.iter().in_parallel().filter_map(|&place| self.without(&best, place)).collect();
             let smaller: Vec<Set> = smaller.into_iter().filter(|s| s.merit > best.merit - WORTH_A_STEP).collect();
-            let judged: Vec<Set> = smaller.into_par_iter().map(|s| self.judged(self.grounded(s))).collect();
+            let judged: Vec<Set> = smaller.in_parallel().map(|s| self.judged(self.grounded(s))).collect();
             let Some(least) = judged.iter().max_by(|a, b| a.total().total_cmp(&b.total())).cloned() else { break };
             all.extend(judged);
             if least.total() < best.total() {

@@ -5,7 +5,7 @@
 //! is missing too. So the foremost sets are tried without their wander, and then without each of their listed effects in turn: what the
 //! others leave is then what a formula has to explain.
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::search::{Set, Tools, WITHIN_REACH};
 use crate::chamber::{Effort, Fit, Free};
@@ -25,7 +25,7 @@ impl Tools<'_, '_> {
         }
         // Without its only one it is the declared model, with which another search begins.
         if bare.members.len() > 1 {
-            let fewer = (0..bare.members.len()).into_par_iter().filter_map(|place| self.fewer(&bare, place));
+            let fewer = (0..bare.members.len()).in_parallel().filter_map(|place| self.fewer(&bare, place));
             begun.extend(fewer.collect::<Vec<_>>());
         }
         let sets = begun.iter().flat_map(|e| {

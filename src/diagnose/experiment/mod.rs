@@ -27,7 +27,8 @@ mod alternatives;
 mod chamber;
 mod plan;
 
-use rayon::prelude::*;
+use crate::numeric::order::sort_descending;
+use crate::parallel::InParallel;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::profile::Profile;
@@ -168,8 +169,7 @@ pub(crate) fn design(comparison: &ModelComparison, chamber: &ChamberCapability, 
         let outcomes = foreseen.refusals.into_iter().map(|r| ExpectedOutcome::new(r, comparison.variance)).collect();
         Some(Judged { profile, outcomes, differences: foreseen.differences })
     };
-    let mut screened: Vec<Judged> =
-        (0..profiles.len()).into_par_iter().filter_map(|p| judge(p, Refit::Linear)).collect();
+    let mut screened: Vec<Judged> = (0..profiles.len()).in_parallel().filter_map(|p| judge(p, Refit::Linear)).collect();
     let outcomes = screened.first()?.outcomes.len();
     let best = |outcome: usize| screened.iter().map(|j| j.outcomes[outcome].margin()).fold(f64::NEG_INFINITY, f64::max);
     let possible: Vec<bool> = (0..outcomes).map(|outcome| best(outcome) > 0.0).collect();
@@ -184,9 +184,9 @@ pub(crate) fn design(comparison: &ModelComparison, chamber: &ChamberCapability, 
         wanted.iter().map(merit).fold(f64::INFINITY, f64::min)
     };
     // The first of equals stays.
-    screened.sort_by(|a, b| merit(b).total_cmp(&merit(a)));
+    sort_descending(&mut screened, merit);
     let foremost: Vec<usize> = screened.iter().take(JUDGED_IN_FULL).map(|j| j.profile).collect();
-    let in_full: Vec<Judged> = foremost.into_par_iter().filter_map(|p| judge(p, Refit::Full)).collect();
+    let in_full: Vec<Judged> = foremost.in_parallel().filter_map(|p| judge(p, Refit::Full)).collect();
     let chosen = in_full.into_iter().reduce(|best, next| if merit(&next) > merit(&best) { next } else { best })?;
     let separations = chosen
         .differences

@@ -7,7 +7,7 @@
 //! D is the sum of squares of the innovations, each over its variance, in the joint model of chamber, pack, sensor and gyro
 //! with the numbers that the records showed, of what the sensor and the gyro would show on average; H is what the records at hand hold the candidate's numbers and the film with.
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::alternatives::{FittedAlternative, ModelComparison};
 use crate::chamber::{Bend, Chamber, Fit, Quantity};
@@ -94,7 +94,7 @@ impl<'a> ExperimentPlan<'a> {
         let air = self.comparison.air.as_ref()?;
         let shown: Vec<Record> = alternatives.iter().map(|r| self.shown(r, air)).collect::<Option<_>>()?;
         let told: Vec<Told> = (0..alternatives.len())
-            .into_par_iter()
+            .in_parallel()
             .map(|i| self.told(&shown[i], i, air, refit))
             .collect::<Option<_>>()?;
         let mut refusals = Vec::new();

@@ -1,6 +1,6 @@
 //! What of a difference between sets is evidence: less than it seems where the records' air is not quite what a chamber's is taken for.
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::{Explanation, Outcome, Question};
 use crate::chamber::DifferenceVariance;
@@ -14,7 +14,7 @@ pub(super) fn adjust(question: &Question, explanations: &mut [Explanation]) -> O
     let Some((best, others)) = explanations.split_first_mut() else { return Ok(()) };
     best.understated = 0.0;
     let best = &*best;
-    others.par_iter_mut().try_for_each(|other| {
+    others.iter_mut().in_parallel().try_for_each(|other| {
         let behind = best.log_likelihood() - other.log_likelihood();
         let divisor = variance(question, best, other)?.divisor();
         other.understated = if behind.is_finite() { behind * (1.0 - 1.0 / divisor) } else { 0.0 };

@@ -1,6 +1,6 @@
 //! Back from a set: what it does without, and what may stand in a member's place.
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::cache::{Cache, keep};
 use super::explanation::{fitted, in_order, key, with, without};
@@ -48,7 +48,7 @@ pub(super) fn look_back(
 ) -> Explanation {
     while best.members.len() > 1 {
         let smaller: Vec<Explanation> = (0..best.members.len())
-            .into_par_iter()
+            .in_parallel()
             .filter_map(|place| {
                 let mut members = best.members.clone();
                 members.remove(place);
@@ -69,7 +69,7 @@ pub(super) fn look_back(
 /// The best set once more with the parameters that have defaults, and with each member exchanged for what promises most.
 pub(super) fn complete(question: &Question, windings: &[Winding], best: &Explanation, cache: &mut Cache) {
     let places = 0..best.members.len();
-    let found = places.into_par_iter().flat_map(|place| with_others(question, windings, best, place, cache));
+    let found = places.in_parallel().flat_map(|place| with_others(question, windings, best, place, cache));
     let found: Vec<Explanation> = found.collect();
     found.into_iter().for_each(|explanation| keep(cache, explanation));
 }
@@ -86,11 +86,11 @@ fn with_others(
     let mut short = next_of_kin(question, windings, best, place, own);
     if best.members.len() > 1 {
         // Where the rest stays as it is, what is like the member promises as much; where it is fitted by itself, what moves it too.
-        let rests = [Effort::NONE, Effort::QUICK].into_par_iter();
+        let rests = [Effort::NONE, Effort::QUICK].in_parallel();
         let rests = rests.filter_map(|effort| rest(question, windings, best, place, effort));
         let rests: Vec<Explanation> = rests.collect();
         let alone = rests.iter().map(|rest| rest.merit).fold(f64::NEG_INFINITY, f64::max);
-        let beside = rests.par_iter().flat_map(|rest| beside_rest(question, windings, rest, known));
+        let beside = rests.iter().in_parallel().flat_map(|rest| beside_rest(question, windings, rest, known));
         short.extend(beside.filter(|other| other.merit > alone).collect::<Vec<_>>());
     }
     let mut foremost = Cache::new();
@@ -98,7 +98,7 @@ fn with_others(
     let mut foremost: Vec<Explanation> = foremost.into_values().collect();
     foremost.sort_by(in_order);
     foremost.truncate(TRIED);
-    let further = foremost.into_par_iter().filter_map(|short| {
+    let further = foremost.in_parallel().filter_map(|short| {
         fitted(question, windings, short.members.clone(), &short.begin(), &short.fit, Effort::QUICK)
     });
     further.collect()
@@ -116,8 +116,8 @@ fn next_of_kin(
     (rest.assumed, rest.free) = without(question, best, place);
     let (own, values) = (&question.candidates[own], best.effects(question).into_iter().find(|e| e.0 == own));
     let values = values.map(|e| e.1.values().to_vec());
-    let kin = question.candidates.par_iter().enumerate().filter(|(_, c)| c.is_fuller_than(own) || c.is_next_to(own));
-    let short = kin.filter_map(|(other, candidate)| {
+    let kin = question.candidates.iter().enumerate().filter(|(_, c)| c.is_fuller_than(own) || c.is_next_to(own));
+    let short = kin.in_parallel().filter_map(|(other, candidate)| {
         let member = Member::Effect(other);
         let values = values.clone().filter(|_| !candidate.is_of_layer());
         let begin = with(question, windings, &rest, member, values)?;
@@ -132,7 +132,7 @@ fn next_of_kin(
 /// What promises most beside a rest, and no fit is known of, after a short fit.
 fn beside_rest(question: &Question, windings: &[Winding], rest: &Explanation, known: &Cache) -> Vec<Explanation> {
     let chosen = choose(proposals(question, rest).unwrap_or_default());
-    let fits = chosen.into_par_iter().filter_map(|p| {
+    let fits = chosen.in_parallel().filter_map(|p| {
         let mut members = rest.members.clone();
         members.push(p.member);
         if known.contains_key(&key(members.clone())) {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::explanation::{fitted, in_order};
 use super::tries::TRIED;
@@ -28,7 +28,7 @@ pub(super) fn carried(question: &Question, windings: &[Winding], cache: Cache) -
         kept += 1;
         e.members.is_empty() || kept <= TRIED
     });
-    let there = all.into_par_iter().filter_map(|e| {
+    let there = all.in_parallel().filter_map(|e| {
         let begin = e.begin();
         fitted(question, windings, e.members, &begin, &e.fit, Effort::QUICK)
     });

@@ -10,7 +10,7 @@
 //!
 //! and the search goes on in the chamber of the best. A set that is wrong needs kinks that the truth does without.
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::explanation::with;
 use super::{Explanation, Member, Outcome, Question, Winding, is_seen, is_seen_alone};
@@ -36,7 +36,7 @@ pub(super) fn best_by_own_kinks<'a>(
     found: &[Explanation],
 ) -> Option<InOwnAir<'a>> {
     let foremost: Vec<&Explanation> = found.iter().filter(|e| !e.is_beyond_physical()).take(LOOKED_AT).collect();
-    let own = foremost.into_par_iter().filter_map(|e| {
+    let own = foremost.in_parallel().filter_map(|e| {
         let own = chamber.with_own_kinks(&e.fit, Effort::QUICK).ok()??;
         Some(in_own_air(question, windings, e.members.clone(), own))
     });
@@ -66,7 +66,7 @@ fn best_of_one<'a>(
     controllers: Controllers,
 ) -> Option<InOwnAir<'a>> {
     let places: Vec<usize> = (0..question.candidates.len()).filter(|&p| is_asked(&question.candidates[p])).collect();
-    let own = places.into_par_iter().filter_map(|place| {
+    let own = places.in_parallel().filter_map(|place| {
         // A heat path that cannot be solved speaks against itself alone.
         by_effect(question, declared, place, controllers).unwrap_or_default()
     });

@@ -2,7 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use rayon::prelude::*;
+use crate::numeric::order::sort_descending;
+use crate::parallel::InParallel;
 
 use super::explanation::with;
 use super::{Explanation, Member, Outcome, Question};
@@ -50,7 +51,7 @@ pub(in crate::diagnose) fn proposals_along(
 /// that ends) is no direction, so it is fitted whatever it promises.
 pub(super) fn looked_at(question: &Question, best: &Explanation) -> Outcome<Vec<Proposal>> {
     let mut all = scored(question, best, &|_, _| true)?;
-    all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    sort_descending(&mut all, |item| item.gain);
     let least = LARGE.max(CLOSE * all.first().map_or(0.0, |p| p.gain));
     let mut seen = BTreeSet::new();
     let mut calm = best.fit.clone();
@@ -62,7 +63,7 @@ pub(super) fn looked_at(question: &Question, best: &Explanation) -> Outcome<Vec<
         .take(LOOKED_AT)
         .collect();
     let gains: Vec<(usize, f64)> = close
-        .into_par_iter()
+        .in_parallel()
         .filter_map(|i| {
             let (assumed, free) = with(question, &[], &best.fit, all[i].member, all[i].values.clone())?;
             let there = question.chamber.fit(&assumed, &free, &question.fitted, Some(&calm), Effort::SHORT).ok()?;
@@ -132,7 +133,7 @@ pub(in crate::diagnose) fn tested_starts(
         let range = range(effect, free);
         along(candidate, &mut assumed).then_some(TestedStart { place, start, share, range, assumed })
     };
-    asked.into_par_iter().filter_map(direction).collect()
+    asked.in_parallel().filter_map(direction).collect()
 }
 
 fn scored(
@@ -217,6 +218,6 @@ pub(super) fn foremost(proposals: &[Proposal]) -> Vec<(usize, f64)> {
         }
     }
     let mut all: Vec<(usize, f64)> = best.into_iter().collect();
-    all.sort_by(|a, b| b.1.total_cmp(&a.1));
+    sort_descending(&mut all, |item| item.1);
     all
 }

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
+use crate::numeric::order::sort_descending;
+use crate::parallel::InParallel;
 
 use super::explanation::{Begin, fitted, in_order, with};
 use super::screen::Proposal;
@@ -95,7 +96,7 @@ fn steps(question: &Question, best: &Explanation) -> Option<Proposal> {
 
 /// The most promising proposals, one start a member, two where they promise nearly the same.
 pub(super) fn choose(mut proposals: Vec<Proposal>) -> Vec<Proposal> {
-    proposals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    sort_descending(&mut proposals, |item| item.gain);
     let first = proposals.iter().map(|p| p.gain).filter(|g| g.is_finite()).fold(0.0, f64::max);
     let least = WORTH_A_FIT.max(WORTH_BESIDE * first);
     let mut seen: BTreeMap<Member, usize> = BTreeMap::new();
@@ -121,7 +122,7 @@ fn fit_all(question: &Question, windings: &[Winding], best: &Explanation, tried:
     calm.calm(&question.fitted);
     let most = tried.iter().map(|p| p.gain).filter(|g| g.is_finite()).fold(0.0, f64::max);
     tried
-        .into_par_iter()
+        .in_parallel()
         .filter_map(|proposal| {
             let mut members = best.members.clone();
             members.push(proposal.member);
@@ -153,7 +154,7 @@ fn from_the_best(
     begin: &Begin,
     starts: &[&Fit],
 ) -> Option<Explanation> {
-    let short = starts.par_iter().filter_map(|from| {
+    let short = starts.iter().in_parallel().filter_map(|from| {
         let members = members.to_vec();
         fitted(question, windings, members, begin, from, Effort::SHORT)
     });
@@ -167,7 +168,7 @@ pub(super) fn calmed(question: &Question, windings: &[Winding], known: Explanati
     start.calm(&question.fitted);
     let begin = known.begin();
     let further = [&known.fit, &start]
-        .into_par_iter()
+        .in_parallel()
         .filter_map(|from| fitted(question, windings, known.members.clone(), &begin, from, Effort::FULL));
     let further: Vec<Explanation> = further.collect();
     further.into_iter().fold(known, |best, again| if again.merit > best.merit { again } else { best })

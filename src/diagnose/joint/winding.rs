@@ -1,7 +1,8 @@
 //! What else may have been wound: another classic, the coil the other way round, two layers exchanged.
 
+use crate::numeric::order::sort_descending;
+use crate::parallel::InParallel;
 use nalgebra::DVector;
-use rayon::prelude::*;
 
 use super::odds::{EXCHANGE, WINDING};
 use super::{Outcome, Question};
@@ -75,7 +76,7 @@ pub(super) fn promising(question: &Question, fit: &Fit) -> Outcome<Vec<Winding>>
         }
     }
     all.retain(|w| w.promised > WORTH_A_LOOK);
-    all.sort_by(|a, b| b.promised.total_cmp(&a.promised));
+    sort_descending(&mut all, |item| item.promised);
     all.truncate(EXCHANGES_LOOKED_AT);
     all.extend(classics(question.pattern, &fit.assumed.pattern));
     Ok(most_likely(question, fit, all))
@@ -105,7 +106,7 @@ fn classics(declared: &Pattern, assumed: &Pattern) -> Vec<Winding> {
 fn most_likely(question: &Question, fit: &Fit, mut all: Vec<Winding>) -> Vec<Winding> {
     promise_beside(question, fit, &mut all);
     let worth = |w: &Winding| w.promised + w.log_prior;
-    all.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
+    sort_descending(&mut all, worth);
     all.truncate(TRIED);
     all
 }
@@ -121,7 +122,7 @@ pub(super) fn promise_beside(question: &Question, fit: &Fit, windings: &mut [Win
         let there = question.chamber.fit(&assumed, &fit.free, &question.fitted, Some(&start), Effort::SHORT);
         there.map_or(f64::NEG_INFINITY, |there| there.posterior() - fit.posterior())
     };
-    windings.par_iter_mut().for_each(|winding| winding.promised = promise(winding));
+    windings.iter_mut().in_parallel().for_each(|winding| winding.promised = promise(winding));
 }
 
 #[cfg(test)]

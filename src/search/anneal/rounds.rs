@@ -4,7 +4,7 @@
 //! what they found is gathered in their order, so the result depends on the seed alone and not on threads. Between
 //! slices the whole state is a plain value ([`State`]) that can be saved and taken up again.
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::restart::{Cooling, Restart, cooling_for};
 use super::windows;
@@ -353,7 +353,7 @@ impl<C: Cost> Rounds for Optimisation<C> {
             return false;
         }
         let (cost, cooling) = (self.working.as_ref().unwrap_or(&self.full), &self.cooling);
-        self.state.restarts.par_iter_mut().filter(|r| !r.is_done(cooling)).for_each(|restart| {
+        self.state.restarts.iter_mut().filter(|r| !r.is_done(cooling)).in_parallel().for_each(|restart| {
             restart.advance(cost, cooling);
         });
         if self.state.restarts.iter().all(|r| r.is_done(&self.cooling)) || self.has_reached_target() {
@@ -407,7 +407,7 @@ impl<C: Cost> Rounds for Optimisation<C> {
         };
         let all = |cost: &C, pass: usize, starts: &[Vec<usize>]| -> Vec<Vec<usize>> {
             let stream = |index: usize| pass * starts.len() + index;
-            starts.par_iter().enumerate().map(|(index, start)| refine(cost, stream(index), start)).collect()
+            starts.iter().enumerate().in_parallel().map(|(index, start)| refine(cost, stream(index), start)).collect()
         };
         if !self.full.is_approximated() || self.state.working.is_empty() {
             return all(&self.full, 0, starts).iter().map(|segments| self.judged(segments)).collect();

@@ -7,8 +7,8 @@
 
 use std::ops::Range;
 
+use crate::parallel::InParallel;
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 
 use super::limits::{layers_at_an_end, pick, to_other_end};
 use super::restart::generator;
@@ -140,7 +140,7 @@ fn descended<C: Cost>(cost: &C, start: &[usize]) -> Reached {
             Breadth::Ends(count) => sets_of_ends(segments, count, sweep),
         };
         let step = windows
-            .into_par_iter()
+            .in_parallel()
             .filter_map(|window| best_within(cost, segments, &position, &window, orders))
             .min_by(|a, b| a.cost.total_cmp(&b.cost).then_with(|| a.segments.cmp(&b.segments)));
         sweep += 1;

@@ -22,7 +22,7 @@
 
 use std::sync::OnceLock;
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::guaranteed::is_linear;
 use super::samples::any_rate_model;
@@ -217,8 +217,9 @@ impl Compared {
             .collect();
         let largest = worst.iter().map(|(_, worst)| *worst).fold(0.0, f64::max);
         let changes: Vec<f64> = worst
-            .par_iter()
+            .iter()
             .filter(|(_, worst)| *worst >= CONTENDER * largest)
+            .in_parallel()
             .map(|&(index, worst)| {
                 let again = self.solved[index].get_or_init(|| {
                     Solver::new(&path)

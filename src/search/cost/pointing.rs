@@ -17,7 +17,7 @@
 //! # Source
 //! Pointing error thermal sensitivity: Opt. Express 21 (2013) 2521 (by its abstract).
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::guaranteed::is_linear;
 use super::samples::{SampleMatrix, any_rate_model};
@@ -154,13 +154,14 @@ fn changes_until(profile: &SolvedProfile, time_s: f64) -> ThermalHistory {
 /// A pattern of another layer count.
 pub fn worst_pointing(model: &CoilModel, solved: &SolvedProfiles, pattern: &Pattern) -> Result<WorstCase, SearchError> {
     let pointing = Pointing::new(model, pattern)?;
-    let sampled: Vec<Vec<f64>> = solved.profiles().par_iter().map(|profile| pointing.series_rad(profile)).collect();
+    let sampled: Vec<Vec<f64>> =
+        solved.profiles().iter().in_parallel().map(|profile| pointing.series_rad(profile)).collect();
     let tops: Vec<f64> =
         sampled.iter().map(|series| series.iter().fold(0.0, |most: f64, e| most.max(e.abs()))).collect();
     let least = PEAK_SHARE * tops.iter().copied().fold(0.0, f64::max);
     let contenders: Vec<usize> = (0..tops.len()).filter(|&index| tops[index] >= least).collect();
     let of_each: Vec<WorstCase> = contenders
-        .into_par_iter()
+        .in_parallel()
         .map(|index| {
             let profile = &solved.profiles()[index];
             let (error_rad, time_s) = pointing.worst_of_series(profile, &sampled[index]);
@@ -198,7 +199,7 @@ pub(in crate::search) fn largest_change_rad(
         let series = one.series_rad(profile);
         two.series_rad(profile).iter().zip(series).map(|(b, a)| (b - a).abs()).fold(0.0, f64::max)
     };
-    Ok(solved.profiles().par_iter().map(of_profile).reduce(|| 0.0, f64::max))
+    Ok(solved.profiles().iter().in_parallel().map(of_profile).fold(0.0, f64::max))
 }
 
 /// The same as the rate that makes it in one hour.
@@ -274,7 +275,7 @@ impl PointingResponses {
 pub(crate) fn pointing_samples(model: &CoilModel, solved: &SolvedProfiles) -> Result<SampleMatrix, SearchError> {
     let responses = PointingResponses::new(model)?;
     let of_all: Vec<WeightResponse> =
-        solved.profiles().par_iter().flat_map_iter(|profile| responses.of_profile(profile)).collect();
+        solved.profiles().iter().in_parallel().flat_map(|profile| responses.of_profile(profile)).collect();
     Ok(SampleMatrix::new(model, &of_all)?)
 }
 

@@ -21,7 +21,7 @@
 //! # Source
 //! The same random numbers for every candidate: Law, Simulation Modeling and Analysis (2015), section 11.2.
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::coil_worst::{Arrangement, Part, Scratch, Worst};
 use crate::numeric::statistics::quantile;
@@ -87,22 +87,20 @@ impl SampledCoils {
     /// As [`crate::search::cost::tolerance::study`].
     pub(crate) fn new(coils: &Coils, probes: &[Pattern]) -> Result<Self, ToleranceError> {
         let layers = coils.model().coil.layers();
-        let coils = match coils.measure() {
+        let coils: Vec<Result<SampledCoil, ToleranceError>> = match coils.measure() {
             Measure::Guaranteed => {
                 let compile = |model: CoilModel| -> Result<SampledCoil, ToleranceError> {
                     let step = UnitStep::new(&model, coils.profiles().max_rate_k_per_s)?;
                     SampledCoil::guaranteed(&model, &step, STRIDE)
                 };
-                coils.built().map(|model| compile(model?)).collect::<Result<Vec<SampledCoil>, ToleranceError>>()?
+                coils.of_built(|model| compile(model?))
             }
             Measure::Sampled => {
                 let instants = binding_instants(coils.model(), coils.profiles(), probes)?;
-                coils
-                    .built()
-                    .map(|model| Ok(SampledCoil::sampled(&model?, coils.profiles(), &instants)?))
-                    .collect::<Result<Vec<SampledCoil>, ToleranceError>>()?
+                coils.of_built(|model| Ok(SampledCoil::sampled(&model?, coils.profiles(), &instants)?))
             }
         };
+        let coils = coils.into_iter().collect::<Result<Vec<SampledCoil>, ToleranceError>>()?;
         Ok(Self { layers, share: SHARE, coils })
     }
 
@@ -125,7 +123,7 @@ impl SampledCoils {
                 }
             }
         };
-        let coils = models.par_iter().map(compile).collect::<Result<Vec<SampledCoil>, ToleranceError>>()?;
+        let coils = models.iter().in_parallel().map(compile).collect::<Result<Vec<SampledCoil>, ToleranceError>>()?;
         let layers = models.first().map_or(0, |model| model.coil.layers());
         Ok(Self { layers, share: SHARE, coils })
     }

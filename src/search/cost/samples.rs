@@ -10,7 +10,7 @@
 //! # Source
 //! The coefficients come from [`RateModel::weight_response`]; tests compare every value with the reference.
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
@@ -103,7 +103,7 @@ impl SampleMatrix {
     pub fn of_profiles(model: &CoilModel, solved: &SolvedProfiles) -> Result<(Self, Vec<SampleOrigin>), SearchError> {
         let rate_model = any_rate_model(model)?;
         let responses: Vec<WeightResponse> =
-            solved.profiles().par_iter().flat_map_iter(|profile| profile.responses(&rate_model)).collect();
+            solved.profiles().iter().in_parallel().flat_map(|profile| profile.responses(&rate_model)).collect();
         let origins = solved
             .profiles()
             .iter()

@@ -28,7 +28,8 @@ mod built;
 
 use std::ops::Range;
 
-use rayon::prelude::*;
+use crate::numeric::order::sort_descending;
+use crate::parallel::InParallel;
 use statrs::statistics::Statistics;
 use thiserror::Error;
 
@@ -293,9 +294,10 @@ impl<'a> Coils<'a> {
         self.judge.measure
     }
 
-    /// The models of all coils, in their order.
-    pub(crate) fn built(&self) -> impl IndexedParallelIterator<Item = Result<CoilModel, SearchError>> {
-        self.deviates.par_iter().map(|coil| built(self.model, self.spec, &self.active, coil))
+    /// What is made of the models of all coils, in their order.
+    pub(crate) fn of_built<R: Send>(&self, of: impl Fn(Result<CoilModel, SearchError>) -> R + Sync) -> Vec<R> {
+        let all = self.deviates.iter().in_parallel();
+        all.map(|coil| of(built(self.model, self.spec, &self.active, coil))).collect()
     }
 
     /// The worst case of each pattern as declared, without spreads.
@@ -324,7 +326,7 @@ impl<'a> Coils<'a> {
     fn worst(&self, spreads: &[Spread], patterns: &[Pattern]) -> Result<Vec<Vec<f64>>, SearchError> {
         let reuse = (!spreads.iter().any(|s| s.is_thermal())).then_some(&self.judge.nominal);
         let of = |coil: &Deviates| self.judge.worst(&built(self.model, self.spec, spreads, coil)?, reuse, patterns);
-        self.deviates.par_iter().map(of).collect()
+        self.deviates.iter().in_parallel().map(of).collect()
     }
 
     /// The 95 % quantile of each pattern, as [`study`] reports it.
@@ -383,7 +385,7 @@ pub(crate) fn study(
                 .zip(&variances)
                 .map(|(spread, v)| (*spread, if sum > 0.0 { v / sum } else { 0.0 }))
                 .collect();
-            variance_shares.sort_by(|a, b| b.1.total_cmp(&a.1));
+            sort_descending(&mut variance_shares, |item| item.1);
             Distribution { nominal_rad_per_s: nominal[p], worst_rad_per_s, yield_share, variance_shares }
         })
         .collect())

@@ -10,7 +10,7 @@
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 use thiserror::Error;
 
 use crate::coil::CoilError;
@@ -127,7 +127,7 @@ impl SolvedProfiles {
             return Err(SearchError::NoProfiles);
         }
         let (solver, remembers) = (Solver::new(&model.heat_path()?)?, model.remembers());
-        let profiles = profiles.par_iter().map(|p| SolvedProfile::new(p.clone(), 0, &solver, remembers));
+        let profiles = profiles.iter().in_parallel().map(|p| SolvedProfile::new(p.clone(), 0, &solver, remembers));
         Ok(Self { profiles: profiles.collect::<Result<_, ThermalError>>()? })
     }
 
@@ -141,7 +141,8 @@ impl SolvedProfiles {
         let settling_s = settling_s(&path)?;
         let soaked: Vec<SolvedProfile> = self
             .profiles
-            .par_iter()
+            .iter()
+            .in_parallel()
             .filter_map(|solved| {
                 let profile = &solved.profile;
                 let soak = Piece { rate_k_per_s: 0.0, duration_s: settling_s };
@@ -214,12 +215,13 @@ impl SolvedProfiles {
     pub(super) fn contenders(&self, rate_model: &RateModel, share: f64) -> Vec<(usize, (f64, f64))> {
         let tops: Vec<f64> = self
             .profiles
-            .par_iter()
+            .iter()
+            .in_parallel()
             .map(|p| p.series_rad_per_s(rate_model).iter().fold(0.0, |most: f64, rate| most.max(rate.abs())))
             .collect();
         let least = share * tops.iter().copied().fold(0.0, f64::max);
         let contenders: Vec<usize> = (0..tops.len()).filter(|&index| tops[index] >= least).collect();
-        contenders.into_par_iter().map(|index| (index, self.profiles[index].worst(rate_model))).collect()
+        contenders.in_parallel().map(|index| (index, self.profiles[index].worst(rate_model))).collect()
     }
 }
 

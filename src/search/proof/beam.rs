@@ -8,7 +8,7 @@
 //! # Source
 //! Ow, Morton, Int. J. Prod. Res. 26, 35 (1988), beam search.
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::permutation_tree::{Node, PermutationTree, Places};
 
@@ -36,7 +36,7 @@ pub(crate) fn promising(
             }
             found
         };
-        let mut next: Vec<(f32, Node)> = kept.par_iter().flat_map_iter(children).collect();
+        let mut next: Vec<(f32, Node)> = kept.iter().in_parallel().flat_map(children).collect();
         let order = |a: &(f32, Node), b: &(f32, Node)| a.0.total_cmp(&b.0).then_with(|| a.1.places.cmp(&b.1.places));
         if next.len() > width {
             next.select_nth_unstable_by(width, order);

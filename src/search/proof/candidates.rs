@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::course::Course;
 use super::support::Support;
@@ -360,7 +360,8 @@ impl<'a> Judge<'a> {
             return (from..self.matrix.samples()).take(most).collect();
         }
         let worst: Vec<usize> = patterns
-            .par_iter()
+            .iter()
+            .in_parallel()
             .map(|segments| {
                 let pattern = Pattern::new(segments.clone()).expect("a search makes permutations only");
                 let values = self.matrix.columns.values(&self.coefficients(&pattern));

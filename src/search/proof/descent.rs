@@ -5,7 +5,7 @@
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::candidates::Judge;
 use super::permutation_tree::{Node, PermutationTree, Places};
@@ -66,7 +66,8 @@ pub(crate) fn search(
         let limit_rad_per_s = outcome.best.as_ref().map_or(limit_rad_per_s, |best| best.rate_rad_per_s);
         let search = Search { orders, judge, limit_rad_per_s, mirrored, most_nodes, watch };
         let found: Vec<PassOutcome> = together
-            .par_iter()
+            .iter()
+            .in_parallel()
             .map(|share| {
                 let mut descent = Descent { search, places: Places::default(), found: PassOutcome::default() };
                 descent.found.complete = descent.descend(&mut share.clone()).is_continue();

@@ -11,8 +11,8 @@
 
 use std::ops::ControlFlow;
 
+use crate::parallel::InParallel;
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 
 use super::box_join::{BoxStep, Matching, Target};
 use super::candidates::{Judge, PatternCandidate};
@@ -105,7 +105,8 @@ pub(super) fn followed<N: Neighbourhood>(
             })
             .collect();
         let found: Vec<PassOutcome> = drawn
-            .par_iter()
+            .iter()
+            .in_parallel()
             .map(|(chain, drawn)| drawn.search(&judge, &samples, task.class, chains[*chain].rate_rad_per_s))
             .collect();
         let mut whole = PassOutcome::default();

@@ -6,7 +6,7 @@
 //! that stays under the limit. What signs are left over are tried one choice after the other. Where a pattern's mirror
 //! image has the opposite error, the outermost sign is fixed.
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::box_join::{BoxStep, Matching, Target, Tree};
 use super::candidates::Judge;
@@ -100,7 +100,8 @@ impl SignSearch {
         let mut outcome = PassOutcome::default();
         let shares = matching.shares(&target, SHARES, &mut outcome.nodes);
         let found: Vec<PassOutcome> = shares
-            .par_iter()
+            .iter()
+            .in_parallel()
             .map(|&share| {
                 let mut mine = PassOutcome::default();
                 let mut nodes = 0;

@@ -6,6 +6,7 @@ use super::compound::compounded;
 use super::stretches::rearranged;
 use super::*;
 use crate::coil::LayerLength;
+use crate::numeric::order::sort_ascending;
 use crate::pattern::classic::Classic;
 use crate::search::cost::columns::Norm;
 use crate::search::cost::pointing::{POINTING_S, worst_pointing};
@@ -44,7 +45,7 @@ fn smallest_by_enumeration(task: &Task) -> f64 {
         .into_iter()
         .map(|p| (matrix.cost(task.model, &p, Norm::Largest).unwrap(), p))
         .collect();
-    sampled.sort_by(|a, b| a.0.total_cmp(&b.0));
+    sort_ascending(&mut sampled, |item| item.0);
     let mut smallest = f64::INFINITY;
     for (cost, pattern) in sampled {
         if cost >= smallest {
