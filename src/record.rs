@@ -1,5 +1,8 @@
 //! A measurement: time, the sensor's temperature, the gyro's rate, and whatever else was logged.
 
+use std::collections::{BTreeSet, HashSet};
+use std::hash::{DefaultHasher, Hash, Hasher};
+
 use thiserror::Error;
 
 use crate::numeric::piecewise::trailing_means;
@@ -302,11 +305,45 @@ impl Record {
         steps.filter(|(_, step_s)| *step_s >= 2.0 * usual_s).collect()
     }
 
+    /// Rows that are another record's as well, none where no stretch of rows is the same: noise does not repeat.
+    pub(crate) fn shared_with(&self, other: &Self) -> Option<SharedRows> {
+        let theirs: HashSet<u64> = other.stretches().flatten().collect();
+        let begins: Vec<usize> =
+            self.stretches().enumerate().filter(|(_, s)| s.is_some_and(|s| theirs.contains(&s))).map(|s| s.0).collect();
+        let first = *begins.first()?;
+        // Stretches overlap: each adds what it has before the next one begins.
+        let rows = begins.windows(2).map(|b| STRETCH.min(b[1] - b[0])).sum::<usize>() + STRETCH;
+        Some(SharedRows { from_s: self.times_s[first], rows })
+    }
+
+    /// What readings and rates of each stretch of rows are, as one number; none where rates take too few values to be told from others.
+    fn stretches(&self) -> impl Iterator<Item = Option<u64>> {
+        self.temperature_k.windows(STRETCH).zip(self.rate_rad_per_s.windows(STRETCH)).map(|(readings, rates)| {
+            let values: BTreeSet<u64> =
+                rates.iter().filter(|rate| rate.is_finite()).map(|rate| rate.to_bits()).collect();
+            let mut all = DefaultHasher::new();
+            readings.iter().chain(rates).for_each(|value| value.to_bits().hash(&mut all));
+            (values.len() >= TELLING).then(|| all.finish())
+        })
+    }
+
     /// The usual interval between rows: the median.
     pub fn interval_s(&self) -> f64 {
         usual_interval_s(&self.times_s)
     }
 }
+
+/// Rows that two records share.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct SharedRows {
+    /// Where they begin in the first record.
+    pub(crate) from_s: f64,
+    pub(crate) rows: usize,
+}
+
+/// Rows in a row whose equality is no chance, and values that rates take in them at least: of six values, as one in 10¹⁸.
+const STRETCH: usize = 24;
+const TELLING: usize = 6;
 
 /// The median of the intervals between at least two times.
 pub(crate) fn usual_interval_s(times_s: &[f64]) -> f64 {
@@ -360,5 +397,28 @@ mod tests {
         let clean = record.without_rows(&rows).unwrap();
         assert_eq!(clean.rows(), 198);
         assert_eq!(clean.gaps(), [(50, 2.0), (119, 2.0)]);
+    }
+
+    #[test]
+    fn rows_of_another_record_are_found_wherever_they_stand() {
+        // Rates of two digits, as a coarse logger has them.
+        let record = |name: &str, rows: std::ops::Range<u64>| {
+            let noise = |i: u64| ((i * 2_654_435_761) % 97) as f64;
+            let times_s = rows.clone().map(|i| 10.0 * (i - rows.start) as f64).collect();
+            let temperature_k = rows.clone().map(|i| 290.0 + (i / 50) as f64).collect();
+            Record::new(name, times_s, temperature_k, rows.map(|i| 1e-7 * noise(i)).collect()).unwrap()
+        };
+        let (whole, other) = (record("whole", 0..400), record("other", 1000..1400));
+        assert_eq!(whole.shared_with(&other), None);
+        assert_eq!(whole.shared_with(&whole.clone()), Some(SharedRows { from_s: 0.0, rows: 400 }));
+        // A cut of it, with a clock of its own, and one that overlaps.
+        let cut = record("cut", 150..260);
+        assert_eq!(cut.shared_with(&whole), Some(SharedRows { from_s: 0.0, rows: 110 }));
+        assert_eq!(whole.shared_with(&cut), Some(SharedRows { from_s: 1500.0, rows: 110 }));
+        let after = record("after", 370..700);
+        assert_eq!(whole.shared_with(&after), Some(SharedRows { from_s: 3700.0, rows: 30 }));
+        // What does not change is the same everywhere and says nothing.
+        let still = Record::new("still", whole.times_s.clone(), vec![290.0; 400], vec![0.0; 400]).unwrap();
+        assert_eq!(still.shared_with(&still.clone()), None);
     }
 }

@@ -6,6 +6,7 @@
 
 use std::collections::BTreeSet;
 
+use super::caution::shared_rows;
 use super::describe::{ScoredExplanation, contenders, findings, ladder, names, unexplained};
 use super::joint::{Explanation, Found, Member, Question, on_the_way};
 use super::standing::CERTAIN;
@@ -226,7 +227,7 @@ pub(super) fn noises(question: &Question, explanation: &Explanation) -> Result<V
 }
 
 fn cautions(chamber: &Chamber, records: &[&Record]) -> Vec<Caution> {
-    let mut cautions = Vec::new();
+    let mut cautions = shared_rows(records);
     for (place, record) in records.iter().enumerate() {
         let name = record.name().to_owned();
         if chamber.spikes(place) > 0 {

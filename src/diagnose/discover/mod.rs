@@ -123,9 +123,7 @@ fn alike(question: &Question, found: &Found, sets: &[Set], listed: &[f64]) -> Ve
             near.push(set.clone());
         }
     }
-    let mass = |total: f64| (total - best_listed).exp();
-    let sum: f64 = listed.iter().map(|t| mass(*t)).chain(near.iter().map(|s| mass(s.total()))).sum();
-    let shares: Vec<f64> = near.iter().map(|s| mass(s.total()) / sum).collect();
+    let shares = shares_of(&near.iter().map(Set::total).collect::<Vec<f64>>(), listed);
     near.into_iter().zip(shares).collect()
 }
 
@@ -155,11 +153,8 @@ fn concluded(tools: &Tools, sets: Vec<Set>, listed: &[f64], least: f64) -> Resul
 /// Sets and what they hold of the posterior mass beside what is listed, most first: a set that is hardly better than a confirmed one within it
 /// gives its mass to that one.
 fn shares(near: Vec<Set>, listed: &[f64], confirmed: &dyn Fn(&Set) -> bool) -> Vec<(Set, f64)> {
-    let top = near.iter().map(Set::total).fold(f64::NEG_INFINITY, f64::max);
-    let mass = |total: f64| (total - top).exp();
-    let sum: f64 = near.iter().map(|s| mass(s.total())).sum::<f64>() + listed.iter().map(|t| mass(*t)).sum::<f64>();
-    let mut shares: Vec<f64> = near.iter().map(|s| mass(s.total()) / sum).collect();
     let totals: Vec<f64> = near.iter().map(Set::total).collect();
+    let mut shares = shares_of(&totals, listed);
     let sizes: Vec<usize> = near.iter().map(Set::len).collect();
     give_to_smaller(&mut shares, &totals, &sizes, |small, large| {
         near[large].holds(&near[small]) && totals[small] > totals[large] - BEATS && confirmed(&near[small])
@@ -167,6 +162,14 @@ fn shares(near: Vec<Set>, listed: &[f64], confirmed: &dyn Fn(&Set) -> bool) -> V
     let mut all: Vec<(Set, f64)> = near.into_iter().zip(shares).collect();
     all.sort_by(|a, b| b.1.total_cmp(&a.1));
     all
+}
+
+/// What sets hold of the posterior mass beside what is listed, by log posteriors, however far these lie apart.
+fn shares_of(totals: &[f64], listed: &[f64]) -> Vec<f64> {
+    let top = totals.iter().chain(listed).copied().fold(f64::NEG_INFINITY, f64::max);
+    let mass = |total: &f64| (total - top).exp();
+    let sum: f64 = totals.iter().chain(listed).map(mass).sum();
+    totals.iter().map(|total| mass(total) / sum).collect()
 }
 
 /// A set with fewer of its terms, from none on, and the set itself, each with the held-out records' days by it, frozen.
@@ -290,6 +293,15 @@ mod tests {
             lagged = Some(now);
             (fan, gain * now)
         })
+    }
+
+    /// A set that held-out records prefer by a thousand and that was not concluded had NaN for its share.
+    #[test]
+    fn shares_are_numbers_however_far_sets_lie_apart() {
+        assert_eq!(shares_of(&[38_848.0, 37_880.0], &[37_877.0, 37_000.0]), [1.0, 0.0]);
+        assert_eq!(shares_of(&[37_000.0], &[38_848.0]), [0.0]);
+        let [a, b] = shares_of(&[1.0, 0.0], &[1.0])[..] else { panic!("one a set") };
+        assert!((2.0 * a + b - 1.0).abs() < 1e-12 && (a / b - std::f64::consts::E).abs() < 1e-12, "{a} {b}");
     }
 
     #[test]

@@ -1,6 +1,9 @@
 //! What may be there beside a fit of the declared model: one round of the search, without looking further.
 
-use rayon::prelude::*;
+use std::cell::OnceCell;
+
+use crate::numeric::order::sort_descending;
+use crate::parallel::InParallel;
 
 use super::explanation::{fitted, with};
 use super::odds::{CERTAIN, EFFECT};
@@ -42,7 +45,7 @@ pub(crate) fn beside(question: &Question, null: &Fit, wandering: &Fit) -> Outcom
     };
     let mut promising = proposals(question, &null)?;
     promising.retain(|p| merit(p) > CERTAIN.log);
-    promising.sort_by(|a, b| merit(b).total_cmp(&merit(a)));
+    sort_descending(&mut promising, merit);
     let mut seen = Vec::new();
     promising.retain(|p| {
         !seen.contains(&p.member) && {
@@ -51,13 +54,13 @@ pub(crate) fn beside(question: &Question, null: &Fit, wandering: &Fit) -> Outcom
         }
     });
     promising.truncate(CONFIRMED);
-    let fits = promising.into_par_iter().filter_map(|Proposal { member, values, .. }| {
+    let fits = promising.in_parallel().filter_map(|Proposal { member, values, .. }| {
         let begin = with(question, &[], &null.fit, member, values)?;
         fitted(question, &[], vec![member], &begin, &null.fit, Effort::QUICK)
     });
     let mut fits: Vec<Explanation> = fits.collect();
     fits.retain(|there| there.members.iter().any(|m| !there.is_no_news(question.model.effects.len(), *m)));
-    take_off(question, &null.fit, &mut fits);
+    take_off(question, &OnceCell::new(), &null.fit, &mut fits);
     let found = fits.into_iter().map(|there| {
         let candidate = match there.members[..] {
             [Member::Effect(place)] => Some(place),

@@ -1,6 +1,9 @@
 //! Held-out records, posterior masses, and sets that are as good without some of their members.
 
-use rayon::prelude::*;
+use std::cell::OnceCell;
+use std::collections::BTreeSet;
+
+use crate::parallel::InParallel;
 
 use super::adjust::adjust;
 use super::back::rest;
@@ -29,80 +32,145 @@ pub(super) enum Care {
 ///
 /// # Errors
 /// A set that was fitted and cannot be solved any more.
-#[expect(
-    clippy::too_many_lines,
-    reason = "the steps of one judgement: each orders or weighs what the step before left"
-)]
 pub(super) fn judge(
     question: &Question,
     windings: &[Winding],
     explanations: &mut Vec<Explanation>,
     care: Care,
 ) -> Outcome<()> {
-    let order = |list: &mut Vec<Explanation>| {
-        list.sort_by(|a, b| b.total().total_cmp(&a.total()).then_with(|| a.key().cmp(&b.key())))
-    };
     order(explanations);
-    // What a larger set has found of the chamber may be better for a smaller one, too.
-    let again: Vec<Explanation> = explanations
-        .iter()
-        .take(if care == Care::InFull { LOOKED_INTO } else { 0 })
+    let mut looked_into: BTreeSet<Vec<Member>> = BTreeSet::new();
+    if care == Care::InFull {
+        let foremost: Vec<Explanation> = explanations.iter().take(LOOKED_INTO).cloned().collect();
+        looked_into.extend(foremost.iter().map(Explanation::key));
+        take_better(explanations, without_one(question, windings, &foremost));
+        order(explanations);
+    }
+    let least = explanations.first().map_or(0.0, |e| e.merit) - WINDOW;
+    keep_asked(explanations, least, !question.held_out.is_empty());
+    let hearing = Hearing { question, windings, care, least };
+    // The first finds what the held-out records' days were; the others begin there.
+    if let Some((first, others)) = explanations.split_first_mut() {
+        hearing.hear(first, None);
+        hearing.hear_all(others, first);
+    }
+    let declared = explanations.iter().find(|e| e.members.is_empty()).map(|e| e.fit.clone());
+    let readings = OnceCell::new();
+    let take_off = |sets: &mut [Explanation]| {
+        if let Some(declared) = &declared {
+            take_off(question, &readings, declared, sets);
+        }
+    };
+    take_off(explanations);
+    order(explanations);
+    // What held-out records prefer may be too large as well, and was not near enough to be looked into.
+    while care == Care::InFull
+        && !question.held_out.is_empty()
+        && let Some(first) = explanations.first().cloned()
+        && looked_into.insert(first.key())
+    {
+        let known: BTreeSet<Vec<Member>> = explanations.iter().map(Explanation::key).collect();
+        let mut smaller = without_one(question, windings, std::slice::from_ref(&first));
+        smaller.retain(|e| !known.contains(&e.key()));
+        hearing.hear_all(&mut smaller, &first);
+        take_off(&mut smaller);
+        explanations.extend(smaller);
+        order(explanations);
+    }
+    adjust(question, explanations)?;
+    order(explanations);
+    give_masses(question, explanations);
+    Ok(())
+}
+
+fn order(explanations: &mut [Explanation]) {
+    explanations.sort_by(|a, b| b.total().total_cmp(&a.total()).then_with(|| a.key().cmp(&b.key())));
+}
+
+/// Sets without one of their members, begun from what was found with it: what a larger set has found of the chamber may be better for
+/// a smaller one, too.
+fn without_one(question: &Question, windings: &[Winding], sets: &[Explanation]) -> Vec<Explanation> {
+    sets.iter()
         .flat_map(|e| (0..e.members.len()).map(move |place| (e, place)))
-        .collect::<Vec<_>>()
-        .into_par_iter()
+        .in_parallel()
         .filter_map(|(large, place)| rest(question, windings, large, place, Effort::QUICK))
-        .collect();
-    for small in again {
-        match explanations.iter_mut().find(|e| e.key() == small.key()) {
-            Some(known) if small.merit > known.merit => *known = small,
+        .collect()
+}
+
+/// Takes sets that are not known, or better than as they are known.
+fn take_better(explanations: &mut Vec<Explanation>, others: Vec<Explanation>) {
+    for other in others {
+        match explanations.iter_mut().find(|e| e.key() == other.key()) {
+            Some(known) if other.merit > known.merit => *known = other,
             Some(_) => {}
-            None => explanations.push(small),
+            None => explanations.push(other),
         }
     }
-    order(explanations);
-    let least = explanations.first().map_or(0.0, |e| e.merit) - WINDOW;
-    let mut kept = 0;
-    explanations.retain(|e| {
-        kept += 1;
-        e.members.is_empty() || (e.merit > least && kept <= JUDGED)
-    });
-    let judged = |e: &mut Explanation| {
-        // What was only ranked is fitted in full before it is judged.
+}
+
+/// What sets are asked before they are weighed.
+struct Hearing<'h, 'q> {
+    question: &'h Question<'q>,
+    windings: &'h [Winding],
+    care: Care,
+    /// The merit from which on a set is near the best of the fitted records.
+    least: f64,
+}
+
+impl Hearing<'_, '_> {
+    fn hear_all(&self, sets: &mut [Explanation], first: &Explanation) {
+        let top = heard(first);
+        sets.iter_mut().in_parallel().for_each(|e| {
+            e.fit.days.clone_from(&first.fit.days);
+            self.hear(e, Some(top));
+        });
+    }
+
+    /// Fits a set that was only ranked in full, and asks the held-out records; what is far from the best by those, too, stays as it is.
+    fn hear(&self, e: &mut Explanation, top: Option<f64>) {
+        let is_far = e.merit <= self.least && !e.members.is_empty();
+        if let Some(top) = top.filter(|_| is_far) {
+            // By another best, in another chamber.
+            e.understated = 0.0;
+            self.ask_held_out(e);
+            if heard(e) < top - WINDOW {
+                return;
+            }
+        }
         let begin = e.begin();
-        if care == Care::InFull
+        if self.care == Care::InFull
             && !e.fit.is_full()
-            && let Some(again) = fitted(question, windings, e.members.clone(), &begin, &e.fit, Effort::FULL)
+            && let Some(again) = fitted(self.question, self.windings, e.members.clone(), &begin, &e.fit, Effort::FULL)
             && again.merit > e.merit
         {
             *e = again;
         }
-        if !question.held_out.is_empty() {
-            e.held_out = Some(question.held_out_evidence(&mut e.fit));
+        self.ask_held_out(e);
+    }
+
+    fn ask_held_out(&self, e: &mut Explanation) {
+        if !self.question.held_out.is_empty() {
+            e.held_out = Some(self.question.held_out_evidence(&mut e.fit));
         }
-    };
-    // The first finds what the held-out records' days were; the others begin there.
-    if let Some((first, others)) = explanations.split_first_mut() {
-        judged(first);
-        others.par_iter_mut().for_each(|e| {
-            e.fit.days.clone_from(&first.fit.days);
-            judged(e);
-        });
     }
-    if let Some(declared) = explanations.iter().find(|e| e.members.is_empty()).map(|e| e.fit.clone()) {
-        take_off(question, &declared, explanations);
-    }
-    order(explanations);
-    adjust(question, explanations)?;
-    order(explanations);
+}
+
+/// What fitted and held-out records say, before anything is taken off.
+fn heard(e: &Explanation) -> f64 {
+    e.merit + e.held_out.unwrap_or(0.0)
+}
+
+/// Posterior masses, from the largest set on: its mass goes to the best set within it that is as good, that lacks no news, or that predicts
+/// rates better.
+fn give_masses(question: &Question, explanations: &mut [Explanation]) {
     let top = explanations.first().map_or(0.0, Explanation::total);
     let masses: Vec<f64> = explanations.iter().map(|e| (e.total() - top).exp()).collect();
     let sum: f64 = masses.iter().sum();
     for (e, mass) in explanations.iter_mut().zip(masses) {
         e.probability = mass / sum;
     }
-    let errors: Vec<Option<[f64; 2]>> = explanations.par_iter().map(|e| errors(question, e).unwrap_or(None)).collect();
-    // From the largest set on: its mass goes to the best set within it that is as good, that lacks no news, or that predicts
-    // rates better.
+    let errors: Vec<Option<[f64; 2]>> =
+        explanations.iter().in_parallel().map(|e| errors(question, e).unwrap_or(None)).collect();
     let totals: Vec<f64> = explanations.iter().map(Explanation::total).collect();
     let sizes: Vec<usize> = explanations.iter().map(|e| e.members.len()).collect();
     let mut masses: Vec<f64> = explanations.iter().map(|e| e.probability).collect();
@@ -119,7 +187,19 @@ pub(super) fn judge(
     });
     explanations.iter_mut().zip(masses).for_each(|(e, mass)| e.probability = mass);
     explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(b.total().total_cmp(&a.total())));
-    Ok(())
+}
+
+/// Keeps the declared model, the foremost sets whose merit is above the `least`, and, where records are held out, the best of each smaller
+/// size: what fitted records need may be what held-out ones refute.
+fn keep_asked(explanations: &mut Vec<Explanation>, least: f64, is_held_out: bool) {
+    let largest = explanations.first().map_or(0, |e| e.members.len());
+    let (mut kept, mut sizes) = (0, BTreeSet::new());
+    explanations.retain(|e| {
+        kept += 1;
+        let size = e.members.len();
+        let is_first_of_size = sizes.insert(size);
+        size == 0 || (e.merit > least && kept <= JUDGED) || (is_held_out && is_first_of_size && size < largest)
+    });
 }
 
 /// A share of the mass below which nothing is named.
@@ -151,6 +231,36 @@ fn errors(question: &Question, explanation: &Explanation) -> Outcome<Option<[f64
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chamber::Assumption;
+    use crate::diagnose::experiment::fixtures::{model, pattern};
+
+    /// Fitted records need four effects, by 150; held-out ones may refute all but the first.
+    #[test]
+    fn where_records_are_held_out_the_best_of_each_smaller_size_is_asked() {
+        let of = |effects: &[usize], merit: f64| {
+            let fit = Fit::to_nothing(Assumption::new(model(Vec::new()), pattern()), Vec::new(), 1e-7);
+            let members = effects.iter().copied().map(Member::Effect).collect();
+            let (held_out, in_readings, understated, probability) = (None, 0.0, 0.0, 0.0);
+            Explanation { members, fit, merit, held_out, in_readings, understated, probability }
+        };
+        let all = [
+            of(&[0, 1, 2, 3], 400.0),
+            of(&[0, 1, 2, 4], 395.0),
+            of(&[0, 1, 2, 5], 350.0),
+            of(&[0, 1, 2], 330.0),
+            of(&[0, 1], 270.0),
+            of(&[0, 2], 265.0),
+            of(&[0], 250.0),
+            of(&[], 0.0),
+        ];
+        let kept = |is_held_out: bool| {
+            let mut sets = all.to_vec();
+            keep_asked(&mut sets, 400.0 - WINDOW, is_held_out);
+            sets.iter().map(|e| e.merit).collect::<Vec<f64>>()
+        };
+        assert_eq!(kept(true), [400.0, 395.0, 330.0, 270.0, 250.0, 0.0]);
+        assert_eq!(kept(false), [400.0, 395.0, 0.0]);
+    }
 
     #[test]
     fn what_raises_both_errors_is_worse_and_what_lowers_either_is_not() {

@@ -9,23 +9,30 @@
 //! likelier, or less likely, under this guess has said nothing of the coil. So sets are judged by the rates, given the readings. Where a
 //! record has a second thermometer, at the bore or in the air, the two together do show the pack, and nothing is taken off.
 
+use std::cell::OnceCell;
 use std::sync::Arc;
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::{Explanation, Member, Question};
 use crate::chamber::{Assumption, Effort, Fit};
 use crate::rate::CoilModel;
 
-/// Takes off what sets gain beside the `declared` model in the readings alone, and gives back what they lose, with the coil's numbers as they were found.
-pub(super) fn take_off(question: &Question, declared: &Fit, explanations: &mut [Explanation]) {
+/// Takes off what sets gain beside the `declared` model in the readings alone, and gives back what they lose, with the coil's numbers as they were
+/// found. `readings`: what the declared model makes of them, once asked.
+pub(super) fn take_off(
+    question: &Question,
+    readings: &OnceCell<Readings>,
+    declared: &Fit,
+    explanations: &mut [Explanation],
+) {
     let mut changing: Vec<&mut Explanation> =
         explanations.iter_mut().filter(|e| changes_readings(question, e)).collect();
     if changing.is_empty() {
         return;
     }
-    let readings = Readings::new(question, declared);
-    changing.par_iter_mut().for_each(|e| e.in_readings = readings.gain(question, &e.fit));
+    let readings = readings.get_or_init(|| Readings::new(question, declared));
+    changing.iter_mut().in_parallel().for_each(|e| e.in_readings = readings.gain(question, &e.fit));
 }
 
 /// The readings alone by the declared model, which sets are compared with.

@@ -1,6 +1,6 @@
 //! Searches: from the declared model, from another heat path, in a chamber that is looked through anew, and of one kind only.
 
-use rayon::prelude::*;
+use crate::parallel::InParallel;
 
 use super::back::complete;
 use super::cache::{Cache, carried, keep};
@@ -103,11 +103,12 @@ fn ranked_from(
     Ok((best, worth, found))
 }
 
-/// Of judged sets, the likeliest if it goes further than the best of the search, and, if that is wound otherwise, the likeliest that is not.
+/// Of judged sets, the likeliest if it goes further than the best of the search or held-out records alone prefer it, and, if that is wound otherwise, the likeliest that is not.
 fn preferred(judged: &[Explanation], best: &Explanation) -> Vec<Explanation> {
     let Some(first) = judged.first() else { return Vec::new() };
     let plain = judged.iter().find(|e| !e.has_winding() && e.members.len() > 1 && !e.is_outside());
-    let further = (first.members.len() > best.members.len()).then_some(first);
+    let is_further = first.members.len() > best.members.len() || first.merit < best.merit - WINDOW;
+    let further = is_further.then_some(first);
     let plain = plain.filter(|e| first.has_winding() && e.key() != best.key() && e.total() > first.total() - WINDOW);
     further.into_iter().chain(plain).cloned().collect()
 }
@@ -119,7 +120,7 @@ fn preferred(judged: &[Explanation], best: &Explanation) -> Vec<Explanation> {
 /// A declared model that cannot be solved for these records.
 pub(crate) fn again(question: &Question, found: Found) -> Outcome<Found> {
     let Found { explanations, promised, left, mut windings, .. } = found;
-    let there = explanations.into_par_iter().filter_map(|e| {
+    let there = explanations.in_parallel().filter_map(|e| {
         let begin = e.begin();
         fitted(question, &windings, e.members, &begin, &e.fit, Effort::FULL)
     });
@@ -159,7 +160,7 @@ pub(crate) fn fit_one(question: &Question, base: &Fit) -> Option<Explanation> {
         values: Some(values),
         gain: 0.0,
     }));
-    let fits = proposals.into_par_iter().filter_map(|p| {
+    let fits = proposals.in_parallel().filter_map(|p| {
         let begin = with(question, &[], base, p.member, p.values)?;
         fitted(question, &[], vec![p.member], &begin, base, Effort::QUICK)
     });
