@@ -1,7 +1,7 @@
 //! What runs on all processors: of every item what a closure makes of it, in the items' order, however many threads there are.
 //!
 //! Rayon's own adaptors are compiled anew for each closure, some two thousand lines of the compiler's code each time: they were a sixth of the
-//! library's. Here its loop is compiled once. An item costs a lock or two, some 50 ns: what is smaller is asked of Rayon itself.
+//! library's. Here its loop is compiled once. An item costs two locks: what is smaller is asked of Rayon itself.
 
 use std::sync::Mutex;
 
