@@ -1,8 +1,6 @@
 //! What each record's air is likeliest to be: a curve, straight but for kinks, or both; whether it approaches set points, and whether it follows
 //! one as a controlled chamber does.
 
-use crate::parallel::InParallel;
-
 use super::ascent::Effort;
 use super::coil_side::CoilSide;
 use super::fit::Fit;
@@ -10,6 +8,7 @@ use super::layout::Numbers;
 use super::prior::{Quantity, price_of_controller};
 use super::series::Series;
 use super::{Assumption, Chamber, ChamberError, Free};
+use crate::parallel::InParallel;
 
 /// Between which films the one is sought that makes a pack as slow as its air \[W/(m²K)\]; halvings of its logarithm.
 const LEAST_FILM: f64 = 0.1;

@@ -21,7 +21,6 @@
 //! Conn, Gould, Toint, Trust-Region Methods (2000), chapters 6 and 7.7 (boxes); Nocedal and Wright, Numerical Optimization
 //! (2006), algorithm 16.3 (active sets of a convex quadratic programme).
 
-use crate::parallel::InParallel;
 use nalgebra::{DMatrix, DVector};
 
 use super::derivative::{DerivativeColumn, Derivatives};
@@ -31,6 +30,7 @@ use super::layout::Numbers;
 use super::model_point::{ModelPoint, log_likelihood};
 use super::parameter::{Parameter, write};
 use super::{Assumption, Chamber, ChamberError};
+use crate::parallel::InParallel;
 
 /// Steps that derivatives of one point serve for.
 const SERVED: usize = 4;

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use crate::parallel::InParallel;
 use nalgebra::DMatrix;
 
 use super::ascent::{AscentEnd, Beginning, Effort, KnownDerivatives};
@@ -12,6 +11,7 @@ use super::layout::Numbers;
 use super::parameter::{Free, Parameter};
 use super::prior::Quantity;
 use super::{Assumption, Chamber, ChamberError};
+use crate::parallel::InParallel;
 
 /// Which courses are smoothed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,8 +6,6 @@
 
 use std::ops::Range;
 
-use crate::parallel::InParallel;
-
 use super::ascent::Effort;
 use super::doubts::doubts;
 use super::elsewhere::Elsewhere;
@@ -19,6 +17,7 @@ use super::prior::Quantity;
 use super::series::Series;
 use super::system::decoupled_system;
 use super::{Assumption, Chamber, ChamberError};
+use crate::parallel::InParallel;
 
 /// Strides in rows by which kinks are moved: each list one after another, all kinks anew with the next.
 const STRIDES_ROWS: [[f64; 2]; 3] = [[0.5, 0.15], [0.15, 0.05], [0.05, 0.015]];

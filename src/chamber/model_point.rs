@@ -1,7 +1,5 @@
 //! The innovations at one point of numbers and effects, and their derivatives there: all that a likelihood is computed from.
 
-use crate::parallel::InParallel;
-
 use super::abreast;
 use super::coil_side::{CoilSide, run};
 use super::derivative::{DerivativeColumn, Derivatives};
@@ -12,6 +10,7 @@ use super::parameter::{Parameter, write};
 use super::prior::Quantity;
 use super::system::{decoupled_system, decoupled_system_beside};
 use super::{Assumption, Chamber, ChamberError};
+use crate::parallel::InParallel;
 
 /// All that a likelihood is computed from.
 pub(super) struct ModelPoint<'a> {

@@ -1,11 +1,11 @@
 //! What many known inputs to the measurements make of the innovations: as [`super::filter::respond`], some at a time.
 
-use crate::parallel::InParallel;
 use nalgebra::DMatrix;
 use pulp::Arch;
 
 use super::filter::{Move, Row, System, Trace, Values};
 use super::sparse::Sparse;
+use crate::parallel::InParallel;
 
 /// Inputs at a time.
 const LANES: usize = 8;

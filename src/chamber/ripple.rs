@@ -3,8 +3,6 @@
 //! A likelihood has a maximum for every period that an oscillator may lock on to, hundreds of units apart, and none leads to the
 //! next. The score of a ripple's variance where there is none says of all periods at once which are worth a fit.
 
-use crate::numeric::order::sort_descending;
-use crate::parallel::InParallel;
 use nalgebra::{DMatrix, DVector};
 
 use super::abreast;
@@ -14,6 +12,8 @@ use super::model_point::MovedRecord;
 use super::prior::Quantity;
 use super::system::decoupled_system;
 use super::{Chamber, ChamberError};
+use crate::numeric::order::sort_descending;
+use crate::parallel::InParallel;
 
 /// Periods that are looked at: so many to a factor of e, as far as the prior reaches both ways in its deviations.
 const PERIODS_PER_E: f64 = 12.0;

@@ -13,7 +13,6 @@
 //! # Source
 //! Rao, Proc. Camb. Phil. Soc. 44 (1948) 50; Rosenberg, Ann. Econ. Soc. Meas. 2 (1973) 399 (columns through a filter).
 
-use crate::parallel::InParallel;
 use nalgebra::{DMatrix, DVector};
 
 use super::coil_side::run_kept;
@@ -22,6 +21,7 @@ use super::filter::{RATE, Values, respond};
 use super::fit::Fit;
 use super::parameter::add_priors;
 use super::{Assumption, Chamber, ChamberError};
+use crate::parallel::InParallel;
 
 /// A course that might add to the rate [rad/s at unit amplitude].
 ///

@@ -3,8 +3,6 @@
 //! Both are asked of the model itself, by what all other measurements make of each one ([`super::filter::doubts`]): a steep
 //! signal is no gross error to a model that has its slope, and a spike on it is none the less one.
 
-use crate::parallel::InParallel;
-
 use super::airs::OwnAir;
 use super::ascent::Effort;
 use super::coil_side::{BLIND_RAD2_PER_S2, CoilSide, run_kept};
@@ -15,6 +13,7 @@ use super::kinked_rows::Bend;
 use super::layout::Numbers;
 use super::prior::{GROSS_FACTOR, GROSS_SHARE, KINKS_PER_ROW, Quantity, price_of_controller};
 use super::series::Series;
+use crate::parallel::InParallel;
 
 use super::system::system;
 use super::{Assumption, Chamber, ChamberError};

@@ -9,8 +9,6 @@
 //! Steps are looked for in an air and with a gyro as usual, because those that were fitted without a switch have taken in what it
 //! does. So they are proposals only: the likelihood of the whole model, everything fitted, says which are needed.
 
-use crate::numeric::order::sort_ascending;
-use crate::parallel::InParallel;
 use nalgebra::{DMatrix, DVector};
 
 use super::ascent::Effort;
@@ -26,7 +24,9 @@ use super::row::Film;
 use super::series::Series;
 use super::system::decoupled_system;
 use super::{Chamber, ChamberError, Innovation};
+use crate::numeric::order::sort_ascending;
 use crate::numeric::pursuit::Pursuit;
+use crate::parallel::InParallel;
 use crate::thermal::Extent;
 
 /// Steps in one record, and times that it is looked through with those found so far.

@@ -25,8 +25,6 @@
 
 mod beside;
 
-use crate::parallel::InParallel;
-
 use super::CompensateError;
 use super::filter::{Dynamics, Filter, Tuning};
 use super::formulas::{Formulas, seen};
@@ -34,6 +32,7 @@ use super::heating::Heating;
 use crate::chamber::{BREAK_K2_PER_S2, BREAKS_PER_S, Causal, Surroundings};
 use crate::effect::DeclaredEffect;
 use crate::numeric::piecewise::PiecewiseLinear;
+use crate::parallel::InParallel;
 use crate::pattern::Pattern;
 use crate::rate::{CoilModel, RateModel};
 use crate::record::Record;

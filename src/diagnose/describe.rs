@@ -1,14 +1,13 @@
 //! What stands beside a verdict: each effect with its size and its equals, the ladder, the candidates, what is left over.
 
-use crate::numeric::order::{sort_ascending, sort_descending};
-use crate::parallel::InParallel;
-
 use super::joint::{Explanation, Found, Member, Question, refit_without};
 use super::plain::{Plain, ResidualShape};
 use super::{Contender, DiagnoseError, Equivalent, Finding, FittedParameter, RecordNoise, Rung, Unexplained};
 use crate::chamber::{Fit, Place, Quantity};
 use crate::effect::DeclaredEffect;
+use crate::numeric::order::{sort_ascending, sort_descending};
 use crate::numeric::statistics::{correlation, rms};
+use crate::parallel::InParallel;
 
 /// An explanation with the fits of the held-out records.
 pub(super) struct ScoredExplanation<'e> {

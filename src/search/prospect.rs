@@ -11,8 +11,6 @@
 //! # Source
 //! Berger, Statistical Decision Theory (1985), section 1.3 (expected loss under a posterior).
 
-use crate::parallel::InParallel;
-
 use super::anneal::quantile::{QuantileCost, default_moves_per_restart};
 use super::anneal::rounds::{DEFAULT_RESTARTS_PER_ROUND, Optimisation, Plan, Rounds, Rules};
 use super::cost::guaranteed::{GuaranteedError, UnitStep};
@@ -21,6 +19,7 @@ use super::cost::tolerance::SHARE;
 use super::cost::worst_case::{SearchError, SolvedProfiles};
 use super::evaluator::{Evaluator, JudgeError};
 use crate::numeric::statistics::quantile;
+use crate::parallel::InParallel;
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::profile::ProfileSpec;

@@ -1,8 +1,6 @@
 //! What patterns are weighed by where the pointing error is what is made small: on unseen profiles, over all profiles, over
 //! built coils and over models that may be the true one, all as the rate that makes it in one hour.
 
-use crate::parallel::InParallel;
-
 use super::aside::Resolution;
 use super::cost::objective::Objective;
 use super::cost::pointing::{EndlessRamp, POINTING_S, pointing_as_rate};
@@ -10,6 +8,7 @@ use super::cost::tolerance::{Coils, SHARE, ToleranceError, ToleranceSpec};
 use super::cost::worst_case::{SearchError, SolvedProfiles};
 use super::evaluator::{Evaluator, JudgeError};
 use crate::numeric::statistics::quantile;
+use crate::parallel::InParallel;
 use crate::pattern::Pattern;
 use crate::profile::Profile;
 use crate::rate::CoilModel;

@@ -1,12 +1,11 @@
 //! What a coil's materials do: strains and optical path layer by layer, and which potting and spool suit its winding.
 
-use crate::numeric::order::sort_ascending;
-use crate::parallel::InParallel;
-
 use crate::io::json::stress::{
     FreeFibreJson, LayerStressJson, PatternStressJson, PottingChoiceJson, PottingJson, StressAtJson, StressJson,
 };
 use crate::io::model::{ModelFile, NamedPattern};
+use crate::numeric::order::sort_ascending;
+use crate::parallel::InParallel;
 use crate::pattern::Pattern;
 use crate::rate::{CoilModel, LayerWeights, RateError};
 use crate::search::cost::guaranteed::UnitStep;

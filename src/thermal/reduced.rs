@@ -22,13 +22,13 @@
 //! Modal truncation with static residue, as in any text on structural dynamics; moments of what is truncated: Antoulas, Approximation of
 //! Large-Scale Dynamical Systems (2005), chapter 11; the exponentials as in `thermal::half_space_memory`.
 
-use crate::numeric::order::sort_descending;
 use nalgebra::{DMatrix, DVector};
 
 use super::half_space::HalfSpace;
 use super::modal::heated_mode;
 use super::pack::Pack;
 use super::{BoreHeat, Extent, HeatPath, Location, ThermalError};
+use crate::numeric::order::sort_descending;
 
 /// A heat path's slow part.
 ///

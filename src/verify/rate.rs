@@ -5,14 +5,13 @@
 //! grid where the pack is linear, and is extrapolated from two grids where its conductivity depends on temperature. The
 //! claim stands on a grid of its own and may be off by what that leaves: [`GRID_SHARES`] or [`STEPPED_SHARES`].
 
-use crate::parallel::InParallel;
-
 use super::along::Along;
 use super::heat::{Heat, Moment, State};
 use super::optics::Optics;
 use super::physics::{Physics, wound_turns};
 use super::winding::Winding;
 use super::{Claim, Findings, Printed, RateCheck, Truth};
+use crate::parallel::InParallel;
 use crate::profile::Profile;
 
 const NOT_THE_WORST: &str = "the rate error is not as claimed: emit the schedule again";

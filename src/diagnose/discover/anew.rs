@@ -10,13 +10,12 @@
 
 use std::sync::Arc;
 
-use crate::parallel::InParallel;
-
 use super::grammar::Allowed;
 use super::search::{MOST_TERMS, Set, WITHIN_REACH};
 use super::{BEATS, Discovered, concluded, tools};
 use crate::chamber::{Chamber, ChamberError, Effort, Fit};
 use crate::diagnose::joint::{Explanation, Found, Question, fitted};
+use crate::parallel::InParallel;
 
 /// The discovery in a chamber that was looked through with a set, and that chamber; None where the set is not better on
 /// average. `behind` says by how much it is worse where it was found.

@@ -1,13 +1,12 @@
 //! Members of a set exchanged for others: a search that goes forward takes what promises most first, which need not be what is best
 //! beside the terms that follow, and two that stand for one (a straight line and a mirrored bend for a bend) stay two.
 
-use crate::numeric::order::sort_descending;
-use crate::parallel::InParallel;
-
 use super::NEAR;
 use super::grounds::Sought;
 use super::search::{Set, TRIED, Tools, WITHIN_REACH, WORTH_LISTED};
 use crate::diagnose::joint::Proposal;
+use crate::numeric::order::sort_descending;
+use crate::parallel::InParallel;
 
 /// Effects of the catalogue that follow the pack's mean rate and so look alike in ramps: mismatch, surplus at either end with either lead, the
 /// empirical ones.

@@ -12,15 +12,14 @@
 
 use std::sync::Arc;
 
-use crate::numeric::order::sort_descending;
-use crate::parallel::InParallel;
-
 use super::courses::Courses;
 use super::grammar::Term;
 use super::search::{Set, Tools, WORTH_LISTED};
 use crate::chamber::{Assumption, ChamberError, Column, Effort, Fit, Follow, Free, Input, Quantity};
 use crate::diagnose::candidate::Candidate;
 use crate::diagnose::joint::{Member, Proposal, Question, fitted, is_seen, proposals_along};
+use crate::numeric::order::sort_descending;
+use crate::parallel::InParallel;
 use crate::rate::CoilModel;
 
 /// Variables along the records, and the same with each number of the coil moved a little.

@@ -4,13 +4,12 @@
 
 use std::sync::Arc;
 
-use crate::numeric::order::sort_descending;
-use crate::parallel::InParallel;
-
 use super::NEAR;
 use super::grounds::{Grounds, SAME};
 use super::search::{Set, Tools};
 use crate::chamber::{ChamberError, Fit};
+use crate::numeric::order::sort_descending;
+use crate::parallel::InParallel;
 
 /// Sets that are looked at: those beside the best that the records hardly tell from it, and no more.
 const MOST: usize = 6;

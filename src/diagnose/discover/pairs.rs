@@ -13,14 +13,13 @@
 use std::cmp::Ordering;
 use std::sync::Arc;
 
-use crate::parallel::InParallel;
-
 use super::grammar::{Family, Term};
 use super::search::{MOST_TERMS, Set, Tools, WITHIN_REACH};
 use crate::chamber::{Effort, Scored, Scorer};
 use crate::diagnose::joint::{
     EFFECT, Explanation, Member, Proposal, TestedStart, fitted, is_seen, tested_starts, with,
 };
+use crate::parallel::InParallel;
 
 /// Pairs that are fitted, of different effects or different families.
 const FITTED: usize = 6;

@@ -13,9 +13,6 @@
 
 use std::sync::{Arc, OnceLock};
 
-use crate::numeric::order::sort_descending;
-use crate::parallel::InParallel;
-
 use super::courses::Courses;
 use super::grammar::{Family, Term};
 use super::grounds::{Grounds, Sought};
@@ -25,6 +22,8 @@ use crate::diagnose::joint::{
     EFFECT, Explanation, Member, Proposal, Question, Readings, Winding, changes_readings, fitted, rates, with, without,
 };
 use crate::numeric::maximise::golden_section_within;
+use crate::numeric::order::sort_descending;
+use crate::parallel::InParallel;
 
 /// A set of listed effects and unlisted terms, fitted.
 #[derive(Debug, Clone)]

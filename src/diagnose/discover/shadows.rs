@@ -5,11 +5,10 @@
 //! is missing too. So the foremost sets are tried without their wander, and then without each of their listed effects in turn: what the
 //! others leave is then what a formula has to explain.
 
-use crate::parallel::InParallel;
-
 use super::search::{Set, Tools, WITHIN_REACH};
 use crate::chamber::{Effort, Fit, Free};
 use crate::diagnose::joint::{Explanation, Found, Member, fitted, without};
+use crate::parallel::InParallel;
 
 /// Terms that are fitted beside each of them.
 const LEAST_TRIED: usize = 2;

@@ -27,10 +27,10 @@ mod alternatives;
 mod chamber;
 mod plan;
 
-use crate::numeric::order::sort_descending;
-use crate::parallel::InParallel;
 use statrs::distribution::{ContinuousCDF, Normal};
 
+use crate::numeric::order::sort_descending;
+use crate::parallel::InParallel;
 use crate::profile::Profile;
 use crate::units::REFERENCE_TEMPERATURE_K;
 use chamber::profiles;

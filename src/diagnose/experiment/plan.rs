@@ -7,12 +7,11 @@
 //! D is the sum of squares of the innovations, each over its variance, in the joint model of chamber, pack, sensor and gyro
 //! with the numbers that the records showed, of what the sensor and the gyro would show on average; H is what the records at hand hold the candidate's numbers and the film with.
 
-use crate::parallel::InParallel;
-
 use super::alternatives::{FittedAlternative, ModelComparison};
 use crate::chamber::{Bend, Chamber, Fit, Quantity};
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::numeric::statistics::standard_deviation;
+use crate::parallel::InParallel;
 use crate::profile::Profile;
 use crate::rate::RateModel;
 use crate::record::Record;

@@ -1,9 +1,8 @@
 //! What of a difference between sets is evidence: less than it seems where the records' air is not quite what a chamber's is taken for.
 
-use crate::parallel::InParallel;
-
 use super::{Explanation, Outcome, Question};
 use crate::chamber::DifferenceVariance;
+use crate::parallel::InParallel;
 
 /// Divides the difference in log likelihood of each set from the first by as much as it varies beyond what it should; what priors and
 /// prices make of their difference stays.

@@ -1,13 +1,12 @@
 //! Back from a set: what it does without, and what may stand in a member's place.
 
-use crate::parallel::InParallel;
-
 use super::cache::{Cache, keep};
 use super::explanation::{fitted, in_order, key, with, without};
 use super::screen::proposals;
 use super::tries::{TRIED, choose};
 use super::{Explanation, Member, Question, Winding};
 use crate::chamber::Effort;
+use crate::parallel::InParallel;
 
 /// A set without one of its members, beginning with the chamber that was found with it.
 pub(super) fn rest(

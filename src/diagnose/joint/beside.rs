@@ -2,15 +2,14 @@
 
 use std::cell::OnceCell;
 
-use crate::numeric::order::sort_descending;
-use crate::parallel::InParallel;
-
 use super::explanation::{fitted, with};
 use super::odds::{CERTAIN, EFFECT};
 use super::readings::take_off;
 use super::screen::{Proposal, proposals};
 use super::{Explanation, Member, Outcome, Question};
 use crate::chamber::{Effort, Fit};
+use crate::numeric::order::sort_descending;
+use crate::parallel::InParallel;
 
 /// Something that may be there beside a fit of the declared model.
 #[derive(Debug, Clone, Copy)]

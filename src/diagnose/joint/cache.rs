@@ -2,12 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use crate::parallel::InParallel;
-
 use super::explanation::{fitted, in_order};
 use super::tries::TRIED;
 use super::{Explanation, Member, Question, Winding};
 use crate::chamber::Effort;
+use crate::parallel::InParallel;
 
 /// Sets that were fitted, by their members.
 pub(super) type Cache = BTreeMap<Vec<Member>, Explanation>;

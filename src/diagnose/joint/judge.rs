@@ -3,8 +3,6 @@
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
 
-use crate::parallel::InParallel;
-
 use super::adjust::adjust;
 use super::back::rest;
 use super::explanation::fitted;
@@ -13,6 +11,7 @@ use super::parsimony::give_to_smaller;
 use super::readings::take_off;
 use super::{Explanation, Member, Outcome, Question, Winding};
 use crate::chamber::{Effort, Fit};
+use crate::parallel::InParallel;
 
 /// Sets that are judged by held-out records at most.
 const JUDGED: usize = 8;

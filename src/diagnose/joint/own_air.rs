@@ -10,12 +10,11 @@
 //!
 //! and the search goes on in the chamber of the best. A set that is wrong needs kinks that the truth does without.
 
-use crate::parallel::InParallel;
-
 use super::explanation::with;
 use super::{Explanation, Member, Outcome, Question, Winding, is_seen, is_seen_alone};
 use crate::chamber::{Chamber, Controllers, Effort, Films, OwnAir};
 use crate::diagnose::candidate::Candidate;
+use crate::parallel::InParallel;
 
 /// Sets that are looked at with kinks of their own after each score test: more are behind by what no kinks make up for.
 const LOOKED_AT: usize = 4;

@@ -12,10 +12,9 @@
 use std::cell::OnceCell;
 use std::sync::Arc;
 
-use crate::parallel::InParallel;
-
 use super::{Explanation, Member, Question};
 use crate::chamber::{Assumption, Effort, Fit};
+use crate::parallel::InParallel;
 use crate::rate::CoilModel;
 
 /// Takes off what sets gain beside the `declared` model in the readings alone, and gives back what they lose, with the coil's numbers as they were

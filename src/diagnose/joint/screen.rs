@@ -2,14 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::numeric::order::sort_descending;
-use crate::parallel::InParallel;
-
 use super::explanation::with;
 use super::{Explanation, Member, Outcome, Question};
 use crate::chamber::{Assumption, Effort};
 use crate::diagnose::candidate::Candidate;
 use crate::effect::DeclaredEffect;
+use crate::numeric::order::sort_descending;
+use crate::parallel::InParallel;
 use crate::units::Unit;
 
 /// A direction is looked at so near to the fit, as a share of the start: a layer that is five per cent off multiplies what the

@@ -1,7 +1,5 @@
 //! Searches: from the declared model, from another heat path, in a chamber that is looked through anew, and of one kind only.
 
-use crate::parallel::InParallel;
-
 use super::back::complete;
 use super::cache::{Cache, carried, keep};
 use super::explanation::{fitted, in_order, with};
@@ -13,6 +11,7 @@ use super::screen::{Proposal, proposals};
 use super::tries::calmed;
 use super::{Explanation, Found, Member, Outcome, Question};
 use crate::chamber::{ChamberError, Effort, Fit};
+use crate::parallel::InParallel;
 
 /// What a score test must promise for records that were only judged by to be searched themselves, and for a search to go on in
 /// another chamber: what an effect costs, twice.

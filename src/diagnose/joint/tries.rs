@@ -2,13 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use crate::numeric::order::sort_descending;
-use crate::parallel::InParallel;
-
 use super::explanation::{Begin, fitted, in_order, with};
 use super::screen::Proposal;
 use super::{Explanation, Member, Question, Winding};
 use crate::chamber::{Effort, Fit, Quantity};
+use crate::numeric::order::sort_descending;
+use crate::parallel::InParallel;
 
 /// Members that are fitted after each score test, as far as they promise this much …
 pub(super) const TRIED: usize = 8;

@@ -1,12 +1,12 @@
 //! What else may have been wound: another classic, the coil the other way round, two layers exchanged.
 
-use crate::numeric::order::sort_descending;
-use crate::parallel::InParallel;
 use nalgebra::DVector;
 
 use super::odds::{EXCHANGE, WINDING};
 use super::{Outcome, Question};
 use crate::chamber::{Effort, Fit};
+use crate::numeric::order::sort_descending;
+use crate::parallel::InParallel;
 use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
 use crate::rate::{LayerWeights, RateModel};

@@ -4,10 +4,9 @@
 //! what they found is gathered in their order, so the result depends on the seed alone and not on threads. Between
 //! slices the whole state is a plain value ([`State`]) that can be saved and taken up again.
 
-use crate::parallel::InParallel;
-
 use super::restart::{Cooling, Restart, cooling_for};
 use super::windows;
+use crate::parallel::InParallel;
 use crate::pattern::Pattern;
 use crate::search::cost::columns::Work;
 use crate::search::cost::{Cost, InFull};

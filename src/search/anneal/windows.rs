@@ -7,11 +7,11 @@
 
 use std::ops::Range;
 
-use crate::parallel::InParallel;
 use rand_chacha::ChaCha8Rng;
 
 use super::limits::{layers_at_an_end, pick, to_other_end};
 use super::restart::generator;
+use crate::parallel::InParallel;
 use crate::pattern::{layers_by_segment, segments_by_layer};
 use crate::search::cost::{Cost, Position};
 

@@ -22,12 +22,11 @@
 
 use std::sync::OnceLock;
 
-use crate::parallel::InParallel;
-
 use super::guaranteed::is_linear;
 use super::samples::any_rate_model;
 use super::worst_case::{PEAK_SHARE, SearchError, SolvedProfile, SolvedProfiles};
 use crate::numeric::piecewise::PiecewiseLinear;
+use crate::parallel::InParallel;
 use crate::pattern::Pattern;
 use crate::profile::Profile;
 use crate::rate::{CoilModel, RateModel};

@@ -17,14 +17,13 @@
 //! # Source
 //! Pointing error thermal sensitivity: Opt. Express 21 (2013) 2521 (by its abstract).
 
-use crate::parallel::InParallel;
-
 use super::guaranteed::is_linear;
 use super::samples::{SampleMatrix, any_rate_model};
 use super::worst_case::{PEAK_SHARE, SearchError, SolvedProfile, SolvedProfiles, WorstCase};
 use crate::numeric::lobatto::gauss;
 use crate::numeric::maximise::golden_section;
 use crate::numeric::piecewise::PiecewiseLinear;
+use crate::parallel::InParallel;
 use crate::pattern::Pattern;
 use crate::rate::{CoilModel, RateModel, WeightResponse};
 use crate::thermal::{Drive, Instant, StepResponse, ThermalHistory, solve};

@@ -21,10 +21,9 @@
 //! # Source
 //! The same random numbers for every candidate: Law, Simulation Modeling and Analysis (2015), section 11.2.
 
-use crate::parallel::InParallel;
-
 use super::coil_worst::{Arrangement, Part, Scratch, Worst};
 use crate::numeric::statistics::quantile;
+use crate::parallel::InParallel;
 use crate::pattern::Pattern;
 use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;

@@ -11,7 +11,6 @@
 //! The coefficients come from [`RateModel::weight_response`]; tests compare every value with the reference.
 
 use crate::parallel::InParallel;
-
 use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
 use crate::rate::{CoilModel, LayerWeights, RateError, RateModel, WeightResponse};

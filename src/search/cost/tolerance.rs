@@ -28,14 +28,14 @@ mod built;
 
 use std::ops::Range;
 
-use crate::numeric::order::sort_descending;
-use crate::parallel::InParallel;
 use statrs::statistics::Statistics;
 use thiserror::Error;
 
 use crate::coil::CoilError;
 use crate::effect;
+use crate::numeric::order::sort_descending;
 use crate::numeric::statistics::quantile;
+use crate::parallel::InParallel;
 use crate::pattern::Pattern;
 use crate::profile::ProfileSpec;
 use crate::rate::CoilModel;

@@ -10,11 +10,11 @@
 
 use std::sync::Arc;
 
-use crate::parallel::InParallel;
 use thiserror::Error;
 
 use crate::coil::CoilError;
 use crate::numeric::maximise::golden_section;
+use crate::parallel::InParallel;
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::profile::{Piece, Profile};

@@ -8,9 +8,8 @@
 //! # Source
 //! Ow, Morton, Int. J. Prod. Res. 26, 35 (1988), beam search.
 
-use crate::parallel::InParallel;
-
 use super::permutation_tree::{Node, PermutationTree, Places};
+use crate::parallel::InParallel;
 
 /// Patterns whose bounds stay below the limit, most promising first, at most `width`.
 pub(crate) fn promising(

@@ -2,12 +2,11 @@
 
 use std::ops::ControlFlow;
 
-use crate::parallel::InParallel;
-
 use super::course::Course;
 use super::support::Support;
 use super::{Goal, PassOutcome, StopWish, Task};
 use crate::coil::Coil;
+use crate::parallel::InParallel;
 use crate::pattern::Pattern;
 use crate::rate::{CoilModel, LayerWeights, RateError, RateModel};
 use crate::search::cost::columns::{BLOCK, Norm};

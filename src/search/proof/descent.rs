@@ -5,11 +5,10 @@
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::parallel::InParallel;
-
 use super::candidates::Judge;
 use super::permutation_tree::{Node, PermutationTree, Places};
 use super::{PassOutcome, StopWish};
+use crate::parallel::InParallel;
 
 /// Pieces of work that are shared out: more than threads, and always the same.
 const SHARES: usize = 256;

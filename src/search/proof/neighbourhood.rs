@@ -11,13 +11,13 @@
 
 use std::ops::ControlFlow;
 
-use crate::parallel::InParallel;
 use rand_chacha::ChaCha8Rng;
 
 use super::box_join::{BoxStep, Matching, Target};
 use super::candidates::{Judge, PatternCandidate};
 use super::sampling::neighbours;
 use super::{PassOutcome, Task, checked_judge, first_best};
+use crate::parallel::InParallel;
 use crate::pattern::Pattern;
 use crate::pattern::windability::WindabilityClass;
 use crate::search::anneal::restart::generator;

@@ -6,12 +6,11 @@
 //! that stays under the limit. What signs are left over are tried one choice after the other. Where a pattern's mirror
 //! image has the opposite error, the outermost sign is fixed.
 
-use crate::parallel::InParallel;
-
 use super::box_join::{BoxStep, Matching, Target, Tree};
 use super::candidates::Judge;
 use super::rows::{Range, SampleRow};
 use super::{PassOutcome, StopWish};
+use crate::parallel::InParallel;
 use crate::search::cost::signs::segments_of_signs;
 
 /// Sums in either set, as a power of two: 16 samples of them fit 64 MB.
