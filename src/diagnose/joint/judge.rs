@@ -47,11 +47,11 @@ pub(super) fn judge(
     }
     let least = explanations.first().map_or(0.0, |e| e.merit) - WINDOW;
     keep_asked(explanations, least, !question.held_out.is_empty());
-    let hearing = Hearing { question, windings, care, least };
+    let assessor = Assessor { question, windings, care, least };
     // The first finds what the held-out records' days were; the others begin there.
     if let Some((first, others)) = explanations.split_first_mut() {
-        hearing.hear(first, None);
-        hearing.hear_all(others, first);
+        assessor.assess(first, None);
+        assessor.assess_all(others, first);
     }
     let declared = explanations.iter().find(|e| e.members.is_empty()).map(|e| e.fit.clone());
     let readings = OnceCell::new();
@@ -71,7 +71,7 @@ pub(super) fn judge(
         let known: BTreeSet<Vec<Member>> = explanations.iter().map(Explanation::key).collect();
         let mut smaller = without_one(question, windings, std::slice::from_ref(&first));
         smaller.retain(|e| !known.contains(&e.key()));
-        hearing.hear_all(&mut smaller, &first);
+        assessor.assess_all(&mut smaller, &first);
         take_off(&mut smaller);
         explanations.extend(smaller);
         order(explanations);
@@ -107,8 +107,8 @@ fn take_better(explanations: &mut Vec<Explanation>, others: Vec<Explanation>) {
     }
 }
 
-/// What sets are asked before they are weighed.
-struct Hearing<'h, 'q> {
+/// Fits sets in full and asks the held-out records, before sets are weighed.
+struct Assessor<'h, 'q> {
     question: &'h Question<'q>,
     windings: &'h [Winding],
     care: Care,
@@ -116,23 +116,23 @@ struct Hearing<'h, 'q> {
     least: f64,
 }
 
-impl Hearing<'_, '_> {
-    fn hear_all(&self, sets: &mut [Explanation], first: &Explanation) {
-        let top = heard(first);
+impl Assessor<'_, '_> {
+    fn assess_all(&self, sets: &mut [Explanation], first: &Explanation) {
+        let top = of_all_records(first);
         sets.iter_mut().in_parallel().for_each(|e| {
             e.fit.days.clone_from(&first.fit.days);
-            self.hear(e, Some(top));
+            self.assess(e, Some(top));
         });
     }
 
     /// Fits a set that was only ranked in full, and asks the held-out records; what is far from the best by those, too, stays as it is.
-    fn hear(&self, e: &mut Explanation, top: Option<f64>) {
+    fn assess(&self, e: &mut Explanation, top: Option<f64>) {
         let is_far = e.merit <= self.least && !e.members.is_empty();
         if let Some(top) = top.filter(|_| is_far) {
             // By another best, in another chamber.
             e.understated = 0.0;
             self.ask_held_out(e);
-            if heard(e) < top - WINDOW {
+            if of_all_records(e) < top - WINDOW {
                 return;
             }
         }
@@ -155,7 +155,7 @@ impl Hearing<'_, '_> {
 }
 
 /// What fitted and held-out records say, before anything is taken off.
-fn heard(e: &Explanation) -> f64 {
+fn of_all_records(e: &Explanation) -> f64 {
     e.merit + e.held_out.unwrap_or(0.0)
 }
 
