@@ -10,7 +10,7 @@ use super::layout::Numbers;
 use super::parameter::{Parameter, Place, write};
 use super::prior::Quantity;
 use super::series::Origin;
-use super::{Assumption, Chamber, ChamberError};
+use super::{Assumption, Chamber, ChamberError, Reference};
 use crate::rate::CoilModel;
 use crate::record::Record;
 
@@ -92,28 +92,93 @@ fn is_coil(parameter: &Parameter) -> bool {
     !matches!(parameter.place, Place::Quantity { quantity, .. } if quantity != Quantity::Film)
 }
 
+/// How far an assumption's free numbers follow a planned record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Refit {
+    /// They stay where records at hand left them.
+    None,
+    /// To where the model linearised there leads, by what that foretells of χ².
+    Linear,
+    /// Step by step, as long as it gets better.
+    Full,
+}
+
 /// One point of a fit to what is foreseen.
 struct Point {
     deviance: f64,
     coordinates: DVector<f64>,
     assumed: Assumption,
     numbers: Vec<Numbers>,
+    /// Where the model is not linear, the courses that it is linearised about.
+    courses: Vec<Option<Reference>>,
+    innovations: Vec<Innovation>,
+}
+
+/// Slope and information of a planned record by the coordinates, at a point.
+type Slope = (DVector<f64>, DMatrix<f64>);
+
+/// A fit to a planned record, from where records at hand left it.
+struct Refitting<'f> {
+    parameters: &'f [Parameter],
+    record: usize,
+    start: &'f Point,
+    hold: Option<&'f Hold>,
+}
+
+impl Refitting<'_> {
+    /// What the hold adds at other coordinates.
+    fn held(&self, at: &DVector<f64>) -> f64 {
+        self.hold.map_or(0.0, |hold| {
+            let moved = at - &self.start.coordinates;
+            moved.dot(&(&hold.information * &moved))
+        })
+    }
+
+    /// Where a step from a point leads: slope and information there are those of the record, those of the hold are added.
+    fn step(&self, at: &Point, (score, information): &Slope) -> Option<DVector<f64>> {
+        let (mut score, mut information) = (score.clone(), information.clone());
+        if let Some(hold) = self.hold {
+            score -= &hold.information * (&at.coordinates - &self.start.coordinates);
+            information += &hold.information;
+        }
+        // What the record says nothing of stays where it is.
+        for (i, parameter) in self.parameters.iter().enumerate() {
+            information[(i, i)] += parameter.deviation.powi(-2) * f64::EPSILON.sqrt();
+        }
+        Some(information.cholesky()?.solve(&score))
+    }
+
+    /// Coordinates a change away, within bounds.
+    fn moved(&self, at: &Point, change: &DVector<f64>) -> DVector<f64> {
+        let mut next = &at.coordinates + change;
+        next.iter_mut().zip(self.parameters).for_each(|(x, p)| *x = x.clamp(p.lower, p.upper));
+        next
+    }
+
+    /// χ² where the model, linearised where the fit begins, is best.
+    fn foretold(&self, slope: &Slope) -> f64 {
+        let Some(change) = self.step(self.start, slope) else { return self.start.deviance };
+        let there = self.moved(self.start, &change);
+        let (change, (score, information)) = (&there - &self.start.coordinates, slope);
+        let gain = 2.0 * score.dot(&change) - change.dot(&(information * &change)) - self.held(&there);
+        self.start.deviance - gain.max(0.0)
+    }
 }
 
 impl Chamber<'_> {
     /// χ² of a planned record under an assumption whose free numbers and film are fitted to it, from where `from`
-    /// left them and, with a hold, against what that says; all numbers of chamber and gyro are those of `air`.
+    /// left them: alone, and against what each hold says; all numbers of chamber and gyro are those of `air`.
     ///
     /// # Errors
     /// A model that cannot be solved.
-    pub(crate) fn foresee(
+    pub(crate) fn foresee<const N: usize>(
         &self,
         from: &Fit,
         air: &Fit,
-        hold: Option<&Hold>,
+        holds: [Option<&Hold>; N],
         record: usize,
-        steps: usize,
-    ) -> Result<f64, ChamberError> {
+        refit: Refit,
+    ) -> Result<[f64; N], ChamberError> {
         let (film, own) = (from.numbers[from.records[0]].get(Quantity::Film), air.numbers[air.records[0]]);
         let mut numbers = vec![own; self.records()];
         numbers.iter_mut().for_each(|n| n.set(Quantity::Film, film));
@@ -123,105 +188,110 @@ impl Chamber<'_> {
             parameters.len(),
             parameters.iter().map(|p| p.read(&from.assumed, &numbers, record).clamp(p.lower, p.upper)),
         );
-        let held = |at: &DVector<f64>| match hold {
-            Some(hold) if hold.information.nrows() == at.len() => {
-                let moved = at - &start;
-                moved.dot(&(&hold.information * &moved))
+        let start = self.point((&from.assumed, &numbers), &parameters, start, record, None)?;
+        let mut deviances = [start.deviance; N];
+        if refit != Refit::None && !parameters.is_empty() {
+            let slope = self.slope_at(&start, &parameters, record)?;
+            for (deviance, hold) in deviances.iter_mut().zip(holds) {
+                let hold = hold.filter(|hold| hold.information.nrows() == parameters.len());
+                let refitting = Refitting { parameters: &parameters, record, start: &start, hold };
+                *deviance = match refit {
+                    Refit::Full => self.refitted(&refitting, &slope)?,
+                    _ => refitting.foretold(&slope),
+                };
             }
-            _ => 0.0,
-        };
-        let mut best = self.point(&from.assumed, &numbers, &parameters, start.clone(), record)?;
-        best.deviance += held(&best.coordinates);
-        for _ in 0..steps.min(MOST_STEPS) {
-            if parameters.is_empty() {
-                break;
-            }
-            let (mut score, mut information) = self.slope_at(&best, &parameters, record)?;
-            if let Some(hold) = hold.filter(|h| h.information.nrows() == parameters.len()) {
-                score -= &hold.information * (&best.coordinates - &start);
-                information += &hold.information;
-            }
-            // What the record says nothing of stays where it is.
-            for i in 0..parameters.len() {
-                information[(i, i)] += parameters[i].deviation.powi(-2) * f64::EPSILON.sqrt();
-            }
-            let Some(factor) = information.cholesky() else { break };
-            let mut change = factor.solve(&score);
-            let mut gain = 0.0;
-            for _ in 0..HALVINGS {
-                let mut next = &best.coordinates + &change;
-                next.iter_mut().zip(&parameters).for_each(|(x, p)| *x = x.clamp(p.lower, p.upper));
-                if let Ok(mut there) = self.point(&best.assumed, &best.numbers, &parameters, next, record) {
-                    there.deviance += held(&there.coordinates);
-                    if there.deviance < best.deviance {
-                        gain = best.deviance - there.deviance;
-                        best = there;
-                        break;
-                    }
-                }
-                change *= 0.5;
-            }
+        }
+        Ok(deviances)
+    }
+
+    /// χ² where a fit ends.
+    fn refitted(&self, refitting: &Refitting, first: &Slope) -> Result<f64, ChamberError> {
+        let mut best: Option<Point> = None;
+        for step in 0..MOST_STEPS {
+            let at = best.as_ref().unwrap_or(refitting.start);
+            let slope =
+                if step == 0 { first.clone() } else { self.slope_at(at, refitting.parameters, refitting.record)? };
+            let Some(better) = self.better(refitting, at, &slope) else { break };
+            let gain = at.deviance - better.deviance;
+            best = Some(better);
             if gain < LEAST_GAIN {
                 break;
             }
         }
-        Ok(best.deviance)
+        Ok(best.as_ref().unwrap_or(refitting.start).deviance)
     }
 
+    /// The point that one step leads to, halved as long as it is no better.
+    fn better(&self, refitting: &Refitting, at: &Point, slope: &Slope) -> Option<Point> {
+        let mut change = refitting.step(at, slope)?;
+        for _ in 0..HALVINGS {
+            let next = refitting.moved(at, &change);
+            let there = self.point((&at.assumed, &at.numbers), refitting.parameters, next, refitting.record, Some(at));
+            if let Ok(mut there) = there {
+                there.deviance += refitting.held(&there.coordinates);
+                if there.deviance < at.deviance {
+                    return Some(there);
+                }
+            }
+            change *= 0.5;
+        }
+        None
+    }
+
+    /// A point, from the courses of another `beside` it.
     fn point(
         &self,
-        assumed: &Assumption,
-        numbers: &[Numbers],
+        (assumed, numbers): (&Assumption, &[Numbers]),
         parameters: &[Parameter],
         coordinates: DVector<f64>,
         record: usize,
+        beside: Option<&Point>,
     ) -> Result<Point, ChamberError> {
         let (mut assumed, mut numbers) = (assumed.clone(), numbers.to_vec());
         if !write(parameters, coordinates.as_slice(), &mut assumed, &mut numbers) {
             return Err(ChamberError::Unsolvable);
         }
-        let courses = self.course_of(&assumed, &numbers, record)?;
+        let courses = self.course_of(&assumed, &numbers, record, beside)?;
         let model_point = self.model_point(assumed, numbers, &[record], &courses)?;
-        let deviance = self.innovations(&model_point, record)?.iter().map(misfit).sum::<f64>();
+        let innovations = self.innovations(&model_point, record)?;
+        let deviance = innovations.iter().map(misfit).sum::<f64>();
         let (assumed, numbers) = (model_point.assumed, model_point.numbers);
         if deviance.is_finite() {
-            Ok(Point { deviance, coordinates, assumed, numbers })
+            Ok(Point { deviance, coordinates, assumed, numbers, courses, innovations })
         } else {
             Err(ChamberError::Unsolvable)
         }
     }
 
+    /// The course of a record where the model is not linear: smoothed once more about that of a point `beside`, or twice from none.
     fn course_of(
         &self,
         assumed: &Assumption,
         numbers: &[Numbers],
         record: usize,
-    ) -> Result<Vec<Option<super::Reference>>, ChamberError> {
+        beside: Option<&Point>,
+    ) -> Result<Vec<Option<Reference>>, ChamberError> {
         let observed = &self.observed[record];
         let mut courses = vec![None; self.records()];
         let side = CoilSide::new(assumed, numbers[record].get(Quantity::Film), self.modes, observed)?;
         if side.needs_reference() {
-            for _ in 0..2 {
-                let before = courses[record].take();
-                courses[record] = Some(smoothed(&side, assumed, &numbers[record], observed, record, before.as_ref())?);
-            }
+            let smoothed = |before| smoothed(&side, assumed, &numbers[record], observed, record, before);
+            courses[record] = Some(match beside.and_then(|point| point.courses[record].as_ref()) {
+                Some(before) => smoothed(Some(before))?,
+                None => smoothed(Some(&smoothed(None)?))?,
+            });
         }
         Ok(courses)
     }
 
-    fn slope_at(
-        &self,
-        point: &Point,
-        parameters: &[Parameter],
-        record: usize,
-    ) -> Result<(DVector<f64>, DMatrix<f64>), ChamberError> {
-        let courses = self.course_of(&point.assumed, &point.numbers, record)?;
-        let model_point = self.model_point(point.assumed.clone(), point.numbers.clone(), &[record], &courses)?;
-        let base = vec![self.innovations(&model_point, record)?];
-        let derivatives = self.derivatives(&model_point, parameters, point.coordinates.as_slice(), &[record], &base)?;
+    fn slope_at(&self, point: &Point, parameters: &[Parameter], record: usize) -> Result<Slope, ChamberError> {
+        let Point { assumed, numbers, courses, innovations, .. } = point;
+        let model_point = self.model_point(assumed.clone(), numbers.clone(), &[record], courses)?;
+        let (coordinates, base) = (point.coordinates.as_slice(), std::slice::from_ref(innovations));
+        let derivatives = self.derivatives(&model_point, parameters, coordinates, &[record], base)?;
         let mut score = DVector::zeros(parameters.len());
         let mut information = DMatrix::zeros(parameters.len(), parameters.len());
-        derivatives[0].add_values_to(&base[0], &mut score, &mut information);
+        derivatives[0].add_values_to(innovations, &mut score, &mut information);
         Ok((score, information))
     }
 }

@@ -99,7 +99,7 @@ pub(crate) use causal::{Causal, Surroundings};
 pub(crate) use filter::Innovation;
 pub(crate) use fit::Fit;
 pub(crate) use fitted::{EffectEstimate, EffectEstimates};
-pub(crate) use foreseen::Hold;
+pub(crate) use foreseen::{Hold, Refit};
 pub(crate) use kinked_rows::Bend;
 pub(crate) use known::Reference;
 pub(crate) use learned::{Estimate, Learned};

@@ -29,12 +29,13 @@ mod plan;
 
 use statrs::distribution::{ContinuousCDF, Normal};
 
+use crate::chamber::Refit;
 use crate::numeric::order::sort_descending;
 use crate::parallel::InParallel;
 use crate::profile::Profile;
 use crate::units::REFERENCE_TEMPERATURE_K;
 use chamber::profiles;
-use plan::{Difference, ExperimentPlan, Refit};
+use plan::{Difference, ExperimentPlan};
 
 pub(crate) use alternatives::ModelComparison;
 pub(crate) use chamber::ChamberCapability;

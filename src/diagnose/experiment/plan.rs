@@ -8,7 +8,7 @@
 //! with the numbers that the records showed, of what the sensor and the gyro would show on average; H is what the records at hand hold the candidate's numbers and the film with.
 
 use super::alternatives::{FittedAlternative, ModelComparison};
-use crate::chamber::{Bend, Chamber, Fit, Quantity};
+use crate::chamber::{Bend, Chamber, Fit, Quantity, Refit};
 use crate::numeric::piecewise::PiecewiseLinear;
 use crate::numeric::statistics::standard_deviation;
 use crate::parallel::InParallel;
@@ -57,28 +57,6 @@ pub(super) struct Difference {
     pub(crate) rms_rad_per_s: f64,
 }
 
-/// How many steps candidates are fitted again with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Refit {
-    Linear,
-    Full,
-}
-
-impl Refit {
-    fn steps(self) -> usize {
-        match self {
-            Refit::Linear => 1,
-            Refit::Full => 4,
-        }
-    }
-}
-
-/// What one truth leaves: of each candidate χ², alone and held by the records; and what all explain.
-struct Told {
-    deviances: Vec<[f64; 2]>,
-    explained: f64,
-}
-
 impl<'a> ExperimentPlan<'a> {
     /// Readings every `step_s` over the whole profile.
     pub(crate) fn new(comparison: &'a ModelComparison, profile: &Profile, start_k: f64, step_s: f64) -> Self {
@@ -92,31 +70,11 @@ impl<'a> ExperimentPlan<'a> {
         let alternatives = &self.comparison.alternatives;
         let air = self.comparison.air.as_ref()?;
         let shown: Vec<Record> = alternatives.iter().map(|r| self.shown(r, air)).collect::<Option<_>>()?;
-        let told: Vec<Told> = (0..alternatives.len())
+        let refusals: Vec<Vec<ExpectedRefusal>> = (0..alternatives.len())
             .in_parallel()
-            .map(|i| self.told(&shown[i], i, air, refit))
+            .map(|truth| self.refusals(&shown[truth], truth, air, refit))
             .collect::<Option<_>>()?;
-        let mut refusals = Vec::new();
-        for truth in 0..alternatives.len() {
-            for refused in 0..alternatives.len() {
-                if truth == refused || self.comparison.is_within(truth, refused) {
-                    continue;
-                }
-                let (own, other) = (told[truth].deviances[truth], told[truth].deviances[refused]);
-                let chi_square_of_records = alternatives[refused].deviance - alternatives[truth].deviance;
-                let explained =
-                    self.comparison.without.as_ref().map_or(0.0, |w| w.deviance - alternatives[truth].deviance);
-                refusals.push(ExpectedRefusal {
-                    truth,
-                    refused,
-                    chi_square_alone: other[0] - own[0],
-                    chi_square_with_records: other[1] - own[1] + chi_square_of_records,
-                    chi_square_of_records,
-                    explained_alone: told[truth].explained,
-                    explained_of_records: explained.max(0.0),
-                });
-            }
-        }
+        let refusals = refusals.concat();
         let mut differences = Vec::new();
         for first in 0..shown.len() {
             for second in first + 1..shown.len() {
@@ -129,21 +87,43 @@ impl<'a> ExperimentPlan<'a> {
         finite.then_some(Foreseen { refusals, differences })
     }
 
-    fn told(&self, shown: &Record, truth: usize, air: &Fit, refit: Refit) -> Option<Told> {
+    /// Every other candidate refused by what one truth shows; one that holds the truth as a special case never is.
+    fn refusals(&self, shown: &Record, truth: usize, air: &Fit, refit: Refit) -> Option<Vec<ExpectedRefusal>> {
+        let alternatives = &self.comparison.alternatives;
+        let is_refused = |&other: &usize| other != truth && !self.comparison.is_within(truth, other);
+        let refused: Vec<usize> = (0..alternatives.len()).filter(is_refused).collect();
+        if refused.is_empty() {
+            return Some(Vec::new());
+        }
         let noise = self.comparison.noise_rad_per_s;
-        let chamber =
-            Chamber::planned(self.comparison.alternatives[truth].model(), shown, &self.bends(), noise).ok()?;
-        let left = |alternative: &FittedAlternative| -> Option<[f64; 2]> {
-            let alone = chamber.foresee(&alternative.fit, air, None, 0, refit.steps()).ok()?;
-            let held = chamber.foresee(&alternative.fit, air, alternative.hold.as_ref(), 0, refit.steps()).ok()?;
-            Some([alone, held])
+        let chamber = Chamber::planned(alternatives[truth].model(), shown, &self.bends(), noise).ok()?;
+        // Alone, and held by the records.
+        let left = |place: usize| -> Option<[f64; 2]> {
+            let alternative = &alternatives[place];
+            chamber.foresee(&alternative.fit, air, [None, alternative.hold.as_ref()], 0, refit).ok()
         };
-        let deviances: Vec<[f64; 2]> = self.comparison.alternatives.iter().map(left).collect::<Option<_>>()?;
-        let explained = match &self.comparison.without {
-            Some(without) => chamber.foresee(&without.fit, air, None, 0, 0).ok()? - deviances[truth][0],
-            None => 0.0,
+        let own = left(truth)?;
+        let (explained_alone, explained_of_records) = match &self.comparison.without {
+            Some(without) => {
+                let [left] = chamber.foresee(&without.fit, air, [None], 0, Refit::None).ok()?;
+                ((left - own[0]).max(0.0), (without.deviance - alternatives[truth].deviance).max(0.0))
+            }
+            None => (0.0, 0.0),
         };
-        Some(Told { deviances, explained: explained.max(0.0) })
+        let refusal = |refused: usize| {
+            let other = left(refused)?;
+            let chi_square_of_records = alternatives[refused].deviance - alternatives[truth].deviance;
+            Some(ExpectedRefusal {
+                truth,
+                refused,
+                chi_square_alone: other[0] - own[0],
+                chi_square_with_records: other[1] - own[1] + chi_square_of_records,
+                chi_square_of_records,
+                explained_alone,
+                explained_of_records,
+            })
+        };
+        refused.into_iter().map(refusal).collect()
     }
 
     /// Where the air's slope changes, which whoever drives the chamber knows.
