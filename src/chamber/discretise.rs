@@ -69,51 +69,82 @@ impl Pass for Discretise<'_> {
     }
 }
 
-/// What a state that changes by one makes of all states so long after: a column of Φ for each of the times, in their order.
-///
-/// # Shapes
-/// `system` row-major n × n \[1/s\]; one entry of the answer a time, of n.
-pub(super) fn changes_after(system: &[f64], n: usize, state: usize, times_s: &[f64]) -> Vec<Vec<f64>> {
-    dispatched(ChangesAfter { system, n, state, times_s })
+/// What a state that changes by one makes of all states any time after: a column of Φ, made up of those of doubled lengths and the series
+/// for what is left.
+pub(super) struct ChangesAfter {
+    state: usize,
+    f: Sparse,
+    doubled: Vec<(f64, Sparse)>,
 }
 
-struct ChangesAfter<'a> {
-    system: &'a [f64],
-    n: usize,
-    state: usize,
+impl ChangesAfter {
+    /// For times up to the longest.
+    ///
+    /// # Shapes
+    /// `system` row-major n × n \[1/s\].
+    pub(super) fn new(system: &[f64], n: usize, state: usize, longest_s: f64) -> Self {
+        let f = Sparse::new(system, n);
+        let unit_s = series_unit_s(system, n, longest_s.max(f64::MIN_POSITIVE));
+        let doubled = dispatched(Doubled { f: &f, unit_s, longest_s });
+        Self { state, f, doubled }
+    }
+
+    /// A column for each of the times, in their order.
+    pub(super) fn at(&self, times_s: &[f64]) -> Vec<Vec<f64>> {
+        dispatched(ColumnsAt { of: self, times_s })
+    }
+}
+
+/// Φ of one unit of time, of two, of four … up to the longest.
+struct Doubled<'a> {
+    f: &'a Sparse,
+    unit_s: f64,
+    longest_s: f64,
+}
+
+impl Pass for Doubled<'_> {
+    type Output = Vec<(f64, Sparse)>;
+
+    #[inline(always)]
+    fn run(self, arithmetic: impl Arithmetic) -> Self::Output {
+        dispatch!(self.f.rows(), doubled_of(arithmetic, &self))
+    }
+}
+
+struct ColumnsAt<'a> {
+    of: &'a ChangesAfter,
     times_s: &'a [f64],
 }
 
-impl Pass for ChangesAfter<'_> {
+impl Pass for ColumnsAt<'_> {
     type Output = Vec<Vec<f64>>;
 
     #[inline(always)]
     fn run(self, arithmetic: impl Arithmetic) -> Self::Output {
-        dispatch!(self.n, changes_after_of(arithmetic, &self))
+        dispatch!(self.of.f.rows(), columns_of(arithmetic, &self))
     }
 }
 
-/// Each by those doubled Φ that its time is made up of, and by the series for what is left.
 #[inline(always)]
-fn changes_after_of<const N: usize>(arithmetic: impl Arithmetic, of: &ChangesAfter) -> Vec<Vec<f64>> {
-    let n = of.n;
-    if of.times_s.is_empty() {
-        return Vec::new();
-    }
-    let longest_s = of.times_s.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    let unit_s = series_unit_s(of.system, n, longest_s);
-    let f = Sparse::new(of.system, n);
+fn doubled_of<const N: usize>(arithmetic: impl Arithmetic, of: &Doubled) -> Vec<(f64, Sparse)> {
+    let n = of.f.rows();
     let mut doubled: Vec<(f64, Sparse)> = Vec::new();
-    let (mut length_s, mut phi) = (unit_s, transition_of::<N>(arithmetic, &f, unit_s));
-    while length_s < longest_s {
+    let (mut length_s, mut phi) = (of.unit_s, transition_of::<N>(arithmetic, of.f, of.unit_s));
+    while length_s < of.longest_s {
         let sparse = Sparse::of_square(&phi, n);
         phi = sparse.times_square(arithmetic, &phi);
         doubled.push((length_s, sparse));
         length_s *= 2.0;
     }
+    doubled
+}
+
+#[inline(always)]
+fn columns_of<const N: usize>(arithmetic: impl Arithmetic, asked: &ColumnsAt) -> Vec<Vec<f64>> {
+    let ChangesAfter { state, f, doubled } = asked.of;
     let column = |&time_s: &f64| {
         let (mut change, mut left_s) = ([0.0; N], time_s);
-        change[of.state] = 1.0;
+        change[*state] = 1.0;
         for (length_s, phi) in doubled.iter().rev() {
             if *length_s <= left_s {
                 left_s -= length_s;
@@ -125,9 +156,9 @@ fn changes_after_of<const N: usize>(arithmetic: impl Arithmetic, of: &ChangesAft
             term = f.times(arithmetic, &term).map(|v| v * left_s / order as f64);
             (0..N).for_each(|i| change[i] += term[i]);
         }
-        change[..n].to_vec()
+        change[..f.rows()].to_vec()
     };
-    of.times_s.iter().map(column).collect()
+    asked.times_s.iter().map(column).collect()
 }
 
 /// Φ over a time for which the series serves.
@@ -296,8 +327,9 @@ mod tests {
         let f = [[-2.5, 0.0, 0.0, 2.5], [0.0, -0.01, 0.05, 0.3], [0.0, -0.05, -0.01, 0.0], [0.0, 0.0, 0.0, -0.002]];
         let (f, none) = (f.concat(), [0.0; 16]);
         let times_s = [9.8, 0.0, 0.02, 60.0, 3.7];
+        let longest_s = times_s.iter().copied().fold(0.0, f64::max);
         for state in 0..4 {
-            for (time_s, found) in times_s.iter().zip(changes_after(&f, 4, state, &times_s)) {
+            for (time_s, found) in times_s.iter().zip(ChangesAfter::new(&f, 4, state, longest_s).at(&times_s)) {
                 let whole = &discretise(&f, [&none, &none], 4, &[*time_s])[0].transition;
                 assert!(
                     (0..4).all(|i| (found[i] - whole[4 * i + state]).abs() < 1e-12),

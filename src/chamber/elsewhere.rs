@@ -48,11 +48,16 @@ impl<'a> Elsewhere<'a> {
         Self { system, values, trace, stretches }
     }
 
-    /// The log likelihood with a stretch as it is in `rows`, which are all of the record's, less that of all rows elsewhere as they were.
-    pub(super) fn log_likelihood(&self, stretch: usize, rows: &[Row], kinks: Vec<Vec<f64>>) -> f64 {
+    /// The rows of a stretch and the one behind, up to which something may be changed.
+    pub(super) fn rows_of(&self, stretch: usize) -> Range<usize> {
+        let Stretch { rows, behind } = &self.stretches[stretch];
+        rows.start..if behind.is_some() { rows.end + 1 } else { rows.end }
+    }
+
+    /// The log likelihood with a stretch's rows ([`Self::rows_of`]) changed to `own`, less that of all rows elsewhere as they were.
+    pub(super) fn log_likelihood(&self, stretch: usize, mut own: Vec<Row>, kinks: Vec<Vec<f64>>) -> f64 {
         let Stretch { rows: changed, behind } = &self.stretches[stretch];
-        let whole = changed.start..if behind.is_some() { changed.end + 1 } else { changed.end };
-        let mut own = rows[whole.clone()].to_vec();
+        let whole = self.rows_of(stretch);
         (own[0].moves, own[0].kink) = (Vec::new(), 0.0);
         if let (Some(_), Some(last)) = (behind, own.last_mut()) {
             last.measured = [None; MEASURED];

@@ -51,7 +51,7 @@ pub(super) struct System {
     /// What a slope that changes by one within a step makes of the states by the step's end.
     pub(crate) kinks: Vec<Vec<f64>>,
     /// Behind each film.
-    pub(crate) dynamics: Vec<ContinuousDynamics>,
+    pub(crate) dynamics: Arc<[ContinuousDynamics]>,
     /// Rows of the thermometers and of the rate, each for the shares of a window: see [`Row::window`].
     pub(crate) rows: Sparse,
     pub(crate) variances: [f64; MEASURED],

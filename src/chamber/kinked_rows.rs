@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::filter::Move;
+use super::row::{Move, Row};
 use super::series::{SHORT_ROW_S, Series, TimeStep, place_of_step};
 
 /// A change of the air's slope that stands out.
@@ -138,29 +138,38 @@ impl Series {
     /// Kinks at these times; of rows that have none so far.
     pub(super) fn with_kinks(&self, kinks: &[Bend]) -> Series {
         let mut with = self.clone();
+        (with.rows, with.after_kinks) = self.rows_with_kinks(0..self.rows.len(), kinks);
+        with
+    }
+
+    /// Some of the rows with those of kinks at these times that are in them, and the times from these kinks to the ends of their steps.
+    pub(super) fn rows_with_kinks(&self, within: Range<usize>, kinks: &[Bend]) -> (Vec<Row>, Vec<TimeStep>) {
+        let mut rows = self.rows[within.clone()].to_vec();
+        let mut after_kinks = self.after_kinks.clone();
         for kink in kinks {
-            let row = with.row_of(kink.time_s);
-            let mut left_s = kink.time_s - with.times_s[row - 1];
-            with.rows[row].kink += kink.slope_change_k_per_s.powi(2);
-            if left_s <= 0.0 || with.rows[row].is_kinked_within() {
+            let place = self.row_of(kink.time_s);
+            if !within.contains(&place) {
                 continue;
             }
-            let is_step = |m: &Move| matches!(m, Move::Step(_));
-            let last = with.rows[row].moves.iter().rposition(is_step);
-            let mut moves = with.rows[row].moves.clone();
-            for (place, movement) in with.rows[row].moves.clone().into_iter().enumerate() {
+            let row = &mut rows[place - within.start];
+            let mut left_s = kink.time_s - self.times_s[place - 1];
+            row.kink += kink.slope_change_k_per_s.powi(2);
+            if left_s <= 0.0 || row.is_kinked_within() {
+                continue;
+            }
+            let last = row.moves.iter().rposition(|m| matches!(m, Move::Step(_)));
+            for (place, movement) in row.moves.clone().into_iter().enumerate() {
                 let Move::Step(step) = movement else { continue };
-                let whole = with.steps[step as usize];
+                let whole = self.steps[step as usize];
                 let after_s = whole.length_s - left_s;
                 if after_s > 0.0 || Some(place) == last {
-                    let kink = with.kink_before(TimeStep { length_s: after_s.max(0.0), ..whole });
-                    moves.insert(place + 1, kink);
+                    let end = TimeStep { length_s: after_s.max(0.0), ..whole };
+                    row.moves.insert(place + 1, Move::Kink(place_of_step(&mut after_kinks, end)));
                     break;
                 }
                 left_s = -after_s;
             }
-            with.rows[row].moves = moves;
         }
-        with
+        (rows, after_kinks)
     }
 }

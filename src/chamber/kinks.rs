@@ -15,7 +15,7 @@ use super::kinked_rows::Bend;
 use super::layout::Numbers;
 use super::prior::Quantity;
 use super::series::Series;
-use super::system::decoupled_system;
+use super::system::{AfterKinks, decoupled_system};
 use super::{Assumption, Chamber, ChamberError};
 use crate::parallel::InParallel;
 
@@ -126,7 +126,7 @@ impl Chamber<'_> {
         let (side, values) = self.side_and_values(fit, record, &numbers)?;
         let likelihood_by = |numbers: &Numbers| {
             let straight = decoupled_system(&side.parts(&fit.assumed), numbers, &base);
-            KinkLikelihood { base: &base, straight, values: &values }
+            KinkLikelihood::new(&base, straight, &values)
         };
         let mut likelihood = likelihood_by(&numbers);
         for strides in strides_rows {
@@ -217,14 +217,25 @@ struct KinkLikelihood<'a> {
     base: &'a Series,
     /// Without any kink.
     straight: System,
+    after: AfterKinks,
     values: &'a Values,
 }
 
-impl KinkLikelihood<'_> {
+impl<'a> KinkLikelihood<'a> {
+    fn new(base: &'a Series, straight: System, values: &'a Values) -> Self {
+        Self { base, after: straight.after_kinks(base, &base.steps), straight, values }
+    }
+
     fn with(&self, kinks: &[Bend]) -> (Series, System) {
         let series = self.base.with_kinks(kinks);
-        let system = System { kinks: self.straight.kinks_of(&series), ..self.straight.clone() };
+        let system = System { kinks: self.after.of(&series.after_kinks), ..self.straight.clone() };
         (series, system)
+    }
+
+    /// With kinks that differ from those elsewhere in one stretch only.
+    fn beside(&self, elsewhere: &Elsewhere, stretch: usize, kinks: &[Bend]) -> f64 {
+        let (rows, after_kinks) = self.base.rows_with_kinks(elsewhere.rows_of(stretch), kinks);
+        elsewhere.log_likelihood(stretch, rows, self.after.of(&after_kinks))
     }
 
     fn of(&self, kinks: &[Bend]) -> f64 {
@@ -248,8 +259,7 @@ impl KinkLikelihood<'_> {
             let at = |time_s: f64| {
                 let mut all = others.clone();
                 all[place].time_s = time_s;
-                let series = self.base.with_kinks(&all);
-                elsewhere.log_likelihood(place, &series.rows, self.straight.kinks_of(&series))
+                self.beside(&elsewhere, place, &all)
             };
             kink.time_s = highest(at, kink.time_s, at(kink.time_s), strides_s);
         });
@@ -274,9 +284,7 @@ impl KinkLikelihood<'_> {
             let cost = |place: usize| {
                 let mut others = kinks.clone();
                 others.remove(place);
-                let without = self.base.with_kinks(&others);
-                let here = elsewhere.log_likelihood(place, &series.rows, system.kinks.clone());
-                here - elsewhere.log_likelihood(place, &without.rows, self.straight.kinks_of(&without))
+                self.beside(&elsewhere, place, kinks) - self.beside(&elsewhere, place, &others)
             };
             let costs: Vec<f64> = (0..kinks.len()).in_parallel().map(cost).collect();
             let least = costs.into_iter().enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
@@ -388,14 +396,11 @@ pub(super) mod tests {
         let kinks: Vec<Bend> = KINKS_S.into_iter().chain([end_s]).map(bend).collect();
         for base in [whole.clone(), whole.with_film_switches(&[1500.0, 2875.0])] {
             let straight = decoupled_system(&side.parts(&assumed), &numbers, &base);
-            let likelihood = KinkLikelihood { base: &base, straight, values: &values };
+            let likelihood = KinkLikelihood::new(&base, straight, &values);
             let (series, system) = likelihood.with(&kinks);
             let stretches = kinks.iter().map(|kink| base.rows_about(kink.time_s, 13.0)).collect();
             let elsewhere = Elsewhere::new(&system, &series.rows, &values, stretches);
-            let beside = |place: usize, kinks: &[Bend]| {
-                let series = base.with_kinks(kinks);
-                elsewhere.log_likelihood(place, &series.rows, likelihood.straight.kinks_of(&series))
-            };
+            let beside = |place: usize, kinks: &[Bend]| likelihood.beside(&elsewhere, place, kinks);
             for place in 0..kinks.len() {
                 let moved = [-13.0, -3.7, 2.0, 13.0].map(|later_s| {
                     let mut moved = kinks.clone();

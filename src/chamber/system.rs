@@ -30,12 +30,13 @@
 use std::sync::Arc;
 
 use super::decoupled::Decoupling;
-use super::discretise::{ContinuousDynamics, changes_after, discretise};
+use super::discretise::{ChangesAfter, ContinuousDynamics, discretise};
 use super::film::drive;
 use super::filter::{RATE, Step, System};
 use super::layout::{Layout, Numbers, Parts};
 use super::prior::Quantity;
-use super::series::{Series, Shape};
+use super::row::Film;
+use super::series::{Series, Shape, TimeStep};
 use super::sparse::Sparse;
 use super::start::start;
 use crate::thermal::{Extent, HeatPath, Location, PackMaterial};
@@ -363,15 +364,21 @@ fn rotate(f: &mut [f64], n: usize, place: usize, period_s: f64) {
 
 impl System {
     /// What a kink makes of the states by the end of the step that it is within, for each of a record's.
-    pub(super) fn kinks_of(&self, series: &Series) -> Vec<Vec<f64>> {
-        let mut kinks: Vec<Vec<f64>> = vec![Vec::new(); series.after_kinks.len()];
-        for (film, dynamics) in series.films().iter().zip(&self.dynamics) {
-            let own: Vec<usize> = (0..kinks.len()).filter(|&i| series.after_kinks[i].film == *film).collect();
-            let times_s: Vec<f64> = own.iter().map(|&i| series.after_kinks[i].length_s).collect();
-            let found = changes_after(&dynamics.of, self.size, self.slope, &times_s);
-            own.into_iter().zip(found).for_each(|(i, change)| kinks[i] = change);
+    fn kinks_of(&self, series: &Series) -> Vec<Vec<f64>> {
+        match series.after_kinks.as_slice() {
+            [] => Vec::new(),
+            times => self.after_kinks(series, times).of(times),
         }
-        kinks
+    }
+
+    /// What kinks in a record make of the states, up to the longest of these times after them.
+    pub(super) fn after_kinks(&self, series: &Series, times: &[TimeStep]) -> AfterKinks {
+        let behind = |(film, dynamics): (&Film, &ContinuousDynamics)| {
+            let own = times.iter().filter(|time| time.film == *film);
+            let longest_s = own.map(|time| time.length_s).fold(0.0, f64::max);
+            (*film, ChangesAfter::new(&dynamics.of, self.size, self.slope, longest_s))
+        };
+        AfterKinks { behind: series.films().iter().zip(self.dynamics.iter()).map(behind).collect() }
     }
 
     /// Takes the offset as known and the gyro as steady: what is left of a rate's variance is air and white noise.
@@ -381,5 +388,23 @@ impl System {
             self.covariance[i * self.size + layout.offset] = 0.0;
             self.covariance[layout.offset * self.size + i] = 0.0;
         }
+    }
+}
+
+/// What kinks of the air's slope make of the states, behind each of a record's films.
+pub(super) struct AfterKinks {
+    behind: Vec<(Film, ChangesAfter)>,
+}
+
+impl AfterKinks {
+    /// By the end of the step that each is within, which is so long after it.
+    pub(super) fn of(&self, after_kinks: &[TimeStep]) -> Vec<Vec<f64>> {
+        let mut changes: Vec<Vec<f64>> = vec![Vec::new(); after_kinks.len()];
+        for (film, after) in &self.behind {
+            let own: Vec<usize> = (0..changes.len()).filter(|&i| after_kinks[i].film == *film).collect();
+            let times_s: Vec<f64> = own.iter().map(|&i| after_kinks[i].length_s).collect();
+            own.into_iter().zip(after.at(&times_s)).for_each(|(i, change)| changes[i] = change);
+        }
+        changes
     }
 }
