@@ -25,9 +25,11 @@ impl Tools<'_, '_> {
         let mut is_beside_listed = false;
         if let Some(listed) = listed.filter(is_answer) {
             // A wander takes up a slow term before a term is tried.
-            let may_replace = self.may_replace(&umbrella(), listed) || self.may_replace(&self.plain(declared), listed);
+            let umbrella = umbrella();
+            let may_replace = self.may_replace(&umbrella, listed)
+                || (umbrella.explanation.is_outside() && self.may_replace(&self.plain(declared), listed));
             if may_replace {
-                sets = self.beneath(umbrella(), declared, best_listed, &|share| progress(0.4 * share));
+                sets = self.beneath(umbrella, declared, best_listed, &|share| progress(0.4 * share));
             }
             let replaces = |s: &Set| s.explanation.members.is_empty() && s.total() > best_listed + BEATS;
             if !sets.iter().any(|s| !s.terms.is_empty() && replaces(s)) {
