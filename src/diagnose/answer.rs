@@ -7,7 +7,7 @@
 use std::collections::BTreeSet;
 
 use super::caution::shared_rows;
-use super::describe::{ScoredExplanation, contenders, findings, ladder, names, unexplained};
+use super::describe::{ScoredExplanation, contenders, driven, findings, ladder, names, unexplained};
 use super::joint::{Explanation, Found, Member, Question, on_the_way};
 use super::standing::CERTAIN;
 use super::switched_film::film_switches;
@@ -69,6 +69,7 @@ pub(super) fn answer(
         cautions,
         extended: named.fit.assumed.model.clone(),
         boundary: question.chamber.learned(&named.fit)?,
+        driven: driven(question, [first, scored])?,
         posterior: posterior(question, found),
         refitted: refitted(question, named),
         hypothesis,

@@ -8,6 +8,7 @@ use crate::effect::DeclaredEffect;
 use crate::numeric::order::{sort_ascending, sort_descending};
 use crate::numeric::statistics::{correlation, rms};
 use crate::parallel::InParallel;
+use crate::predict::Boundary;
 
 /// An explanation with the fits of the held-out records.
 pub(super) struct ScoredExplanation<'e> {
@@ -27,8 +28,29 @@ impl<'e> ScoredExplanation<'e> {
         question: &Question,
         explanations: impl Iterator<Item = &'e Explanation>,
     ) -> Result<Vec<Self>, DiagnoseError> {
-        explanations.map(|explanation| Self::new(question, explanation)).collect()
+        let explanations: Vec<&Explanation> = explanations.collect();
+        explanations.in_parallel().map(|explanation| Self::new(question, explanation)).collect()
     }
+
+    /// What drove each record, as it has it.
+    pub(crate) fn driven(&self, question: &Question) -> Result<Vec<Boundary>, DiagnoseError> {
+        let of = |record: usize| {
+            let place = question.held_out.iter().position(|r| *r == record);
+            let day = place.map_or(&self.explanation.fit, |place| &self.held_out[place]);
+            Boundary::told(question.chamber, day, record)
+        };
+        let found: Result<Vec<Boundary>, _> = (0..question.chamber.records()).in_parallel().map(of).collect();
+        Ok(found?)
+    }
+}
+
+/// What drove each record, as two explanations have it.
+pub(super) fn driven(
+    question: &Question,
+    [before, after]: [&ScoredExplanation; 2],
+) -> Result<Vec<[Boundary; 2]>, DiagnoseError> {
+    let pairs = before.driven(question)?.into_iter().zip(after.driven(question)?);
+    Ok(pairs.map(|(before, after)| [before, after]).collect())
 }
 
 /// The kinds of a set; of what is no effect, a word.

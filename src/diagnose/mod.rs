@@ -31,12 +31,12 @@ pub(crate) mod trim;
 
 use thiserror::Error;
 
-use crate::chamber::{Assumption, Chamber, ChamberError, EffectEstimates, Films, Learned, Noise};
+use crate::chamber::{Assumption, Chamber, ChamberError, EffectEstimates, Films, Fit, Learned, Noise};
 use crate::coil::CoilError;
 use crate::effect::DeclaredEffect;
 use crate::numeric::noise::white_noise;
 use crate::pattern::Pattern;
-use crate::predict::PredictError;
+use crate::predict::{Boundary, PredictError};
 use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::units::Unit;
@@ -44,7 +44,6 @@ use crate::units::Unit;
 pub use crate::chamber::FilmSwitches;
 pub use caution::{Caution, Refusal};
 use discover::Beyond;
-use experiment::ModelComparison;
 use joint::Question;
 pub(crate) use plain::{Plain, ResidualShape};
 pub(crate) use standing::{Standing, standing};
@@ -210,6 +209,8 @@ pub struct Diagnosis {
     pub proposals: Vec<discover::FormulaProposal>,
     /// What the fitted records say of film, offset and chamber, with the accepted effects.
     pub(crate) boundary: Learned,
+    /// What drove each record, as the declared model and as all that was found have it.
+    pub(crate) driven: Vec<[Boundary; 2]>,
 }
 
 /// What one set of explanations holds of the posterior mass.
@@ -368,6 +369,21 @@ fn checked<'a>(request: &Request<'a>) -> Result<Vec<&'a Record>, DiagnoseError> 
 /// # Errors
 /// No records, records that say nothing, a model that cannot be solved.
 pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Diagnosis, DiagnoseError> {
+    Ok(diagnosed(request, progress)?.diagnosis)
+}
+
+/// A diagnosis, with the chamber that it began in and the declared model's fit there.
+pub(crate) struct Diagnosed<'a> {
+    pub(crate) diagnosis: Diagnosis,
+    chamber: Chamber<'a>,
+    declared: Fit,
+}
+
+/// As [`diagnose`], for what is asked of the same records afterwards.
+pub(crate) fn diagnosed<'a>(
+    request: &Request<'a>,
+    progress: &(dyn Fn(f64) + Sync),
+) -> Result<Diagnosed<'a>, DiagnoseError> {
     let records = checked(request)?;
     progress(0.0);
     let given = request.records.len();
@@ -384,11 +400,9 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
         held_out: (given..records.len()).collect(),
         depth: MOST_MEMBERS,
     };
-    let found = joint::ranked(&question, null, &|share| progress(0.4 * share))?;
-    let (switched, found) = match switched_film::in_turns(&question, &records, found)? {
-        (Some(chamber), found) => (chamber, found),
-        (None, found) => (chamber.clone(), found),
-    };
+    let found = joint::ranked(&question, null.clone(), &|share| progress(0.4 * share))?;
+    let (switched, found) = switched_film::in_turns(&question, &records, found)?;
+    let switched = switched.unwrap_or_else(|| chamber.clone());
     progress(0.5);
     let question = Question { chamber: &switched, ..question };
     let again = looked_through_again(request, &records, &question, &found)?;
@@ -397,11 +411,10 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
         None => question,
     };
     let found = if again.is_some() { joint::again(&question, found)? } else { joint::judged(&question, found)? };
-    let chamber = question.chamber;
     progress(0.6);
     let timed = match &again {
         Some(chamber) => chamber.clone(),
-        None => in_time(chamber, &found)?,
+        None => in_time(question.chamber, &found)?,
     };
     let mut diagnosis = said(request, &question, &records, &timed, &found, &|share| progress(0.6 + 0.2 * share))?;
     // Where what is to be fitted shows nothing, the other records may; the former then confirm it.
@@ -411,7 +424,7 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
         let other = Question { fitted: question.held_out.clone(), held_out: question.fitted.clone(), ..question };
         let found = joint::search_if_it_promises(&other, &declared.fit, &|share| progress(0.8 + 0.2 * share))?;
         if let Some(found) = found {
-            let timed = in_time(chamber, &found)?;
+            let timed = in_time(other.chamber, &found)?;
             let mut elsewhere = said(request, &other, &records, &timed, &found, &|_| ())?;
             if elsewhere.verdict != Verdict::Adequate {
                 // Columns stay those of the records as they were given.
@@ -422,7 +435,7 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(f64) + Sync)) -> Result<Di
         }
     }
     progress(1.0);
-    Ok(diagnosis)
+    Ok(Diagnosed { diagnosis, chamber, declared: null })
 }
 
 /// The chamber looked through by the best set: gross errors and kinks were those of the declared model. None where that is the best; if
@@ -474,14 +487,6 @@ fn said(
     let timed = elsewhere.as_ref().unwrap_or(timed);
     discover::amend(&Question { chamber: timed, ..question.clone() }, found, &discovered, &mut diagnosis)?;
     Ok(diagnosis)
-}
-
-/// What a diagnosis leaves to be told apart by an experiment.
-///
-/// # Errors
-/// Records that say nothing, models that cannot be solved.
-pub(crate) fn model_comparison(request: &Request, diagnosis: &Diagnosis) -> Result<ModelComparison, DiagnoseError> {
-    ModelComparison::new(request, diagnosis)
 }
 
 impl From<ChamberError> for DiagnoseError {

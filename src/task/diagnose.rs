@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::compare::suspicion;
 use crate::diagnose::discover::Allowed;
-use crate::diagnose::experiment::{ChamberCapability, Experiment, design};
+use crate::diagnose::experiment::{ChamberCapability, Experiment, ModelComparison, design};
 use crate::diagnose::{self, Diagnosis, Terms, Verdict};
 use crate::effect;
 use crate::io::json::diagnosis::{DiagnosisJson, DiagnosisRow};
@@ -16,7 +16,7 @@ use crate::io::write::boundary_edit::with_boundary;
 use crate::io::write::measurement_folder::{DIAGNOSIS_FILE, MeasurementFiles, PROPOSED_FILE, before_and_after_name};
 use crate::io::write::model_edit::with_effect;
 use crate::pattern::Pattern;
-use crate::predict::{noise_floor_rad_per_s, predict};
+use crate::predict::{Boundary, noise_floor_rad_per_s, predict_from};
 use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::report::diagnosis::{before_and_after_chart, before_and_after_name as picture_name};
@@ -89,11 +89,11 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
         holdout: &holdout,
         terms: request.terms,
     };
-    let diagnosis = diagnose::diagnose(&asked, &|share| observer.at(share, ""))?;
+    let diagnosed = diagnose::diagnosed(&asked, &|share| observer.at(share, ""))?;
     let all: Vec<&Record> = records.iter().chain(&holdout).collect();
-    let seed = request.experiment_seed.filter(|_| !diagnosis.effects.is_empty());
+    let seed = request.experiment_seed.filter(|_| !diagnosed.diagnosis.effects.is_empty());
     let experiment = match ChamberCapability::of(&all).zip(seed) {
-        Some((chamber, seed)) => match diagnose::model_comparison(&asked, &diagnosis) {
+        Some((chamber, seed)) => match ModelComparison::new(&asked, &diagnosed) {
             Ok(comparison) => design(&comparison, &chamber, seed),
             // What was found holds without it.
             Err(error) => {
@@ -103,6 +103,7 @@ pub fn run(request: &Request, observer: &dyn Observer) -> Result<Answer, TaskErr
         },
         None => None,
     };
+    let diagnosis = diagnosed.diagnosis;
     let holdout_noise = (!holdout.is_empty()).then(|| noise_of(&holdout));
     let fitted = request.measurements.iter().map(|m| m.input("fitted"));
     let inputs = fitted.chain(request.holdout.iter().map(|m| m.input("held out"))).collect();
@@ -202,8 +203,9 @@ impl Answer {
             files.add(PROPOSED_FILE, source.as_bytes())?;
         }
         if let Some(after) = self.after() {
-            for (index, record) in self.records.iter().chain(&self.holdout).enumerate() {
-                let rows = self.before_and_after(model, after, record)?;
+            let records = self.records.iter().chain(&self.holdout).zip(&self.diagnosis.driven);
+            for (index, (record, driven)) in records.enumerate() {
+                let rows = self.before_and_after([&model.model, after], record, driven)?;
                 let noise = deg_per_h_from_rad_per_s(noise_floor_rad_per_s(record));
                 let chart = before_and_after_chart(&format!("Residual of {}", record.name()), &rows, noise);
                 files.table(&before_and_after_name(index + 1), &rows)?;
@@ -225,16 +227,16 @@ impl Answer {
     /// What the declared model and the one with everything that was found leave of a record.
     fn before_and_after(
         &self,
-        model: &ModelFile,
-        after: &CoilModel,
+        models: [&CoilModel; 2],
         record: &Record,
+        driven: &[Boundary; 2],
     ) -> Result<Vec<DiagnosisRow>, TaskError> {
-        let left = |model: &CoilModel| -> Result<Vec<f64>, TaskError> {
-            let predicted = predict(model, &self.pattern, record)?.rate_rad_per_s;
+        let left = |place: usize| -> Result<Vec<f64>, TaskError> {
+            let predicted = predict_from(models[place], &self.pattern, record, &driven[place])?.rate_rad_per_s;
             let residuals = record.rate_rad_per_s().iter().zip(predicted);
             Ok(residuals.map(|(m, p)| rounded(deg_per_h_from_rad_per_s(m - p), RATE_DECIMALS)).collect())
         };
-        let (declared, extended) = (left(&model.model)?, left(after)?);
+        let (declared, extended) = (left(0)?, left(1)?);
         let rows = record.times_s().iter().zip(declared).zip(extended);
         Ok(rows
             .map(|((&time_s, residual_declared_deg_per_h), residual_extended_deg_per_h)| DiagnosisRow {

@@ -5,7 +5,7 @@ use super::search::Set;
 use super::{Discovered, Question};
 use crate::chamber::Fit;
 use crate::diagnose::answer::{hypothesis, noises};
-use crate::diagnose::describe::{ScoredExplanation, findings, names, unexplained};
+use crate::diagnose::describe::{ScoredExplanation, driven, findings, names, unexplained};
 use crate::diagnose::joint::{Explanation, Found};
 use crate::diagnose::standing::CERTAIN;
 use crate::diagnose::{DiagnoseError, Diagnosis, Rung, Share, Verdict};
@@ -154,6 +154,7 @@ pub(in crate::diagnose) fn amend(
     );
     diagnosis.posterior = posterior;
     diagnosis.extended = best.explanation.fit.assumed.model.clone();
+    diagnosis.driven = driven(question, [&first, &refined])?;
     diagnosis.proposals = vec![proposal];
     Ok(())
 }

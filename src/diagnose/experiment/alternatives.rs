@@ -1,7 +1,7 @@
 //! What a diagnosis leaves to be told apart, and what the records at hand say about each candidate.
 
-use super::super::{DiagnoseError, Diagnosis, Request, Verdict};
-use crate::chamber::{Assumption, Chamber, Effort, Fit, Free, Hold, Quantity};
+use super::super::{DiagnoseError, Diagnosed, Diagnosis, Request, Verdict};
+use crate::chamber::{Assumption, Effort, Fit, Free, Hold, Quantity};
 use crate::rate::CoilModel;
 use crate::record::Record;
 
@@ -33,8 +33,9 @@ impl ModelComparison {
     /// Of a diagnosis: every candidate is fitted again to the records that it was drawn from.
     ///
     /// # Errors
-    /// Records that say nothing, models that cannot be solved.
-    pub(in super::super) fn new(request: &Request, diagnosis: &Diagnosis) -> Result<Self, DiagnoseError> {
+    /// Models that cannot be solved.
+    pub(crate) fn new(request: &Request, diagnosed: &Diagnosed) -> Result<Self, DiagnoseError> {
+        let Diagnosed { diagnosis, chamber, declared } = diagnosed;
         let candidates = candidates(request.model, diagnosis);
         let mut comparison =
             Self { alternatives: Vec::new(), without: None, air: None, noise_rad_per_s: 0.0, variance: 1.0 };
@@ -44,8 +45,7 @@ impl ModelComparison {
         let records: Vec<&Record> = request.records.iter().chain(request.holdout).collect();
         let fitted: Vec<usize> = (0..request.records.len()).collect();
         let held_out: Vec<usize> = (request.records.len()..records.len()).collect();
-        let declared = Assumption::new(request.model.clone(), request.pattern.clone());
-        let (chamber, mut from) = Chamber::new(request.model, &records)?.with_shocks(&declared, &fitted)?;
+        let mut from = declared.clone();
         let mut alternative = |(name, model): (String, CoilModel)| -> Result<FittedAlternative, DiagnoseError> {
             let free = free_numbers(request.model, &model);
             let assumed = Assumption::new(model, request.pattern.clone());
