@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::film::drive;
 use super::filter::{self, Innovation, Trace, Values};
-use super::known::{Asked, Reference, known, taken_off};
+use super::known::{Asked, Reference, begins_between_rows, known, taken_off};
 use super::layout::{Layout, Numbers, OutputGains, Parts};
 use super::prior::Quantity;
 use super::row::Film;
@@ -214,6 +214,7 @@ impl CoilSide {
             air_k: Vec::with_capacity(rows),
             drive_k: Vec::with_capacity(rows),
             outputs_k: Vec::with_capacity(rows * outputs),
+            slopes_k_per_s: Vec::new(),
         };
         for (k, x) in states.chunks_exact(layout.size).enumerate() {
             let (drive, shown) = &behind[series.film_at(k) as usize];
@@ -320,7 +321,12 @@ pub(super) fn smoothed(
     system.variances[filter::RATE] += BLIND_RAD2_PER_S2;
     let trace = filter::forward(&system, &observed.series.rows, &values, true);
     let states = filter::smooth(&system, &observed.series.rows, &trace);
-    side.reference(assumed, numbers, observed, &states, before)
+    let mut course = side.reference(assumed, numbers, observed, &states, before)?;
+    if begins_between_rows(&observed.series) {
+        course.slopes_k_per_s =
+            side.slopes(&Layout::new(&side.parts(assumed), &observed.series), &observed.series, &states, &course);
+    }
+    Ok(course)
 }
 
 /// The film as a number of the chamber, where the model does not state one.

@@ -10,6 +10,7 @@ use super::known::Reference;
 use super::layout::Numbers;
 use super::noise::Remedy;
 use super::prior::Quantity;
+use super::readings::Told;
 use super::{Chamber, ChamberError};
 
 /// What a model says a record's rate was, from its readings alone.
@@ -56,7 +57,7 @@ impl Chamber<'_> {
         let numbers = self.numbers_for(fit, record);
         let assumed = &fit.assumed;
         let side = CoilSide::new(assumed, numbers.get(Quantity::Film), self.modes, observed)?;
-        let course = self.course_by_readings(fit, record)?;
+        let Told { course, .. } = self.told(fit, record)?;
         let rows = self.times_s(record).len();
         let mut prediction = Prediction {
             rate_rad_per_s: side.rates(assumed, observed, record, &course)?,

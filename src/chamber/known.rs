@@ -39,6 +39,8 @@ pub(crate) struct Reference {
     /// What the pack's modes follow: the air, but for a skin and behind a film that is switched.
     pub(super) drive_k: Vec<f64>,
     pub(crate) outputs_k: Vec<f64>,
+    /// Slopes of the outputs and the air, row-major rows × (outputs + 1) \[K/s\]; empty where the course counts as straight between rows.
+    pub(crate) slopes_k_per_s: Vec<f64>,
 }
 
 impl Reference {
@@ -56,7 +58,7 @@ impl Reference {
             let window_s = series.shapes[series.shape_of(k)].window_s;
             if window_s > 0.0 {
                 let (before, share) = window_start(series, k);
-                (at(k) - (at(before) + share * (at(before + 1) - at(before)))) / window_s
+                (at(k) - self.between(series, before, share, output)) / window_s
             } else {
                 (at(k) - at(k - 1)) / (series.times_s[k] - series.times_s[k - 1])
             }
@@ -68,9 +70,29 @@ impl Reference {
     pub(super) fn at_window_start(&self, series: &Series, row: usize, out: &mut Vec<f64>) -> f64 {
         let (before, share) = window_start(series, row);
         out.clear();
-        out.extend(self.row(before).iter().zip(self.row(before + 1)).map(|(a, b)| a + share * (b - a)));
-        self.air_k[before] + share * (self.air_k[before + 1] - self.air_k[before])
+        out.extend((0..self.outputs).map(|j| self.between(series, before, share, Some(j))));
+        self.between(series, before, share, None)
     }
+
+    /// An output (None: the air) so far from a row to the next: on the cubic that has its slopes there, on a line where none are known.
+    fn between(&self, series: &Series, before: usize, share: f64, output: Option<usize>) -> f64 {
+        let at = |k: usize| output.map_or(self.air_k[k], |j| self.row(k)[j]);
+        let (a, b) = (at(before), at(before + 1));
+        let columns = self.outputs + 1;
+        let slope = |k: usize| self.slopes_k_per_s.get(k * columns + output.unwrap_or(self.outputs));
+        match slope(before).zip(slope(before + 1)) {
+            Some((from, to)) => {
+                let length_s = series.times_s[before + 1] - series.times_s[before];
+                hermite((a, b), (length_s * from, length_s * to), share)
+            }
+            None => a + share * (b - a),
+        }
+    }
+}
+
+/// The cubic through two values with these slopes, x from one to the other.
+fn hermite((a, b): (f64, f64), (p, q): (f64, f64), x: f64) -> f64 {
+    a + x * (p + x * (3.0 * (b - a) - 2.0 * p - q + x * (2.0 * (a - b) + p + q)))
 }
 
 /// The row after which a row's window begins, and how far to the next one.
@@ -80,6 +102,15 @@ fn window_start(series: &Series, row: usize) -> (usize, f64) {
     let before = (0..row).rev().find(|&k| series.times_s[k] <= start_s + 1e-6).unwrap_or(0);
     let (t0, t1) = (series.times_s[before], series.times_s[before + 1]);
     (before, ((start_s - t0) / (t1 - t0)).clamp(0.0, 1.0))
+}
+
+/// Whether some window of a record begins between two of its rows, where the course itself is not known.
+pub(super) fn begins_between_rows(series: &Series) -> bool {
+    let is_between = |k: usize| {
+        let share = window_start(series, k).1;
+        series.shapes[series.shape_of(k)].window_s > 0.0 && share > 1e-6 && share < 1.0 - 1e-6
+    };
+    (1..series.times_s.len()).any(is_between)
 }
 
 /// What a model needs to have worked out.
@@ -280,4 +311,19 @@ pub(super) fn taken_off(series: &Series, known: &Values) -> Values {
         if known.of[m].is_empty() { own.clone() } else { own.iter().zip(&known.of[m]).map(|(v, k)| v - k).collect() }
     };
     Values { of: std::array::from_fn::<_, MEASURED, _>(less) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn between_rows_a_course_is_the_cubic_with_its_slopes() {
+        let value = |x: f64| 0.3 - x + 2.0 * x * x - 0.7 * x.powi(3);
+        let slope = |x: f64| -1.0 + 4.0 * x - 2.1 * x * x;
+        for x in [0.0, 0.25, 0.75, 1.0] {
+            let found = hermite((value(0.0), value(1.0)), (slope(0.0), slope(1.0)), x);
+            assert!((found - value(x)).abs() < 1e-14, "{x}: {found}");
+        }
+    }
 }

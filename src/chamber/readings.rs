@@ -28,10 +28,8 @@ use crate::record::Record;
 /// One entry a row of the chamber.
 #[derive(Debug, Clone)]
 pub(crate) struct Told {
-    /// Layers and air.
+    /// Layers and air, with their slopes.
     pub(crate) course: Reference,
-    /// Slopes of the layers, their axial moments and the air, row-major \[K/s\].
-    pub(crate) slopes_k_per_s: Vec<f64>,
     /// Variance that what the readings leave open gives each row's rate \[(rad/s)²\].
     pub(crate) rate_variance_rad2_per_s2: Vec<f64>,
     pub(crate) bends: Vec<Bend>,
@@ -119,31 +117,36 @@ impl<'a> Chamber<'a> {
         let states = filter::smooth(&system, &rows, &trace);
         let bends = self.bends(record, |k| states[k * n + layout.trend + 1]);
         let before = fit.courses[record].as_ref().filter(|c| side.fits(c));
-        let course = side.reference(&fit.assumed, &numbers, &self.observed[record], &states, before)?;
-        let slopes_k_per_s = slopes(&side, &layout, series, &states, &course);
-        Ok(Told { course, slopes_k_per_s, rate_variance_rad2_per_s2: variance, bends })
+        let mut course = side.reference(&fit.assumed, &numbers, &self.observed[record], &states, before)?;
+        course.slopes_k_per_s = side.slopes(&layout, series, &states, &course);
+        Ok(Told { course, rate_variance_rad2_per_s2: variance, bends })
     }
 }
 
-/// Slopes of a course at its rows: of the modes as they follow the air, of all else those of the parabola through a row and
-/// its neighbours.
-fn slopes(side: &CoilSide, layout: &Layout, series: &Series, states: &[f64], course: &Reference) -> Vec<f64> {
-    let (reduced, columns) = (&side.reduced, course.outputs + 1);
-    let times_s = &series.times_s;
-    let (mut rest, mut slopes) = (course.air_k.clone(), vec![0.0; course.air_k.len() * columns]);
-    add_parabolas(times_s, &rest, columns, course.outputs, &mut slopes);
-    for j in 0..course.outputs {
-        let shares = &reduced.row(j)[..layout.modes];
-        for (k, x) in states.chunks_exact(layout.size).enumerate() {
-            rest[k] = course.row(k)[j];
-            for ((share, x), decay) in shares.iter().zip(x).zip(&reduced.decay_per_s) {
-                rest[k] -= share * x;
-                slopes[k * columns + j] += share * decay * (course.drive_k[k] - x);
+impl CoilSide {
+    /// Slopes of a course at its rows: of the modes as they follow the air, of all else those of the parabola through a row and
+    /// its neighbours.
+    ///
+    /// # Shapes
+    /// Row-major rows × (outputs + 1), those of the air last \[K/s\].
+    pub(super) fn slopes(&self, layout: &Layout, series: &Series, states: &[f64], course: &Reference) -> Vec<f64> {
+        let (reduced, columns) = (&self.reduced, course.outputs + 1);
+        let times_s = &series.times_s;
+        let (mut rest, mut slopes) = (course.air_k.clone(), vec![0.0; course.air_k.len() * columns]);
+        add_parabolas(times_s, &rest, columns, course.outputs, &mut slopes);
+        for j in 0..course.outputs {
+            let shares = &reduced.row(j)[..layout.modes];
+            for (k, x) in states.chunks_exact(layout.size).enumerate() {
+                rest[k] = course.row(k)[j];
+                for ((share, x), decay) in shares.iter().zip(x).zip(&reduced.decay_per_s) {
+                    rest[k] -= share * x;
+                    slopes[k * columns + j] += share * decay * (course.drive_k[k] - x);
+                }
             }
+            add_parabolas(times_s, &rest, columns, j, &mut slopes);
         }
-        add_parabolas(times_s, &rest, columns, j, &mut slopes);
+        slopes
     }
-    slopes
 }
 
 /// Adds the slope of the parabola through each row's value and its neighbours'; at the ends, that of the last piece.

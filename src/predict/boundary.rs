@@ -41,7 +41,7 @@ impl Boundary {
     /// # Errors
     /// A model that cannot be solved.
     pub(crate) fn told(chamber: &Chamber, fit: &Fit, record: usize) -> Result<Self, ChamberError> {
-        let Told { course, slopes_k_per_s, rate_variance_rad2_per_s2, bends } = chamber.told(fit, record)?;
+        let Told { course, rate_variance_rad2_per_s2, bends } = chamber.told(fit, record)?;
         let film_w_per_m2_k = fit.value(Place::Quantity { quantity: Quantity::Film, record: None });
         let reference_k = chamber.reference_k(record);
         let columns = course.outputs + 1;
@@ -53,7 +53,7 @@ impl Boundary {
             values.push(reference_k + air_k);
         }
         let times_s = chamber.times_s(record).to_vec();
-        let course = Course { layers: course.layers, columns, times_s, values, slopes_per_s: slopes_k_per_s };
+        let course = Course { layers: course.layers, columns, times_s, values, slopes_per_s: course.slopes_k_per_s };
         let film_switches = chamber.film_switches(record, Some(fit));
         Ok(Self { film_w_per_m2_k, bends, film_switches, course, rate_variance_rad2_per_s2 })
     }
