@@ -38,13 +38,16 @@ impl Tools<'_, '_> {
             // Terms that were chosen before the coil was found that they belong to.
             all.extend(self.other_terms(set, set));
         }
-        for place in 0..set.explanation.members.len() {
-            let Some(fewer) = self.without(set, place) else { continue };
-            all.extend(self.other_terms(set, &fewer));
+        let in_its_place = |place: usize| -> Vec<Set> {
+            let Some(fewer) = self.without(set, place) else { return Vec::new() };
+            let mut found = self.other_terms(set, &fewer);
             let sets = self.with_others(&fewer, &|p| p.member != set.explanation.members[place]);
             let near = sets.into_iter().filter(|s| s.merit > set.merit - WITHIN_REACH);
-            all.extend(self.all_judged(set, near.collect()));
-        }
+            found.extend(self.all_judged(set, near.collect()));
+            found
+        };
+        let places = 0..set.explanation.members.len();
+        all.extend(places.in_parallel().flat_map(in_its_place).collect::<Vec<Set>>());
         if set.explanation.members.len() > 1 {
             all.extend(self.beside_the_terms_alone(set));
         }

@@ -27,13 +27,14 @@ impl Tools<'_, '_> {
             let fewer = (0..bare.members.len()).in_parallel().filter_map(|place| self.fewer(&bare, place));
             begun.extend(fewer.collect::<Vec<_>>());
         }
-        let sets = begun.iter().flat_map(|e| {
+        let sets = begun.iter().in_parallel().flat_map(|e| {
             let set = self.plain(e);
             let regression = self.question.chamber.regression(&e.fit);
             let with = regression.map_or_else(|_| Vec::new(), |r| self.with_terms(&set, &r, LEAST_TRIED));
-            with.into_iter().map(move |with| (with, set.clone())).collect::<Vec<_>>()
+            with.into_iter().map(|with| (with, set.clone())).collect::<Vec<_>>()
         });
-        let (best, bare) = sets.max_by(|(a, _), (b, _)| a.merit.total_cmp(&b.merit))?;
+        let sets: Vec<(Set, Set)> = sets.collect();
+        let (best, bare) = sets.into_iter().max_by(|(a, _), (b, _)| a.merit.total_cmp(&b.merit))?;
         let mut best = self.judged(self.consistent(best));
         if best.total() < best_listed - WITHIN_REACH {
             return None;
