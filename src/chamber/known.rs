@@ -21,6 +21,7 @@ use super::shows::Shows;
 use super::solved::Solved;
 use super::system::driven_by_air;
 use crate::effect::PackState;
+use crate::numeric::hermite::hermite;
 use crate::rate::{Past, RateModel};
 use crate::thermal::reduced::Reduced;
 use crate::thermal::{HeatPath, ThermalError};
@@ -83,16 +84,11 @@ impl Reference {
         match slope(before).zip(slope(before + 1)) {
             Some((from, to)) => {
                 let length_s = series.times_s[before + 1] - series.times_s[before];
-                hermite((a, b), (length_s * from, length_s * to), share)
+                hermite((a, b), (length_s * from, length_s * to), share).0
             }
             None => a + share * (b - a),
         }
     }
-}
-
-/// The cubic through two values with these slopes, x from one to the other.
-fn hermite((a, b): (f64, f64), (p, q): (f64, f64), x: f64) -> f64 {
-    a + x * (p + x * (3.0 * (b - a) - 2.0 * p - q + x * (2.0 * (a - b) + p + q)))
 }
 
 /// The row after which a row's window begins, and how far to the next one.
@@ -315,15 +311,38 @@ pub(super) fn taken_off(series: &Series, known: &Values) -> Values {
 
 #[cfg(test)]
 mod tests {
+    use super::super::dense::tests::{effect, model};
+    use super::super::kinks::tests::kinked;
+    use super::super::model_point::log_likelihood;
+    use super::super::{Assumption, Chamber, Effort};
     use super::*;
+    use crate::pattern::classic::Classic;
+    use crate::record::Record;
 
+    /// Rows 40 s apart, each rate the mean over 10 s: on a line between the rows the rate of each layer is that over 40 s.
     #[test]
-    fn between_rows_a_course_is_the_cubic_with_its_slopes() {
-        let value = |x: f64| 0.3 - x + 2.0 * x * x - 0.7 * x.powi(3);
-        let slope = |x: f64| -1.0 + 4.0 * x - 2.1 * x * x;
-        for x in [0.0, 0.25, 0.75, 1.0] {
-            let found = hermite((value(0.0), value(1.0)), (slope(0.0), slope(1.0)), x);
-            assert!((found - value(x)).abs() < 1e-14, "{x}: {found}");
-        }
+    fn where_windows_begin_between_rows_what_is_not_linear_is_told_by_the_slopes_there() {
+        let (hidden, pattern) =
+            (model(vec![effect("heating_cooling_asymmetry", &[0.3])]), Classic::Zyl.pattern(8).unwrap());
+        let whole = kinked(&hidden, &pattern);
+        let every_fourth = |column: &[f64]| column.iter().copied().skip(3).step_by(4).collect::<Vec<f64>>();
+        let columns = [whole.times_s(), whole.temperature_k(), whole.rate_rad_per_s()].map(every_fourth);
+        let [times_s, temperature_k, rate_rad_per_s] = columns;
+        let record = Record::new("spaced", times_s, temperature_k, rate_rad_per_s).unwrap();
+        let assumed = Assumption::new(hidden.clone(), pattern);
+        let close = Chamber::new(&hidden, &[&whole]).unwrap();
+        assert!(!begins_between_rows(&close.observed[0].series));
+        let chamber = Chamber::new(&hidden, &[&record]).unwrap();
+        assert!(begins_between_rows(&chamber.observed[0].series));
+        let fit = chamber.fit(&assumed, &[], &[0], None, Effort::QUICK).unwrap();
+        let likelihood = |courses: &[Option<Reference>]| {
+            let point = chamber.model_point(assumed.clone(), fit.numbers.clone(), &[0], courses).unwrap();
+            log_likelihood(&chamber.innovations(&point, 0).unwrap())
+        };
+        let mut straight = fit.courses.clone();
+        straight.iter_mut().flatten().for_each(|course| course.slopes_k_per_s.clear());
+        let (with_slopes, on_lines) = (likelihood(&fit.courses), likelihood(&straight));
+        println!("{with_slopes} with slopes, {on_lines} on lines");
+        assert!(with_slopes > on_lines + 5.0, "{with_slopes} with slopes, {on_lines} on lines");
     }
 }

@@ -209,7 +209,7 @@ pub struct Diagnosis {
     pub proposals: Vec<discover::FormulaProposal>,
     /// What the fitted records say of film, offset and chamber, with the accepted effects.
     pub(crate) boundary: Learned,
-    /// What drove each record, as the declared model and as all that was found have it.
+    /// What drove each record, those held out last, as the declared model has it and as all that was found has it.
     pub(crate) driven: Vec<[Boundary; 2]>,
 }
 

@@ -3,6 +3,7 @@
 pub mod allan;
 pub mod coloured;
 pub mod expression;
+pub(crate) mod hermite;
 pub(crate) mod lobatto;
 pub(crate) mod maximise;
 pub(crate) mod noise;

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::PredictError;
 use crate::chamber::{Bend, Chamber, ChamberError, FilmSwitches, Fit, Place, Quantity, Told};
+use crate::numeric::hermite::hermite;
 use crate::rate::CoilModel;
 use crate::record::Record;
 use crate::thermal::{GivenField, ThermalHistory};
@@ -179,10 +180,9 @@ impl Course {
                 continue;
             }
             let (p, q) = (length_s * self.slope(right - 1, j), length_s * self.slope(right, j));
-            // Hermite's cubic.
-            let (c, d) = (3.0 * (b - a) - 2.0 * p - q, 2.0 * (a - b) + p + q);
-            let slope = if x < 0.0 { b - a } else { p + inside * (2.0 * c + 3.0 * d * inside) } / length_s;
-            *value = a + inside * (p + inside * (c + d * inside)) + if out { beyond_s * slope } else { 0.0 };
+            let (within, rising) = hermite((a, b), (p, q), inside);
+            let slope = if x < 0.0 { b - a } else { rising } / length_s;
+            *value = within + if out { beyond_s * slope } else { 0.0 };
             if let Some(slopes) = slopes.as_deref_mut() {
                 slopes[j] = slope;
             }
