@@ -57,6 +57,17 @@ pub struct Judged {
     pub(crate) pointing: Option<PointingError>,
 }
 
+impl Judged {
+    /// By more than rounding.
+    pub(super) fn is_better_than(&self, other: &Judged) -> bool {
+        self.objective_rad_per_s < other.objective_rad_per_s * (1.0 - EQUALLY_GOOD)
+    }
+
+    pub(super) fn as_found(&self) -> FoundPattern {
+        FoundPattern { cost: self.objective_rad_per_s, segments: self.pattern.segments().to_vec() }
+    }
+}
+
 /// What a pattern is judged by.
 #[derive(Debug, Clone, Copy)]
 pub struct Evaluator<'a> {
@@ -95,7 +106,7 @@ const BEAM_WIDTH: usize = 1 << 14;
 const COMPOUND_SEED: u64 = 1;
 
 /// Patterns that the improvement begins with, besides the best.
-const MOST_STARTS: usize = 6;
+pub(super) const MOST_STARTS: usize = 6;
 
 /// Relative difference below which two patterns count as equally good.
 pub(crate) const EQUALLY_GOOD: f64 = 1e-9;

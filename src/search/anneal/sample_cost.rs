@@ -42,6 +42,25 @@ impl SampleCost {
         self
     }
 
+    /// How much each sample has to do with the cost of given patterns.
+    fn scores(&self, patterns: &[&[usize]]) -> Vec<f64> {
+        // The largest one alone makes the cost, and a near one that of a pattern near by.
+        let power = match self.norm {
+            Norm::Largest => 8,
+            Norm::RootMeanSquare => 2,
+            Norm::Sum => 1,
+        };
+        let mut scores = vec![0.0; self.samples()];
+        for segments in patterns {
+            let values = self.values(segments);
+            let largest = Norm::Largest.of(&values);
+            if largest > 0.0 {
+                scores.iter_mut().zip(&values).for_each(|(score, v)| *score += (v / largest).abs().powi(power));
+            }
+        }
+        scores
+    }
+
     fn values(&self, segments: &[usize]) -> Vec<f64> {
         self.space.columns().values(self.space.walk(segments.to_vec()).coefficients())
     }
@@ -153,6 +172,14 @@ impl Cost for SampleCost {
         Self { space: Space::new(matrix, self.space.class()), norm: self.norm, frozen: None }
     }
 
+    fn refusing_soon(&self, near: &[Vec<usize>]) -> Self {
+        let patterns: Vec<&[usize]> = near.iter().map(Vec::as_slice).collect();
+        let scores = self.scores(&patterns);
+        let mut order: Vec<usize> = (0..self.samples()).collect();
+        order.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]).then(a.cmp(&b)));
+        self.narrowed(&order)
+    }
+
     fn is_approximated(&self) -> bool {
         self.frozen.is_some()
     }
@@ -186,16 +213,7 @@ impl Cost for SampleCost {
         if self.norm != Norm::Largest {
             return;
         }
-        let mut scores = vec![0.0_f64; self.samples()];
-        for segments in best {
-            let values = self.values(segments);
-            let largest = Norm::Largest.of(&values);
-            if largest > 0.0 {
-                for (score, v) in scores.iter_mut().zip(&values) {
-                    *score += (v / largest).powi(8);
-                }
-            }
-        }
+        let scores = self.scores(best);
         working.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]).then(a.cmp(&b)));
     }
 }

@@ -67,6 +67,9 @@ enum Window {
 /// The best of descents from given patterns, and from a few steps off the best of them as long as that brings better ones.
 /// `goes_on` is asked between descents; none before the first.
 pub(super) fn followed<C: Cost>(cost: &C, starts: &[Vec<usize>], goes_on: &dyn Fn() -> bool) -> Option<Reached> {
+    let steps_from = |start: &Vec<usize>| (0..STARTS).map(|stream| steps_off(cost, start, stream)).collect::<Vec<_>>();
+    let near: Vec<Vec<usize>> = starts.iter().cloned().chain(starts.iter().flat_map(steps_from)).collect();
+    let (in_order, cost) = (cost, &cost.refusing_soon(&near));
     let mut best = best_descended(cost, starts, goes_on)?;
     let patience = if cost.is_of_permutations() { PATIENCE_OF_PERMUTATIONS } else { PATIENCE };
     let (mut round, mut idle) = (0, 0);
@@ -80,6 +83,8 @@ pub(super) fn followed<C: Cost>(cost: &C, starts: &[Vec<usize>], goes_on: &dyn F
             (best, idle) = (better, 0);
         }
     }
+    // Sums in another order round in another way.
+    best.cost = in_order.at(&best.segments).cost();
     Some(best)
 }
 
@@ -279,6 +284,34 @@ mod tests {
         for class in [WindabilityClass::Any, WindabilityClass::Captive(1), WindabilityClass::Standard] {
             checked(&QuantileCost::new(coils(), class));
             checked(&SampleCost::new(step.samples(&model).unwrap(), class, Norm::Sum));
+        }
+    }
+
+    #[test]
+    fn what_is_refused_soon_is_what_is_refused_and_takes_fewer_samples() {
+        let model = model(12, LayerLength::Actual, &["surface_film"]);
+        let step = UnitStep::new(&model, 0.003).unwrap();
+        let start: Vec<usize> = Classic::Qua.pattern(12).unwrap().segments().to_vec();
+        for norm in [Norm::Largest, Norm::RootMeanSquare, Norm::Sum] {
+            let cost = SampleCost::new(step.samples(&model).unwrap(), WindabilityClass::Any, norm);
+            let near: Vec<Vec<usize>> = (0..STARTS).map(|stream| steps_off(&cost, &start, stream)).collect();
+            let soon = cost.refusing_soon(&near);
+            let (mut at, mut at_soon) = (cost.at(&start), soon.at(&start));
+            for stream in STARTS..4 * STARTS {
+                let other = steps_off(&cost, &start, stream);
+                let here = at.cost_of(&cost, &other, f64::INFINITY).unwrap();
+                let there = at_soon.cost_of(&soon, &other, f64::INFINITY).unwrap();
+                assert!((here / there - 1.0).abs() < 1e-12, "{norm:?} {other:?}: {here} {there}");
+            }
+            let before = [at.work().samples, at_soon.work().samples];
+            for stream in STARTS..4 * STARTS {
+                let other = steps_off(&cost, &start, stream);
+                let limit = at.cost();
+                let found = [at.cost_of(&cost, &other, limit), at_soon.cost_of(&soon, &other, limit)];
+                assert_eq!(found[0].is_some(), found[1].is_some(), "{norm:?} {other:?}");
+            }
+            let looked_at = [at.work().samples - before[0], at_soon.work().samples - before[1]];
+            assert!(4 * looked_at[1] < 3 * looked_at[0], "{norm:?} {looked_at:?}");
         }
     }
 

@@ -90,6 +90,12 @@ pub trait Cost: Clone + Send + Sync + std::fmt::Debug {
         self.select(working)
     }
 
+    /// The cost itself, its samples in an order in which what is worse than given patterns is found to be so soon.
+    #[must_use]
+    fn refusing_soon(&self, _near: &[Vec<usize>]) -> Self {
+        self.clone()
+    }
+
     /// The samples that a search begins with; empty for all of them in their own order.
     fn first_working_set(&self, seed: u64, starts: &[Vec<usize>]) -> Vec<usize>;
 

@@ -127,6 +127,32 @@ fn under_every_objective_the_answer_is_the_best_of_all_permutations_and_of_those
 }
 
 #[test]
+fn searches_that_differ_in_their_seed_alone_have_one_end_and_go_on_from_it_only_to_something_better() {
+    let (profiles, tolerance) = (spec(1), spread());
+    let model = model(10, LayerLength::Actual, &["surface_film", "spool_mass"]);
+    for objective in [Objective::GuaranteedRate, Objective::RootMeanSquare] {
+        for class in [WindabilityClass::Captive(1), WindabilityClass::Any] {
+            let plain = Request { recommend: false, class, ..request(&model, &profiles, &tolerance, objective) };
+            let solved = SolvedProfiles::new(&model, &profiles.profiles()).unwrap();
+            let step = UnitStep::new(&model, profiles.max_rate_k_per_s).ok();
+            let evaluator = plain.evaluator(&solved, step.as_ref());
+            let least_of = |patterns: &[Pattern]| {
+                let named: Vec<(String, Pattern)> = patterns.iter().map(|p| (String::new(), p.clone())).collect();
+                let judged = evaluator.judge_all(&named).unwrap();
+                judged.iter().map(|j| j.objective_rad_per_s).fold(f64::INFINITY, f64::min)
+            };
+            let common = least_of(&evaluator.companions(class, &plain.plan, &|| true).unwrap());
+            for seed in [1, 2, 3] {
+                let plan = Plan { seed, ..plain.plan.clone() };
+                let answer = run(&Request { plan, ..plain.clone() }, &mut Unobserved).unwrap().unwrap();
+                let found = answer.best.objective_rad_per_s;
+                assert!((found / common - 1.0).abs() < 1e-6, "{class} {} {seed}: {found} {common}", objective.key());
+            }
+        }
+    }
+}
+
+#[test]
 fn with_cutting_planes_what_was_sampled_says_what_is_guaranteed_and_is_as_small_as_a_search_for_that_finds() {
     let (profiles, tolerance) = (spec(1), spread());
     let model = model(8, LayerLength::Actual, &["surface_film"]);
