@@ -148,8 +148,8 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Improves the first of known patterns by bounds, begun together with others of them that are drawn, until several draws have brought
-    /// nothing: bounds are learnt from what is near to all that they begin with, so that others make others. True if the first is then proved
-    /// to be the best of its class.
+    /// nothing: bounds are learnt from what is near to all that they begin with, so that others make others. What is new is improved by many
+    /// moves at once as well. True if the first is then proved to be the best of its class.
     fn improved_from_others(
         &self,
         class: WindabilityClass,
@@ -159,14 +159,19 @@ impl<'a> Evaluator<'a> {
     ) -> Result<bool, JudgeError> {
         let most_idle = if class == WindabilityClass::Standard { 1 } else { IDLE_DRAWS };
         let mut others = known.clone();
-        let mut idle = 0;
+        let (mut idle, mut is_new) = (0, true);
         while idle < most_idle && goes_on() {
             let begun_with: Vec<FoundPattern> = others.iter().take(MOST_STARTS).map(Judged::as_found).collect();
-            let (improved, is_optimal) = self.improved(class, known[0].clone(), &begun_with, None)?;
+            let (best, is_whole) = (known[0].clone(), std::mem::take(&mut is_new));
+            let (improved, is_optimal) = if is_whole {
+                self.improved(class, best, &begun_with, None)?
+            } else {
+                self.improved_by_bounds(class, best, &begun_with, None)?
+            };
             idle += 1;
             if improved.is_better_than(&known[0]) {
                 known.insert(0, improved);
-                idle = 0;
+                (idle, is_new) = (0, !is_whole);
             }
             if is_optimal {
                 return Ok(true);

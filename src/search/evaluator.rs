@@ -57,6 +57,13 @@ pub struct Judged {
     pub(crate) pointing: Option<PointingError>,
 }
 
+/// The best of what was found and a few others of it.
+fn starts_with(best: &Judged, found: &[FoundPattern]) -> Vec<Pattern> {
+    let others = found.iter().take(MOST_STARTS);
+    let others = others.map(|f| Pattern::new(f.segments.clone()).expect("a walk visits permutations only"));
+    std::iter::once(best.pattern.clone()).chain(others).collect()
+}
+
 impl Judged {
     /// By more than rounding.
     pub(super) fn is_better_than(&self, other: &Judged) -> bool {
@@ -312,27 +319,42 @@ impl Evaluator<'_> {
         found: &[FoundPattern],
         good_enough_rad_per_s: Option<f64>,
     ) -> Result<(Judged, bool), JudgeError> {
-        let layers = self.model.coil.layers();
-        let Some(task) = self.task(class).filter(|_| layers >= FEWEST_LAYERS) else { return Ok((best, false)) };
-        let others = found.iter().take(MOST_STARTS);
-        let others = others.map(|f| Pattern::new(f.segments.clone()).expect("a walk visits permutations only"));
-        let starts: Vec<Pattern> = std::iter::once(best.pattern.clone()).chain(others).collect();
-        let good_enough_rad_per_s = good_enough_rad_per_s.unwrap_or(0.0);
-        let Improvement { mut pattern, is_optimal } = if self.can_improve(class) {
-            let most_nodes = if self.is_provable(class) { PROVING_NODES } else { IMPROVING_NODES };
-            let beam_width = if layers > PROVABLE_LAYERS { BEAM_WIDTH } else { 0 };
-            improve(&task, &starts, ProofEffort { most_nodes, beam_width, good_enough_rad_per_s })?
-        } else {
-            Improvement { pattern: best.pattern.clone(), is_optimal: false }
+        let (bounded, is_optimal) = self.improved_by_bounds(class, best.clone(), found, good_enough_rad_per_s)?;
+        let Some(task) = self.task(class).filter(|_| !is_optimal && best.pattern.layers() >= FEWEST_LAYERS) else {
+            return Ok((bounded, is_optimal));
         };
-        if matches!(self.objective, Objective::Pointing | Objective::RootMeanSquare) && !is_optimal {
-            let starts: Vec<Pattern> = std::iter::once(pattern).chain(starts.iter().cloned()).collect();
-            pattern = compounded(&task, &starts, COMPOUND_SEED)?;
+        let starts = starts_with(&best, found);
+        let mut pattern = bounded.pattern.clone();
+        let before = |pattern: Pattern| -> Vec<Pattern> { std::iter::once(pattern).chain(starts.clone()).collect() };
+        if matches!(self.objective, Objective::Pointing | Objective::RootMeanSquare) {
+            pattern = compounded(&task, &before(pattern), COMPOUND_SEED)?;
         }
-        if self.can_improve(class) && !is_optimal {
-            let starts: Vec<Pattern> = std::iter::once(pattern).chain(starts).collect();
-            pattern = rearranged(&task, &starts, COMPOUND_SEED)?;
+        if self.can_improve(class) {
+            pattern = rearranged(&task, &before(pattern), COMPOUND_SEED)?;
         }
+        if pattern == bounded.pattern {
+            return Ok((bounded, false));
+        }
+        Ok((self.judge(&name_of(&pattern), &pattern)?, false))
+    }
+
+    /// The same by bounds alone.
+    ///
+    /// # Errors
+    /// None that a model which could be solved would cause.
+    pub(super) fn improved_by_bounds(
+        &self,
+        class: WindabilityClass,
+        best: Judged,
+        found: &[FoundPattern],
+        good_enough_rad_per_s: Option<f64>,
+    ) -> Result<(Judged, bool), JudgeError> {
+        let Some(task) = self.task(class).filter(|_| self.can_improve(class)) else { return Ok((best, false)) };
+        let most_nodes = if self.is_provable(class) { PROVING_NODES } else { IMPROVING_NODES };
+        let beam_width = if best.pattern.layers() > PROVABLE_LAYERS { BEAM_WIDTH } else { 0 };
+        let good_enough_rad_per_s = good_enough_rad_per_s.unwrap_or(0.0);
+        let effort = ProofEffort { most_nodes, beam_width, good_enough_rad_per_s };
+        let Improvement { pattern, is_optimal } = improve(&task, &starts_with(&best, found), effort)?;
         if pattern == best.pattern {
             return Ok((best, is_optimal));
         }
