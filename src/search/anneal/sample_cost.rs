@@ -42,8 +42,8 @@ impl SampleCost {
         self
     }
 
-    /// How much each sample has to do with the cost of given patterns.
-    fn scores(&self, patterns: &[&[usize]]) -> Vec<f64> {
+    /// Puts those samples first that have most to do with the cost of given patterns.
+    fn sort_by_share(&self, patterns: &[&[usize]], samples: &mut [usize]) {
         // The largest one alone makes the cost, and a near one that of a pattern near by.
         let power = match self.norm {
             Norm::Largest => 8,
@@ -58,7 +58,7 @@ impl SampleCost {
                 scores.iter_mut().zip(&values).for_each(|(score, v)| *score += (v / largest).abs().powi(power));
             }
         }
-        scores
+        samples.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]).then(a.cmp(&b)));
     }
 
     fn values(&self, segments: &[usize]) -> Vec<f64> {
@@ -174,9 +174,8 @@ impl Cost for SampleCost {
 
     fn refusing_soon(&self, near: &[Vec<usize>]) -> Self {
         let patterns: Vec<&[usize]> = near.iter().map(Vec::as_slice).collect();
-        let scores = self.scores(&patterns);
         let mut order: Vec<usize> = (0..self.samples()).collect();
-        order.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]).then(a.cmp(&b)));
+        self.sort_by_share(&patterns, &mut order);
         self.narrowed(&order)
     }
 
@@ -213,8 +212,7 @@ impl Cost for SampleCost {
         if self.norm != Norm::Largest {
             return;
         }
-        let scores = self.scores(best);
-        working.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]).then(a.cmp(&b)));
+        self.sort_by_share(best, working);
     }
 }
 

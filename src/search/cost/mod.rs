@@ -90,7 +90,8 @@ pub trait Cost: Clone + Send + Sync + std::fmt::Debug {
         self.select(working)
     }
 
-    /// The cost itself, its samples in an order in which what is worse than given patterns is found to be so soon.
+    /// The cost itself, its samples so ordered that patterns like the given ones are refused after few of them; the same where its
+    /// order has nothing to do with that.
     #[must_use]
     fn refusing_soon(&self, _near: &[Vec<usize>]) -> Self {
         self.clone()
