@@ -19,7 +19,8 @@ use super::{Chamber, ChamberError, Place};
 pub(crate) struct Noise {
     /// Of one value as logged.
     pub(crate) white_rad_per_s: f64,
-    pub(crate) white_standard_error_rad_per_s: f64,
+    /// As the fit has it, which takes its model to be right.
+    pub(crate) white_fit_error_rad_per_s: f64,
     /// Slow wander of the gyro, drift and cycle included.
     pub(crate) wander_rad_per_s: f64,
     /// What the air does that the sensor cannot see, on a row of the chamber.
@@ -30,6 +31,14 @@ pub(crate) struct Noise {
     pub(crate) whiteness: f64,
     /// What each change of the measurement would leave of the unresolved air, most helpful first.
     pub(crate) remedies: Vec<(Remedy, f64)>,
+}
+
+impl Noise {
+    /// Standard error of the white noise: that of the fit, and as much of the model's error as the fit may have taken for white noise.
+    pub(crate) fn white_standard_error_rad_per_s(&self) -> f64 {
+        let taken = self.model_error_rad_per_s.min(self.white_rad_per_s).powi(2) / (2.0 * self.white_rad_per_s);
+        self.white_fit_error_rad_per_s.hypot(taken)
+    }
 }
 
 /// A change of the measurement.
@@ -104,7 +113,7 @@ impl Chamber<'_> {
         sort_ascending(&mut remedies, |item| item.1);
         Ok(Noise {
             white_rad_per_s: white,
-            white_standard_error_rad_per_s: error,
+            white_fit_error_rad_per_s: error,
             wander_rad_per_s: wander.sqrt(),
             unresolved_air_rad_per_s: air(unseen.expected),
             model_error_rad_per_s: (unseen.found - unseen.expected).max(0.0).sqrt(),
@@ -139,4 +148,28 @@ impl Chamber<'_> {
 struct Unseen {
     expected: f64,
     found: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn white_noise_is_as_uncertain_as_its_fit_and_what_the_model_is_wrong_by() {
+        let noise = |model_error_rad_per_s: f64| Noise {
+            white_rad_per_s: 2e-7,
+            white_fit_error_rad_per_s: 3e-8,
+            wander_rad_per_s: 0.0,
+            unresolved_air_rad_per_s: 0.0,
+            model_error_rad_per_s,
+            whiteness: 1.0,
+            remedies: Vec::new(),
+        };
+        let error = |model_error: f64| noise(model_error).white_standard_error_rad_per_s();
+        assert_eq!(error(0.0), 3e-8);
+        // (1.6e-7)²/(2 · 2e-7) = 6.4e-8.
+        assert!((error(1.6e-7) - 3e-8_f64.hypot(6.4e-8)).abs() < 1e-20);
+        // No more can be taken for white noise than there is: half of it is the error then.
+        assert!((error(9e-7) - 3e-8_f64.hypot(1e-7)).abs() < 1e-20);
+    }
 }

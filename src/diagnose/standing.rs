@@ -37,7 +37,7 @@ pub(crate) struct Standing {
 pub(crate) fn is_adequate(probability: f64, noise: &[Noise], declared_white_rad_per_s: Option<f64>) -> bool {
     let white = declared_white_rad_per_s.is_none_or(|declared| {
         noise.iter().all(|n| {
-            let relative = n.white_standard_error_rad_per_s / n.white_rad_per_s;
+            let relative = n.white_fit_error_rad_per_s / n.white_rad_per_s;
             !((n.white_rad_per_s / declared).ln().abs() > WITHIN_ERRORS * relative)
         })
     });
@@ -84,7 +84,7 @@ mod tests {
     fn noise(white: f64, error: f64) -> Noise {
         Noise {
             white_rad_per_s: white,
-            white_standard_error_rad_per_s: error,
+            white_fit_error_rad_per_s: error,
             wander_rad_per_s: 0.0,
             unresolved_air_rad_per_s: 0.0,
             model_error_rad_per_s: 0.0,

@@ -3,8 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::explanation::with;
+use super::tries::WORTH_A_FIT;
 use super::{Explanation, Member, Outcome, Question};
-use crate::chamber::{Assumption, Effort};
+use crate::chamber::{Assumption, Effort, Fit};
 use crate::diagnose::candidate::Candidate;
 use crate::effect::DeclaredEffect;
 use crate::numeric::order::sort_descending;
@@ -14,9 +15,9 @@ use crate::units::Unit;
 /// A direction is looked at so near to the fit, as a share of the start: a layer that is five per cent off multiplies what the
 /// air's turbulence does to the rate, and such variances hide what its mean explains.
 const TESTED_SHARE: f64 = 0.02;
-/// Where the score test promises more, its order is not to be relied on …
+/// Where the score test promises more, its order is not to be relied on: each is fitted …
 const LARGE: f64 = 25.0;
-/// … among those that promise this share of the most; so many are fitted, all layers of a coil among them.
+/// … and so many of those that promise this share of the most, all layers of a coil among them.
 const CLOSE: f64 = 0.5;
 const LOOKED_AT: usize = 40;
 /// Layers whose halves lie on the same side differ little; what was not fitted to tells them apart.
@@ -28,6 +29,8 @@ pub(in crate::diagnose) struct Proposal {
     pub(crate) member: Member,
     pub(crate) values: Option<Vec<f64>>,
     pub(crate) gain: f64,
+    /// What a short fit with it from a gyro that does not wander came to, where one was made.
+    pub(super) short: Option<Fit>,
 }
 
 /// The score test of every candidate from each of its starts; of what every layer has one for, the best layer's.
@@ -45,31 +48,36 @@ pub(in crate::diagnose) fn proposals_along(
     Ok(best_layers(question, scored(question, best, along)?, 1))
 }
 
-/// The same, and where something large is missing a short fit of what promises most: the score test then says alike of
-/// whatever follows the mean rate, because the gyro's wander stands for all of it. What has no number that could be small (a pack
-/// that ends) is no direction, so it is fitted whatever it promises.
+/// The same, and where something large is missing a short fit of each that promises anything: the score test then says alike of whatever follows the mean rate,
+/// and little of what comes and goes, because the gyro's wander stands for all of it. What has no number that could be small (a pack that
+/// ends) is no direction, so it is fitted whatever is missing.
 pub(super) fn looked_at(question: &Question, best: &Explanation) -> Outcome<Vec<Proposal>> {
     let mut all = scored(question, best, &|_, _| true)?;
     sort_descending(&mut all, |item| item.gain);
-    let least = LARGE.max(CLOSE * all.first().map_or(0.0, |p| p.gain));
-    let mut seen = BTreeSet::new();
-    let mut calm = best.fit.clone();
-    calm.calm(&question.fitted);
+    let most = all.first().map_or(0.0, |p| p.gain);
+    let least = if most > LARGE { WORTH_A_FIT } else { f64::INFINITY };
+    let foremost = are_best_layers(question, &all, LAYERS_TRIED);
     let is_whole =
         |p: &Proposal| matches!(p.member, Member::Effect(place) if question.candidates[place].free.is_empty());
-    let close: Vec<usize> = (0..all.len())
-        .filter(|&i| (all[i].gain > least || is_whole(&all[i])) && seen.insert(all[i].member))
-        .take(LOOKED_AT)
-        .collect();
-    let gains: Vec<(usize, f64)> = close
+    let mut seen = BTreeSet::new();
+    let is_close = |i: &usize| all[*i].gain > LARGE.max(CLOSE * most) && seen.insert(all[*i].member);
+    let mut asked: Vec<usize> = (0..all.len()).filter(is_close).take(LOOKED_AT).collect();
+    let others = (0..all.len()).filter(|&i| (foremost[i] && all[i].gain > least) || is_whole(&all[i]));
+    asked.extend(others.filter(|&i| seen.insert(all[i].member)));
+    let mut calm = best.fit.clone();
+    calm.calm(&question.fitted);
+    let shorts: Vec<(usize, Fit)> = asked
         .in_parallel()
         .filter_map(|i| {
             let (assumed, free) = with(question, &[], &best.fit, all[i].member, all[i].values.clone())?;
             let there = question.chamber.fit(&assumed, &free, &question.fitted, Some(&calm), Effort::SHORT).ok()?;
-            Some((i, there.posterior() - best.fit.posterior()))
+            Some((i, there))
         })
         .collect();
-    gains.into_iter().for_each(|(i, gain)| all[i].gain = all[i].gain.max(gain));
+    for (i, short) in shorts {
+        all[i].gain = all[i].gain.max(short.posterior() - best.fit.posterior());
+        all[i].short = Some(short);
+    }
     Ok(best_layers(question, all, LAYERS_TRIED))
 }
 
@@ -99,7 +107,7 @@ impl TestedStart {
     pub(in crate::diagnose) fn proposal(&self, question: &Question, gain: f64, amplitude: f64) -> Proposal {
         let candidate = &question.candidates[self.place];
         let values = scaled(&candidate.effect, &candidate.free, &self.start, amplitude * self.share);
-        Proposal { member: Member::Effect(self.place), values: Some(values), gain }
+        Proposal { member: Member::Effect(self.place), values: Some(values), gain, short: None }
     }
 }
 
@@ -153,18 +161,22 @@ fn scored(
 
 /// Of what every layer has a candidate for, only the layers that promise most: their neighbours look alike.
 fn best_layers(question: &Question, proposals: Vec<Proposal>, count: usize) -> Vec<Proposal> {
+    let kept = are_best_layers(question, &proposals, count);
+    proposals.into_iter().zip(kept).filter_map(|(p, keep)| keep.then_some(p)).collect()
+}
+
+fn are_best_layers(question: &Question, proposals: &[Proposal], count: usize) -> Vec<bool> {
     let candidate = |p: &Proposal| match p.member {
         Member::Effect(place) => Some(&question.candidates[place]).filter(|c| c.is_of_layer()),
         _ => None,
     };
-    let outdone = |p: &Proposal| {
+    let is_outdone = |p: &Proposal| {
         candidate(p).is_some_and(|own| {
             let of_kind = |o: &&Proposal| candidate(o).is_some_and(|c| c.kind() == own.kind());
             proposals.iter().filter(of_kind).filter(|o| o.gain > p.gain).count() >= count
         })
     };
-    let kept: Vec<bool> = proposals.iter().map(|p| !outdone(p)).collect();
-    proposals.into_iter().zip(kept).filter_map(|(p, keep)| keep.then_some(p)).collect()
+    proposals.iter().map(|p| !is_outdone(p)).collect()
 }
 
 /// Multiples of a start that a score test may look for: either sign where the parameter has both.
@@ -219,4 +231,51 @@ pub(super) fn foremost(proposals: &[Proposal]) -> Vec<(usize, f64)> {
     let mut all: Vec<(usize, f64)> = best.into_iter().collect();
     sort_descending(&mut all, |item| item.1);
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chamber::Chamber;
+    use crate::diagnose::candidate::candidates;
+    use crate::diagnose::experiment::fixtures::{effect, model, pattern};
+    use crate::diagnose::tests::bare_day;
+
+    #[test]
+    fn where_something_large_is_missing_what_promises_anything_is_fitted_and_where_nothing_is_no_more() {
+        let declared = model(Vec::new());
+        let pattern = pattern();
+        let candidates = candidates(&declared, &[]);
+        for (hidden, is_large) in [(vec![effect("midpoint_offset", &[0.1])], true), (Vec::new(), false)] {
+            let record = bare_day(&model(hidden), 20.0, 3);
+            let assumed = Assumption::new(declared.clone(), pattern.clone());
+            let (chamber, null) = Chamber::new(&declared, &[&record]).unwrap().with_shocks(&assumed, &[0]).unwrap();
+            let question = Question {
+                chamber: &chamber,
+                model: &declared,
+                pattern: &pattern,
+                candidates: &candidates,
+                fitted: vec![0],
+                held_out: Vec::new(),
+                depth: 2,
+            };
+            let null = Explanation::new(&question, &[], Vec::new(), null);
+            let scored = scored(&question, &null, &|_, _| true).unwrap();
+            let most = scored.iter().map(|p| p.gain).fold(0.0, f64::max);
+            assert_eq!(most > LARGE, is_large, "{most}");
+            let looked_at = looked_at(&question, &null).unwrap();
+            let is_sized = |p: &Proposal| matches!(p.member, Member::Effect(c) if !candidates[c].free.is_empty());
+            let fitted = |member| looked_at.iter().any(|p| p.member == member && p.short.is_some());
+            let promising = scored.iter().filter(|p| is_sized(p) && !candidates[place(p)].is_of_layer());
+            let mut promising: Vec<Member> = promising.filter(|p| p.gain > WORTH_A_FIT).map(|p| p.member).collect();
+            promising.dedup();
+            assert!(promising.iter().all(|&member| fitted(member) == is_large), "{promising:?}");
+            assert!(!is_large || promising.len() > 2, "{promising:?}");
+        }
+    }
+
+    fn place(proposal: &Proposal) -> usize {
+        let Member::Effect(place) = proposal.member else { unreachable!() };
+        place
+    }
 }

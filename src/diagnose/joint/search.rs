@@ -158,6 +158,7 @@ pub(crate) fn fit_one(question: &Question, base: &Fit) -> Option<Explanation> {
         member: Member::Effect(place),
         values: Some(values),
         gain: 0.0,
+        short: None,
     }));
     let fits = proposals.in_parallel().filter_map(|p| {
         let begin = with(question, &[], base, p.member, p.values)?;

@@ -11,9 +11,10 @@ use crate::parallel::InParallel;
 
 /// Members that are fitted after each score test, as far as they promise this much …
 pub(super) const TRIED: usize = 8;
-const WORTH_A_FIT: f64 = 3.0;
-/// … and this share of what the first does.
+pub(super) const WORTH_A_FIT: f64 = 3.0;
+/// … and this share of what the first does, or, where a short fit was made, what that gained: a long one has brought up to twice as much.
 const WORTH_BESIDE: f64 = 0.08;
+const WORTH_A_LONG_FIT: f64 = 0.25;
 /// An effect that gains so much needs no comparison with a mere wander yet.
 const PLAIN: f64 = 25.0;
 /// Another winding that promises less than this share of the most is not fitted from several chambers.
@@ -43,7 +44,7 @@ pub(super) fn discrete(question: &Question, windings: &[Winding], best: &Explana
     let mut all = Vec::new();
     let mut add = |member: Member, gain: f64| {
         if !best.members.contains(&member) {
-            all.push(Proposal { member, values: None, gain });
+            all.push(Proposal { member, values: None, gain, short: None });
         }
     };
     if !best.has_winding() {
@@ -61,7 +62,7 @@ pub(super) fn discrete(question: &Question, windings: &[Winding], best: &Explana
 /// Members that say that something else is there.
 fn outside(best: &Explanation) -> Vec<Proposal> {
     let all = [Member::Drift, Member::Cycle].into_iter().filter(|m| !best.members.contains(m));
-    all.map(|member| Proposal { member, values: None, gain: f64::INFINITY }).collect()
+    all.map(|member| Proposal { member, values: None, gain: f64::INFINITY, short: None }).collect()
 }
 
 /// The most promising step of the offset.
@@ -90,18 +91,18 @@ fn steps(question: &Question, best: &Explanation) -> Option<Proposal> {
     let from = row.saturating_sub(width).max(2);
     let fine: Vec<(usize, usize)> = (from..(row + width).min(rows - 1)).map(|k| (record, k)).collect();
     let (gain, (record, row)) = scan(&fine)?;
-    Some(Proposal { member: Member::Step { record, row }, values: None, gain })
+    Some(Proposal { member: Member::Step { record, row }, values: None, gain, short: None })
 }
 
 /// The most promising proposals, one start a member, two where they promise nearly the same.
 pub(super) fn choose(mut proposals: Vec<Proposal>) -> Vec<Proposal> {
     sort_descending(&mut proposals, |item| item.gain);
     let first = proposals.iter().map(|p| p.gain).filter(|g| g.is_finite()).fold(0.0, f64::max);
-    let least = WORTH_A_FIT.max(WORTH_BESIDE * first);
     let mut seen: BTreeMap<Member, usize> = BTreeMap::new();
     let mut scored = 0;
     proposals.retain(|p| {
-        if !(p.gain > least) {
+        let share = if p.short.is_some() { WORTH_A_LONG_FIT } else { WORTH_BESIDE };
+        if !(p.gain > WORTH_A_FIT.max(share * first)) {
             return false;
         }
         let times = seen.entry(p.member).or_insert(0);
@@ -129,10 +130,11 @@ fn fit_all(question: &Question, windings: &[Winding], best: &Explanation, tried:
             if proposal.member == Member::Cycle {
                 let longest = question.fitted.iter().map(|&r| duration_s(question, r)).fold(0.0, f64::max);
                 let starts = CYCLES.map(|share| moved(&best.fit, Quantity::CyclePeriod, share * longest));
-                return from_the_best(question, windings, &members, &begin, &starts.each_ref());
+                return from_the_best(question, windings, &members, &begin, &starts.each_ref(), None);
             }
             // Wander that stood for what was missing may stay where it is: each begins without it, too.
-            let known = from_the_best(question, windings, &members, &begin, &[&best.fit, &calm]);
+            let starts: &[&Fit] = if proposal.short.is_some() { &[&best.fit] } else { &[&best.fit, &calm] };
+            let known = from_the_best(question, windings, &members, &begin, starts, proposal.short);
             let is_better = known.as_ref().is_some_and(|k| k.merit > best.merit);
             if !matches!(proposal.member, Member::Winding(_)) || !is_better || proposal.gain < MAY_WIN * most {
                 return known;
@@ -145,19 +147,22 @@ fn fit_all(question: &Question, windings: &[Winding], best: &Explanation, tried:
         .collect()
 }
 
-/// A set fitted from whichever start a short fit leads furthest from.
+/// A set fitted from whichever start a short fit leads furthest from, or led as `known`.
 fn from_the_best(
     question: &Question,
     windings: &[Winding],
     members: &[Member],
     begin: &Begin,
     starts: &[&Fit],
+    known: Option<Fit>,
 ) -> Option<Explanation> {
     let short = starts.iter().in_parallel().filter_map(|from| {
         let members = members.to_vec();
         fitted(question, windings, members, begin, from, Effort::SHORT)
     });
-    let best = short.max_by(|a, b| a.merit.total_cmp(&b.merit))?;
+    let known = known.map(|fit| Explanation::new(question, windings, members.to_vec(), fit));
+    let short: Vec<Explanation> = short.collect();
+    let best = short.into_iter().chain(known).max_by(|a, b| a.merit.total_cmp(&b.merit))?;
     fitted(question, windings, members.to_vec(), &best.begin(), &best.fit, Effort::QUICK)
 }
 
@@ -182,4 +187,33 @@ fn moved(fit: &Fit, quantity: Quantity, value: f64) -> Fit {
     let mut fit = fit.clone();
     fit.set_number(quantity, value);
     fit
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chamber::Assumption;
+    use crate::diagnose::experiment::fixtures::{model, pattern};
+
+    #[test]
+    fn what_a_short_fit_leaves_far_behind_is_fitted_no_further_than_a_score_that_may_be_wrong() {
+        let short = Fit::to_nothing(Assumption::new(model(Vec::new()), pattern()), Vec::new(), 1e-7);
+        let proposal = |effect: usize, gain: f64, is_fitted: bool| Proposal {
+            member: Member::Effect(effect),
+            values: None,
+            gain,
+            short: is_fitted.then(|| short.clone()),
+        };
+        let chosen = choose(vec![
+            proposal(0, 100.0, true),
+            proposal(1, 10.0, true),
+            proposal(2, 10.0, false),
+            proposal(3, 30.0, true),
+            proposal(4, 2.0, false),
+        ]);
+        let members: Vec<Member> = chosen.iter().map(|p| p.member).collect();
+        assert_eq!(members, [0, 3, 2].map(Member::Effect));
+        // Nothing else says what is there: then a small promise is worth a fit.
+        assert_eq!(choose(vec![proposal(1, 10.0, true)]).len(), 1);
+    }
 }

@@ -117,7 +117,7 @@ pub(crate) struct NoisePartsJson {
 
 impl NoisePartsJson {
     fn new(noise: &Noise) -> Self {
-        let error = deg_per_h_from_rad_per_s(noise.white_standard_error_rad_per_s);
+        let error = deg_per_h_from_rad_per_s(noise.white_standard_error_rad_per_s());
         Self {
             white_deg_per_h: deg_per_h_from_rad_per_s(noise.white_rad_per_s),
             white_standard_error_deg_per_h: Some(error).filter(|e| e.is_finite()),

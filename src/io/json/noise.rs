@@ -36,7 +36,7 @@ impl RecordNoiseJson {
         Self {
             record: of.record.clone(),
             white_deg_per_h: deg_per_h_from_rad_per_s(of.noise.white_rad_per_s),
-            white_standard_error_deg_per_h: deg_per_h_from_rad_per_s(of.noise.white_standard_error_rad_per_s),
+            white_standard_error_deg_per_h: deg_per_h_from_rad_per_s(of.noise.white_standard_error_rad_per_s()),
             wander_deg_per_h: deg_per_h_from_rad_per_s(of.noise.wander_rad_per_s),
             unresolved_air_deg_per_h: deg_per_h_from_rad_per_s(of.noise.unresolved_air_rad_per_s),
             model_error_deg_per_h: deg_per_h_from_rad_per_s(of.noise.model_error_rad_per_s),
