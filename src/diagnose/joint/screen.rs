@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::explanation::with;
-use super::tries::WORTH_A_FIT;
 use super::{Explanation, Member, Outcome, Question};
 use crate::chamber::{Assumption, Effort, Fit};
 use crate::diagnose::candidate::Candidate;
@@ -20,6 +19,8 @@ const LARGE: f64 = 25.0;
 /// … and so many of those that promise this share of the most, all layers of a coil among them.
 const CLOSE: f64 = 0.5;
 const LOOKED_AT: usize = 40;
+/// What is fitted at all, shortly or at length, promises so much.
+pub(super) const WORTH_A_FIT: f64 = 3.0;
 /// Layers whose halves lie on the same side differ little; what was not fitted to tells them apart.
 const LAYERS_TRIED: usize = 3;
 

@@ -3,15 +3,14 @@
 use std::collections::BTreeMap;
 
 use super::explanation::{Begin, fitted, in_order, with};
-use super::screen::Proposal;
+use super::screen::{Proposal, WORTH_A_FIT};
 use super::{Explanation, Member, Question, Winding};
 use crate::chamber::{Effort, Fit, Quantity};
 use crate::numeric::order::sort_descending;
 use crate::parallel::InParallel;
 
-/// Members that are fitted after each score test, as far as they promise this much …
+/// Members that are fitted after each score test, as far as they promise [`WORTH_A_FIT`] …
 pub(super) const TRIED: usize = 8;
-pub(super) const WORTH_A_FIT: f64 = 3.0;
 /// … and this share of what the first does, or, where a short fit was made, what that gained: a long one has brought up to twice as much.
 const WORTH_BESIDE: f64 = 0.08;
 const WORTH_A_LONG_FIT: f64 = 0.25;
