@@ -37,11 +37,12 @@ pub(crate) fn anew<'a>(
         .iter()
         .filter(|e| e.members.is_empty() || e.total() > least)
         .in_parallel()
-        .filter_map(|e| refitted_from(&there, found, e, &e.fit))
+        .filter_map(|e| refitted_from(&there, found, e, &e.fit.to_another_chamber()))
         .collect();
     let Some(declared) = listed.iter().find(|e| e.members.is_empty()) else { return Ok(None) };
     let Some(tools) = tools(&there, found, &declared.fit, &set.explanation.fit, allowed)? else { return Ok(None) };
-    let there = Set { grounds: Arc::clone(&tools.grounds), ..set.clone() };
+    let mut there = Set { grounds: Arc::clone(&tools.grounds), ..set.clone() };
+    there.explanation.fit = set.explanation.fit.to_another_chamber();
     let mut begun = tools.judged(tools.refitted(&there).ok_or(ChamberError::Unsolvable)?);
     begun.held_out_gain = begun.held_out.zip(declared.held_out).map(|(with, without)| with - without);
     let sets = tools.search(begun, MOST_TERMS, &|_| ());

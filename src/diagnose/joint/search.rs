@@ -121,7 +121,7 @@ pub(crate) fn again(question: &Question, found: Found) -> Outcome<Found> {
     let Found { explanations, promised, left, mut windings, .. } = found;
     let there = explanations.in_parallel().filter_map(|e| {
         let begin = e.begin();
-        fitted(question, &windings, e.members, &begin, &e.fit, Effort::FULL)
+        fitted(question, &windings, e.members, &begin, &e.fit.to_another_chamber(), Effort::FULL)
     });
     let mut cache: Cache = there.map(|e| (e.key(), e)).collect();
     if !cache.contains_key(&Vec::new()) {
@@ -171,14 +171,55 @@ pub(crate) fn fit_one(question: &Question, base: &Fit) -> Option<Explanation> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
-    use crate::chamber::Assumption;
+    use crate::chamber::{Assumption, Chamber, Quantity};
     use crate::diagnose::experiment::fixtures::{model, pattern};
+    use crate::diagnose::tests::bare_day;
 
     fn judged(members: Vec<Member>, merit: f64, held_out: f64) -> Explanation {
         let fit = Fit::to_nothing(Assumption::new(model(Vec::new()), pattern()), Vec::new(), 1e-7);
         let held_out = Some(held_out);
         Explanation { members, fit, merit, held_out, in_readings: 0.0, understated: 0.0, probability: 0.0 }
+    }
+
+    #[test]
+    fn what_another_chamber_took_held_out_days_for_is_no_beginning() {
+        let declared = model(Vec::new());
+        let pattern = pattern();
+        let records = [3, 4].map(|seed| bare_day(&declared, 20.0, seed));
+        let assumed = Assumption::new(declared.clone(), pattern.clone());
+        let chamber = Chamber::new(&declared, &[&records[0], &records[1]]).unwrap();
+        let (chamber, null) = chamber.with_shocks(&assumed, &[0]).unwrap();
+        let question = Question {
+            chamber: &chamber,
+            model: &declared,
+            pattern: &pattern,
+            candidates: &[],
+            fitted: vec![0],
+            held_out: vec![1],
+            depth: 1,
+        };
+        let held_out = |fit: &Fit| {
+            let explanations = vec![Explanation::new(&question, &[], Vec::new(), fit.clone())];
+            let found = Found {
+                explanations,
+                promised: Vec::new(),
+                left: f64::INFINITY,
+                windings: Vec::new(),
+                is_elsewhere: false,
+            };
+            again(&question, found).unwrap().explanations[0].held_out
+        };
+        let mut from_elsewhere = null.clone();
+        question.held_out_evidence(&mut from_elsewhere);
+        let mut days = from_elsewhere.days.to_vec();
+        assert_eq!(days.len(), 1);
+        days[0].set_number(Quantity::RateNoise, 1.0);
+        from_elsewhere.days = Arc::new(days);
+        assert!(held_out(&null).is_some_and(f64::is_finite));
+        assert_eq!(held_out(&null), held_out(&from_elsewhere));
     }
 
     #[test]
