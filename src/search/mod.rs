@@ -15,6 +15,7 @@ pub(crate) mod outlook;
 pub(crate) mod pareto;
 pub mod proof;
 pub(crate) mod prospect;
+mod provoked;
 pub(crate) mod recommendation;
 mod rehearsal;
 pub(crate) mod request;

@@ -13,8 +13,9 @@
 //! A search for the pointing error is weighed by the same figures of the pointing error
 //! ([`weighed_pointing`](super::weighed_pointing)), and what is closer together than a coil can be wound to is equal.
 //!
-//! How far a pattern is behind the best classic where it is furthest behind, in any of these figures or on any set of
-//! unseen profiles, is its regret. The classic with the least regret stays unless a pattern that was found is better by
+//! How far a pattern is behind the best classic where it is furthest behind, in any of these figures, on any set of
+//! unseen profiles or, where nothing is guaranteed, on the profiles that provoke patterns most
+//! ([`provoked`](super::provoked)), is its regret. The classic with the least regret stays unless a pattern that was found is better by
 //! more than `TIE` in the figure and has no more regret than that classic or none at all; or unless every classic is
 //! behind another one by more than `TIE` somewhere and a found pattern is not (`rehearsal` searches
 //! such). Of what is equally good to `TIE` the pattern is taken that is easiest to wind: fewest captive runs, then the
@@ -221,8 +222,10 @@ impl Evaluator<'_> {
         let scrap: Vec<Option<f64>> = built.iter().map(|b| b.and_then(|(_, share)| share).map(|y| 2.0 - y)).collect();
         let of_pointing =
             |figure: fn(&PointingFigures) -> Option<f64>| -> Vec<Option<f64>> { pointing.iter().map(figure).collect() };
+        let provoked =
+            if pointing.is_empty() { self.provoked_rad_per_s(&patterns)? } else { vec![None; patterns.len()] };
         let figures = if pointing.is_empty() {
-            vec![guaranteed, p95, scrap, expected, likely]
+            vec![guaranteed, provoked.clone(), p95, scrap, expected, likely]
         } else {
             let built = of_pointing(|p| p.built.map(|(p95, _)| p95));
             vec![of_pointing(|p| p.guaranteed_rad_per_s), built, of_pointing(|p| p.likely_rad_per_s)]
@@ -238,6 +241,7 @@ impl Evaluator<'_> {
             windability: WindingGraph::new(&judged.pattern).windability(),
             is_classic: in_class.contains(&i),
             unseen_rad_per_s: unseen.worst_rad_per_s(i),
+            provoked_rad_per_s: provoked[i],
             p95_rad_per_s: built.map(|(p95, _)| p95),
             yield_share: built.and_then(|(_, share)| share),
             prospect: prospects.get(i).copied(),
@@ -417,6 +421,7 @@ fn facts(weighed: &Weighed, profiles: usize) -> String {
         format!("{:.4} on {profiles} unseen ones", shown(weighed.unseen_rad_per_s)),
     ]);
     parts.extend(weighed.judged.guaranteed_rad_per_s.map(|g| format!("{:.4} guaranteed", shown(g))));
+    parts.extend(weighed.provoked_rad_per_s.map(|p| format!("{:.4} on profiles that provoke windings most", shown(p))));
     parts.extend(weighed.p95_rad_per_s.map(|p| format!("{:.4} for 95 % of built coils", shown(p))));
     parts.extend(weighed.yield_share.map(|y| format!("yield {:.1} %", percent_from_fraction(y))));
     parts.extend(weighed.prospect.map(|p| {

@@ -19,6 +19,8 @@ pub(super) struct Weighed {
     pub(crate) windability: Windability,
     pub(crate) is_classic: bool,
     pub(crate) unseen_rad_per_s: f64,
+    /// On the profiles that provoke patterns most, where nothing is guaranteed.
+    pub(crate) provoked_rad_per_s: Option<f64>,
     pub(crate) p95_rad_per_s: Option<f64>,
     pub(crate) yield_share: Option<f64>,
     /// Where the model is not known for certain.
@@ -145,6 +147,7 @@ mod tests {
             windability,
             is_classic,
             unseen_rad_per_s,
+            provoked_rad_per_s: None,
             p95_rad_per_s: None,
             yield_share: None,
             prospect: None,
