@@ -10,7 +10,10 @@
 //! provoked(p) = max over q of max over t |rate of p on the profile that is worst for q without those effects|
 //! ```
 //!
-//! That is no bound, but one that is searched for: the worst of all profiles is at least as bad.
+//! The worst of all profiles is at least as bad: this bounds what a guaranteed rate would be from below, not from above.
+//!
+//! # Source
+//! The bang-bang profile as in [`guaranteed`](super::cost::guaranteed).
 
 use super::cost::guaranteed::UnitStep;
 use super::cost::worst_case::SolvedProfiles;
@@ -21,7 +24,7 @@ use crate::profile::{Piece, Profile};
 use crate::rate::CoilModel;
 
 impl Evaluator<'_> {
-    /// The worst rates [rad/s]; none where the model has a guaranteed one, and where what is not linear is a rate that no winding changes: it
+    /// The worst rate of each pattern [rad/s]; none where the model has a guaranteed one, and where what is not linear is a rate that no winding changes: it
     /// follows temperature, and is largest on other profiles.
     ///
     /// # Errors
@@ -48,7 +51,8 @@ impl Evaluator<'_> {
     }
 }
 
-/// The last part of a profile, at most so long [s]: what lies further back is nearly forgotten when the worst is reached.
+/// The last part of a profile, at most so long [s]: what lies further back is nearly forgotten when the worst is reached. The whole of
+/// it where that is no length.
 fn end_of(profile: &Profile, duration_s: f64) -> Profile {
     let mut left_s = duration_s;
     let mut pieces = Vec::new();
