@@ -24,7 +24,7 @@ use crate::profile::{Piece, Profile};
 use crate::rate::CoilModel;
 
 impl Evaluator<'_> {
-    /// The worst rate of each pattern [rad/s]; none where the model has a guaranteed one, and where what is not linear is a rate that no winding changes: it
+    /// The worst rate of each pattern \[rad/s\]; none where the model has a guaranteed one, and where what is not linear is a rate that no winding changes: it
     /// follows temperature, and is largest on other profiles.
     ///
     /// # Errors
@@ -51,7 +51,7 @@ impl Evaluator<'_> {
     }
 }
 
-/// The last part of a profile, at most so long [s]: what lies further back is nearly forgotten when the worst is reached. The whole of
+/// The last part of a profile, at most so long \[s\]: what lies further back is nearly forgotten when the worst is reached. The whole of
 /// it where that is no length.
 fn end_of(profile: &Profile, duration_s: f64) -> Profile {
     let mut left_s = duration_s;
