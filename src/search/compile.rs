@@ -145,6 +145,7 @@ mod tests {
     use crate::profile::ProfileSpec;
     use crate::rate::CoilModel;
     use crate::search::cost::columns::Work;
+    use crate::search::cost::sampled_coils::QuantileWorst;
     use crate::search::cost::samples::tests::{model, profiles};
     use crate::search::cost::signs::segments_of_signs;
     use crate::search::cost::tolerance::{AsBuilt, Coils, ToleranceSpec};
@@ -289,6 +290,54 @@ mod tests {
             let mut resumed = evaluator.search(class, plan(3), Some(saved)).unwrap().unwrap();
             while resumed.advance() {}
             assert_eq!(*resumed.state(), unbroken);
+        });
+    }
+
+    #[test]
+    fn coils_that_are_worst_near_by_tell_what_all_do_until_a_pattern_is_worst_in_others() {
+        let model = model(12, LayerLength::Actual, &["surface_film", "strain_mismatch"]);
+        with_evaluator(&model, Objective::P95, &tolerance(0.004, 400), |evaluator| {
+            let coils = SampledCoils::new(&evaluator.coils().unwrap(), &[]).unwrap();
+            let near = Classic::Qua.pattern(12).unwrap().segments().to_vec();
+            let telling = coils.worst_with(std::slice::from_ref(&near)).unwrap();
+            assert_eq!(telling.count(), 40);
+            let of_all = coils.cost(&near);
+            // Coarser in time by a little.
+            assert!((telling.cost(&near) / of_all - 1.0).abs() < 0.003, "{} {of_all}", telling.cost(&near));
+            // Fewer coils are above, never more.
+            for classic in [Classic::Zyl, Classic::Dip, Classic::Sym] {
+                let other = classic.pattern(12).unwrap().segments().to_vec();
+                assert!(telling.cost(&other) <= coils.cost(&other) * (1.0 + 1e-9), "{classic:?}");
+                let both = coils.worst_with(&[near.clone(), other.clone()]).unwrap();
+                assert!((both.cost(&other) / coils.cost(&other) - 1.0).abs() < 0.003, "{classic:?}");
+            }
+            let few = SampledCoils::nominal(&model, evaluator.unit_step.unwrap()).unwrap();
+            assert!(few.worst_with(&[near]).is_none());
+        });
+    }
+
+    #[test]
+    fn a_pattern_that_passes_is_judged_in_all_coils_and_one_that_does_not_is_hardly_ever_better() {
+        let model = model(12, LayerLength::Actual, &["surface_film", "strain_mismatch"]);
+        with_evaluator(&model, Objective::P95, &tolerance(0.004, 400), |evaluator| {
+            let coils = SampledCoils::new(&evaluator.coils().unwrap(), &[]).unwrap();
+            let here = draw(WindabilityClass::Captive(1), 12, &mut generator(1, 0));
+            let mut state = QuantileWorst::new(&coils, &here);
+            let limit = state.cost();
+            let (mut passed, mut missed) = (0, 0);
+            for stream in 1..200 {
+                let there = draw(WindabilityClass::Captive(1), 12, &mut generator(1, stream));
+                let cost = coils.cost(&there);
+                match state.propose(&coils, &there, limit) {
+                    Some(proposed) => {
+                        assert_eq!(proposed, cost);
+                        passed += 1;
+                    }
+                    None => missed += u32::from(cost <= limit),
+                }
+            }
+            println!("{passed} passed, {missed} missed");
+            assert!(passed > 10 && missed * 20 < passed, "{passed} passed, {missed} missed");
         });
     }
 

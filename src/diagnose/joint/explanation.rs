@@ -82,6 +82,16 @@ impl Explanation {
         self.members.iter().any(|m| matches!(m, Member::Winding(_)))
     }
 
+    /// Whether another has all of its members.
+    pub(super) fn is_within(&self, other: &Explanation) -> bool {
+        self.members.iter().all(|m| other.members.contains(m))
+    }
+
+    /// What another does not have.
+    pub(super) fn more_than(&self, other: &Explanation) -> impl Iterator<Item = Member> {
+        self.members.iter().copied().filter(|m| !other.members.contains(m))
+    }
+
     /// The members in an order of their own.
     pub(crate) fn key(&self) -> Vec<Member> {
         key(self.members.clone())

@@ -173,21 +173,36 @@ fn give_masses(question: &Question, explanations: &mut [Explanation]) {
     }
     let errors: Vec<Option<[f64; 2]>> =
         explanations.iter().in_parallel().map(|e| errors(question, e).unwrap_or(None)).collect();
-    let totals: Vec<f64> = explanations.iter().map(Explanation::total).collect();
     let sizes: Vec<usize> = explanations.iter().map(|e| e.members.len()).collect();
+    let is_no_news = |small: usize, large: usize| {
+        let mut more = explanations[large].more_than(&explanations[small]);
+        more.all(|m| explanations[large].is_no_news(question.model.effects.len(), m))
+    };
+    // Within what declared numbers are known to.
+    let worth = worth(explanations, is_no_news);
     let mut masses: Vec<f64> = explanations.iter().map(|e| e.probability).collect();
-    give_to_smaller(&mut masses, &totals, &sizes, |small, large| {
-        let (a, b) = (&explanations[small], &explanations[large]);
-        let more = || b.members.iter().filter(|m| !a.members.contains(m));
-        let no_news = || more().all(|m| b.is_no_news(question.model.effects.len(), *m));
+    give_to_smaller(&mut masses, &worth, &sizes, |small, large| {
         let worsens = || {
-            more().all(|m| matches!(m, Member::Effect(_) | Member::Refitted(_)))
+            let mut more = explanations[large].more_than(&explanations[small]);
+            more.all(|m| matches!(m, Member::Effect(_) | Member::Refitted(_)))
                 && errors[small].zip(errors[large]).is_some_and(|(a, b)| is_worse(b, a))
         };
-        a.members.iter().all(|m| b.members.contains(m)) && (is_as_good(a.total(), b.total()) || no_news() || worsens())
+        explanations[small].is_within(&explanations[large])
+            && (is_as_good(worth[small], worth[large]) || is_no_news(small, large) || worsens())
     });
     explanations.iter_mut().zip(masses).for_each(|(e, mass)| e.probability = mass);
     explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(b.total().total_cmp(&a.total())));
+}
+
+/// What each set is worth where those that have more than it, but nothing that is news, are the same set.
+fn worth(explanations: &[Explanation], is_no_news: impl Fn(usize, usize) -> bool) -> Vec<f64> {
+    let of = |small: usize| {
+        let stands_for =
+            |large: &usize| explanations[small].is_within(&explanations[*large]) && is_no_news(small, *large);
+        let totals = (0..explanations.len()).filter(stands_for).map(|large| explanations[large].total());
+        totals.fold(explanations[small].total(), f64::max)
+    };
+    (0..explanations.len()).map(of).collect()
 }
 
 /// Keeps the declared model, the foremost sets whose merit is above the `least`, and, where records are held out, the best of each smaller
@@ -266,6 +281,24 @@ mod tests {
         };
         assert_eq!(kept(true), [400.0, 395.0, 330.0, 270.0, 250.0, 0.0]);
         assert_eq!(kept(false), [400.0, 395.0, 0.0]);
+    }
+
+    /// A record of nothing was answered by an offset of the middle, where dn/dT that is 0.5 % off does as well.
+    #[test]
+    fn a_set_is_worth_what_it_is_with_declared_numbers_as_far_off_as_they_may_be() {
+        let of = |effects: &[usize], merit: f64| {
+            let fit = Fit::to_nothing(Assumption::new(model(Vec::new()), pattern()), Vec::new(), 1e-7);
+            let members = effects.iter().copied().map(Member::Effect).collect();
+            let (held_out, in_readings, understated, probability) = (None, 0.0, 0.0, 0.0);
+            Explanation { members, fit, merit, held_out, in_readings, understated, probability }
+        };
+        // {}, {dn/dT}, {offset}, {offset, dn/dT}.
+        let all = [of(&[], 0.0), of(&[0], 20.0), of(&[1], 20.2), of(&[1, 0], 21.0)];
+        let is_no_news = |small: usize, large: usize| all[large].more_than(&all[small]).all(|m| m == Member::Effect(0));
+        assert_eq!(worth(&all, is_no_news), [20.0, 20.0, 21.0, 21.0]);
+        assert_eq!(worth(&all, |small, large| small == large), [0.0, 20.0, 20.2, 21.0]);
+        // … the offset then goes to nothing, which it did not.
+        assert!(is_as_good(20.0, 21.0) && !is_as_good(0.0, 20.2));
     }
 
     /// A record with one effect was answered by two: the second was certain by 0.04, which another end of the same fits undid.

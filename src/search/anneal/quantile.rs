@@ -5,7 +5,8 @@
 //! ```
 //!
 //! A move is judged coil by coil, those first that are worst now, and refused as soon as so many coils are above the
-//! Metropolis limit that the quantile must be. Most moves are refused after a twentieth of the coils.
+//! Metropolis limit that the quantile must be. Rounds run on coils of every kind that stand for all; descents on those that are worst with
+//! patterns like theirs, of which the quantile is that of all. All coils have the last word.
 //!
 //! The same cost serves the guaranteed worst case of a coil whose bore is heated: one coil, and no sum over samples; and
 //! any search that limits how far a crossover may climb.
@@ -140,7 +141,7 @@ impl Cost for QuantileCost {
     }
 
     fn select(&self, working: &[usize]) -> Self {
-        Self { coils: self.coils.select(working), ..*self }
+        Self { coils: self.coils.telling(working), ..*self }
     }
 
     /// Where there are many coils, every so many-th of them in the order of how badly a typical pattern does in them:
@@ -156,6 +157,10 @@ impl Cost for QuantileCost {
             self.coils.by_worst(&typical).into_iter().skip(stride / 2).step_by(stride).collect();
         working.sort_unstable();
         working
+    }
+
+    fn that_tell(&self, near: &[Vec<usize>]) -> Option<Self> {
+        Some(Self { coils: self.coils.worst_with(near)?, ..*self })
     }
 
     fn order_working_set(&self, _best: &[&[usize]], _working: &mut [usize]) {}

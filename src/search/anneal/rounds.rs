@@ -409,7 +409,9 @@ impl<C: Cost> Rounds for Optimisation<C> {
             starts.iter().enumerate().in_parallel().map(|(index, start)| refine(cost, stream(index), start)).collect()
         };
         if !self.full.is_approximated() || self.state.working.is_empty() {
-            return all(&self.full, 0, starts).iter().map(|segments| self.judged(segments)).collect();
+            let telling = self.full.that_tell(starts);
+            let refined = all(telling.as_ref().unwrap_or(&self.full), 0, starts);
+            return refined.iter().map(|segments| self.judged(segments)).collect();
         }
         // On samples that bind, as in the rounds; what binds besides joins for the second pass.
         let mut working = self.state.working.clone();

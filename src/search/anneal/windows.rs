@@ -70,7 +70,8 @@ pub(super) fn followed<C: Cost>(cost: &C, starts: &[Vec<usize>], goes_on: &dyn F
     let steps_from = |start: &Vec<usize>| (0..STARTS).map(|stream| steps_off(cost, start, stream)).collect::<Vec<_>>();
     let near: Vec<Vec<usize>> = starts.iter().cloned().chain(starts.iter().flat_map(steps_from)).collect();
     let (in_order, cost) = (cost, &cost.refusing_soon(&near));
-    let mut best = best_descended(cost, starts, goes_on)?;
+    let mut reached = starts.to_vec();
+    let mut best = best_descended(cost, starts, &mut reached, goes_on)?;
     let patience = if cost.is_of_permutations() { PATIENCE_OF_PERMUTATIONS } else { PATIENCE };
     let (mut round, mut idle) = (0, 0);
     while idle < patience && goes_on() {
@@ -78,7 +79,7 @@ pub(super) fn followed<C: Cost>(cost: &C, starts: &[Vec<usize>], goes_on: &dyn F
             (0..STARTS).map(|start| steps_off(cost, &best.segments, round * STARTS + start)).collect();
         round += 1;
         idle += 1;
-        let found = best_descended(cost, &near, goes_on);
+        let found = best_descended(cost, &near, &mut reached, goes_on);
         if let Some(better) = found.filter(|found| found.cost < best.cost * (1.0 - ROUNDING)) {
             (best, idle) = (better, 0);
         }
@@ -117,10 +118,25 @@ fn an_exchange_off(segments: &[usize], random: &mut ChaCha8Rng) -> Vec<usize> {
     exchanged
 }
 
-/// One descent after the other: the windows of each are shared out.
-fn best_descended<C: Cost>(cost: &C, starts: &[Vec<usize>], goes_on: &dyn Fn() -> bool) -> Option<Reached> {
-    let found = starts.iter().take_while(|_| goes_on()).map(|start| descended(cost, start));
-    found.min_by(|a, b| a.cost.total_cmp(&b.cost).then_with(|| a.segments.cmp(&b.segments)))
+/// The best of descents, one after the other: the windows of each are shared out. Where samples tell, descents are by those that tell of what was
+/// `reached` before, and the best of what they come to goes on by the cost itself.
+fn best_descended<C: Cost>(
+    cost: &C,
+    starts: &[Vec<usize>],
+    reached: &mut Vec<Vec<usize>>,
+    goes_on: &dyn Fn() -> bool,
+) -> Option<Reached> {
+    let best = |found: Vec<Reached>| {
+        found.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost).then_with(|| a.segments.cmp(&b.segments)))
+    };
+    let starts = starts.iter().take_while(|_| goes_on());
+    let Some(telling) = cost.that_tell(reached) else {
+        return best(starts.map(|start| descended(cost, start)).collect());
+    };
+    let found = starts.map(|start| descended(&telling, start).segments);
+    let found: Vec<Reached> = found.map(|segments| Reached { cost: cost.at(&segments).cost(), segments }).collect();
+    reached.extend(found.iter().map(|found| found.segments.clone()));
+    Some(descended(cost, &best(found)?.segments))
 }
 
 /// Where a descent from a pattern ends.

@@ -14,16 +14,19 @@ use crate::rate::{WeightResponse, segment_weights_m2};
 /// further look at 32 as one it takes no less.
 const ROWS_AS_ONE: usize = 8;
 
+/// Rows that are added up at a time, in registers.
+const LANES: usize = 8;
+
 /// A linear map from layer weights to samples.
 ///
 /// # Shapes
-/// `columns` holds one column a layer, each `rows` long; the columns of half B and of the axial moments follow where they
-/// are needed.
+/// Columns: the constant, one a layer, and those of half B and of the axial moments where they are needed. `blocks` holds [`LANES`] rows of each
+/// column, then the next rows of each; the last rows are filled up with zeros.
 #[derive(Debug, Clone)]
 pub(super) struct Part {
     rows: usize,
-    constant: Vec<f64>,
-    columns: Vec<f64>,
+    columns: usize,
+    blocks: Vec<[f64; LANES]>,
     /// Where half B's columns are multiples of half A's.
     half_b_over_a: Option<Vec<f64>>,
     axial: bool,
@@ -45,6 +48,7 @@ pub(super) struct Scratch {
     half_a_m2: Vec<f64>,
     half_b_m2: Vec<f64>,
     axial_m2: Vec<f64>,
+    factors: Vec<f64>,
     values: Vec<f64>,
     heat: Vec<f64>,
 }
@@ -63,29 +67,33 @@ impl Part {
         fn axial(response: &WeightResponse) -> &[f64] {
             &response.axial_rad_per_s_m2
         }
-        let mut columns: Vec<f64> = (0..layers).flat_map(|j| column(half_a, j)).collect();
+        let mut columns = vec![responses.iter().map(|r| r.constant_rad_per_s).collect()];
+        columns.extend((0..layers).map(|j| column(half_a, j)));
         let half_b_over_a: Option<Vec<f64>> =
             (0..layers).map(|j| ratio(&column(half_a, j), &column(half_b, j))).collect();
         if half_b_over_a.is_none() {
-            columns.extend((0..layers).flat_map(|j| column(half_b, j)));
+            columns.extend((0..layers).map(|j| column(half_b, j)));
         }
         let has_axial = responses.iter().any(|r| r.axial_rad_per_s_m2.iter().any(|x| *x != 0.0));
         if has_axial {
-            columns.extend((0..layers).flat_map(|j| column(axial, j)));
+            columns.extend((0..layers).map(|j| column(axial, j)));
         }
-        Self {
-            rows: responses.len(),
-            constant: responses.iter().map(|r| r.constant_rad_per_s).collect(),
-            columns,
-            half_b_over_a,
-            axial: has_axial,
+        Self::of_columns(&columns, half_b_over_a, has_axial)
+    }
+
+    fn of_columns(columns: &[Vec<f64>], half_b_over_a: Option<Vec<f64>>, axial: bool) -> Self {
+        let rows = columns[0].len();
+        let mut blocks = Vec::with_capacity(rows.div_ceil(LANES) * columns.len());
+        for first in (0..rows).step_by(LANES) {
+            let block = |column: &Vec<f64>| std::array::from_fn(|i| column.get(first + i).copied().unwrap_or(0.0));
+            blocks.extend(columns.iter().map(block));
         }
+        Self { rows, columns: columns.len(), blocks, half_b_over_a, axial }
     }
 
     /// Sums of so many rows each.
     fn summed(&self, rows: usize) -> Self {
-        let sums = |column: &[f64]| -> Vec<f64> { column.chunks(rows).map(|chunk| chunk.iter().sum()).collect() };
-        self.each_column(sums)
+        self.each_column(|column| column.chunks(rows).map(|chunk| chunk.iter().sum()).collect())
     }
 
     /// The last of so many rows each.
@@ -94,44 +102,35 @@ impl Part {
     }
 
     fn each_column(&self, shorter: impl Fn(&[f64]) -> Vec<f64>) -> Self {
-        let constant = shorter(&self.constant);
-        let columns = self.columns.chunks(self.rows.max(1)).flat_map(&shorter).collect();
-        Self { rows: constant.len(), constant, columns, ..self.clone() }
+        let value = |column: usize, row: usize| self.blocks[row / LANES * self.columns + column][row % LANES];
+        let column = |k: usize| -> Vec<f64> { (0..self.rows).map(|row| value(k, row)).collect() };
+        let columns: Vec<Vec<f64>> = (0..self.columns).map(|k| shorter(&column(k))).collect();
+        Self::of_columns(&columns, self.half_b_over_a.clone(), self.axial)
     }
 
-    fn values(&self, scratch: &Scratch, values: &mut Vec<f64>) {
-        values.clone_from(&self.constant);
-        let layers = scratch.half_a_m2.len();
+    /// Columns are added one after the other, in every row.
+    fn values(&self, scratch: &mut Scratch, values: &mut Vec<f64>) {
+        let Scratch { half_a_m2, half_b_m2, axial_m2, factors, .. } = scratch;
+        factors.clear();
         match &self.half_b_over_a {
             Some(ratio) => {
-                let weights = ratio.iter().zip(scratch.half_a_m2.iter().zip(&scratch.half_b_m2));
-                self.add_columns(0, weights.map(|(ratio, (a, b))| a + ratio * b), values);
+                let halves = half_a_m2.iter().zip(half_b_m2);
+                factors.extend(ratio.iter().zip(halves).map(|(ratio, (a, b))| *a + ratio * *b));
             }
-            None => self.add_columns(0, scratch.half_a_m2.iter().chain(&scratch.half_b_m2).copied(), values),
+            None => factors.extend(half_a_m2.iter().chain(half_b_m2.iter())),
         }
         if self.axial {
-            self.add_columns(self.columns.len() / self.rows - layers, scratch.axial_m2.iter().copied(), values);
+            factors.extend(axial_m2.iter());
         }
-    }
-
-    /// Adds columns from a first one on, each with its factor, to values: several in one pass over them, one after the other.
-    fn add_columns(&self, first: usize, factors: impl Iterator<Item = f64>, values: &mut [f64]) {
-        // Without rows there are no columns either.
-        let mut columns = self.columns[first * self.rows..].chunks_exact(self.rows.max(1)).zip(factors);
-        while let Some((one, x)) = columns.next() {
-            match (columns.next(), columns.next(), columns.next()) {
-                (Some((two, y)), Some((three, z)), Some((four, w))) => {
-                    let rows = values.iter_mut().zip(one).zip(two).zip(three).zip(four);
-                    rows.for_each(|((((v, a), b), c), d)| *v = *v + x * a + y * b + z * c + w * d);
-                }
-                (two, three, _) => {
-                    let rest = [Some((one, x)), two, three];
-                    for (column, factor) in rest.into_iter().flatten() {
-                        values.iter_mut().zip(column).for_each(|(v, d)| *v += factor * d);
-                    }
-                }
+        values.clear();
+        for block in self.blocks.chunks_exact(self.columns) {
+            let mut sum = block[0];
+            for (column, factor) in block[1..].iter().zip(factors.iter()) {
+                sum.iter_mut().zip(column).for_each(|(v, d)| *v += factor * d);
             }
+            values.extend_from_slice(&sum);
         }
+        values.truncate(self.rows);
     }
 }
 
@@ -155,6 +154,15 @@ impl Worst {
             Worst::Largest(part) => Worst::Largest(part.last_of(ROWS_AS_ONE)),
             Worst::Variation(part) => Worst::Variation(part.summed(ROWS_AS_ONE)),
             Worst::Heated(changes, heat) => Worst::Heated(changes.summed(ROWS_AS_ONE), heat.last_of(ROWS_AS_ONE)),
+        }
+    }
+
+    /// One of half the work: of changes over two rows, which is hardly less. What is looked at by instants has each of them.
+    pub(super) fn coarser(&self) -> Self {
+        match self {
+            Worst::Largest(part) => Worst::Largest(part.clone()),
+            Worst::Variation(part) => Worst::Variation(part.summed(2)),
+            Worst::Heated(changes, heat) => Worst::Heated(changes.summed(2), heat.last_of(2)),
         }
     }
 
@@ -282,7 +290,7 @@ mod tests {
         let mut scratch = Scratch::default();
         Arrangement::new(&segments).weigh(model.wound_coil().unwrap().layer_lengths_m(), &mut scratch);
         let mut values = Vec::new();
-        part.values(&scratch, &mut values);
+        part.values(&mut scratch, &mut values);
         let of = |columns: &[f64], weights: &[f64]| -> f64 { columns.iter().zip(weights).map(|(d, w)| d * w).sum() };
         let expected: Vec<f64> = (parts.changes.iter())
             .map(|response| {

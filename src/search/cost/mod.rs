@@ -97,6 +97,12 @@ pub trait Cost: Clone + Send + Sync + std::fmt::Debug {
         self.clone()
     }
 
+    /// The cost on those samples that tell whether a pattern like the given ones is better, where that takes far less; the cost itself has
+    /// the last word.
+    fn that_tell(&self, _near: &[Vec<usize>]) -> Option<Self> {
+        None
+    }
+
     /// The samples that a search begins with; empty for all of them in their own order.
     fn first_working_set(&self, seed: u64, starts: &[Vec<usize>]) -> Vec<usize>;
 
