@@ -317,7 +317,8 @@ impl QuantileWorst {
                 return None;
             }
         }
-        (self.above.clear(), self.unknown.clear());
+        self.above.clear();
+        self.unknown.clear();
         for &index in &self.order {
             self.judged += 1;
             if is_seen_above(index, &mut self.scratch) {
