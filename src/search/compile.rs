@@ -317,6 +317,19 @@ mod tests {
     }
 
     #[test]
+    fn a_descent_by_coils_that_tell_ends_on_the_smallest_quantile_of_all_coils() {
+        let model = model(8, LayerLength::Actual, &["surface_film", "strain_mismatch"]);
+        with_evaluator(&model, Objective::P95, &tolerance(0.004, 100), |evaluator| {
+            let coils = SampledCoils::new(&evaluator.coils().unwrap(), &[]).unwrap();
+            let smallest = standard_patterns(8).iter().map(|p| coils.cost(p.segments())).fold(f64::INFINITY, f64::min);
+            let search = Optimisation::new(QuantileCost::new(coils, WindabilityClass::Standard), plan(1));
+            let start = Classic::Zyl.pattern(8).unwrap().segments().to_vec();
+            let reached = search.in_other_orders(&[start], &|| true).unwrap();
+            assert!((reached.cost / smallest - 1.0).abs() < 1e-9, "{} {smallest}", reached.cost);
+        });
+    }
+
+    #[test]
     fn a_pattern_that_passes_is_judged_in_all_coils_and_one_that_does_not_is_hardly_ever_better() {
         let model = model(12, LayerLength::Actual, &["surface_film", "strain_mismatch"]);
         with_evaluator(&model, Objective::P95, &tolerance(0.004, 400), |evaluator| {
