@@ -6,7 +6,7 @@
 
 use super::cost::objective::Objective;
 use super::cost::pointing::pointing_as_rate;
-use super::cost::worst_case::{SearchError, SolvedProfiles};
+use super::cost::worst_case::{SearchError, SolvedProfiles, WorstCase};
 use super::evaluator::Evaluator;
 use super::weighing::ratio_over;
 use crate::pattern::Pattern;
@@ -108,12 +108,11 @@ impl Evaluator<'_> {
                 return Ok(vec![[0.0; 2]; patterns.len()]);
             }
             let solved = SolvedProfiles::new(self.model, profiles)?;
-            let worst = |pattern: &Pattern| {
-                let rate_rad_per_s = solved.worst_case(self.model, pattern)?.rate_rad_per_s.abs();
+            let worst = |(pattern, worst): (&Pattern, WorstCase)| {
                 let pointing = is_for_pointing.then(|| pointing_as_rate(self.model, &solved, pattern)).transpose()?;
-                Ok([rate_rad_per_s, pointing.map_or(0.0, |worst| worst.rate_rad_per_s.abs())])
+                Ok([worst.rate_rad_per_s.abs(), pointing.map_or(0.0, |worst| worst.rate_rad_per_s.abs())])
             };
-            patterns.iter().map(worst).collect()
+            patterns.iter().zip(solved.worst_cases(self.model, patterns)?).map(worst).collect()
         };
         let on_listed = worst_of(listed)?;
         let sets: Vec<Vec<[f64; 2]>> = drawn.chunks(drawn.len() / SETS).map(worst_of).collect::<Result<_, _>>()?;

@@ -57,6 +57,8 @@ class Case:
         self.logger = more.pop("logger", None) or drawn_logger(rng)
         self.gyro = more.pop("gyro", None) or drawn_gyro(rng, self.logger)
         self.expects, self.conditions = more.pop("expects", {}), [chamber] + more.pop("conditions", [])
+        # Of each effect the words of the simulator that it stands in; another winding's.
+        self.words = more.pop("words", None) or {kind: list(self.hidden) for kind in self.answers}
         self.extra, self.declared = more.pop("extra", []), dict(more.pop("declared", {}))
         self.test_chamber, self.discoverable = more.pop("test_chamber", None), more.pop("discoverable", None)
         assert not more, more
@@ -90,17 +92,18 @@ def effect(rng, kind):
 
 
 def with_effects(rng, name, chamber, kinds, **extra):
-    hidden, declared, columns = {}, {}, list(extra.pop("columns", []))
+    hidden, declared, words, columns = {}, {}, {}, list(extra.pop("columns", []))
     for kind in kinds:
         h, more = effect(rng, kind)
         hidden |= h
+        words[kind] = list(h)
         declared |= more.get("declared", {})
         columns += more.get("columns", [])
     logger = extra.pop("logger", None) or drawn_logger(rng)
     if columns:
         logger["columns"] = columns
     conditions = ["control" if not kinds else "one effect" if len(kinds) == 1 else "several effects"]
-    return Case(rng, name, chamber, kinds, hidden, logger=logger, declared=declared, conditions=conditions + extra.pop("conditions", []), **extra)
+    return Case(rng, name, chamber, kinds, hidden, words=words, logger=logger, declared=declared, conditions=conditions + extra.pop("conditions", []), **extra)
 
 
 def lab(rng):
@@ -322,11 +325,17 @@ def write(root, kind, seed, cases):
                 quiet = dict(case.gyro, sigma=0.0, flicker=0.0, walk=0.0, steps={})
                 without = record(declared, keep, chamber, case.logger, quiet, part, base)[2]
                 listed = number(float((plain - without).std()), 4)
+                own = {}
+                for item, words in (case.words | {"winding": ["wound_as", "wound_segments"]}).items():
+                    if not set(words) & set(hidden):
+                        continue
+                    less = {k: v for k, v in hidden.items() if k not in words or k in keep}
+                    own[item] = number(float((plain - record(declared, less, chamber, case.logger, quiet, part, base)[2]).std()), 4)
         truth[case.name] = dict(answers=case.answers, hidden=case.hidden, expects=case.expects, extra=case.extra, catalogue=case.answers, discoverable=case.discoverable,
                                 columns=case.logger.get("columns", []), wound_as=case.hidden.get("wound_as", case.pattern), declared_as=case.pattern, chamber=case.chamber,
                                 logger={k: v for k, v in case.logger.items() if k != "columns"}, gyro=case.gyro, conditions=case.conditions,
                                 white_noise_deg_per_h=case.gyro["sigma"], noise_sigma_deg_per_h=case.gyro["sigma"], signal_rms_deg_per_h=signal, hidden_rms=size,
-                                listed_rms_deg_per_h=listed, rows=rows_of)
+                                listed_rms_deg_per_h=listed, own_rms_deg_per_h=own, rows=rows_of)
         print(case.name, case.answers or "-", case.extra or "", f"{listed / case.gyro['sigma']:.2f} {size['calibration'] / case.gyro['sigma']:.2f}", rows_of, flush=True)
         json.dump(truth, open(f"{root}/truth.json", "w"), indent=1)
     open(f"{root}/README.md", "w").write(f"Drawn by `laboratory_cases.py DIR {kind} {seed}`.\n\n{__doc__}")

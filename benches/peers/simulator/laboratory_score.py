@@ -98,10 +98,26 @@ def said_among_others(expects, answer):
     return False
 
 
+THROUGH_READINGS = {"sensor_lag", "surface_film", "finite_pack"}
+FAINT = 0.15  # of the white noise: too little to be found
+
+
 def faint(truth):
-    """Whether what is hidden is too little to be found: below 0.15 noises, and nothing that acts through the readings."""
-    through_readings = {"sensor_lag", "surface_film", "finite_pack"} & set(truth["answers"] or [])
-    return not through_readings and truth.get("listed_rms_deg_per_h", 1e9) < 0.15 * truth["noise_sigma_deg_per_h"]
+    """Whether what is hidden is too little to be found, and nothing that acts through the readings."""
+    through_readings = THROUGH_READINGS & set(truth["answers"] or [])
+    return not through_readings and truth.get("listed_rms_deg_per_h", 1e9) < FAINT * truth["noise_sigma_deg_per_h"]
+
+
+def seen(truth):
+    """Of the hidden effects those that can be found beside the others; batches before that was written down count all of them."""
+    own = truth.get("own_rms_deg_per_h") or {}
+    is_seen = lambda kind: kind in THROUGH_READINGS or own.get(kind, 1e9) >= FAINT * truth["noise_sigma_deg_per_h"]
+    return frozenset(kind for kind in truth["answers"] if is_seen(kind))
+
+
+def is_faint_winding(truth):
+    """Whether another winding than the declared one is too little to be found."""
+    return (truth.get("own_rms_deg_per_h") or {}).get("winding", 1e9) < FAINT * truth["noise_sigma_deg_per_h"]
 
 
 def expected(truth):
@@ -118,6 +134,8 @@ def judge(truth, answer):
     expects, discoverable = expected(truth), truth.get("discoverable")
     sets = named(answer) if answer.get("effects") else []
     truth_set = None if wanted is None else frozenset(wanted)
+    if is_faint_winding(truth) and not answer.get("hypothesis"):
+        expects = {k: v for k, v in expects.items() if k not in ("winding", "exchanged")}
     hypothesis = hypothesis_right(expects, answer)
     if hypothesis is None and answer.get("hypothesis") and any(v for v in answer["hypothesis"].values()):
         return "CONFIDENT WRONG" if not answer["hypothesis"].get("offset_steps") else "WRONG SET"
@@ -162,10 +180,10 @@ def judge(truth, answer):
             return "FALSE ALARM"
         return "right" if verdict == "adequate" else "honest"
     if verdict == "adequate":
-        return "right" if faint(truth) else "missed"
+        return "right" if faint(truth) or not seen(truth) else "missed"
     if verdict == "unexplained":
         return "honest"
-    if truth_set in sets:
+    if any(seen(truth) <= s <= truth_set for s in sets):
         return "right" if len(set(sets)) == 1 else "right set"
     return "CONFIDENT WRONG" if verdict == "missing" and len(set(sets)) == 1 else "WRONG SET"
 
@@ -215,13 +233,14 @@ def leading_right(truth, answer):
     if first is None or truth["answers"] is None or truth.get("extra") or (answer["verdict"] == "unexplained" and not hypothesis):
         return None
     expects = expected(truth)
-    asked = hypothesis_right(expects, first)
+    asked = None if is_faint_winding(truth) and not hypothesis else hypothesis_right(expects, first)
     # What is said in words, with a space in it, is a hypothesis or a refitted number.
     said = frozenset(plain_kind(e) for e in first["effects"] if " " not in e)
     hidden = frozenset(truth["answers"])
     beside = {expects["refitted"]["kind"]} if "refitted" in expects else set()
     wanted = [hidden, hidden | beside] + ([frozenset()] if faint(truth) else [])
-    return (asked if asked is not None else not hypothesis) and said in wanted
+    is_whole = said in wanted or seen(truth) <= said <= hidden
+    return (asked if asked is not None else not hypothesis) and is_whole
 
 
 BINS = [(0.0, 0.5), (0.5, 0.8), (0.8, 0.95), (0.95, 1.01)]

@@ -47,6 +47,13 @@ const ROUNDING: f64 = 1e-9;
 /// a twentieth of all coils; of 200 patterns none that is better is refused so (a test allows one in twenty).
 const NEAR: usize = 4;
 
+/// A pattern is refused by the first of them alone where that is seen to be so many times above the limit. Of 9 million proposals of a search on 40 layers
+/// 240 000 passed, five of them with 1.3 times and more there, and none with 1.5; 6 million were above twice.
+const FAR: f64 = 1.5;
+
+/// Coils that are looked at before any is judged in full, over those that are above the quantile: others are seldom seen above the limit.
+const LOOKED_AT: usize = 2;
+
 /// Coils that are the worst with a pattern, over those that are above the quantile. With four patterns that are alike these were 46 of 400, and a
 /// descent came to what is small in them alone; it is asked again with what it came to among the patterns.
 const WORST_OVER_QUANTILE: usize = 2;
@@ -65,6 +72,8 @@ pub struct SampledCoils {
 #[derive(Debug, Clone)]
 struct SampledCoil {
     lengths_m: Vec<f64>,
+    length_m: f64,
+    asks_axial: bool,
     worst: Worst,
     /// Never above `worst`, and a fraction of the work: enough to refuse most patterns.
     at_least: Worst,
@@ -72,19 +81,20 @@ struct SampledCoil {
 
 impl SampledCoil {
     fn new(lengths_m: &[f64], worst: Worst) -> Self {
-        Self { lengths_m: lengths_m.to_vec(), at_least: worst.at_least(), worst }
+        let length_m = lengths_m.iter().sum();
+        let asks_axial = worst.asks_axial();
+        Self { lengths_m: lengths_m.to_vec(), length_m, asks_axial, at_least: worst.at_least(), worst }
     }
 
     fn worst(&self, pattern: &Arrangement, scratch: &mut Scratch) -> f64 {
-        pattern.weigh(&self.lengths_m, scratch);
+        pattern.weigh(&self.lengths_m, self.length_m, self.asks_axial, scratch);
         self.worst.of(scratch)
     }
 
-    /// Whether a look is enough to see that its worst case is above a limit.
-    fn is_seen_above(&self, pattern: &Arrangement, limit: f64, scratch: &mut Scratch) -> bool {
-        pattern.weigh(&self.lengths_m, scratch);
-        // Rounding refuses nothing.
-        self.at_least.of(scratch) * (1.0 - ROUNDING) > limit
+    /// What a look is enough to see that its worst case is above; rounding refuses nothing.
+    fn seen_above(&self, pattern: &Arrangement, scratch: &mut Scratch) -> f64 {
+        pattern.weigh(&self.lengths_m, self.length_m, self.asks_axial, scratch);
+        self.at_least.of(scratch) * (1.0 - ROUNDING)
     }
 }
 
@@ -165,7 +175,10 @@ impl SampledCoils {
 
     /// Some of the coils, each looked at with half the work.
     pub(crate) fn telling(&self, coils: &[usize]) -> Self {
-        let coarser = |&i: &usize| SampledCoil { worst: self.coils[i].worst.coarser(), ..self.coils[i].clone() };
+        let coarser = |&i: &usize| {
+            let coil = &self.coils[i];
+            SampledCoil { worst: coil.worst.coarser(), at_least: coil.at_least.single(), ..coil.clone() }
+        };
         Self { coils: coils.iter().map(coarser).collect(), ..*self }
     }
 
@@ -307,21 +320,27 @@ impl QuantileWorst {
     pub(crate) fn propose(&mut self, coils: &SampledCoils, segments: &[usize], limit: f64) -> Option<f64> {
         let pattern = Arrangement::new(segments);
         let count = coils.coils.len();
-        let is_seen_above =
-            |index: usize, scratch: &mut Scratch| coils.coils[index].is_seen_above(&pattern, limit, scratch);
+        let scratch = &mut self.scratch;
+        let seen_above = |index: usize, scratch: &mut Scratch| coils.coils[index].seen_above(&pattern, scratch);
         let mut left = count - (coils.share * (count - 1) as f64).floor() as usize;
-        if left > NEAR {
-            let near = &self.order[left - NEAR / 2..left + NEAR / 2];
-            self.judged += NEAR as u64;
-            if near.iter().all(|&index| is_seen_above(index, &mut self.scratch)) {
+        let near = &self.order[left - left.min(NEAR / 2)..count.min(left + NEAR / 2)];
+        let first = seen_above(near[0], scratch);
+        self.judged += 1;
+        if first > FAR * limit {
+            return None;
+        }
+        if left > NEAR && first > limit {
+            self.judged += near.len() as u64 - 1;
+            if near[1..].iter().all(|&index| seen_above(index, scratch) > limit) {
                 return None;
             }
         }
         self.above.clear();
         self.unknown.clear();
-        for &index in &self.order {
+        let (doubtful, others) = self.order.split_at(count.min(LOOKED_AT * left));
+        for &index in doubtful {
             self.judged += 1;
-            if is_seen_above(index, &mut self.scratch) {
+            if seen_above(index, scratch) > limit {
                 self.above.push(index);
                 left -= 1;
                 if left == 0 {
@@ -331,8 +350,9 @@ impl QuantileWorst {
                 self.unknown.push(index);
             }
         }
-        for &index in &self.unknown {
-            self.proposed[index] = coils.coils[index].worst(&pattern, &mut self.scratch);
+        for &index in self.unknown.iter().chain(others) {
+            self.judged += 1;
+            self.proposed[index] = coils.coils[index].worst(&pattern, scratch);
             if self.proposed[index] > limit {
                 left -= 1;
                 if left == 0 {
@@ -341,7 +361,7 @@ impl QuantileWorst {
             }
         }
         for &index in &self.above {
-            self.proposed[index] = coils.coils[index].worst(&pattern, &mut self.scratch);
+            self.proposed[index] = coils.coils[index].worst(&pattern, scratch);
         }
         self.proposed_cost = quantile_of(&self.proposed, coils.share);
         (self.proposed_cost <= limit).then_some(self.proposed_cost)

@@ -15,7 +15,7 @@ use crate::pattern::Pattern;
 use crate::pattern::classic::Classic;
 use crate::rate::{CoilModel, LayerWeights, RateError, RateModel, WeightResponse};
 use crate::search::cost::columns::{Columns, Norm};
-use crate::search::cost::worst_case::{SearchError, SolvedProfiles};
+use crate::search::cost::worst_case::{SearchError, SolvedProfiles, WorstCase};
 use crate::thermal::Instant;
 
 /// Which column belongs to which layer and half.
@@ -285,10 +285,36 @@ impl SampleMatrix {
     }
 }
 
+impl SolvedProfiles {
+    /// [`SolvedProfiles::worst_case`] of each of several patterns: what the layer weights are multiplied with is worked out once for all.
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn worst_cases(&self, model: &CoilModel, patterns: &[Pattern]) -> Result<Vec<WorstCase>, SearchError> {
+        if patterns.len() < FEWEST_AT_ONCE || any_rate_model(model)?.has_formulas() {
+            return patterns.iter().map(|pattern| self.worst_case(model, pattern)).collect();
+        }
+        let (matrix, origins) = SampleMatrix::of_profiles(model, self)?;
+        let worst = |pattern: &Pattern| {
+            let mut tops = vec![0.0_f64; self.profiles().len()];
+            let rates_rad_per_s = matrix.rates_rad_per_s(model, pattern)?;
+            origins
+                .iter()
+                .zip(&rates_rad_per_s)
+                .for_each(|(o, rate)| tops[o.profile] = tops[o.profile].max(rate.abs()));
+            Ok(self.worst_of(&RateModel::new(model, pattern, &[])?, &tops))
+        };
+        patterns.iter().map(worst).collect()
+    }
+}
+
 fn is_finite(response: &WeightResponse) -> bool {
     let parts = [&response.half_a_rad_per_s_m2, &response.half_b_rad_per_s_m2, &response.axial_rad_per_s_m2];
     response.constant_rad_per_s.is_finite() && parts.into_iter().flatten().all(|v| v.is_finite())
 }
+
+/// Patterns from which on the responses of all samples take less than the samples of each.
+const FEWEST_AT_ONCE: usize = 3;
 
 /// A rate model with a pattern that does not matter, to ask for responses.
 pub(crate) fn any_rate_model(model: &CoilModel) -> Result<RateModel, SearchError> {
@@ -344,6 +370,21 @@ pub(in crate::search) mod tests {
         let up = Piece { rate_k_per_s: 0.003, duration_s: 40.0 };
         let down = Piece { rate_k_per_s: -0.002, duration_s: 60.0 };
         vec![Profile::new("up", vec![up, down]).unwrap(), Profile::new("down", vec![down, up, down]).unwrap()]
+    }
+
+    #[test]
+    fn worst_cases_of_several_patterns_are_those_of_each() {
+        // One that is linear, one that remembers, one that has moments along the axis.
+        for effects in [&["surface_film"][..], &["sensor_lag", "midpoint_offset"], &["surface_film", "axial_gradient"]]
+        {
+            let model = model(8, LayerLength::Actual, effects);
+            let solved = SolvedProfiles::new(&model, &profiles()).unwrap();
+            let patterns = [Classic::Zyl, Classic::Dip, Classic::Qua].map(|classic| classic.pattern(8).unwrap());
+            let together = solved.worst_cases(&model, &patterns).unwrap();
+            for (pattern, found) in patterns.iter().zip(&together) {
+                assert_eq!(*found, solved.worst_case(&model, pattern).unwrap(), "{effects:?}");
+            }
+        }
     }
 
     #[test]

@@ -192,8 +192,13 @@ impl SolvedProfiles {
         {
             return Err(fault.into());
         }
+        Ok(self.worst_of(&rate_model, &self.tops(&rate_model)))
+    }
+
+    /// The largest of a pattern, given the largest sample of each profile.
+    pub(super) fn worst_of(&self, rate_model: &RateModel, tops: &[f64]) -> WorstCase {
         let candidates: Vec<WorstCase> = self
-            .contenders(&rate_model, PEAK_SHARE)
+            .contenders_of(rate_model, tops, PEAK_SHARE)
             .into_iter()
             .map(|(index, (rate_rad_per_s, time_s))| {
                 let profile = self.profiles[index].profile.name().to_owned();
@@ -207,18 +212,22 @@ impl SolvedProfiles {
                 worst = candidate;
             }
         }
-        Ok(worst.clone())
+        worst.clone()
+    }
+
+    /// The largest sample of each profile.
+    fn tops(&self, rate_model: &RateModel) -> Vec<f64> {
+        let top = |p: &SolvedProfile| p.series_rad_per_s(rate_model).iter().fold(0.0, |most: f64, r| most.max(r.abs()));
+        self.profiles.iter().in_parallel().map(top).collect()
     }
 
     /// By their indices, in order, the profiles whose largest sample is at least this share of the largest of all; each with its
     /// largest rate error, between samples too, and the time of it. There is always one.
     pub(super) fn contenders(&self, rate_model: &RateModel, share: f64) -> Vec<(usize, (f64, f64))> {
-        let tops: Vec<f64> = self
-            .profiles
-            .iter()
-            .in_parallel()
-            .map(|p| p.series_rad_per_s(rate_model).iter().fold(0.0, |most: f64, rate| most.max(rate.abs())))
-            .collect();
+        self.contenders_of(rate_model, &self.tops(rate_model), share)
+    }
+
+    fn contenders_of(&self, rate_model: &RateModel, tops: &[f64], share: f64) -> Vec<(usize, (f64, f64))> {
         let least = share * tops.iter().copied().fold(0.0, f64::max);
         let contenders: Vec<usize> = (0..tops.len()).filter(|&index| tops[index] >= least).collect();
         contenders.in_parallel().map(|index| (index, self.profiles[index].worst(rate_model))).collect()
