@@ -67,15 +67,14 @@ pub(crate) fn worst_rates_rad_per_s(
     patterns: &[Pattern],
 ) -> Result<Vec<f64>, SearchError> {
     let bounds = UnitStep::new(model, profiles.max_rate_k_per_s).and_then(|step| {
-        let bound = |pattern: &Pattern| Ok(step.guaranteed(model, pattern)?.rate_rad_per_s);
-        patterns.iter().map(bound).collect::<Result<Vec<f64>, GuaranteedError>>()
+        Ok(step.guaranteed_of_each(model, patterns)?.iter().map(|bound| bound.rate_rad_per_s).collect())
     });
     match bounds {
         Ok(bounds) => Ok(bounds),
         Err(GuaranteedError::Search(error)) => Err(error),
         Err(GuaranteedError::Effect { .. }) => {
             let solved = SolvedProfiles::new(model, &profiles.profiles())?;
-            patterns.iter().map(|pattern| Ok(solved.worst_case(model, pattern)?.rate_rad_per_s.abs())).collect()
+            Ok(solved.worst_cases(model, patterns)?.iter().map(|worst| worst.rate_rad_per_s.abs()).collect())
         }
     }
 }

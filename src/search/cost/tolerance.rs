@@ -429,17 +429,16 @@ impl<'a> Judge<'a> {
                 &fresh
             }
         };
-        patterns
-            .iter()
-            .map(|pattern| match field {
-                Solved::Step(step) => match step.guaranteed(model, pattern) {
-                    Ok(found) => Ok(found.rate_rad_per_s),
-                    Err(GuaranteedError::Search(error)) => Err(error),
-                    Err(GuaranteedError::Effect { .. }) => Ok(f64::INFINITY),
-                },
-                Solved::Profiles(profiles) => Ok(profiles.worst_case(model, pattern)?.rate_rad_per_s.abs()),
-            })
-            .collect()
+        match field {
+            Solved::Step(step) => match step.guaranteed_of_each(model, patterns) {
+                Ok(found) => Ok(found.iter().map(|found| found.rate_rad_per_s).collect()),
+                Err(GuaranteedError::Search(error)) => Err(error),
+                Err(GuaranteedError::Effect { .. }) => Ok(vec![f64::INFINITY; patterns.len()]),
+            },
+            Solved::Profiles(profiles) => {
+                Ok(profiles.worst_cases(model, patterns)?.iter().map(|worst| worst.rate_rad_per_s.abs()).collect())
+            }
+        }
     }
 }
 
