@@ -67,7 +67,8 @@ pub(crate) fn worst_rates_rad_per_s(
     patterns: &[Pattern],
 ) -> Result<Vec<f64>, SearchError> {
     let bounds = UnitStep::new(model, profiles.max_rate_k_per_s).and_then(|step| {
-        Ok(step.guaranteed_of_each(model, patterns)?.iter().map(|bound| bound.rate_rad_per_s).collect())
+        let bound = |pattern: &Pattern| Ok(step.guaranteed(model, pattern)?.rate_rad_per_s);
+        patterns.iter().map(bound).collect::<Result<Vec<f64>, GuaranteedError>>()
     });
     match bounds {
         Ok(bounds) => Ok(bounds),

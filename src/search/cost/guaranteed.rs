@@ -37,7 +37,7 @@ use crate::numeric::piecewise::PiecewiseLinear;
 use crate::pattern::Pattern;
 use crate::profile::{Piece, Profile};
 use crate::rate::{CoilModel, RateModel, WeightResponse};
-use crate::search::cost::samples::{FEWEST_AT_ONCE, SampleMatrix, any_rate_model};
+use crate::search::cost::samples::{SampleMatrix, any_rate_model};
 use crate::search::cost::worst_case::SearchError;
 use crate::thermal::{Drive, Field, Instant, StepResponse, ThermalHistory, solve};
 use crate::units::REFERENCE_TEMPERATURE_K;
@@ -166,39 +166,7 @@ impl UnitStep {
     /// A pattern of another layer count.
     pub fn guaranteed(&self, model: &CoilModel, pattern: &Pattern) -> Result<Guaranteed, GuaranteedError> {
         let rate_model = RateModel::new(model, pattern, &[]).map_err(SearchError::from)?;
-        let heats = self.heat.as_ref().map(|heat| rate_model.series_rad_per_s(&heat.history));
-        Ok(self.worst_of(&rate_model, rate_model.series_rad_per_s(&self.history), heats))
-    }
-
-    /// The same of each of several patterns: what the layer weights are multiplied with is worked out once for all.
-    ///
-    /// # Errors
-    /// As there.
-    pub(crate) fn guaranteed_of_each(
-        &self,
-        model: &CoilModel,
-        patterns: &[Pattern],
-    ) -> Result<Vec<Guaranteed>, GuaranteedError> {
-        if patterns.len() < FEWEST_AT_ONCE {
-            return patterns.iter().map(|pattern| self.guaranteed(model, pattern)).collect();
-        }
-        let any = any_rate_model(model)?;
-        let matrix = |history: &ThermalHistory| {
-            let rows: Vec<usize> = (0..history.len()).collect();
-            SampleMatrix::new(model, &responses(&any, history, &rows)).map_err(SearchError::from)
-        };
-        let errors = matrix(&self.history)?;
-        let heated = self.heat.as_ref().map(|heat| matrix(&heat.history)).transpose()?;
-        let worst = |pattern: &Pattern| -> Result<Guaranteed, SearchError> {
-            let heats = heated.as_ref().map(|heated| heated.rates_rad_per_s(model, pattern)).transpose()?;
-            let rate_model = RateModel::new(model, pattern, &[])?;
-            Ok(self.worst_of(&rate_model, errors.rates_rad_per_s(model, pattern)?, heats))
-        };
-        Ok(patterns.iter().map(worst).collect::<Result<_, _>>()?)
-    }
-
-    /// Of the errors at the times of the grid and in the limit, and those of the heat alone.
-    fn worst_of(&self, rate_model: &RateModel, mut series: Vec<f64>, heats: Option<Vec<f64>>) -> Guaranteed {
+        let mut series = rate_model.series_rad_per_s(&self.history);
         let limit = series.pop().expect("the limit was appended");
         let error_of = |field: &Field, time_s: f64| {
             let history = rates_at(field, &[time_s]);
@@ -223,8 +191,9 @@ impl UnitStep {
         let rate_rad_per_s = series[0].abs() + variation + (limit - series[last]).abs();
         let mut found = Guaranteed { rate_rad_per_s, max_rate_k_per_s: self.max_rate_k_per_s, turns, limit, sign: 1.0 };
         let heat_at = |time_s: f64| self.heat.as_ref().map_or(0.0, |heat| error_of(&heat.field, time_s));
-        if let Some(heats) = heats {
+        if let Some(heat) = &self.heat {
             let with_heat = |time_s: f64, error: f64, heat: f64| found.variation_until(time_s, error) + heat.abs();
+            let heats = rate_model.series_rad_per_s(&heat.history);
             let worst = (1..last)
                 .map(|i| (i, with_heat(self.times_s[i], series[i], heats[i])))
                 .fold((0, 0.0), |best, here| if here.1 > best.1 { here } else { best });
@@ -235,14 +204,14 @@ impl UnitStep {
                 let rate_rad_per_s = peak.value.max(worst.1);
                 found.turns.retain(|turn| turn.0 < peak_s);
                 found.turns.push((peak_s, error_at(peak_s)));
-                return Guaranteed { rate_rad_per_s, sign: heat_at(peak_s).signum(), ..found };
+                return Ok(Guaranteed { rate_rad_per_s, sign: heat_at(peak_s).signum(), ..found });
             }
         }
         found.shorten(&self.times_s, &series);
         if self.heat.is_some() {
             found.sign = heat_at(found.turns[found.turns.len() - 1].0).signum();
         }
-        found
+        Ok(found)
     }
 
     /// The bound as a sum of sizes over samples, for any pattern: minimise it with [`crate::search::cost::columns::Norm::Sum`]. It falls
@@ -262,11 +231,14 @@ impl UnitStep {
         let rate_model = any_rate_model(model)?;
         let limit = self.times_s.len();
         let rows: Vec<usize> = (0..limit).step_by(stride).chain([limit]).collect();
-        let steps = responses(&rate_model, &self.history, &rows);
+        let of = |history: &ThermalHistory, rows: &[usize]| -> Vec<WeightResponse> {
+            rows.iter().map(|&row| rate_model.weight_response(&rate_model.state(history, row, &[]))).collect()
+        };
+        let steps = of(&self.history, &rows);
         let mut changes = vec![steps[0].clone()];
         changes.extend(steps.windows(2).map(|pair| difference(&pair[1], &pair[0])));
         let heat = self.heat.as_ref().map_or_else(Vec::new, |heat| {
-            let mut errors = responses(&rate_model, &heat.history, &rows[..rows.len() - 1]);
+            let mut errors = of(&heat.history, &rows[..rows.len() - 1]);
             // Nothing is left of the heat's error in the limit.
             errors.push(difference(&errors[0], &errors[0]));
             errors
@@ -337,11 +309,6 @@ fn append_limit(history: &mut ThermalHistory, rate_k_per_s: f64) {
     history.ambient_rate_k_per_s.push(rate_k_per_s);
 }
 
-/// What the layer weights are multiplied with in some rows of a history.
-fn responses(rate_model: &RateModel, history: &ThermalHistory, rows: &[usize]) -> Vec<WeightResponse> {
-    rows.iter().map(|&row| rate_model.weight_response(&rate_model.state(history, row, &[]))).collect()
-}
-
 fn difference(later: &WeightResponse, earlier: &WeightResponse) -> WeightResponse {
     let of = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<f64>>();
     WeightResponse {
@@ -368,22 +335,6 @@ mod tests {
 
     /// Extrema of the step's response are found to this share of the bound; the margin of its grid is larger.
     const EXTREMA: f64 = 1e-5;
-
-    #[test]
-    fn guaranteed_of_several_patterns_is_that_of_each() {
-        for effects in [&["surface_film"][..], &["surface_film", "midpoint_offset"], &["self_heating"]] {
-            let model = model(8, LayerLength::Actual, effects);
-            let step = UnitStep::new(&model, 0.003).unwrap();
-            let patterns = [Classic::Zyl, Classic::Dip, Classic::Qua].map(|classic| classic.pattern(8).unwrap());
-            let together = step.guaranteed_of_each(&model, &patterns).unwrap();
-            for (pattern, found) in patterns.iter().zip(&together) {
-                let alone = step.guaranteed(&model, pattern).unwrap();
-                let off = found.rate_rad_per_s / alone.rate_rad_per_s - 1.0;
-                assert!(off.abs() < 1e-9, "{effects:?}: {off:e}");
-                assert!((found.limit - alone.limit).abs() < 1e-9 * alone.rate_rad_per_s, "{effects:?}");
-            }
-        }
-    }
 
     #[test]
     fn the_bang_bang_profile_attains_the_bound_and_nothing_exceeds_it() {

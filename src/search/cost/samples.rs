@@ -314,7 +314,7 @@ fn is_finite(response: &WeightResponse) -> bool {
 }
 
 /// Patterns from which on the responses of all samples take less than the samples of each.
-pub(crate) const FEWEST_AT_ONCE: usize = 3;
+const FEWEST_AT_ONCE: usize = 3;
 
 /// A rate model with a pattern that does not matter, to ask for responses.
 pub(crate) fn any_rate_model(model: &CoilModel) -> Result<RateModel, SearchError> {

@@ -430,11 +430,14 @@ impl<'a> Judge<'a> {
             }
         };
         match field {
-            Solved::Step(step) => match step.guaranteed_of_each(model, patterns) {
-                Ok(found) => Ok(found.iter().map(|found| found.rate_rad_per_s).collect()),
-                Err(GuaranteedError::Search(error)) => Err(error),
-                Err(GuaranteedError::Effect { .. }) => Ok(vec![f64::INFINITY; patterns.len()]),
-            },
+            Solved::Step(step) => {
+                let worst = |pattern| match step.guaranteed(model, pattern) {
+                    Ok(found) => Ok(found.rate_rad_per_s),
+                    Err(GuaranteedError::Search(error)) => Err(error),
+                    Err(GuaranteedError::Effect { .. }) => Ok(f64::INFINITY),
+                };
+                patterns.iter().map(worst).collect()
+            }
             Solved::Profiles(profiles) => {
                 Ok(profiles.worst_cases(model, patterns)?.iter().map(|worst| worst.rate_rad_per_s.abs()).collect())
             }
