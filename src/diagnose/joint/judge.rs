@@ -3,6 +3,8 @@
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
 
+use nalgebra::DVector;
+
 use super::adjust::adjust;
 use super::back::rest;
 use super::explanation::fitted;
@@ -10,7 +12,7 @@ use super::odds::{CERTAIN, WINDOW};
 use super::parsimony::give_to_smaller;
 use super::readings::take_off;
 use super::{Explanation, Member, Outcome, Question, Winding};
-use crate::chamber::{Effort, Fit};
+use crate::chamber::{Column, Effort, Fit};
 use crate::parallel::InParallel;
 
 /// Sets that are judged by held-out records at most.
@@ -171,8 +173,8 @@ fn give_masses(question: &Question, explanations: &mut [Explanation]) {
     for (e, mass) in explanations.iter_mut().zip(masses) {
         e.probability = mass / sum;
     }
-    let errors: Vec<Option<[f64; 2]>> =
-        explanations.iter().in_parallel().map(|e| errors(question, e).unwrap_or(None)).collect();
+    let rates: Vec<Option<Rates>> =
+        explanations.iter().in_parallel().map(|e| rates(question, e).unwrap_or(None)).collect();
     let sizes: Vec<usize> = explanations.iter().map(|e| e.members.len()).collect();
     let is_no_news = |small: usize, large: usize| {
         let mut more = explanations[large].more_than(&explanations[small]);
@@ -185,7 +187,9 @@ fn give_masses(question: &Question, explanations: &mut [Explanation]) {
         let worsens = || {
             let mut more = explanations[large].more_than(&explanations[small]);
             more.all(|m| matches!(m, Member::Effect(_) | Member::Refitted(_)))
-                && errors[small].zip(errors[large]).is_some_and(|(a, b)| is_worse(b, a))
+                && rates[small].as_ref().zip(rates[large].as_ref()).is_some_and(|(from, to)| {
+                    mean_gain(question, &explanations[small].fit, from, to).is_ok_and(is_loss)
+                })
         };
         explanations[small].is_within(&explanations[large])
             && (is_as_good(worth[small], worth[large]) || is_no_news(small, large) || worsens())
@@ -226,34 +230,46 @@ fn is_as_good(small: f64, large: f64) -> bool {
 /// A share of the mass below which nothing is named.
 const LOOKED_AT: f64 = 0.01;
 
-/// Whether the first leaves more of fitted and of held-out rates than the second: what is missing in a coil lowers one of them.
-fn is_worse(errors: [f64; 2], than: [f64; 2]) -> bool {
-    errors[0] > than[0] && errors[1] >= than[1]
-}
+/// Rates that a set predicts [rad/s] of each of the chamber's records, from readings alone; empty where it was neither fitted nor asked.
+type Rates = Vec<Vec<f64>>;
 
-/// Mean squares that readings and a set leave of the rates of fitted and of held-out records.
-fn errors(question: &Question, explanation: &Explanation) -> Outcome<Option<[f64; 2]>> {
+fn rates(question: &Question, explanation: &Explanation) -> Outcome<Option<Rates>> {
     if explanation.probability < LOOKED_AT && !explanation.members.is_empty() {
         return Ok(None);
     }
-    let of = |fit: &Fit, records: &[usize]| -> Outcome<f64> {
-        let mut squares: Vec<f64> = Vec::new();
-        for &r in records {
-            let residuals = question.chamber.prediction(fit, r)?.residual_rad_per_s;
-            squares.extend(residuals.iter().filter(|v| v.is_finite()).map(|v| v * v));
-        }
-        Ok(squares.iter().sum::<f64>() / squares.len().max(1) as f64)
+    let mut all = vec![Vec::new(); question.chamber.records()];
+    let fitted = question.fitted.iter().map(|&r| (r, &explanation.fit));
+    for (r, fit) in fitted.chain(question.held_out.iter().copied().zip(&*explanation.fit.days)) {
+        all[r] = question.chamber.prediction(fit, r)?.rate_rad_per_s;
+    }
+    Ok(Some(all))
+}
+
+/// By how much the log likelihoods of fitted and of held-out rates rise if the rates that a fit predicts are replaced by others and all that is
+/// said of noise and air stays as it is.
+fn mean_gain(question: &Question, fit: &Fit, from: &Rates, to: &Rates) -> Outcome<[f64; 2]> {
+    let change = |(from, to): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
+        from.iter().zip(to).map(|(from, to)| to - from).map(|d| if d.is_finite() { d } else { 0.0 }).collect()
     };
-    let days = question.held_out.iter().zip(&*explanation.fit.days).map(|(&r, day)| of(day, &[r]));
-    let days: Outcome<Vec<f64>> = days.collect();
-    Ok(Some([of(&explanation.fit, &question.fitted)?, days?.iter().sum()]))
+    let column = [Column { rate_rad_per_s: from.iter().zip(to).map(change).collect() }];
+    let gain = |fit: &Fit| Ok(question.chamber.score(fit, &column)?.gain_of(&DVector::from_element(1, 1.0)));
+    let held_out: Outcome<Vec<f64>> = fit.days.iter().map(gain).collect();
+    Ok([gain(fit)?, held_out?.iter().sum()])
+}
+
+/// Whether what a set predicts is worse in fitted and in held-out records: what is missing in a coil is seen in one of them.
+fn is_loss(gain: [f64; 2]) -> bool {
+    gain[0] < 0.0 && gain[1] <= 0.0
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chamber::Assumption;
-    use crate::diagnose::experiment::fixtures::{model, pattern};
+    use crate::chamber::{Assumption, Chamber};
+    use crate::diagnose::candidate::candidates;
+    use crate::diagnose::experiment::fixtures::{effect, model, pattern};
+    use crate::diagnose::joint::with;
+    use crate::diagnose::tests::bare_day;
 
     fn of(effects: &[usize], merit: f64) -> Explanation {
         let fit = Fit::to_nothing(Assumption::new(model(Vec::new()), pattern()), Vec::new(), 1e-7);
@@ -304,10 +320,44 @@ mod tests {
     }
 
     #[test]
-    fn what_raises_both_errors_is_worse_and_what_lowers_either_is_not() {
-        assert!(is_worse([1.1, 2.1], [1.0, 2.0]));
-        assert!(!is_worse([1.1, 1.9], [1.0, 2.0]) && !is_worse([0.9, 2.1], [1.0, 2.0]));
+    fn rates_of_what_is_hidden_gain_and_those_without_it_lose() {
+        let hidden = effect("midpoint_offset", &[0.1]);
+        let declared = model(Vec::new());
+        let records = [3, 4].map(|seed| bare_day(&model(vec![hidden.clone()]), 20.0, seed));
+        let pattern = pattern();
+        let assumed = Assumption::new(declared.clone(), pattern.clone());
+        let (chamber, null) =
+            Chamber::new(&declared, &[&records[0], &records[1]]).unwrap().with_shocks(&assumed, &[0]).unwrap();
+        let candidates = candidates(&declared, &[&records[0], &records[1]]);
+        let question = Question {
+            chamber: &chamber,
+            model: &declared,
+            pattern: &pattern,
+            candidates: &candidates,
+            fitted: vec![0],
+            held_out: vec![1],
+            depth: 1,
+        };
+        let place = Member::Effect(candidates.iter().position(|c| c.kind() == "midpoint_offset").unwrap());
+        let begin = with(&question, &[], &null, place, Some(hidden.values().to_vec())).unwrap();
+        let without = Explanation::new(&question, &[], Vec::new(), null.clone());
+        let found = fitted(&question, &[], vec![place], &begin, &null, Effort::QUICK).unwrap();
+        let [without, found] = [without, found].map(|mut explanation| {
+            question.held_out_evidence(&mut explanation.fit);
+            Explanation { probability: 1.0, ..explanation }
+        });
+        let of = |explanation: &Explanation| rates(&question, explanation).unwrap().unwrap();
+        let gain = mean_gain(&question, &without.fit, &of(&without), &of(&found)).unwrap();
+        let loss = mean_gain(&question, &found.fit, &of(&found), &of(&without)).unwrap();
+        assert!(gain.iter().all(|g| *g > 10.0) && loss.iter().all(|g| *g < -10.0), "{gain:?} {loss:?}");
+        assert!(is_loss(loss) && !is_loss(gain));
+    }
+
+    #[test]
+    fn what_predicts_fitted_and_held_out_rates_worse_is_a_loss_and_what_predicts_either_better_is_not() {
+        assert!(is_loss([-1.0, -2.0]));
+        assert!(!is_loss([-1.0, 2.0]) && !is_loss([1.0, -2.0]));
         // Nothing held out.
-        assert!(is_worse([1.1, 0.0], [1.0, 0.0]) && !is_worse([1.0, 0.0], [1.0, 0.0]));
+        assert!(is_loss([-1.0, 0.0]) && !is_loss([1.0, 0.0]));
     }
 }

@@ -102,14 +102,17 @@ fn ranked_from(
     Ok((best, worth, found))
 }
 
-/// Of judged sets, the likeliest if it goes further than the best of the search or held-out records alone prefer it, and, if that is wound otherwise, the likeliest that is not.
+/// Of judged sets, the likeliest, and the likeliest before any gave its mass to a smaller one, if they go further than the best of the search or held-out
+/// records alone prefer them, and, if the likeliest is wound otherwise, the likeliest that is not.
 fn preferred(judged: &[Explanation], best: &Explanation) -> Vec<Explanation> {
     let Some(first) = judged.first() else { return Vec::new() };
+    let fullest = judged.iter().filter(|e| !e.is_outside() && e.key() != first.key());
+    let fullest = fullest.max_by(|a, b| a.total().total_cmp(&b.total())).filter(|e| e.total() > first.total());
+    let is_further = |e: &&Explanation| e.members.len() > best.members.len() || e.merit < best.merit - WINDOW;
+    let further = [Some(first), fullest].into_iter().flatten().filter(is_further);
     let plain = judged.iter().find(|e| !e.has_winding() && e.members.len() > 1 && !e.is_outside());
-    let is_further = first.members.len() > best.members.len() || first.merit < best.merit - WINDOW;
-    let further = is_further.then_some(first);
     let plain = plain.filter(|e| first.has_winding() && e.key() != best.key() && e.total() > first.total() - WINDOW);
-    further.into_iter().chain(plain).cloned().collect()
+    further.chain(plain).cloned().collect()
 }
 
 /// What was found, judged again in a chamber that is looked through with the best of it ([`crate::chamber::Chamber::with_timed_shocks_by`]):
@@ -231,6 +234,11 @@ mod tests {
         assert!(preferred(std::slice::from_ref(&best), &best).is_empty());
         let further = judged(vec![one, Member::Effect(1)], 101.0, 58.0);
         assert_eq!(keys(preferred(&[further.clone(), best.clone()], &best)), [further.key()]);
+        // So is what gave its mass to a smaller one, though it was likelier: another effect in the place of one of it may be certain.
+        let list = [best.clone(), further.clone()];
+        assert_eq!(keys(preferred(&list, &best)), [further.key()]);
+        let behind = judged(vec![one, Member::Effect(1)], 101.0, 48.0);
+        assert!(preferred(&[best.clone(), behind], &best).is_empty());
         // In the place of another winding, too, unless it is far behind.
         let rewound = judged(vec![one, wound], 102.0, 60.0);
         let list = [rewound.clone(), further.clone(), best.clone()];
