@@ -246,7 +246,7 @@ fn rates(question: &Question, explanation: &Explanation) -> Outcome<Option<Rates
 }
 
 /// By how much the log likelihoods of fitted and of held-out rates rise if the rates that a fit predicts are replaced by others and all that is
-/// said of noise and air stays as it is.
+/// said of noise and air stays as it is, what was fitted apart ([`crate::chamber::Chamber::score`]).
 fn mean_gain(question: &Question, fit: &Fit, from: &Rates, to: &Rates) -> Outcome<[f64; 2]> {
     let change = |(from, to): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
         from.iter().zip(to).map(|(from, to)| to - from).map(|d| if d.is_finite() { d } else { 0.0 }).collect()

@@ -106,10 +106,10 @@ fn ranked_from(
 /// records alone prefer them, and, if the likeliest is wound otherwise, the likeliest that is not.
 fn preferred(judged: &[Explanation], best: &Explanation) -> Vec<Explanation> {
     let Some(first) = judged.first() else { return Vec::new() };
-    let fullest = judged.iter().filter(|e| !e.is_outside() && e.key() != first.key());
-    let fullest = fullest.max_by(|a, b| a.total().total_cmp(&b.total())).filter(|e| e.total() > first.total());
+    let others = judged.iter().filter(|e| !e.is_outside() && e.key() != first.key());
+    let likelier = others.max_by(|a, b| a.total().total_cmp(&b.total())).filter(|e| e.total() > first.total());
     let is_further = |e: &&Explanation| e.members.len() > best.members.len() || e.merit < best.merit - WINDOW;
-    let further = [Some(first), fullest].into_iter().flatten().filter(is_further);
+    let further = [Some(first), likelier].into_iter().flatten().filter(is_further);
     let plain = judged.iter().find(|e| !e.has_winding() && e.members.len() > 1 && !e.is_outside());
     let plain = plain.filter(|e| first.has_winding() && e.key() != best.key() && e.total() > first.total() - WINDOW);
     further.chain(plain).cloned().collect()

@@ -79,14 +79,19 @@ pub(super) fn promising(question: &Question, fit: &Fit) -> Outcome<Vec<Winding>>
             }
         }
     }
-    all.retain(|w| w.promised > WORTH_A_LOOK);
-    sort_descending(&mut all, |item| item.promised);
-    let are_neighbours = |w: &Winding| w.exchanged.is_some_and(|(a, b)| b - a == 1);
-    let mut others = all.split_off(EXCHANGES_LOOKED_AT.min(all.len()));
-    others.retain(are_neighbours);
-    all.extend(others.into_iter().take(NEIGHBOURS_LOOKED_AT));
+    let mut all = worth_a_look(all);
     all.extend(classics(question.pattern, &fit.assumed.pattern));
     Ok(most_likely(question, fit, all))
+}
+
+/// Exchanges that promise most, and neighbours behind them.
+fn worth_a_look(mut all: Vec<Winding>) -> Vec<Winding> {
+    all.retain(|w| w.promised > WORTH_A_LOOK);
+    sort_descending(&mut all, |item| item.promised);
+    let mut others = all.split_off(EXCHANGES_LOOKED_AT.min(all.len()));
+    others.retain(|w| w.exchanged.is_some_and(|(a, b)| b - a == 1));
+    all.extend(others.into_iter().take(NEIGHBOURS_LOOKED_AT));
+    all
 }
 
 /// Other classics, and the declared winding connected the other way round: this as likely as all of those together, which are alike.
@@ -144,6 +149,26 @@ mod tests {
         assert!((sum - 1.0).abs() < 1e-12, "{sum}");
         let ratio = share_of_exchanges((31, 32), layers) / share_of_exchanges((3, 13), layers);
         assert!((ratio - 10.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn neighbours_are_looked_at_behind_others_that_promise_more() {
+        let pattern = Classic::Dip.pattern(8).unwrap();
+        let exchange = |pair, promised| Winding {
+            pattern: pattern.clone(),
+            classic: None,
+            reversed: false,
+            exchanged: Some(pair),
+            log_prior: 0.0,
+            promised,
+        };
+        let far = (0..40).map(|i| exchange((0, 2 + i), 200.0 - i as f64));
+        let near = (0..10).map(|i| exchange((i, i + 1), 20.0 - i as f64));
+        let found = worth_a_look(near.chain(far).chain([exchange((5, 6), WORTH_A_LOOK - 1.0)]).collect());
+        let pairs: Vec<(usize, usize)> = found.iter().filter_map(|w| w.exchanged).collect();
+        let expected = (0..EXCHANGES_LOOKED_AT).map(|i| (0, 2 + i));
+        let expected = expected.chain((0..NEIGHBOURS_LOOKED_AT).map(|i| (i, i + 1)));
+        assert_eq!(pairs, expected.collect::<Vec<_>>());
     }
 
     #[test]
