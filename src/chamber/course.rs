@@ -35,15 +35,16 @@ impl Chamber<'_> {
     /// # Errors
     /// A model that cannot be solved for this record.
     pub(crate) fn held_out(&self, fit: &Fit, record: usize) -> Result<Fit, ChamberError> {
-        let mut start = fit.clone();
-        // With the day as a fit like this one found it, where one was asked.
-        if let Some(day) = fit.days.iter().find(|day| day.records == [record]) {
-            start.records = vec![record];
-            start.numbers.clone_from(&day.numbers);
-            start.courses[record].clone_from(&day.courses[record]);
-            start.known_derivatives.clone_from(&day.known_derivatives);
-        }
-        start.days = Arc::default();
+        let mut start = Fit { days: Arc::default(), ..fit.clone() };
+        let Some(day) = fit.days.iter().find(|day| day.records == [record]) else {
+            let day = self.fit(&fit.assumed, &[], &[record], Some(&start), Effort::FULL)?;
+            return self.in_better_order(day, Effort::FULL);
+        };
+        // With the day as a fit like this one found it.
+        start.records = vec![record];
+        start.numbers.clone_from(&day.numbers);
+        start.courses[record].clone_from(&day.courses[record]);
+        start.known_derivatives.clone_from(&day.known_derivatives);
         self.fit(&fit.assumed, &[], &[record], Some(&start), Effort::FULL)
     }
 

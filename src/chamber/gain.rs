@@ -44,6 +44,29 @@ impl Chamber<'_> {
         Ok(here? - there?.max(worth(&same_air, fit, other)?))
     }
 
+    /// The rise of the log posterior of some records \[nat\] over that by another chamber, with the kinks of each paid for: what either leaves out
+    /// is left out of both.
+    ///
+    /// # Errors
+    /// As [`Chamber::fit`].
+    pub(super) fn posterior_over(
+        &self,
+        fit: &Fit,
+        other: (&Self, &Fit),
+        records: &[usize],
+    ) -> Result<f64, ChamberError> {
+        let worth = |chamber: &Self, fit: &Fit, beside: &Self| -> Result<f64, ChamberError> {
+            let mut chamber = chamber.clone();
+            records.iter().for_each(|&r| chamber.leave_out_as(beside, r));
+            let fit = chamber.fit(&fit.assumed.clone(), &fit.free.clone(), records, Some(fit), Effort::QUICK)?;
+            let kinks: usize = records.iter().map(|&r| chamber.observed[r].series.kinks).sum();
+            Ok(fit.posterior() + kinks as f64 * KINKS_PER_ROW.ln())
+        };
+        let (other, other_fit) = other;
+        let (here, there) = crate::parallel::join(|| worth(self, fit, other), || worth(other, other_fit, self));
+        Ok(here? - there?)
+    }
+
     /// Leaves out of a record what another chamber leaves out of it as well.
     fn leave_out_as(&mut self, other: &Self, record: usize) {
         let there = &other.observed[record].series;
@@ -83,6 +106,12 @@ mod tests {
         assert!(difference.abs() > 5.0, "two values fewer are another density: {difference}");
         let gain = fewer.gain_over(&other, (&chamber, &fit), 0).unwrap();
         assert!(gain.abs() < 0.5, "{gain}");
+        // Kinks that are not there are paid for.
+        let gain = fewer.posterior_over(&other, (&chamber, &fit), &[0]).unwrap();
+        assert!(gain.abs() < 0.5, "{gain}");
+        fewer.observed[0].series.kinks += 2;
+        let with_kinks = fewer.posterior_over(&other, (&chamber, &fit), &[0]).unwrap();
+        assert!((with_kinks - gain - 2.0 * KINKS_PER_ROW.ln()).abs() < 1e-9, "{with_kinks}");
 
         let mut switched = chamber.clone();
         let middle_s = record.times_s()[record.times_s().len() / 2] + 1.0;

@@ -13,10 +13,11 @@ use super::kinked_rows::Bend;
 use super::layout::Numbers;
 use super::prior::{GROSS_FACTOR, GROSS_SHARE, KINKS_PER_ROW, Quantity, price_of_controller};
 use super::series::Series;
+use crate::effect::Acts;
 use crate::parallel::InParallel;
 
 use super::system::system;
-use super::{Assumption, Chamber, ChamberError};
+use super::{Assumption, Chamber, ChamberError, Free};
 
 /// Times that a record is looked through for gross errors, and for kinks.
 pub(super) const GROSS_ROUNDS: usize = 5;
@@ -44,7 +45,7 @@ impl<'a> Chamber<'a> {
     /// As [`Chamber::fit`].
     pub(crate) fn with_shocks(self, assumed: &Assumption, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
         let fit = self.best_start(assumed, &[], records)?;
-        self.with_shocks_about(fit, records)
+        self.with_shocks_about(fit, &[], records)
     }
 
     /// The same chamber by a fit that is there already, what is free of its effects included: where a model shows the air at other
@@ -53,31 +54,44 @@ impl<'a> Chamber<'a> {
     /// # Errors
     /// As [`Chamber::fit`].
     pub(crate) fn with_timed_shocks_by(self, fit: Fit, records: &[usize]) -> Result<Self, ChamberError> {
-        let (chamber, fit) = self.with_shocks_by(fit, records)?;
-        chamber.with_timed_kinks(&fit)
+        let effects = &fit.assumed.model.effects;
+        let is_seen = |f: &&Free| matches!(effects[f.effect].spec().acts, Acts::HeatPath | Acts::Sensor);
+        let (seen, of_rates): (Vec<Free>, Vec<Free>) = fit.free.iter().partition(is_seen);
+        let (chamber, there) = self.clone().with_shocks_by(fit.clone(), records)?;
+        let is_kinked = |&r: &usize| chamber.observed[r].series.kinks > 0;
+        if seen.is_empty() || !records.iter().any(is_kinked) {
+            return chamber.with_timed_kinks(&there);
+        }
+        // In air that bends where it should have a kink, heat paths and sensors make up for that: kinks may be better placed by what they
+        // were found to be before.
+        let curved = self.curved(&fit, &of_rates, records)?;
+        let (held, by_held) = self.with_shocks_about(curved, &fit.free, records)?;
+        let is_better = held.posterior_over(&by_held, (&chamber, &there), records)? > 0.0;
+        if is_better { held.with_timed_kinks(&by_held) } else { chamber.with_timed_kinks(&there) }
     }
 
-    /// As [`Chamber::with_timed_shocks_by`], with the fit there and kinks near which rows they are.
+    /// As [`Chamber::with_timed_shocks_by`], with the fit there and kinks near which rows they are, found while all that is free stays so.
     ///
     /// # Errors
     /// As [`Chamber::fit`].
     pub(crate) fn with_shocks_by(self, fit: Fit, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
-        let curved = self.curved(fit, records)?;
-        self.with_shocks_about(curved, records)
+        let curved = self.curved(&fit, &fit.free, records)?;
+        self.with_shocks_about(curved, &fit.free, records)
     }
 
     /// A fit in an air that bends wherever readings do, whatever the air was.
-    pub(super) fn curved(&self, mut fit: Fit, records: &[usize]) -> Result<Fit, ChamberError> {
+    pub(super) fn curved(&self, fit: &Fit, free: &[Free], records: &[usize]) -> Result<Fit, ChamberError> {
+        let mut fit = fit.clone();
         for &r in records {
             let medians = Numbers::medians(&self.observed[r].series);
             Quantity::AIR.iter().for_each(|&quantity| fit.numbers[r].set(quantity, medians.get(quantity)));
         }
-        self.fit(&fit.assumed.clone(), &fit.free.clone(), records, Some(&fit), Effort::QUICK)
+        self.fit(&fit.assumed.clone(), free, records, Some(&fit), Effort::QUICK)
     }
 
     /// By a fit whose air bends wherever readings do: to one that is straight but for its kinks, what does not know them yet is full of
-    /// gross errors.
-    fn with_shocks_about(mut self, curved: Fit, records: &[usize]) -> Result<(Self, Fit), ChamberError> {
+    /// gross errors. `free`: what of its effects is fitted at last.
+    fn with_shocks_about(mut self, curved: Fit, free: &[Free], records: &[usize]) -> Result<(Self, Fit), ChamberError> {
         let whole = self.observed.iter().map(|o| o.series.clone()).collect::<Vec<_>>();
         let curved = self.without_gross_errors(curved, records)?;
         let own = || -> Result<(Self, Fit), ChamberError> {
@@ -90,7 +104,7 @@ impl<'a> Chamber<'a> {
         let (own, days) = crate::parallel::join(own, || self.days_of_others(&curved, records, &look));
         let (mut chamber, fit) = own?;
         chamber.take_days(days?);
-        let fit = chamber.fit(&fit.assumed.clone(), &fit.free.clone(), records, Some(&fit), Effort::FULL)?;
+        let fit = chamber.fit(&fit.assumed.clone(), free, records, Some(&fit), Effort::FULL)?;
         Ok((chamber, fit))
     }
 
@@ -335,7 +349,7 @@ impl<'a> Chamber<'a> {
     pub(super) fn best_start(
         &self,
         assumed: &Assumption,
-        free: &[super::Free],
+        free: &[Free],
         records: &[usize],
     ) -> Result<Fit, ChamberError> {
         let mut base = self.fit(assumed, free, records, None, Effort::NONE)?;
@@ -375,18 +389,10 @@ impl<'a> Chamber<'a> {
     ///
     /// # Errors
     /// As [`Chamber::fit`].
-    pub(crate) fn fit_anew(
-        &self,
-        assumed: &Assumption,
-        free: &[super::Free],
-        records: &[usize],
-    ) -> Result<Fit, ChamberError> {
+    pub(crate) fn fit_anew(&self, assumed: &Assumption, free: &[Free], records: &[usize]) -> Result<Fit, ChamberError> {
         let best = self.best_start(assumed, free, records)?;
         let fit = self.fit(&best.assumed.clone(), free, records, Some(&best), Effort::FULL)?;
-        let Some(&staged) = records.iter().find(|&&r| self.observed[r].series.approaches) else { return Ok(fit) };
-        let Some(other) = self.in_other_order(&fit, &fit, staged)? else { return Ok(fit) };
-        let other = self.fit(&other.assumed.clone(), free, records, Some(&other), Effort::FULL)?;
-        Ok(if other.posterior() > fit.posterior() { other } else { fit })
+        self.in_better_order(fit, Effort::FULL)
     }
 }
 

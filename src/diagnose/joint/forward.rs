@@ -5,7 +5,7 @@ use super::cache::{Cache, carried, keep};
 use super::odds::{CERTAIN, WINDING};
 use super::own_air::{InOwnAir, best_by_own_kinks};
 use super::screen::{foremost, looked_at};
-use super::tries::{calmed, discrete, tried};
+use super::tries::{discrete, from_other_days, tried};
 use super::winding::{promise_beside, promising};
 use super::{Explanation, Outcome, Question, Winding};
 use crate::chamber::{Chamber, Effort};
@@ -101,7 +101,7 @@ impl<'a> Search<'a> {
             (None, None) => return false,
         };
         let here = Question { chamber: &self.chamber, ..question.clone() };
-        let next = calmed(&here, &self.windings, next);
+        let next = from_other_days(&here, &self.windings, next);
         keep(&mut self.cache, next.clone());
         // What was fitted with the larger set may be a better chamber for the smaller one.
         let last = next.members.len().checked_sub(1);

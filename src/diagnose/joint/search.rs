@@ -8,7 +8,7 @@ use super::judge::{Care, judge};
 use super::odds::{CERTAIN, WINDOW};
 use super::own_air::{best_by_own_air, best_without_controllers};
 use super::screen::{Proposal, proposals};
-use super::tries::calmed;
+use super::tries::from_other_days;
 use super::{Explanation, Found, Member, Outcome, Question};
 use crate::chamber::{ChamberError, Effort, Fit};
 use crate::parallel::InParallel;
@@ -28,6 +28,7 @@ pub(crate) fn search_if_it_promises(
     progress: &(dyn Fn(f64) + Sync),
 ) -> Outcome<Option<Found>> {
     let day = question.chamber.fit(&declared.assumed, &[], &question.fitted, Some(declared), Effort::FULL)?;
+    let day = question.chamber.in_better_order(day, Effort::FULL)?;
     let null = Explanation::new(question, &[], Vec::new(), day.clone());
     if most_promised(question, &null)? <= PROMISING {
         return Ok(None);
@@ -169,7 +170,7 @@ pub(crate) fn fit_one(question: &Question, base: &Fit) -> Option<Explanation> {
     });
     let fits: Vec<Explanation> = fits.collect();
     let best = fits.into_iter().max_by(|a, b| a.merit.total_cmp(&b.merit))?;
-    Some(calmed(question, &[], best))
+    Some(from_other_days(question, &[], best))
 }
 
 #[cfg(test)]

@@ -165,12 +165,16 @@ fn from_the_best(
     fitted(question, windings, members.to_vec(), &best.begin(), &best.fit, Effort::QUICK)
 }
 
-/// A set once more from a gyro that does not wander: with less missing there may be a better maximum there.
-pub(super) fn calmed(question: &Question, windings: &[Winding], known: Explanation) -> Explanation {
-    let mut start = known.fit.clone();
-    start.calm(&question.fitted);
+/// A set once more from a gyro that does not wander, and with the lags of a stage and of the pack in the other order: with less missing there may be
+/// a better maximum there.
+pub(super) fn from_other_days(question: &Question, windings: &[Winding], known: Explanation) -> Explanation {
+    let mut calm = known.fit.clone();
+    calm.calm(&question.fitted);
+    // Lags that cannot be exchanged speak for those that were found.
+    let exchanged = question.chamber.with_lags_exchanged(&known.fit).unwrap_or_default();
+    let starts: Vec<&Fit> = [&known.fit, &calm].into_iter().chain(&exchanged).collect();
     let begin = known.begin();
-    let further = [&known.fit, &start]
+    let further = starts
         .in_parallel()
         .filter_map(|from| fitted(question, windings, known.members.clone(), &begin, from, Effort::FULL));
     let further: Vec<Explanation> = further.collect();
