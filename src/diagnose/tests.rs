@@ -12,6 +12,18 @@ use crate::thermal::exposure::expose;
 use crate::thermal::{Instant, Location, solve};
 use crate::units::REFERENCE_TEMPERATURE_K;
 
+/// What is asked of a chamber whose first record is fitted and whose others are held out.
+pub(crate) fn of_first_record<'a>(
+    chamber: &'a Chamber<'a>,
+    model: &'a CoilModel,
+    pattern: &'a Pattern,
+    candidates: &'a [candidate::Candidate],
+    depth: usize,
+) -> Question<'a> {
+    let held_out = (1..chamber.records()).collect();
+    Question { chamber, model, pattern, candidates, fitted: vec![0], held_out, depth }
+}
+
 fn gaussian(seed: u64) -> impl FnMut(f64) -> f64 {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let normal = Normal::new(0.0, 1.0).unwrap();

@@ -262,6 +262,7 @@ mod tests {
     use crate::diagnose::candidate;
     use crate::diagnose::discover::grammar::{Allowed, families, variables};
     use crate::diagnose::experiment::fixtures::{effect, model, pattern};
+    use crate::diagnose::tests::of_first_record;
     use crate::numeric::piecewise::PiecewiseLinear;
     use crate::record::Record;
     use crate::thermal::exposure::expose;
@@ -287,15 +288,7 @@ mod tests {
         let with = model(vec![effect("sensor_lag", &[60.0])]);
         let chamber = Chamber::new(&with, &[&record]).unwrap();
         let candidates = candidate::candidates(&with, &[&record]);
-        let question = Question {
-            chamber: &chamber,
-            model: &with,
-            pattern: &pattern,
-            candidates: &candidates,
-            fitted: vec![0],
-            held_out: Vec::new(),
-            depth: 1,
-        };
+        let question = of_first_record(&chamber, &with, &pattern, &candidates, 1);
         let free = [Free { effect: 0, parameter: 0, stated: None, deviation: None }];
         let mut fit = chamber.fit_anew(&Assumption::new(with.clone(), pattern.clone()), &free, &[0]).unwrap();
         let lag_s = |lag: f64, fit: &mut Fit| fit.assumed.model.effects[0] = effect("sensor_lag", &[lag]);

@@ -149,7 +149,7 @@ mod tests {
     use crate::chamber::{Assumption, Chamber};
     use crate::diagnose::candidate::candidates;
     use crate::diagnose::experiment::fixtures::{effect, model, pattern};
-    use crate::diagnose::tests::bare_day;
+    use crate::diagnose::tests::{bare_day, of_first_record};
 
     #[test]
     fn in_its_place_a_member_promises_what_it_is_worth_and_beside_a_rest_that_makes_up_for_it_less() {
@@ -159,15 +159,7 @@ mod tests {
         let assumed = Assumption::new(declared.clone(), pattern.clone());
         let (chamber, null) = Chamber::new(&declared, &[&record]).unwrap().with_shocks(&assumed, &[0]).unwrap();
         let candidates = candidates(&declared, &[&record]);
-        let question = Question {
-            chamber: &chamber,
-            model: &declared,
-            pattern: &pattern,
-            candidates: &candidates,
-            fitted: vec![0],
-            held_out: Vec::new(),
-            depth: 2,
-        };
+        let question = of_first_record(&chamber, &declared, &pattern, &candidates, 2);
         let place = |kind: &str| Member::Effect(candidates.iter().position(|c| c.kind() == kind).unwrap());
         let [own, other] = ["midpoint_offset", "glass_transition"].map(place);
         let one = with(&question, &[], &null, own, Some(hidden[0].values().to_vec())).unwrap();

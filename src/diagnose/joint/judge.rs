@@ -269,7 +269,7 @@ mod tests {
     use crate::diagnose::candidate::candidates;
     use crate::diagnose::experiment::fixtures::{effect, model, pattern};
     use crate::diagnose::joint::with;
-    use crate::diagnose::tests::bare_day;
+    use crate::diagnose::tests::{bare_day, of_first_record};
 
     fn of(effects: &[usize], merit: f64) -> Explanation {
         let fit = Fit::to_nothing(Assumption::new(model(Vec::new()), pattern()), Vec::new(), 1e-7);
@@ -329,15 +329,7 @@ mod tests {
         let (chamber, null) =
             Chamber::new(&declared, &[&records[0], &records[1]]).unwrap().with_shocks(&assumed, &[0]).unwrap();
         let candidates = candidates(&declared, &[&records[0], &records[1]]);
-        let question = Question {
-            chamber: &chamber,
-            model: &declared,
-            pattern: &pattern,
-            candidates: &candidates,
-            fitted: vec![0],
-            held_out: vec![1],
-            depth: 1,
-        };
+        let question = of_first_record(&chamber, &declared, &pattern, &candidates, 1);
         let place = Member::Effect(candidates.iter().position(|c| c.kind() == "midpoint_offset").unwrap());
         let begin = with(&question, &[], &null, place, Some(hidden.values().to_vec())).unwrap();
         let without = Explanation::new(&question, &[], Vec::new(), null.clone());

@@ -240,7 +240,7 @@ mod tests {
     use crate::chamber::Chamber;
     use crate::diagnose::candidate::candidates;
     use crate::diagnose::experiment::fixtures::{effect, model, pattern};
-    use crate::diagnose::tests::bare_day;
+    use crate::diagnose::tests::{bare_day, of_first_record};
 
     #[test]
     fn where_something_large_is_missing_what_promises_anything_is_fitted_and_where_nothing_is_no_more() {
@@ -251,15 +251,7 @@ mod tests {
             let record = bare_day(&model(hidden), 20.0, 3);
             let assumed = Assumption::new(declared.clone(), pattern.clone());
             let (chamber, null) = Chamber::new(&declared, &[&record]).unwrap().with_shocks(&assumed, &[0]).unwrap();
-            let question = Question {
-                chamber: &chamber,
-                model: &declared,
-                pattern: &pattern,
-                candidates: &candidates,
-                fitted: vec![0],
-                held_out: Vec::new(),
-                depth: 2,
-            };
+            let question = of_first_record(&chamber, &declared, &pattern, &candidates, 2);
             let null = Explanation::new(&question, &[], Vec::new(), null);
             let scored = scored(&question, &null, &|_, _| true).unwrap();
             let most = scored.iter().map(|p| p.gain).fold(0.0, f64::max);

@@ -180,7 +180,7 @@ mod tests {
     use super::*;
     use crate::chamber::{Assumption, Chamber, Quantity};
     use crate::diagnose::experiment::fixtures::{model, pattern};
-    use crate::diagnose::tests::bare_day;
+    use crate::diagnose::tests::{bare_day, of_first_record};
 
     fn judged(members: Vec<Member>, merit: f64, held_out: f64) -> Explanation {
         let fit = Fit::to_nothing(Assumption::new(model(Vec::new()), pattern()), Vec::new(), 1e-7);
@@ -196,15 +196,7 @@ mod tests {
         let assumed = Assumption::new(declared.clone(), pattern.clone());
         let chamber = Chamber::new(&declared, &[&records[0], &records[1]]).unwrap();
         let (chamber, null) = chamber.with_shocks(&assumed, &[0]).unwrap();
-        let question = Question {
-            chamber: &chamber,
-            model: &declared,
-            pattern: &pattern,
-            candidates: &[],
-            fitted: vec![0],
-            held_out: vec![1],
-            depth: 1,
-        };
+        let question = of_first_record(&chamber, &declared, &pattern, &[], 1);
         let held_out = |fit: &Fit| {
             let explanations = vec![Explanation::new(&question, &[], Vec::new(), fit.clone())];
             let found = Found {
